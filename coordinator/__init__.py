@@ -1,0 +1,1 @@
+"""Strips, their allocation to vehicles and the ledger of tasks."""

@@ -1,0 +1,137 @@
+"""Shapes that planning and messages share: the sweep frame, the grid, tracks, strips, detection curves.
+
+Frozen, without algorithms. The mission frame is ENU metres (x east, y north). The sweep frame of an area has its
+origin at the area's corner; `along` (v) points along the tracks, `across` (u) to the right of that, the direction in
+which tracks are laid side by side. Headings are compass headings: radians, clockwise from north.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Point = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class SweepFrame:
+    """Where the sweep frame lies in the mission frame.
+
+    `origin_x_m`, `origin_y_m`: the sweep frame's origin, mission frame. `heading_rad`: compass heading of the along
+    axis, [0, 2 pi).
+    """
+
+    origin_x_m: float
+    origin_y_m: float
+    heading_rad: float
+
+    def to_sweep(self, x_m: FloatArray | float, y_m: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """Mission-frame points as (across_m, along_m)."""
+        sin, cos = math.sin(self.heading_rad), math.cos(self.heading_rad)
+        dx, dy = np.asarray(x_m) - self.origin_x_m, np.asarray(y_m) - self.origin_y_m
+        return dx * cos - dy * sin, dx * sin + dy * cos
+
+    def to_mission(self, across_m: FloatArray | float, along_m: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+        """Sweep-frame points as (x_m, y_m)."""
+        sin, cos = math.sin(self.heading_rad), math.cos(self.heading_rad)
+        u, v = np.asarray(across_m), np.asarray(along_m)
+        return self.origin_x_m + u * cos + v * sin, self.origin_y_m - u * sin + v * cos
+
+
+@dataclass(frozen=True)
+class GridSpec:
+    """The residual-risk map's cells.
+
+    Arrays over the grid have shape (rows, columns): row j is centred at `along = (j + 0.5) * cell_m`, column i at
+    `across = i * cell_m`, so that with whole-metre track offsets a cell's range is a whole multiple of the grid's step
+    (the paper's map, section V). `columns`, `rows` >= 1; `cell_m` > 0.
+    """
+
+    frame: SweepFrame
+    cell_m: float
+    columns: int
+    rows: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(rows, columns)."""
+        return self.rows, self.columns
+
+    @property
+    def cell_area_m2(self) -> float:
+        """Area of one cell."""
+        return self.cell_m * self.cell_m
+
+    @cached_property
+    def across_m(self) -> FloatArray:
+        """Centres of the columns, sweep frame, shape (columns,)."""
+        return np.arange(self.columns) * self.cell_m
+
+    @cached_property
+    def along_m(self) -> FloatArray:
+        """Centres of the rows, sweep frame, shape (rows,)."""
+        return (np.arange(self.rows) + 0.5) * self.cell_m
+
+
+@dataclass(frozen=True)
+class Track:
+    """A straight leg on which the sonar looks, from start to end in the mission frame.
+
+    `number` counts from 1 in the order of flying; `across_m` is the track's offset in the sweep frame.
+    """
+
+    number: int
+    across_m: float
+    start: Point
+    end: Point
+
+    @property
+    def length_m(self) -> float:
+        """Length of the leg."""
+        return math.dist(self.start, self.end)
+
+    @property
+    def heading_rad(self) -> float:
+        """Compass heading from start to end, [0, 2 pi)."""
+        return math.atan2(self.end[0] - self.start[0], self.end[1] - self.start[1]) % (2 * math.pi)
+
+
+@dataclass(frozen=True)
+class Strip:
+    """A rectangle worth a second look: `width_m` wide about a centre line that starts at `start` (mission frame) and
+    runs `length_m` along `heading_rad`. `number` is stable for the strip's life."""
+
+    number: int
+    start: Point
+    heading_rad: float
+    length_m: float
+    width_m: float
+
+    @property
+    def end(self) -> Point:
+        """The centre line's other end, mission frame."""
+        return (
+            self.start[0] + self.length_m * math.sin(self.heading_rad),
+            self.start[1] + self.length_m * math.cos(self.heading_rad),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class DetectionCurve:
+    """P(y): probability of detection over lateral range (paper, section III-B).
+
+    `range_m`: ascending, >= 0, shape (n,), n >= 2. `p_detect`: in [0, 1), same shape; linear in between, 0 outside.
+    """
+
+    range_m: FloatArray
+    p_detect: FloatArray
+
+    def at(self, range_m: FloatArray | float) -> FloatArray:
+        """P_d at the given ranges; 0 outside the curve."""
+        return np.interp(range_m, self.range_m, self.p_detect, left=0.0, right=0.0)

@@ -1,0 +1,1 @@
+"""The front door: command line, scenarios, launcher, observer and results."""

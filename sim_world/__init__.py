@@ -1,0 +1,1 @@
+"""The sea: seabed, sonar, vehicle motion and truth."""

@@ -1,0 +1,1 @@
+"""The survey agent and the revisit agent."""

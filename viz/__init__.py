@@ -1,0 +1,1 @@
+"""Rerun recorder, blueprint and report."""
