@@ -1,0 +1,54 @@
+"""A message's payload: header and body as one positional MessagePack array behind the schema version."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+
+from comms.messages import Message
+from comms.wire import IDENTIFIER, WireError, record_of
+
+SCHEMA_VERSION = 1
+HEADER_FIELDS = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """Who sent a message, which of its messages it is, and when (simulated milliseconds).
+
+    `incarnation` counts a node's starts, `sequence` the messages of this incarnation, both from 0.
+    """
+
+    sender: str
+    incarnation: int
+    sequence: int
+    sent_ms: int
+
+
+def encode(header: Header, message: Message) -> bytes:
+    """The payload of a message; raises WireError where a field does not fit."""
+    body = record_of(type(message)).encode(message)
+    payload: bytes = msgpack.packb(
+        [SCHEMA_VERSION, header.sender, header.incarnation, header.sequence, header.sent_ms, body]
+    )
+    return payload
+
+
+def decode(payload: bytes, message_type: type[Message]) -> tuple[Header, Message]:
+    """Header and message of a payload; raises WireError, and nothing else, where it is not one of `message_type`."""
+    try:
+        parts: Any = msgpack.unpackb(payload)
+    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
+        raise WireError(f"not MessagePack: {error}") from None
+    if type(parts) is not list or len(parts) != HEADER_FIELDS:
+        raise WireError(f"not a list of {HEADER_FIELDS} parts")
+    version, sender, incarnation, sequence, sent_ms, body = parts
+    if version != SCHEMA_VERSION:
+        raise WireError(f"schema version {version!r}, this is version {SCHEMA_VERSION}")
+    if type(sender) is not str or not IDENTIFIER.fullmatch(sender):
+        raise WireError("the sender is not an identifier")
+    if not all(type(number) is int and number >= 0 for number in (incarnation, sequence, sent_ms)):
+        raise WireError("incarnation, sequence and send time are whole numbers from 0")
+    return Header(sender, incarnation, sequence, sent_ms), record_of(message_type).decode(body)

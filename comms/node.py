@@ -1,0 +1,75 @@
+"""What a node is: an object without I/O that is told messages and times and says what to publish and when to wake it.
+
+A node never reads a clock, a socket or a global random generator; `random_stream` gives it its own generators.
+"""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from comms.codec import Header
+from comms.messages import Message
+from comms.topics import Topic
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message as a node gets it: what the key says, who sent it and when, and what it says."""
+
+    key: str
+    topic: Topic
+    vehicle: str
+    header: Header
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Publication:
+    """A message to be published under a key (below the run id)."""
+
+    key: str
+    message: Message
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """What a node wants after it was told something: publications, in order, and its next wake-up.
+
+    `wake_ms` replaces the wake-up asked for before; None asks for none. A wake-up lies in the future, except that a
+    node that is told a message may leave the one due now in place.
+    """
+
+    publish: tuple[Publication, ...] = ()
+    wake_ms: int | None = None
+
+
+class Node(Protocol):
+    """A participant of the fleet. All times are simulated milliseconds since the start of the mission."""
+
+    def start(self, now_ms: int) -> Step:
+        """Called once before anything else."""
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        """Called for each delivered message, ordered by send time, sender and sequence number."""
+
+    def on_wake(self, now_ms: int) -> Step:
+        """Called when the wake-up asked for has come, after the messages due at the same time."""
+
+
+class Listener(Protocol):
+    """A participant that only listens and does the I/O a node must not do: recorder and observer."""
+
+    def on_message(self, received: Received) -> None:
+        """Called for each message of the run, ordered by send time, sender and sequence number."""
+
+    def close(self) -> None:
+        """Called once at the end, also of an interrupted run: write what is held."""
+
+
+def random_stream(seed: int, *names: str) -> np.random.Generator:
+    """A generator of its own for (seed, names): the same on every machine, independent of all others."""
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *(zlib.crc32(n.encode()) for n in names)])))

@@ -1,0 +1,288 @@
+"""How one value travels: quantities as scaled integers, arrays as packed bytes, records as positional arrays.
+
+A message is a frozen dataclass whose fields are annotated with a kind from this file. A receiver gets the quantised
+value, on every bus, so that everyone decides on the same numbers. Whatever does not fit raises `WireError`.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+IDENTIFIER = re.compile(r"[a-z0-9_-]{1,40}")
+
+
+class WireError(ValueError):
+    """A value that does not fit its field; the text says what and what is allowed."""
+
+
+class Kind(Protocol):
+    """How one field's value becomes a MessagePack value and back."""
+
+    def encode(self, value: Any) -> Any:
+        """The wire form; raises WireError where the value is outside the field's range."""
+
+    def decode(self, wire: Any) -> Any:
+        """The value; raises WireError where the wire form is not one this field can have."""
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """A real number as an integer count of steps: `steps_per_unit` steps to one unit, from `low` to `high` units."""
+
+    unit: str
+    steps_per_unit: int
+    low: float
+    high: float
+
+    def encode(self, value: float) -> int:
+        if not self.low <= value <= self.high:  # refuses NaN too
+            raise WireError(f"{value} {self.unit} is outside {self.low} to {self.high}")
+        return round(value * self.steps_per_unit)
+
+    def decode(self, wire: Any) -> float:
+        if type(wire) is not int or not self.low <= wire / self.steps_per_unit <= self.high:
+            raise WireError(f"{wire!r} is not a whole number within {self.low} to {self.high} {self.unit}")
+        return wire / self.steps_per_unit
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A whole number from `low` to `high`."""
+
+    low: int
+    high: int
+
+    def encode(self, value: int) -> int:
+        if not self.low <= value <= self.high:
+            raise WireError(f"{value} is outside {self.low} to {self.high}")
+        return int(value)
+
+    def decode(self, wire: Any) -> int:
+        if type(wire) is not int or not self.low <= wire <= self.high:
+            raise WireError(f"{wire!r} is not a whole number from {self.low} to {self.high}")
+        return wire
+
+
+@dataclass(frozen=True)
+class Flag:
+    """True or false."""
+
+    def encode(self, value: bool) -> bool:
+        return bool(value)
+
+    def decode(self, wire: Any) -> bool:
+        if type(wire) is not bool:
+            raise WireError(f"{wire!r} is not true or false")
+        return wire
+
+
+@dataclass(frozen=True)
+class Words:
+    """Text of at most `longest` characters; `pattern` narrows it."""
+
+    longest: int
+    pattern: re.Pattern[str] | None = None
+
+    def encode(self, value: str) -> str:
+        return self.decode(value)
+
+    def decode(self, wire: Any) -> str:
+        if type(wire) is not str or len(wire) > self.longest:
+            raise WireError(f"{str(wire)[:60]!r} is not text of at most {self.longest} characters")
+        if self.pattern is not None and not self.pattern.fullmatch(wire):
+            raise WireError(f"{wire!r} does not match {self.pattern.pattern}")
+        return wire
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One member of an enumeration, by its place in it."""
+
+    members: tuple[enum.Enum, ...]
+
+    def encode(self, value: enum.Enum) -> int:
+        return self.members.index(value)
+
+    def decode(self, wire: Any) -> enum.Enum:
+        if type(wire) is not int or not 0 <= wire < len(self.members):
+            raise WireError(f"{wire!r} is not one of 0 to {len(self.members) - 1}")
+        return self.members[wire]
+
+
+@dataclass(frozen=True)
+class Packed:
+    """An array with `dimensions` axes of at most `most` elements, as its shape and its bytes.
+
+    `steps_per_unit`: None keeps the integers of `dtype` as they are; a number scales floats in [0, `high`] to them.
+    """
+
+    dimensions: int
+    dtype: str
+    most: int
+    steps_per_unit: int | None = None
+    high: float = 0.0
+
+    def encode(self, value: NDArray[Any]) -> list[Any]:
+        array = np.asarray(value)
+        if array.ndim != self.dimensions or array.size > self.most:
+            raise WireError(f"an array of shape {array.shape} has not {self.dimensions} axes and {self.most} elements")
+        if self.steps_per_unit is not None:
+            if array.size and not (float(array.min()) >= 0.0 and float(array.max()) <= self.high):  # refuses NaN too
+                raise WireError(f"an array's values are outside 0 to {self.high}")
+            array = np.rint(array * self.steps_per_unit)
+        return [*array.shape, np.ascontiguousarray(array, dtype=self.dtype).tobytes()]
+
+    def decode(self, wire: Any) -> NDArray[Any]:
+        if type(wire) is not list or len(wire) != self.dimensions + 1 or type(wire[-1]) is not bytes:
+            raise WireError(f"not an array of {self.dimensions} axes")
+        shape = wire[:-1]
+        if not all(type(n) is int and 0 <= n <= self.most for n in shape) or math.prod(shape) > self.most:
+            raise WireError(f"{shape} is not a shape of at most {self.most} elements")
+        if math.prod(shape) * np.dtype(self.dtype).itemsize != len(wire[-1]):
+            raise WireError(f"{len(wire[-1])} bytes do not fill the shape {shape}")
+        array = np.frombuffer(wire[-1], dtype=self.dtype).reshape(shape)
+        if self.steps_per_unit is None:
+            return array
+        values = array / self.steps_per_unit
+        if values.size and float(values.max()) > self.high:
+            raise WireError(f"an array's values are above {self.high}")
+        return values
+
+
+@dataclass(frozen=True)
+class Mask:
+    """A two-dimensional array of true and false, eight to a byte."""
+
+    most: int
+
+    def encode(self, value: NDArray[np.bool_]) -> list[Any]:
+        array = np.asarray(value, dtype=np.bool_)
+        if array.ndim != 2 or array.size > self.most:
+            raise WireError(f"a mask of shape {array.shape} has not 2 axes and at most {self.most} cells")
+        return [*array.shape, np.packbits(array).tobytes()]
+
+    def decode(self, wire: Any) -> NDArray[np.bool_]:
+        if type(wire) is not list or len(wire) != 3 or type(wire[2]) is not bytes:
+            raise WireError("not a mask")
+        rows, columns, packed = wire
+        if not all(type(n) is int and 0 <= n <= self.most for n in (rows, columns)) or rows * columns > self.most:
+            raise WireError(f"{(rows, columns)} is not a shape of at most {self.most} cells")
+        if len(packed) != (rows * columns + 7) // 8:
+            raise WireError(f"{len(packed)} bytes do not fill the shape {(rows, columns)}")
+        bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=rows * columns)
+        return bits.astype(np.bool_).reshape(rows, columns)
+
+
+@dataclass(frozen=True)
+class Many:
+    """At most `most` values of one kind, as a tuple."""
+
+    kind: Kind
+    most: int
+
+    def encode(self, value: tuple[Any, ...]) -> list[Any]:
+        if len(value) > self.most:
+            raise WireError(f"{len(value)} entries are more than {self.most}")
+        return [self.kind.encode(one) for one in value]
+
+    def decode(self, wire: Any) -> tuple[Any, ...]:
+        if type(wire) is not list or len(wire) > self.most:
+            raise WireError(f"not a list of at most {self.most} entries")
+        return tuple(self.kind.decode(one) for one in wire)
+
+
+class Record:
+    """A frozen dataclass as a positional array of its fields."""
+
+    def __init__(self, cls: type[Any]) -> None:
+        hints = get_type_hints(cls, include_extras=True)
+        self.cls = cls
+        self.fields: tuple[tuple[str, Callable[[Any], Any], Callable[[Any], Any]], ...] = tuple(
+            (field.name, kind.encode, kind.decode)
+            for field in fields(cls)
+            for kind in (_kind_of(hints[field.name], f"{cls.__name__}.{field.name}"),)
+        )
+
+    def encode(self, value: Any) -> list[Any]:
+        try:
+            return [encode(getattr(value, name)) for name, encode, _ in self.fields]
+        except WireError:
+            return self._name_the_field(lambda name, encode, _: encode(getattr(value, name)))
+
+    def decode(self, wire: Any) -> Any:
+        if type(wire) is not list or len(wire) != len(self.fields):
+            raise WireError(f"{self.cls.__name__} needs a list of {len(self.fields)} fields")
+        try:
+            return self.cls(*[decode(one) for (_, _, decode), one in zip(self.fields, wire, strict=True)])
+        except WireError:
+            values = iter(wire)
+            return self._name_the_field(lambda _name, _encode, decode: decode(next(values)))
+
+    def _name_the_field(self, convert: Callable[[str, Callable[..., Any], Callable[..., Any]], Any]) -> list[Any]:
+        # The slow second pass is taken only for a value that does not fit, to say which field it was.
+        for name, encode, decode in self.fields:
+            try:
+                convert(name, encode, decode)
+            except WireError as error:
+                raise WireError(f"{self.cls.__name__}.{name}: {error}") from None
+        raise AssertionError("a conversion that failed once passed the second time")
+
+
+_RECORDS: dict[object, Record] = {}
+
+
+def record_of(cls: type[Any]) -> Record:
+    """The codec of a message class, made once."""
+    try:
+        return _RECORDS[cls]
+    except KeyError:
+        return _RECORDS.setdefault(cls, Record(cls))
+
+
+def _kind_of(hint: Any, where: str) -> Kind:
+    if get_origin(hint) is Annotated:
+        for note in get_args(hint)[1:]:
+            if hasattr(note, "encode") and hasattr(note, "decode"):
+                return note  # type: ignore[no-any-return]
+        most = next((note for note in get_args(hint)[1:] if isinstance(note, AtMost)), None)
+        base = get_args(hint)[0]
+        if most is not None and get_origin(base) is tuple:
+            return Many(_kind_of(get_args(base)[0], where), most.count)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return Choice(tuple(hint))
+    if isinstance(hint, type) and is_dataclass(hint):
+        return record_of(hint)
+    raise TypeError(f"{where}: no wire kind for {hint!r}")
+
+
+@dataclass(frozen=True)
+class AtMost:
+    """Bounds how many entries a tuple field may have on the wire."""
+
+    count: int
+
+
+Metres = Annotated[float, Scaled("m", 100, -1e7, 1e7)]
+Radians = Annotated[float, Scaled("rad", 1_000_000, -7.0, 7.0)]
+MetresPerSecond = Annotated[float, Scaled("m/s", 1000, 0.0, 100.0)]
+Probability = Annotated[float, Scaled("(probability)", 10_000, 0.0, 1.0)]
+SquareMetres = Annotated[float, Scaled("m2", 10, 0.0, 1e9)]
+Milliseconds = Annotated[int, Whole(0, 2**53)]
+Count = Annotated[int, Whole(0, 2**31 - 1)]
+YesNo = Annotated[bool, Flag()]
+Identifier = Annotated[str, Words(40, IDENTIFIER)]
+OptionalIdentifier = Annotated[str, Words(40, re.compile(r"[a-z0-9_-]*"))]
+Digest = Annotated[str, Words(64, re.compile(r"[0-9a-f]{64}"))]
+Text = Annotated[str, Words(200)]
+ProbabilityCurve = Annotated[NDArray[np.float64], Packed(1, "<u2", 4096, 10_000, 0.999)]
+ProbabilityLook = Annotated[NDArray[np.float64], Packed(3, "<u2", 65_536, 10_000, 0.999)]
+Levels = Annotated[NDArray[np.uint8], Packed(2, "u1", 1024)]
+CellMask = Annotated[NDArray[np.bool_], Mask(1024)]
