@@ -1,0 +1,28 @@
+"""What a bus reports of a run that has ended."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+
+
+class Ending(enum.Enum):
+    """Why a run has ended."""
+
+    OVER = "over"
+    IDLE = "idle"
+    TIME_LIMIT = "time_limit"
+
+
+@dataclass(frozen=True)
+class BusResult:
+    """`mission_ms`: simulated time of the mission's end. `messages`: count per topic. `dropped`: count per reason.
+    `latencies_ms`: wall-clock latencies measured by the bus, by name; empty on the local bus."""
+
+    ending: Ending
+    mission_ms: int
+    digest: str
+    rounds: int
+    messages: dict[str, int]
+    dropped: dict[str, int]
+    latencies_ms: dict[str, list[float]] = field(default_factory=dict)

@@ -1,0 +1,172 @@
+"""Runs one node of a lockstep fleet: its mail in order, its sequence numbers and its digest. No I/O."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from collections import Counter
+from dataclasses import dataclass
+
+from comms.codec import Header, decode, encode
+from comms.messages import Message
+from comms.node import Node, Publication, Received, Step
+from comms.routing import Route, Routing
+from comms.wire import WireError
+
+log = logging.getLogger("secondlook.comms")
+
+
+class NodeError(Exception):
+    """A node has broken the rules of the house or raised; the text is one sentence that names it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outgoing:
+    """A message on its way: key below the run id, route, payload."""
+
+    key: str
+    route: Route
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class SenderDigest:
+    """What one incarnation of a sender has said: how many messages, and the SHA-256 over them in order."""
+
+    sender: str
+    incarnation: int
+    count: int
+    sha256: str
+
+
+class Stamp:
+    """Numbers and hashes what one sender publishes."""
+
+    def __init__(self, sender: str, routing: Routing, incarnation: int = 0) -> None:
+        self.sender = sender
+        self._routing = routing
+        self._incarnation = incarnation
+        self._count = 0
+        self._hash = hashlib.sha256()
+
+    def __call__(self, key: str, message: Message, now_ms: int) -> Outgoing:
+        """The message as it goes out; raises NodeError where the sender may not write it or a field does not fit."""
+        route = self._routing.route(key)
+        if route is None or route.writer != self.sender or type(message) is not route.topic.message:
+            raise NodeError(f"{self.sender} may not publish a {type(message).__name__} under {key}")
+        try:
+            payload = encode(Header(self.sender, self._incarnation, self._count, now_ms), message)
+        except WireError as error:
+            raise NodeError(f"{self.sender} has published a message that does not fit: {error}") from error
+        if len(payload) > route.topic.max_bytes:
+            raise NodeError(
+                f"{self.sender} has published {len(payload)} bytes under {key}, where {route.topic.max_bytes} are allowed"
+            )
+        self._count += 1
+        self._hash.update(b"%s %d\n" % (key.encode(), len(payload)))
+        self._hash.update(payload)
+        return Outgoing(key, route, payload)
+
+    def digest(self) -> SenderDigest:
+        """What was said so far."""
+        return SenderDigest(self.sender, self._incarnation, self._count, self._hash.hexdigest())
+
+
+class Intake:
+    """Opens what arrives: validates, counts and drops what does not fit, and says so once per sender and reason."""
+
+    def __init__(self, routing: Routing) -> None:
+        self.dropped: Counter[str] = Counter()
+        self._routing = routing
+        self._told: set[tuple[str, str]] = set()
+
+    def open(self, key: str, payload: bytes) -> Received | None:
+        """The message, or None where it does not fit."""
+        route = self._routing.route(key)
+        if route is None:
+            return self._drop("unknown key", "nobody", key)
+        if len(payload) > route.topic.max_bytes:
+            return self._drop("too long", route.writer, f"{key}: {len(payload)} bytes")
+        try:
+            header, message = decode(payload, route.topic.message)
+        except WireError as error:
+            return self._drop("malformed", route.writer, f"{key}: {error}")
+        if header.sender != route.writer:
+            return self._drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
+        vehicle = ""
+        if route.topic.has_vehicle:
+            match = route.topic.regex.fullmatch(key)
+            vehicle = match.group("vehicle") if match else ""
+        return Received(key, route.topic, vehicle, header, message)
+
+    def _drop(self, reason: str, sender: str, detail: str) -> None:
+        self.dropped[reason] += 1
+        if (sender, reason) not in self._told:
+            self._told.add((sender, reason))
+            log.warning("dropped a message from %s: %s: %s (said once)", sender, reason, detail)
+
+
+class NodeRunner:
+    """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
+
+    def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
+        self.node_id = node_id
+        self.arrived: Counter[str] = Counter()
+        self.stamp = Stamp(node_id, routing, incarnation)
+        self._node = node
+        self._wake_ms: int | None = 0
+        self._mail: dict[int, list[tuple[int, str, int, int, Received]]] = {}
+
+    def deliver(self, received: Received) -> None:
+        """Puts a message into the mailbox, to be handled when it is due."""
+        header = received.header
+        due = header.sent_ms + received.topic.delay_ms
+        self._mail.setdefault(due, []).append(
+            (header.sent_ms, header.sender, header.incarnation, header.sequence, received)
+        )
+
+    def has_all(self, expected: dict[str, int]) -> bool:
+        """Whether as many messages of each sender have arrived as the clock expects."""
+        return all(self.arrived[sender] >= count for sender, count in expected.items())
+
+    def act(self, now_ms: int, *, start: bool) -> tuple[int | None, list[Outgoing]]:
+        """Starts the node, or handles its due mail in order and then its wake-up if that is due.
+
+        Returns the next wake-up and what the node publishes. Raises NodeError.
+        """
+        published: list[Publication] = []
+        try:
+            if start:
+                self._take(self._node.start(now_ms), published)
+            else:
+                for due in sorted(due for due in self._mail if due <= now_ms):
+                    for *_, received in sorted(self._mail.pop(due), key=_mail_order):
+                        self._take(self._node.on_message(received, now_ms), published)
+                if self._wake_ms is not None and self._wake_ms <= now_ms:
+                    self._take(self._node.on_wake(now_ms), published)
+        except NodeError:
+            raise
+        except Exception as error:
+            log.exception("%s has failed", self.node_id)
+            raise NodeError(
+                f"{self.node_id} has failed at {now_ms / 1000:.3f} s: {type(error).__name__}: {error}"
+            ) from error
+        if self._wake_ms is not None and self._wake_ms <= now_ms:
+            raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self._wake_ms} ms, which is not later")
+        return self._wake_ms, [self.stamp(one.key, one.message, now_ms) for one in published]
+
+    def _take(self, step: Step, published: list[Publication]) -> None:
+        self._wake_ms = step.wake_ms
+        published.extend(step.publish)
+
+
+def _mail_order(entry: tuple[int, str, int, int, Received]) -> tuple[int, str, int, int]:
+    return entry[:4]
+
+
+def fleet_digest(senders: list[SenderDigest]) -> str:
+    """The SHA-256 over all senders' digests but the clock's: the same run gives the same one on every bus."""
+    total = hashlib.sha256()
+    for one in sorted((d.sender, d.incarnation, d.count, d.sha256) for d in senders if d.sender != "clock"):
+        total.update(repr(one).encode())
+    return total.hexdigest()
