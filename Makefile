@@ -1,0 +1,72 @@
+# Two commands suffice: `make run` flies a mission, `make test` runs every check. Both set up .venv first, at the first
+# call and whenever the locks or pyproject.toml change.
+
+# The first Python >= 3.11 that can make a virtual environment; one inside .venv itself (activated) does not count.
+usable = import ensurepip, os, sys, venv; sys.exit(sys.version_info < (3, 11) or sys.prefix == os.path.abspath(".venv"))
+PYTHON ?= $(shell for python in python3 python3.13 python3.12 python3.11; do \
+	"$$python" -c '$(usable)' >/dev/null 2>&1 && { echo "$$python"; break; }; done)
+
+# Passed on to `secondlook run`, e.g. make run ARGS="patchy --seed 3".
+ARGS ?=
+# Passed on to `uv pip compile`, e.g. make lock LOCK_ARGS=--upgrade. Without, versions already locked are kept.
+LOCK_ARGS ?=
+
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check
+INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
+
+.PHONY: run test lock clean
+.DELETE_ON_ERROR:
+
+run: .venv/.run-ready
+	@$(BIN)/secondlook run $(ARGS)
+
+test: .venv/.test-ready
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+	$(BIN)/pytest
+
+# The stamps are what makes a second call start at once.
+.venv/.made:
+	@"$(PYTHON)" -c '$(usable)' 2>/dev/null || { echo "No usable Python found: secondlook needs Python 3.11 or newer" \
+		"with its venv module (on Debian and Ubuntu: python3-venv); name one with make PYTHON=/path/to/python3." >&2; \
+		exit 1; }
+	@rm -rf .venv
+	@echo "Setting up .venv with $(PYTHON)"
+	@"$(PYTHON)" -m venv .venv
+	@touch $@
+
+.venv/.run-ready: .venv/.made requirements.lock pyproject.toml
+	@echo "Installing what running needs (requirements.lock)"
+	@$(PIP) install --quiet --require-hashes --requirement requirements.lock
+	@$(INSTALL_PROJECT)
+	@touch $@
+
+# What testing needs includes what running needs, so this makes both ready.
+.venv/.test-ready: .venv/.made requirements-dev.lock pyproject.toml
+	@echo "Installing what testing needs (requirements-dev.lock)"
+	@$(PIP) install --quiet --require-hashes --requirement requirements-dev.lock
+	@$(INSTALL_PROJECT)
+	@touch .venv/.run-ready $@
+
+# The locks hold for every Python >= 3.11 and every platform, each package in one version for all of them, and name no
+# index. The tool that writes them has an environment of its own, so that a broken lock can still be made anew.
+UV_VERSION := 0.13.8
+COMPILE = .venv-lock/bin/uv pip compile --no-config --universal --fork-strategy fewest --python-version 3.11 \
+	--generate-hashes --no-emit-index-url --no-emit-find-links --no-annotate --no-header --quiet $(LOCK_ARGS)
+
+lock: .venv-lock/.uv-$(UV_VERSION)
+	$(COMPILE) pyproject.toml --group build --output-file requirements.lock
+	$(COMPILE) pyproject.toml --group build --group dev --constraint requirements.lock --output-file requirements-dev.lock
+
+.venv-lock/.uv-$(UV_VERSION):
+	@rm -rf .venv-lock
+	@"$(PYTHON)" -m venv .venv-lock
+	@.venv-lock/bin/python -m pip --disable-pip-version-check install --quiet uv==$(UV_VERSION)
+	@touch $@
+
+clean:
+	rm -rf .venv .venv-lock build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
