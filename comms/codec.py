@@ -12,6 +12,7 @@ from comms.wire import IDENTIFIER, WireError, record_of
 
 SCHEMA_VERSION = 1
 HEADER_FIELDS = 6
+CLOCK = "clock"  # the clock's id as a sender
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +26,11 @@ class Header:
     incarnation: int
     sequence: int
     sent_ms: int
+
+    @property
+    def order(self) -> tuple[int, bool, str, int, int]:
+        """The order in which messages are handled: by send time, then the clock's first, then sender and sequence."""
+        return self.sent_ms, self.sender != CLOCK, self.sender, self.incarnation, self.sequence
 
 
 def encode(header: Header, message: Message) -> bytes:

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from comms.clock import LockstepClock, Sent
+from comms.codec import CLOCK
 from comms.messages import Message, RunInfo
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending
 from comms.routing import Routing
 from comms.runner import Intake, NodeRunner, Outgoing, Stamp, fleet_digest
 from comms.topics import RUN
-
-CLOCK = "clock"
 
 
 def run_local(

@@ -7,7 +7,7 @@ import logging
 from collections import Counter
 from dataclasses import dataclass
 
-from comms.codec import Header, decode, encode
+from comms.codec import CLOCK, Header, decode, encode
 from comms.messages import Message
 from comms.node import Node, Publication, Received, Step
 from comms.routing import Route, Routing
@@ -22,10 +22,11 @@ class NodeError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Outgoing:
-    """A message on its way: key below the run id, route, payload."""
+    """A message on its way: key below the run id, route, the message and its payload."""
 
     key: str
     route: Route
+    message: Message
     payload: bytes
 
 
@@ -65,7 +66,7 @@ class Stamp:
         self._count += 1
         self._hash.update(b"%s %d\n" % (key.encode(), len(payload)))
         self._hash.update(payload)
-        return Outgoing(key, route, payload)
+        return Outgoing(key, route, message, payload)
 
     def digest(self) -> SenderDigest:
         """What was said so far."""
@@ -84,15 +85,19 @@ class Intake:
         """The message, or None where it does not fit."""
         route = self._routing.route(key)
         if route is None:
-            return self._drop("unknown key", "nobody", key)
+            self._drop("unknown key", "nobody", key)
+            return None
         if len(payload) > route.topic.max_bytes:
-            return self._drop("too long", route.writer, f"{key}: {len(payload)} bytes")
+            self._drop("too long", route.writer, f"{key}: {len(payload)} bytes")
+            return None
         try:
             header, message = decode(payload, route.topic.message)
         except WireError as error:
-            return self._drop("malformed", route.writer, f"{key}: {error}")
+            self._drop("malformed", route.writer, f"{key}: {error}")
+            return None
         if header.sender != route.writer:
-            return self._drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
+            self._drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
+            return None
         vehicle = ""
         if route.topic.has_vehicle:
             match = route.topic.regex.fullmatch(key)
@@ -115,15 +120,11 @@ class NodeRunner:
         self.stamp = Stamp(node_id, routing, incarnation)
         self._node = node
         self._wake_ms: int | None = 0
-        self._mail: dict[int, list[tuple[int, str, int, int, Received]]] = {}
+        self._mail: dict[int, list[Received]] = {}
 
     def deliver(self, received: Received) -> None:
         """Puts a message into the mailbox, to be handled when it is due."""
-        header = received.header
-        due = header.sent_ms + received.topic.delay_ms
-        self._mail.setdefault(due, []).append(
-            (header.sent_ms, header.sender, header.incarnation, header.sequence, received)
-        )
+        self._mail.setdefault(received.header.sent_ms + received.topic.delay_ms, []).append(received)
 
     def has_all(self, expected: dict[str, int]) -> bool:
         """Whether as many messages of each sender have arrived as the clock expects."""
@@ -140,7 +141,7 @@ class NodeRunner:
                 self._take(self._node.start(now_ms), published)
             else:
                 for due in sorted(due for due in self._mail if due <= now_ms):
-                    for *_, received in sorted(self._mail.pop(due), key=_mail_order):
+                    for received in sorted(self._mail.pop(due), key=lambda one: one.header.order):
                         self._take(self._node.on_message(received, now_ms), published)
                 if self._wake_ms is not None and self._wake_ms <= now_ms:
                     self._take(self._node.on_wake(now_ms), published)
@@ -160,13 +161,9 @@ class NodeRunner:
         published.extend(step.publish)
 
 
-def _mail_order(entry: tuple[int, str, int, int, Received]) -> tuple[int, str, int, int]:
-    return entry[:4]
-
-
 def fleet_digest(senders: list[SenderDigest]) -> str:
     """The SHA-256 over all senders' digests but the clock's: the same run gives the same one on every bus."""
     total = hashlib.sha256()
-    for one in sorted((d.sender, d.incarnation, d.count, d.sha256) for d in senders if d.sender != "clock"):
+    for one in sorted((d.sender, d.incarnation, d.count, d.sha256) for d in senders if d.sender != CLOCK):
         total.update(repr(one).encode())
     return total.hexdigest()

@@ -1,0 +1,97 @@
+"""What clock and processes say to each other in lockstep, beside the topics: keys and packed words.
+
+A process is a host: it holds some of the nodes, or one listener. Hub to host: `welcome`, `grant`, `mark`, `finish`.
+Host to hub: `hello`, `ready`, `answer`, `ack`, `final`, `failed`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+
+from comms.clock import Grant, Sent
+from comms.runner import SenderDigest
+from comms.topics import KEY_ROOT
+
+
+@dataclass(frozen=True)
+class RunKeys:
+    """Full Zenoh keys of one run."""
+
+    run: str
+
+    @property
+    def root(self) -> str:
+        """What all keys of the run begin with."""
+        return f"{KEY_ROOT}/{self.run}/"
+
+    def topic(self, key: str) -> str:
+        """The full key, or key expression, of one below the run id."""
+        return self.root + key
+
+    def to_host(self, host: str) -> str:
+        """Where the clock speaks to a host."""
+        return f"{self.root}clock/to/{host}"
+
+    def from_host(self, host: str) -> str:
+        """Where a host answers the clock."""
+        return f"{self.root}clock/from/{host}"
+
+    def alive(self, host: str) -> str:
+        """The host's liveliness token."""
+        return f"{self.root}clock/alive/{host}"
+
+
+@dataclass(frozen=True, slots=True)
+class HostPlan:
+    """Which nodes a process holds. Its id is also its user name at the hub."""
+
+    host: str
+    nodes: tuple[str, ...]
+
+
+def pack(*words: Any) -> bytes:
+    """A control message: its name and its words."""
+    packed: bytes = msgpack.packb(words)
+    return packed
+
+
+def unpack(payload: bytes) -> list[Any]:
+    """Name and words of a control message."""
+    words: list[Any] = msgpack.unpackb(payload)
+    return words
+
+
+def pack_grants(now_ms: int, *, start: bool, grants: list[Grant]) -> bytes:
+    """Leave for a host's nodes to act."""
+    return pack("grant", now_ms, start, [[one.node_id, one.wake, one.expected] for one in grants])
+
+
+def unpack_grants(words: list[Any]) -> tuple[int, bool, list[Grant]]:
+    """Time, whether it is the start, and the grants of a `grant`."""
+    _, now_ms, start, grants = words
+    return now_ms, start, [Grant(*one) for one in grants]
+
+
+def pack_answers(answers: list[tuple[str, int | None, list[Sent]]]) -> bytes:
+    """For each granted node its next wake-up and what it has published."""
+    return pack("answer", [[node, wake, [[one.key, one.size] for one in sent]] for node, wake, sent in answers])
+
+
+def unpack_answers(words: list[Any]) -> list[tuple[str, int | None, list[Sent]]]:
+    """The answers of an `answer`."""
+    return [(node, wake, [Sent(*one) for one in sent]) for node, wake, sent in words[1]]
+
+
+def pack_final(digests: list[SenderDigest], dropped: dict[str, int], latencies_ms: dict[str, list[float]]) -> bytes:
+    """A host's last word: what its nodes have said, what it has dropped, what it has measured."""
+    senders = [[one.sender, one.incarnation, one.count, one.sha256] for one in digests]
+    return pack("final", senders, dropped, latencies_ms)
+
+
+def unpack_final(words: list[Any]) -> tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]:
+    """Digests, dropped and latencies of a `final`."""
+    _, senders, dropped, latencies_ms = words
+    return [SenderDigest(*one) for one in senders], dropped, latencies_ms

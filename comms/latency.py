@@ -1,0 +1,38 @@
+"""Wall-clock latency from a strip's publication to its acceptance, stamped where the coordinator's process sends and
+receives, outside payload and digest."""
+
+from __future__ import annotations
+
+from comms.messages import StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus
+from comms.node import Received
+from comms.runner import Outgoing
+
+STRIP_TO_TASK = "strip_to_task"
+
+
+class StripLatency:
+    """Times each strip that is published and offered at once, that is while an eligible helper is free."""
+
+    def __init__(self) -> None:
+        self.milliseconds: list[float] = []
+        self._published_s: dict[int, float] = {}
+
+    def sending(self, outgoing: list[Outgoing], wall_s: float) -> None:
+        """The coordinator's publications of one round, about to be sent."""
+        new = {
+            int(one.key.rsplit("/", 1)[1])
+            for one in outgoing
+            if isinstance(one.message, StripStatus) and one.message.state is StripState.OPEN
+        }
+        for one in outgoing:
+            task = one.message
+            if isinstance(task, Task) and task.action is TaskAction.TAKE and task.strip in new:
+                self._published_s.setdefault(task.strip, wall_s)
+
+    def arrived(self, received: Received, wall_s: float) -> None:
+        """A message that has reached the coordinator's process."""
+        status = received.message
+        if isinstance(status, TaskStatus) and status.state is TaskState.ACCEPTED:
+            published_s = self._published_s.pop(status.strip, None)
+            if published_s is not None:
+                self.milliseconds.append((wall_s - published_s) * 1000)

@@ -1,0 +1,189 @@
+"""A process's side of a lockstep run over Zenoh: it holds nodes that act when granted, or one listener."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections import Counter
+from collections.abc import Mapping
+
+import zenoh
+
+from comms.clock import Grant, Sent
+from comms.control import RunKeys, pack, pack_answers, pack_final, unpack, unpack_grants
+from comms.group import NodeGroup
+from comms.latency import STRIP_TO_TASK, StripLatency
+from comms.messages import Role
+from comms.node import Listener, Node, Received
+from comms.routing import Routing
+from comms.runner import Intake, NodeError, Outgoing
+from comms.zenoh_session import put, subscribe
+
+HELLO_EVERY_S = 0.2
+_Mail = tuple[str, bytes]
+
+
+class Interrupted(Exception):  # noqa: N818 - not an error: the launcher has asked for an early end
+    """The run ends early; what was received so far is kept."""
+
+
+class _Line:
+    """The line to the hub: mail and the clock's words in one queue, in order of arrival."""
+
+    def __init__(self, session: zenoh.Session, keys: RunKeys, host: str, expressions: list[str]) -> None:
+        self.queue: queue.SimpleQueue[_Mail | None] = queue.SimpleQueue()
+        self._session = session
+        self._keys = keys
+        self._host = host
+        self._words_key = keys.to_host(host)
+        # The clock's words are subscribed to last: when they arrive, the hub knows of all the others.
+        self._subscribers = subscribe(session, map(keys.topic, expressions), self._enqueue)
+        self._subscribers += subscribe(session, [self._words_key], self._enqueue)
+        self._token = session.liveliness().declare_token(keys.alive(host))
+
+    def _enqueue(self, key: str, payload: bytes) -> None:
+        self.queue.put((key, payload))
+
+    def say(self, words: bytes) -> None:
+        """A word to the clock."""
+        put(self._session, self._keys.from_host(self._host), words)
+
+    def publish(self, outgoing: list[Outgoing]) -> None:
+        """Sends a node's messages."""
+        for one in outgoing:
+            put(self._session, self._keys.topic(one.key), one.payload)
+
+    def shake_hands(self) -> None:
+        """Says hello until the hub's welcome shows that it hears and is heard."""
+        while True:
+            self.say(pack("hello"))
+            try:
+                item = self.queue.get(timeout=HELLO_EVERY_S)
+            except queue.Empty:
+                continue
+            if item is None:
+                raise Interrupted
+            if item[0] == self._words_key and unpack(item[1])[0] == "welcome":
+                self.say(pack("ready"))
+                return
+
+    def get(self) -> tuple[list[object] | None, _Mail | None]:
+        """The next item: the clock's words, or mail (key below the run id, payload)."""
+        item = self.queue.get()
+        if item is None:
+            raise Interrupted
+        key, payload = item
+        if key == self._words_key:
+            return unpack(payload), None
+        return None, (key.removeprefix(self._keys.root), payload)
+
+
+def serve_nodes(session: zenoh.Session, keys: RunKeys, host: str, nodes: Mapping[str, Node], routing: Routing) -> None:
+    """Lets the nodes act as the clock grants, until the run is finished.
+
+    A node that fails is reported to the hub, and NodeError raised.
+    """
+    group = NodeGroup(nodes, routing)
+    expressions = [one for node_id in nodes for one in routing.subscriptions(node_id)]
+    line = _Line(session, keys, host, expressions)
+    latency = StripLatency()
+    coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
+    line.shake_hands()
+    granted: tuple[int, bool, list[Grant]] | None = None
+    while True:
+        words, mail = line.get()
+        if mail is not None:
+            received = group.receive(*mail)
+            if received is not None and group.holds(coordinators):
+                latency.arrived(received, time.perf_counter())
+        elif words is not None and words[0] == "grant":
+            granted = unpack_grants(words)
+        elif words is not None and words[0] == "finish":
+            line.say(pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds}))
+            return
+        if granted is not None and group.has_all(granted[2]):
+            now_ms, start, grants = granted
+            granted = None
+            answers = []
+            for grant in grants:
+                try:
+                    wake_ms, outgoing = group.act(grant, now_ms, start=start)
+                except NodeError as error:
+                    line.say(pack("failed", str(error)))
+                    raise
+                if grant.node_id in coordinators:
+                    latency.sending(outgoing, time.perf_counter())
+                line.publish(outgoing)
+                answers.append((grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing]))
+            line.say(pack_answers(answers))
+
+
+class ListenerHost:
+    """Holds one listener: gives it the messages in order as the clock's marks come, and acknowledges each mark.
+
+    `run` returns when the run is finished, or when `interrupt` is called from another thread; either way the listener
+    has then had all that arrived in order, and is closed.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, keys: RunKeys, host: str, node_id: str, listener: Listener, routing: Routing
+    ) -> None:
+        self._listener = listener
+        self._routing = routing
+        self._intake = Intake(routing)
+        self._arrived: Counter[str] = Counter()
+        self._held: list[Received] = []
+        self._line = _Line(session, keys, host, list(routing.subscriptions(node_id)))
+
+    def interrupt(self) -> None:
+        """Ends the run early."""
+        self._line.queue.put(None)
+
+    def run(self) -> None:
+        """Listens to the end of the run."""
+        mark: list[object] | None = None
+        try:
+            self._line.shake_hands()
+            while True:
+                words, mail = self._line.get()
+                if mail is not None:
+                    self._receive(*mail)
+                elif words is not None and words[0] in ("mark", "finish"):
+                    mark = words
+                if mark is None or not self._has_all(mark):
+                    continue
+                self._release(up_to_ms=mark[2])  # type: ignore[arg-type]
+                if mark[0] == "finish":
+                    break
+                self._line.say(pack("ack", mark[1]))
+                mark = None
+        except Interrupted:
+            # Without a mark nobody knows whether earlier messages are still missing: what there is, in order.
+            self._release(up_to_ms=None)
+            self._listener.close()
+            return
+        self._listener.close()
+        self._line.say(pack_final([], dict(self._intake.dropped), {}))
+
+    def _receive(self, key: str, payload: bytes) -> None:
+        route = self._routing.route(key)
+        if route is not None:
+            self._arrived[route.writer] += 1
+        received = self._intake.open(key, payload)
+        if received is not None:
+            self._held.append(received)
+
+    def _has_all(self, mark: list[object]) -> bool:
+        expected = mark[3]
+        assert isinstance(expected, dict)
+        return all(self._arrived[sender] >= count for sender, count in expected.items())
+
+    def _release(self, *, up_to_ms: int | None) -> None:
+        self._held.sort(key=lambda one: one.header.order)
+        ready = self._held
+        self._held = []
+        if up_to_ms is not None:
+            self._held = [one for one in ready if one.header.sent_ms > up_to_ms]
+            ready = [one for one in ready if one.header.sent_ms <= up_to_ms]
+        for one in ready:
+            self._listener.on_message(one)

@@ -1,0 +1,98 @@
+"""Opening Zenoh sessions: the hub on a loopback port that the system picks, everyone else as its client."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+CONNECT_TIMEOUT_MS = 10_000
+LARGEST_MESSAGE_BYTES = 4 << 20
+
+
+class ConnectionFailedError(Exception):
+    """A session that could not be opened; the text is one sentence."""
+
+
+def open_hub(users: Mapping[str, str], access_control: dict[str, Any] | None) -> tuple[zenoh.Session, str]:
+    """A session that routes for all others, and the endpoint it listens on.
+
+    `users`: a password for each user name that may connect. Only loopback is listened on.
+    """
+    with tempfile.TemporaryDirectory(prefix="secondlook-") as folder:
+        passwords = Path(folder) / "users"
+        with open(os.open(passwords, os.O_WRONLY | os.O_CREAT, 0o600), "w") as file:
+            file.writelines(f"{name}:{password}\n" for name, password in users.items())
+        config = _config("router", listen=["tcp/127.0.0.1:0"])
+        _set(config, "scouting/delay", 0)
+        _set(config, "adminspace", {"enabled": True, "permissions": {"read": True, "write": False}})
+        _set(config, "transport/auth/usrpwd/dictionary_file", str(passwords))
+        if access_control is not None:
+            _set(config, "access_control", access_control)
+        session = zenoh.open(config)
+    # The session's own admin space is where the port that the system picked can be read.
+    for reply in session.get(f"@/{session.info.zid()}/router"):
+        if reply.ok is not None:
+            return session, str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
+    session.close()
+    raise ConnectionFailedError("the hub does not say which port it listens on")
+
+
+def open_client(endpoint: str, user: str, password: str) -> zenoh.Session:
+    """A session that speaks through the hub at `endpoint`; raises ConnectionFailedError where there is none."""
+    config = _config("client", connect=[endpoint])
+    _set(config, "connect/timeout_ms", CONNECT_TIMEOUT_MS)
+    _set(config, "transport/auth/usrpwd/user", user)
+    _set(config, "transport/auth/usrpwd/password", password)
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        raise ConnectionFailedError(f"no connection to the hub at {endpoint} as {user}") from error
+
+
+def put(session: zenoh.Session, key: str, payload: bytes) -> None:
+    """Publishes reliably and at once. No declared publisher: one would drop what it sends before it has heard of a
+    subscriber, while a plain put always goes to the hub."""
+    session.put(
+        key,
+        payload,
+        congestion_control=zenoh.CongestionControl.BLOCK,
+        priority=zenoh.Priority.REAL_TIME,
+        express=True,
+    )
+
+
+def subscribe(
+    session: zenoh.Session, expressions: Iterable[str], handler: Callable[[str, bytes], None]
+) -> list[zenoh.Subscriber[None]]:
+    """Subscribes to all expressions; `handler(key, payload)` runs on the network's thread and must only enqueue.
+
+    An expression that another one includes is left out, so that no message comes twice.
+    """
+    wanted = [zenoh.KeyExpr(one) for one in dict.fromkeys(expressions)]
+    needed = [one for one in wanted if not any(other != one and other.includes(one) for other in wanted)]
+
+    def forward(sample: zenoh.Sample) -> None:
+        handler(str(sample.key_expr), sample.payload.to_bytes())
+
+    return [session.declare_subscriber(one, zenoh.handlers.Callback(forward, indirect=False)) for one in needed]
+
+
+def _config(mode: str, *, listen: Iterable[str] = (), connect: Iterable[str] = ()) -> zenoh.Config:
+    config = zenoh.Config()
+    _set(config, "mode", mode)
+    _set(config, "scouting/multicast/enabled", False)
+    _set(config, "listen/endpoints", list(listen))  # always: a router listens on all interfaces by default
+    _set(config, "connect/endpoints", list(connect))
+    _set(config, "transport/shared_memory/enabled", False)  # a killed process would leave segments behind
+    _set(config, "transport/link/rx/max_message_size", LARGEST_MESSAGE_BYTES)
+    return config
+
+
+def _set(config: zenoh.Config, path: str, value: Any) -> None:
+    config.insert_json5(path, json.dumps(value))

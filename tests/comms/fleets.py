@@ -1,0 +1,170 @@
+"""A small fleet of scripted nodes on real topics, and how to run it on either bus."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from comms.access import access_rules
+from comms.control import HostPlan, RunKeys
+from comms.local_bus import run_local
+from comms.messages import AgentState, ClockMode, Grid, MissionOver, Mode, Nav, Role, RunInfo
+from comms.node import Listener, Node, Publication, Received, Step
+from comms.result import BusResult
+from comms.routing import RosterNode, Routing
+from comms.topics import MISSION_OVER, NAV, STATE
+from comms.zenoh_host import ListenerHost, serve_nodes
+from comms.zenoh_hub import Hub
+from comms.zenoh_session import open_client, open_hub
+
+RUN_INFO = RunInfo(
+    schema=1,
+    scenario="toy",
+    scenario_sha256="0" * 64,
+    seed=1,
+    mode=ClockMode.LOCKSTEP,
+    area=(),
+    grid=Grid(0, 0, 0, 5, 2, 2),
+    rho=0.0,
+    vehicles=(),
+)
+ROSTER = (
+    RosterNode("clock", Role.CLOCK),
+    RosterNode("world", Role.WORLD, ("alpha", "beta")),
+    RosterNode("alpha", Role.SURVEY, ("alpha",)),
+    RosterNode("beta", Role.REVISIT, ("beta",)),
+    RosterNode("coordinator", Role.COORDINATOR),
+    RosterNode("observer", Role.OBSERVER),
+)
+
+
+def nav(x_m: float = 0.0) -> Nav:
+    """A position message that differs in x only."""
+    return Nav(x_m, 0, 0, 1, 0, 0)
+
+
+def state(mode: Mode = Mode.IDLE, works_on: int = 0) -> AgentState:
+    """An agent's state."""
+    return AgentState(mode, works_on, 1.0, 0, 0, 0, 0)
+
+
+@dataclass
+class Scripted:
+    """A node that writes down all it is told and acts as its three functions say.
+
+    `hears` may return None: nothing to publish, and the wake-up asked for before stays.
+    """
+
+    starts: Callable[[int], Step] = lambda now_ms: Step()
+    hears: Callable[[Received, int], Step | None] = lambda received, now_ms: None
+    wakes: Callable[[int], Step] = lambda now_ms: Step()
+    log: list[tuple[object, ...]] = field(default_factory=list)
+    wake_ms: int | None = None
+
+    def start(self, now_ms: int) -> Step:
+        self.log.append(("start", now_ms))
+        return self._keep(self.starts(now_ms))
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        header = received.header
+        self.log.append((now_ms, received.key, header.sender, header.sequence, header.sent_ms))
+        return self._keep(self.hears(received, now_ms) or Step(wake_ms=self.wake_ms))
+
+    def on_wake(self, now_ms: int) -> Step:
+        self.log.append(("wake", now_ms))
+        return self._keep(self.wakes(now_ms))
+
+    def _keep(self, step: Step) -> Step:
+        self.wake_ms = step.wake_ms
+        return step
+
+
+@dataclass
+class Notes:
+    """A listener that writes down what it hears."""
+
+    heard: list[Received] = field(default_factory=list)
+    closed: int = 0
+
+    def on_message(self, received: Received) -> None:
+        self.heard.append(received)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def says(*publications: Publication, wake_ms: int | None = None) -> Step:
+    """A step that publishes these."""
+    return Step(publications, wake_ms)
+
+
+def say_nav(vehicle: str, x_m: float = 0.0) -> Publication:
+    """A vehicle's position."""
+    return Publication(NAV.key(vehicle=vehicle), nav(x_m))
+
+
+def say_state(vehicle: str, works_on: int = 0) -> Publication:
+    """An agent's state."""
+    return Publication(STATE.key(vehicle=vehicle), state(works_on=works_on))
+
+
+def say_over() -> Publication:
+    """The end of the mission."""
+    return Publication(MISSION_OVER.key(), MissionOver("enough"))
+
+
+Bus = Callable[..., BusResult]
+
+
+def on_local(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
+    """Runs the toy fleet on the local bus; nodes left out do nothing."""
+    filled = _filled(nodes)
+    return run_local(Routing(ROSTER), filled, {"observer": listener}, RUN_INFO, time_limit_ms)
+
+
+def on_zenoh(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
+    """Runs the toy fleet over Zenoh on loopback: the world at the hub, each other node behind a session of its own."""
+    return _over_zenoh(nodes, listener, [["alpha"], ["beta"], ["coordinator"]], time_limit_ms)
+
+
+def on_zenoh_grouped(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
+    """The same with coordinator and one agent behind one session."""
+    return _over_zenoh(nodes, listener, [["alpha"], ["beta", "coordinator"]], time_limit_ms)
+
+
+BUSES: dict[str, Bus] = {"local": on_local, "zenoh": on_zenoh, "zenoh-grouped": on_zenoh_grouped}
+
+
+def _filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
+    acting = [node.node_id for node in ROSTER if not node.listens_only and node.role is not Role.CLOCK]
+    return {node_id: nodes.get(node_id, Scripted()) for node_id in acting}
+
+
+def _over_zenoh(
+    nodes: Mapping[str, Node], listener: Listener, groups: list[list[str]], time_limit_ms: int
+) -> BusResult:
+    filled = _filled(nodes)
+    routing = Routing(ROSTER)
+    keys = RunKeys("toy")
+    plans = tuple(HostPlan("-".join(group), tuple(group)) for group in [*groups, ["observer"]])
+    passwords = {plan.host: f"secret-{plan.host}" for plan in plans}
+    hub_session, endpoint = open_hub(passwords, access_rules(routing, plans, keys))
+
+    def serve(plan: HostPlan) -> None:
+        with open_client(endpoint, plan.host, passwords[plan.host]) as session:
+            if plan.host == "observer":
+                ListenerHost(session, keys, plan.host, "observer", listener, routing).run()
+            else:
+                serve_nodes(session, keys, plan.host, {name: filled[name] for name in plan.nodes}, routing)
+
+    with hub_session:
+        hub = Hub(hub_session, keys, routing, plans, {"world": filled["world"]}, time_limit_ms)
+        threads = [threading.Thread(target=serve, args=(plan,), daemon=True) for plan in plans]
+        for thread in threads:
+            thread.start()
+        result = hub.run(RUN_INFO)
+        for thread in threads:
+            thread.join(timeout=20)
+            assert not thread.is_alive()
+    return result
