@@ -1,0 +1,105 @@
+"""The fleet's map: every vehicle's newest tiles, joined.
+
+Sums add and maxima take the maximum over vehicles; of one vehicle's tiles the newest (incarnation, version) wins. So
+joining is commutative, associative and idempotent: lost, repeated, late and reordered tiles converge to one map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from planner.risk import LevelArray, residual_risk
+from planner.types import BoolArray, FloatArray, GridSpec
+
+
+@dataclass
+class VehicleLayer:
+    """What one vehicle has published: levels and settled cells, grid shape, and the version of each tile."""
+
+    sum_levels: LevelArray
+    largest_levels: LevelArray
+    settled: BoolArray
+    versions: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
+
+
+class FleetMap:
+    """Joins tiles as they come. `rho`: see `planner.risk.residual_risk`."""
+
+    def __init__(self, grid: GridSpec, rho: float = 0.0) -> None:
+        self.grid = grid
+        self.rho = rho
+        self.layers: dict[str, VehicleLayer] = {}
+        self.risk: FloatArray = np.ones(grid.shape)
+        self.changes = 0
+
+    def take(
+        self,
+        vehicle: str,
+        version: tuple[int, int],
+        first_row: int,
+        first_column: int,
+        sum_levels: LevelArray,
+        largest_levels: LevelArray,
+        settled: BoolArray,
+    ) -> bool:
+        """Takes one tile; returns whether it was news.
+
+        `version`: (incarnation, version). A tile that does not lie on the grid, or whose arrays differ in shape, raises
+        ValueError.
+        """
+        rows, columns = sum_levels.shape
+        fits = first_row + rows <= self.grid.rows and first_column + columns <= self.grid.columns
+        if not fits or largest_levels.shape != sum_levels.shape or settled.shape != sum_levels.shape:
+            raise ValueError(f"a tile of {rows} x {columns} cells at {first_row}, {first_column} is not on the grid")
+        layer = self.layers.get(vehicle)
+        if layer is None:
+            layer = self.layers[vehicle] = VehicleLayer(
+                sum_levels=np.zeros(self.grid.shape, dtype=np.uint8),
+                largest_levels=np.zeros(self.grid.shape, dtype=np.uint8),
+                settled=np.zeros(self.grid.shape, dtype=np.bool_),
+            )
+        place = (first_row, first_column)
+        if version <= layer.versions.get(place, (-1, -1)):
+            return False
+        layer.versions[place] = version
+        window = (slice(first_row, first_row + rows), slice(first_column, first_column + columns))
+        layer.sum_levels[window] = sum_levels
+        layer.largest_levels[window] = largest_levels
+        layer.settled[window] = settled
+        self.risk[window] = residual_risk(*self._joined(window, self.layers), self.rho)
+        self.changes += 1
+        return True
+
+    def seen(self) -> BoolArray:
+        """Cells with at least one look by anyone."""
+        seen = np.zeros(self.grid.shape, dtype=np.bool_)
+        for layer in self.layers.values():
+            seen |= layer.sum_levels > 0
+        return seen
+
+    def settled_by(self, vehicles: set[str]) -> BoolArray:
+        """Cells that every one of these vehicles has declared settled; none where one has said nothing yet."""
+        settled = np.full(self.grid.shape, fill_value=bool(vehicles))
+        for vehicle in vehicles:
+            settled &= self.layers[vehicle].settled if vehicle in self.layers else False
+        return settled
+
+    def risk_of(self, vehicles: set[str]) -> tuple[FloatArray, BoolArray]:
+        """Residual risk, and which cells are seen, from these vehicles' layers alone."""
+        chosen = {vehicle: layer for vehicle, layer in self.layers.items() if vehicle in vehicles}
+        everywhere = (slice(None), slice(None))
+        sums, largest = self._joined(everywhere, chosen)
+        return residual_risk(sums, largest, self.rho), sums > 0
+
+    def _joined(
+        self, window: tuple[slice, slice], layers: dict[str, VehicleLayer]
+    ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], np.ndarray[tuple[int, ...], np.dtype[np.int64]]]:
+        shape = self.risk[window].shape
+        sums = np.zeros(shape, dtype=np.int64)
+        largest = np.zeros(shape, dtype=np.int64)
+        for layer in layers.values():
+            sums += layer.sum_levels[window]
+            np.maximum(largest, layer.largest_levels[window], out=largest)
+        return sums, largest

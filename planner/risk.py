@@ -1,0 +1,90 @@
+"""Residual risk: what looks leave undetected, kept in two channels so that correlated looks can be told apart.
+
+A layer holds, per cell, the sum of -ln(1 - P_d) over its looks and the largest of them. What travels and what is decided
+on are both in whole levels of 0.02, so that everyone sees one map.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.types import BoolArray, FloatArray, GridSpec
+
+NATS_PER_LEVEL = 0.02
+MOST_LEVELS = 255
+HIGHEST_P_DETECT = 0.999
+WORST_SHARE = 0.30
+
+LevelArray = NDArray[np.uint8]
+
+
+class RiskLayer:
+    """One vehicle's looks, summed over the grid (equation 2 of the paper, in logarithms)."""
+
+    def __init__(self, grid: GridSpec) -> None:
+        self.sum_nats: FloatArray = np.zeros(grid.shape)
+        self.largest_nats: FloatArray = np.zeros(grid.shape)
+
+    def add_look(self, rows: slice, columns: slice, p_detect: FloatArray) -> None:
+        """Adds a look's P_d per cell of a window, 0 where a cell was not seen.
+
+        Raises ValueError for P_d outside [0, 0.999].
+        """
+        if p_detect.size and not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
+            raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
+        nats = -np.log1p(-p_detect)
+        self.sum_nats[rows, columns] += nats
+        np.maximum(self.largest_nats[rows, columns], nats, out=self.largest_nats[rows, columns])
+
+    def sum_levels(self) -> LevelArray:
+        """The sums in levels; they saturate at 255, a residual risk of 0.006."""
+        return to_levels(self.sum_nats)
+
+    def largest_levels(self) -> LevelArray:
+        """The largest single looks in levels; they saturate at 255 (one look of P_d 0.994)."""
+        return to_levels(self.largest_nats)
+
+
+def to_levels(nats: FloatArray) -> LevelArray:
+    """Nats as whole levels. What was seen at all is at least one level, so that it does not read as unseen."""
+    levels = np.minimum(np.rint(nats * (1 / NATS_PER_LEVEL)), MOST_LEVELS)
+    return np.where((nats > 0) & (levels == 0), 1, levels).astype(np.uint8)
+
+
+def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.integer], rho: float = 0.0) -> FloatArray:
+    """RR = exp(-(largest + (1 - rho) (sum - largest))) per cell.
+
+    `rho` in [0, 1]: how far looks at one cell tell the same story; 0 is the paper's product over looks (equation 2).
+    """
+    if rho == 0.0:
+        risk: FloatArray = np.exp(sum_levels * -NATS_PER_LEVEL)
+        return risk
+    largest = largest_levels.astype(np.float64)
+    risk = np.exp(-NATS_PER_LEVEL * (largest + (1.0 - rho) * (sum_levels - largest)))
+    return risk
+
+
+@dataclass(frozen=True)
+class RiskStatistics:
+    """Over `cells` cells: mean residual risk, mean over the worst 30 % of them, share of cells without any look."""
+
+    cells: int
+    mean: float
+    worst30_mean: float
+    uncovered_share: float
+
+
+def risk_statistics(risk: FloatArray, seen: BoolArray, inside: BoolArray) -> RiskStatistics:
+    """Statistics over the cells inside the area; `seen`: cells with at least one look. All arrays of grid shape."""
+    values = risk[inside]
+    worst = max(1, round(WORST_SHARE * values.size))
+    ranked = np.partition(values, values.size - worst)
+    return RiskStatistics(
+        cells=int(values.size),
+        mean=float(values.mean()),
+        worst30_mean=float(ranked[values.size - worst :].mean()),
+        uncovered_share=float(1.0 - np.count_nonzero(seen[inside]) / values.size),
+    )

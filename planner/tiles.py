@@ -1,0 +1,36 @@
+"""How the grid is cut into tiles, the pieces in which coverage is published."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from planner.types import GridSpec
+
+TILE_CELLS = 20  # 20 x 20 cells in two channels and a mask stay under 1 kB
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One tile: its name, its first cell and its window of the grid's arrays."""
+
+    name: str
+    first_row: int
+    first_column: int
+    window: tuple[slice, slice]
+
+
+def tiles(grid: GridSpec) -> tuple[Tile, ...]:
+    """All tiles of a grid, row by row; those at the far edges may be smaller."""
+    return tuple(
+        Tile(
+            name=f"{row // TILE_CELLS}-{column // TILE_CELLS}",
+            first_row=row,
+            first_column=column,
+            window=(
+                slice(row, min(row + TILE_CELLS, grid.rows)),
+                slice(column, min(column + TILE_CELLS, grid.columns)),
+            ),
+        )
+        for row in range(0, grid.rows, TILE_CELLS)
+        for column in range(0, grid.columns, TILE_CELLS)
+    )

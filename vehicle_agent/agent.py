@@ -1,0 +1,163 @@
+"""What every agent does alike: listen to its vehicle, command it, report state every 10 s, publish coverage."""
+
+from __future__ import annotations
+
+from comms.messages import (
+    AgentState,
+    Contact,
+    Look,
+    Maneuver,
+    ManeuverKind,
+    ManeuverStatus,
+    MissionOver,
+    Mode,
+    Nav,
+    RunInfo,
+    Task,
+)
+from comms.node import Publication, Received, Step
+from comms.topics import CONTACT, MANEUVER, STATE
+from planner.types import Point, SweepFrame, Track
+from vehicle_agent.coverage import CoverageLayer
+
+REPORT_EVERY_MS = 10_000
+
+
+class Agent:
+    """An agent in the back seat of one vehicle.
+
+    Before `run` has told it area and grid it does nothing. Subclasses say what to do then, and with each look, each
+    manoeuvre's end and each task.
+    """
+
+    def __init__(self, vehicle: str, endurance_ms: int) -> None:
+        self.vehicle = vehicle
+        self.mode = Mode.IDLE
+        self.works_on = 0
+        self.expected_end_ms = 0
+        self.nav: Nav | None = None
+        self.coverage: CoverageLayer | None = None
+        self.maneuver: Maneuver | None = None
+        self._endurance_ms = endurance_ms
+        self._maneuvers = 0
+        self._contacts = 0
+        self._outbox: list[Publication] = []
+        self._wake_ms: int | None = None
+        self._over = False
+
+    def start(self, now_ms: int) -> Step:
+        """Waits for the run's announcement."""
+        return Step()
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        """Takes in what the vehicle and the coordinator say."""
+        message = received.message
+        if isinstance(message, Nav):
+            self.nav = message
+        elif isinstance(message, RunInfo) and self.coverage is None:
+            self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
+            self._wake_ms = now_ms + REPORT_EVERY_MS
+            self.on_run(message, now_ms)
+        elif self.coverage is not None and not self._over:
+            if isinstance(message, Look):
+                self._take_look(message, now_ms)
+            elif isinstance(message, ManeuverStatus):
+                if self.maneuver is not None and message.number == self.maneuver.number:
+                    self.on_maneuver(message, now_ms)
+            elif isinstance(message, Task):
+                self.on_task(message, now_ms)
+            elif isinstance(message, MissionOver):
+                self._over = True
+                self._wake_ms = None
+                self.on_over(now_ms)
+                self.report(now_ms)
+        return self._step()
+
+    def on_wake(self, now_ms: int) -> Step:
+        """Reports, every 10 s."""
+        self._wake_ms = now_ms + REPORT_EVERY_MS
+        self.report(now_ms)
+        return self._step()
+
+    def on_run(self, run: RunInfo, now_ms: int) -> None:
+        """The run is announced; the coverage layer is there."""
+
+    def on_look(self, look: Look, now_ms: int) -> None:
+        """A valid look has been added to the coverage layer."""
+
+    def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
+        """The present manoeuvre has come further."""
+
+    def on_task(self, task: Task, now_ms: int) -> None:
+        """The coordinator offers a strip or wants it back."""
+
+    def on_over(self, now_ms: int) -> None:
+        """The mission is over; the last report follows."""
+
+    def publish(self, key: str, message: object) -> None:
+        """Puts a message into the present step."""
+        self._outbox.append(Publication(key, message))  # type: ignore[arg-type]
+
+    def follow(self, track: Track, run_in_m: float) -> None:
+        """Commands the vehicle to fly a track with the sonar on."""
+        self._command(ManeuverKind.FOLLOW, track.start, track.end, run_in_m)
+
+    def hold(self) -> None:
+        """Commands the vehicle to stay where it is."""
+        here = self.position
+        self._command(ManeuverKind.HOLD, here, here, 0.0)
+
+    def report(self, now_ms: int) -> None:
+        """Publishes the tiles that changed and the state."""
+        assert self.coverage is not None
+        self._outbox.extend(self.coverage.changed_tiles())
+        self.report_state(now_ms)
+
+    def report_state(self, now_ms: int) -> None:
+        """Publishes the state alone."""
+        x_m, y_m = self.position
+        message = AgentState(
+            mode=self.mode,
+            works_on=self.works_on,
+            battery=self.battery(now_ms),
+            expected_end_ms=self.expected_end_ms,
+            x_m=x_m,
+            y_m=y_m,
+            heading_rad=self.nav.heading_rad if self.nav else 0.0,
+        )
+        self.publish(STATE.key(vehicle=self.vehicle), message)
+
+    def battery(self, now_ms: int) -> float:
+        """Share of the endurance that is left."""
+        return max(0.0, 1.0 - now_ms / self._endurance_ms)
+
+    @property
+    def position(self) -> Point:
+        """Where the vehicle was at its last nav message; the mission frame's origin before the first."""
+        return (self.nav.x_m, self.nav.y_m) if self.nav else (0.0, 0.0)
+
+    def _command(self, kind: ManeuverKind, start: Point, end: Point, run_in_m: float) -> None:
+        self._maneuvers += 1
+        self.maneuver = Maneuver(self._maneuvers, kind, *start, *end, run_in_m)
+        self.publish(MANEUVER.key(vehicle=self.vehicle), self.maneuver)
+
+    def _take_look(self, look: Look, now_ms: int) -> None:
+        for contact in look.contacts:
+            self._contacts += 1
+            key = CONTACT.key(vehicle=self.vehicle, number=self._contacts)
+            x_m, y_m = _in_mission_frame(look, contact.along_m, contact.lateral_m)
+            self.publish(key, Contact(x_m, y_m, look.position_sigma_m, contact.score, look.number))
+        if look.valid and self.coverage is not None:
+            self.coverage.add(look)
+            self.on_look(look, now_ms)
+
+    def _step(self) -> Step:
+        published = tuple(self._outbox)
+        self._outbox.clear()
+        return Step(published, self._wake_ms)
+
+
+def _in_mission_frame(look: Look, along_m: float, lateral_m: float) -> Point:
+    frame = SweepFrame(look.origin_x_m, look.origin_y_m, look.heading_rad)
+    x_m, y_m = frame.to_mission(lateral_m, along_m)
+    return float(x_m), float(y_m)
