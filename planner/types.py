@@ -71,12 +71,12 @@ class GridSpec:
     @cached_property
     def across_m(self) -> FloatArray:
         """Centres of the columns, sweep frame, shape (columns,)."""
-        return np.arange(self.columns) * self.cell_m
+        return np.arange(self.columns, dtype=np.float64) * self.cell_m
 
     @cached_property
     def along_m(self) -> FloatArray:
         """Centres of the rows, sweep frame, shape (rows,)."""
-        return (np.arange(self.rows) + 0.5) * self.cell_m
+        return (np.arange(self.rows, dtype=np.float64) + 0.5) * self.cell_m
 
 
 @dataclass(frozen=True)
@@ -134,4 +134,4 @@ class DetectionCurve:
 
     def at(self, range_m: FloatArray | float) -> FloatArray:
         """P_d at the given ranges; 0 outside the curve."""
-        return np.interp(range_m, self.range_m, self.p_detect, left=0.0, right=0.0)
+        return np.asarray(np.interp(range_m, self.range_m, self.p_detect, left=0.0, right=0.0))
