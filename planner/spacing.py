@@ -114,8 +114,7 @@ def _pairs_and_singles(width_m: float, nadir_gap_m: float, range_m: float) -> tu
         raise ValueError(
             f"the range must be above 0 and at least three nadir gaps ({3 * nadir_gap_m:g} m), not {range_m:g} m"
         )
-    if width_m <= TOLERANCE_M:
-        return 0, 0
+    width_m = max(width_m, 0.0)
     pair_m = 3 * range_m - nadir_gap_m
     pairs = math.floor(width_m / pair_m)
     left_m = width_m - pairs * pair_m
