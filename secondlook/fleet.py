@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from importlib import import_module
-from typing import Any
 
 from comms.codec import SCHEMA_VERSION
 from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
@@ -14,6 +12,7 @@ from coordinator.allocation import Allocator, GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from planner.area import SurveyArea
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
+from secondlook.node_spec import NodeSpec
 from secondlook.scenario import (
     PatchySeabed,
     RevisitVehicle,
@@ -25,19 +24,6 @@ from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleC
 from vehicle_agent.config import RevisitConfig, SurveyConfig
 
 ALLOCATORS: dict[str, Allocator] = {"greedy": GreedyAllocator(), "none": NoAllocator()}
-
-
-@dataclass(frozen=True)
-class NodeSpec:
-    """How to make a node in whatever process it is to live: `factory` is `module:Class`, called with `config`."""
-
-    factory: str
-    config: Any
-
-    def make(self) -> Any:
-        """The node itself; its module is imported only here."""
-        module, name = self.factory.split(":")
-        return getattr(import_module(module), name)(self.config)
 
 
 @dataclass(frozen=True)
