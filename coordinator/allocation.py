@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from planner.dubins import shortest_path
-from planner.types import Strip
+from planner.dubins import Pose, shortest_path
+from planner.types import Point, Strip
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class NoAllocator:
 
 def service_s(strip: Strip, helper: FreeHelper) -> float:
     """Seconds for a helper to get to the nearer end of a strip and along it once."""
-    pose = (helper.x_m, helper.y_m, helper.heading_rad)
+    pose = Pose(helper.x_m, helper.y_m, helper.heading_rad)
     ahead_rad, back_rad = strip.heading_rad, (strip.heading_rad + math.pi) % (2 * math.pi)
     transit_m = min(
         shortest_path(pose, _before(end, heading_rad, helper.run_in_m), helper.turn_radius_m).length_m
@@ -86,9 +86,6 @@ def service_s(strip: Strip, helper: FreeHelper) -> float:
     return (transit_m + helper.run_in_m + strip.length_m) / helper.speed_mps
 
 
-def _before(point: tuple[float, float], heading_rad: float, distance_m: float) -> tuple[float, float, float]:
-    return (
-        point[0] - distance_m * math.sin(heading_rad),
-        point[1] - distance_m * math.cos(heading_rad),
-        heading_rad,
-    )
+def _before(point: Point, heading_rad: float, distance_m: float) -> Pose:
+    x_m, y_m = point
+    return Pose(x_m - distance_m * math.sin(heading_rad), y_m - distance_m * math.cos(heading_rad), heading_rad)

@@ -33,6 +33,7 @@ from coordinator.allocation import FreeHelper, OpenStrip
 from coordinator.config import CoordinatorConfig
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
+from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray, FloatArray
 
@@ -118,9 +119,8 @@ class Coordinator:
     def _begin(self, run: RunInfo, now_ms: int) -> None:
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
-        outline = shapely.Polygon([(corner.x_m, corner.y_m) for corner in run.area])
-        across, along = np.meshgrid(spec.across_m, spec.along_m)
-        self._inside = shapely.intersects_xy(outline.buffer(1e-6), *spec.frame.to_mission(across, along))
+        outline = tuple((corner.x_m, corner.y_m) for corner in run.area)
+        self._inside = SurveyArea(outline, spec.frame.heading_rad).inside(spec)
         self.vehicles = {entry.vehicle: _Vehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
         helpers = [entry for entry in run.vehicles if entry.role is Role.REVISIT]
         if helpers:

@@ -10,44 +10,24 @@ from __future__ import annotations
 import json
 import logging
 import os
-import pickle
 import signal
 import sys
 import threading
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from typing import Any, BinaryIO
 
 from comms.access import access_rules
 from comms.clock import RunawayError
-from comms.control import HostPlan, RunKeys
-from comms.messages import RunInfo
-from comms.routing import RosterNode, Routing
+from comms.control import RunKeys
+from comms.routing import Routing
 from comms.runner import NodeError
 from comms.zenoh_host import ListenerHost, serve_nodes
 from comms.zenoh_hub import FleetError, Hub
 from comms.zenoh_session import ConnectionFailedError, open_client, open_hub
-from secondlook.node_spec import NodeSpec
+from secondlook.child_order import STATUS_FD, ChildOrder, read_order
 
-STATUS_FD = "SECONDLOOK_STATUS_FD"
 ORPHANED = 3  # exit code when the launcher is gone
-
-
-@dataclass(frozen=True)
-class ChildOrder:
-    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock."""
-
-    run: str
-    host: str
-    password: str
-    roster: tuple[RosterNode, ...]
-    specs: dict[str, NodeSpec]
-    is_hub: bool = False
-    is_listener: bool = False
-    hosts: tuple[HostPlan, ...] = ()
-    passwords: dict[str, str] = field(default_factory=dict)
-    run_info: RunInfo | None = None
-    time_limit_ms: int = 0
 
 
 def main() -> int:
@@ -59,7 +39,7 @@ def main() -> int:
     def tell(**words: Any) -> None:
         status.write(json.dumps(words) + "\n")
 
-    order = _read_order(sys.stdin.buffer)
+    order = read_order(sys.stdin.buffer)
     try:
         if order.is_hub:
             _be_hub(order, tell)
@@ -71,20 +51,6 @@ def main() -> int:
         tell(failed=str(error))
         return 1
     return 0
-
-
-def write_order(pipe: BinaryIO, order: ChildOrder) -> None:
-    """Sends an order to a child's standard input."""
-    pickled = pickle.dumps(order)
-    pipe.write(len(pickled).to_bytes(8, "big") + pickled)
-    pipe.flush()
-
-
-def _read_order(pipe: BinaryIO) -> ChildOrder:
-    size = int.from_bytes(pipe.read(8), "big")
-    order = pickle.loads(pipe.read(size))  # noqa: S301 - comes from the launcher that started this process
-    assert isinstance(order, ChildOrder)
-    return order
 
 
 def _read_endpoint(pipe: BinaryIO) -> str:

@@ -7,7 +7,6 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-import shapely
 
 from comms.messages import (
     AgentState,
@@ -24,6 +23,7 @@ from comms.messages import (
     TruthTargets,
 )
 from comms.node import Received
+from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray
@@ -150,9 +150,8 @@ class Metrics:
         self.run = run
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
-        outline = shapely.Polygon([(corner.x_m, corner.y_m) for corner in run.area]).buffer(1e-6)
-        across, along = np.meshgrid(spec.across_m, spec.along_m)
-        self.inside = shapely.intersects_xy(outline, *spec.frame.to_mission(across, along))
+        outline = tuple((corner.x_m, corner.y_m) for corner in run.area)
+        self.inside = SurveyArea(outline, spec.frame.heading_rad).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role) for entry in run.vehicles}
 
     def _pass_time(self, sent_ms: int) -> None:

@@ -23,7 +23,7 @@ from comms.result import BusResult, Ending
 from comms.routing import Routing
 from comms.zenoh_host import ListenerHost
 from comms.zenoh_session import ConnectionFailedError, open_client
-from secondlook.child import STATUS_FD, ChildOrder, write_order
+from secondlook.child_order import STATUS_FD, ChildOrder, write_order
 from secondlook.fleet import Fleet
 from secondlook.node_spec import NodeSpec
 
