@@ -23,7 +23,6 @@ def test_the_mean_over_both_draws_is_the_truth(truth: float) -> None:
 @given(truth=st.floats(0.02, 0.98), noise_cell=st.floats(0.0, 1.5))
 def test_the_mean_is_the_truth_for_any_noise(truth: float, noise_cell: float) -> None:
     noise = PDetectEstimate(noise_cell, 0.0)
-    # Antithetic draws would hide a wrong shift only if it were odd in the error, and it is constant: plain draws it is.
     estimates = noise.estimate(np.full((2, 100, 1000), truth), 0.0, np.random.default_rng(7))
     assert estimates.mean() == pytest.approx(
         truth, abs=max(4.5 * estimates.std() / np.sqrt(estimates.size), 1e-6) + 2e-4

@@ -85,7 +85,7 @@ def test_without_a_heading_it_goes_straight_to_a_point_ahead_and_stays_about_whe
     assert sailing.go_to((10.0 + 30.0, 10.0 + 40.0), math.atan2(30.0, 40.0), 0) > 25_000
     straight = motion(Pose(10.0, 10.0, math.atan2(30.0, 40.0)))
     assert straight.go_to((40.0, 50.0), None, 0) == 25_000
-    there = motion()
+    there = motion(Pose(0.0, 0.0, 1.0))
     assert there.go_to((0.0, 0.0), None, 7) == 7
 
 

@@ -24,7 +24,7 @@ from comms.messages import (
     TruthPose,
     TruthTargets,
 )
-from comms.node import Publication, Received, Step
+from comms.node import Node, Publication, Received, Step
 from comms.routing import RosterNode, Routing
 from comms.topics import LOOK, MANEUVER, MANEUVER_STATUS, MISSION_OVER, TRUTH_LOOK, TRUTH_POSE, Topic
 from planner.types import DetectionCurve
@@ -55,7 +55,7 @@ class Sea:
     """Steps a world by its wake-ups, tells it orders at their times, and keeps what it publishes."""
 
     def __init__(self, config: WorldConfig) -> None:
-        self.world = World(config)
+        self.world: Node = World(config)
         self.now_ms = 0
         self.wake_ms: int | None = None
         self.published: Published = []
