@@ -17,6 +17,7 @@ from planner.types import DetectionCurve, Point
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
+FARTHEST_RANGE_M = 1e4
 HIGHEST_P_DETECT = 0.999
 """The wire refuses P_d above this."""
 LARGEST_LOOK_CELLS = 65_536
@@ -72,11 +73,11 @@ class SensorConfig:
             "curve", f"{ranges.size} ranges and {values.size} values", "as many values as ranges, at least two",
         )  # fmt: skip
         _require(
-            bool(ranges[0] >= 0.0 and np.all(np.diff(ranges) > 0.0)), "curve", "its ranges", "ascending from 0 or more"
-        )
-        _require(
-            bool(np.all((values >= 0.0) & (values <= HIGHEST_P_DETECT))), "curve", "its values", "0 to 0.999"
+            bool(ranges[0] >= 0.0 and np.all(np.diff(ranges) > 0.0) and ranges[-1] <= FARTHEST_RANGE_M),
+            "curve", "its ranges", f"ascending, 0 to {FARTHEST_RANGE_M:.0f} m",
         )  # fmt: skip
+        sound = bool(np.all((values >= 0.0) & (values <= HIGHEST_P_DETECT)))
+        _require(sound, "curve", "its values", f"0 to {HIGHEST_P_DETECT}")
         for name in ("along_bin_m", "range_bin_m", "look_m"):
             _require(0.01 <= getattr(self, name) <= 1e4, name, getattr(self, name), "0.01 to 10000 m")
         per_look = self.look_m / self.along_bin_m
