@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from secondlook.scenario.area import Area
 from secondlook.scenario.dialect import dump
-from secondlook.scenario.values import Duration, Length, Mapping, Share, check_pair, refused
+from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId
 
 
@@ -62,13 +62,15 @@ class Coordinator(Mapping):
     """How strips are cut and given out.
 
     `lost_after_s`: age of a vehicle's last state from which it counts as lost. `min_strip_m`, `max_strip_m`: length
-    of a strip.
+    of a strip. `worth_risk`: mean residual risk over a helper's swath from which a further metre of strip is worth
+    flying.
     """
 
     allocator: Literal["greedy", "none"] = "greedy"
     lost_after_s: Duration = 30.0
     min_strip_m: Length = 30.0
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
+    worth_risk: OpenShare = 0.25
 
     @field_validator("max_strip_m")
     @classmethod
