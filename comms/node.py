@@ -18,13 +18,14 @@ from comms.topics import Topic
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """A message as a node gets it: what the key says, who sent it and when, and what it says."""
+    """A message as a node gets it: what the key says, who sent it and when, what it says, and its payload's bytes."""
 
     key: str
     topic: Topic
     vehicle: str
     header: Header
     message: Message
+    payload: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

@@ -102,7 +102,7 @@ class Intake:
         if route.topic.has_vehicle:
             match = route.topic.regex.fullmatch(key)
             vehicle = match.group("vehicle") if match else ""
-        return Received(key, route.topic, vehicle, header, message)
+        return Received(key, route.topic, vehicle, header, message, payload)
 
     def _drop(self, reason: str, sender: str, detail: str) -> None:
         self.dropped[reason] += 1

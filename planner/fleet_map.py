@@ -6,6 +6,7 @@ joining is commutative, associative and idempotent: lost, repeated, late and reo
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -79,11 +80,12 @@ class FleetMap:
             seen |= layer.sum_levels > 0
         return seen
 
-    def settled_by(self, vehicles: set[str]) -> BoolArray:
-        """Cells that every one of these vehicles has declared settled; none where one has said nothing yet."""
-        settled = np.full(self.grid.shape, fill_value=bool(vehicles))
+    def settled_by(self, vehicles: Iterable[str]) -> BoolArray:
+        """Cells that one of these vehicles has declared settled."""
+        settled = np.zeros(self.grid.shape, dtype=np.bool_)
         for vehicle in vehicles:
-            settled &= self.layers[vehicle].settled if vehicle in self.layers else False
+            if vehicle in self.layers:
+                settled |= self.layers[vehicle].settled
         return settled
 
     def risk_of(self, vehicles: set[str]) -> tuple[FloatArray, BoolArray]:

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 from numpy.typing import NDArray
-from scipy import ndimage
 
+from planner.groups import label_groups
 from planner.types import BoolArray, FloatArray, GridSpec, Point
 
 BLOCK_M = 500.0
@@ -66,7 +66,7 @@ def find_hotspots(
     the id that most of its cells had; the larger group wins an id that two claim; ids are not used again.
     """
     previous, next_id = before.ids, before.next_id
-    groups, count = _label(grid, hot)
+    groups, count = label_groups(hot, block=max(1, int(BLOCK_M / grid.cell_m)))
     flat_groups, flat_previous = groups.ravel(), previous.ravel()
     sizes = np.bincount(flat_groups, minlength=count + 1)
     id_of_group = np.zeros(count + 1, dtype=np.int32)
@@ -89,12 +89,10 @@ def find_hotspots(
             id_of_group[group] = next_id
             next_id += 1
     ids = id_of_group[groups]
-    touches_open = ndimage.binary_dilation(open_cells)
+    touches_open = _beside(open_cells)
     growing: set[int] = set()
     changed: list[HotspotArea] = []
-    for number, window in enumerate(ndimage.find_objects(ids), start=1):
-        if window is None:
-            continue
+    for number, window in _windows(ids):
         cells = ids[window] == number
         grows = bool((cells & touches_open[window]).any())
         if grows:
@@ -110,19 +108,29 @@ def find_hotspots(
     return HotspotChange(HotspotMap(ids, frozenset(growing), next_id), tuple(changed), withdrawn)
 
 
-def _label(grid: GridSpec, hot: BoolArray) -> tuple[IdArray, int]:
-    block = max(1, int(BLOCK_M / grid.cell_m))
-    groups = np.zeros(grid.shape, dtype=np.int32)
-    count = 0
-    for row in range(0, grid.rows, block):
-        for column in range(0, grid.columns, block):
-            window = (slice(row, row + block), slice(column, column + block))
-            if not hot[window].any():
-                continue
-            labelled, found = ndimage.label(hot[window])
-            groups[window] = np.where(labelled > 0, labelled + count, 0)
-            count += found
-    return groups, count
+def _beside(cells: BoolArray) -> BoolArray:
+    """The cells and their four neighbours."""
+    beside = cells.copy()
+    beside[1:] |= cells[:-1]
+    beside[:-1] |= cells[1:]
+    beside[:, 1:] |= cells[:, :-1]
+    beside[:, :-1] |= cells[:, 1:]
+    return beside
+
+
+def _windows(ids: IdArray) -> list[tuple[int, tuple[slice, slice]]]:
+    """For each id, ascending, the smallest window with all its cells."""
+    rows, columns = np.nonzero(ids)
+    numbers, inverse = np.unique(ids[rows, columns], return_inverse=True)
+    low = np.full((2, numbers.size), np.iinfo(np.int64).max)
+    high = np.full((2, numbers.size), -1)
+    for axis, places in enumerate((rows, columns)):
+        np.minimum.at(low[axis], inverse, places)
+        np.maximum.at(high[axis], inverse, places)
+    return [
+        (int(number), (slice(int(top), int(bottom) + 1), slice(int(left), int(right) + 1)))
+        for number, (top, left), (bottom, right) in zip(numbers, low.T, high.T, strict=True)
+    ]
 
 
 def _outline(grid: GridSpec, cells: BoolArray, window: tuple[slice, slice]) -> tuple[Point, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 from comms.messages import (
     AgentState,
     Contact,
@@ -19,6 +21,8 @@ from comms.node import Publication, Received, Step
 from comms.topics import CONTACT, MANEUVER, STATE
 from planner.types import Point, SweepFrame, Track
 from vehicle_agent.coverage import CoverageLayer
+
+log = logging.getLogger("secondlook.agent")
 
 REPORT_EVERY_MS = 10_000
 
@@ -44,6 +48,7 @@ class Agent:
         self._outbox: list[Publication] = []
         self._wake_ms: int | None = None
         self._over = False
+        self._complained = False
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
@@ -142,6 +147,11 @@ class Agent:
         self.publish(MANEUVER.key(vehicle=self.vehicle), self.maneuver)
 
     def _take_look(self, look: Look, now_ms: int) -> None:
+        if not _makes_sense(look):
+            if not self._complained:
+                self._complained = True
+                log.warning("%s: dropped a look without bins (said once)", self.vehicle)
+            return
         for contact in look.contacts:
             self._contacts += 1
             key = CONTACT.key(vehicle=self.vehicle, number=self._contacts)
@@ -155,6 +165,11 @@ class Agent:
         published = tuple(self._outbox)
         self._outbox.clear()
         return Step(published, self._wake_ms)
+
+
+def _makes_sense(look: Look) -> bool:
+    sides, along_bins, range_bins = look.p_detect.shape
+    return sides == 2 and along_bins > 0 and range_bins > 1 and look.along_bin_m > 0 and look.range_bin_m > 0
 
 
 def _in_mission_frame(look: Look, along_m: float, lateral_m: float) -> Point:

@@ -14,6 +14,7 @@ from comms.messages import (
     TaskStatus,
 )
 from comms.topics import TASK_STATUS
+from planner.dubins import Pose
 from planner.sweep import cheapest_entry, legs_over_strip
 from planner.types import Strip, Track
 from vehicle_agent.agent import Agent
@@ -92,7 +93,7 @@ class RevisitAgent(Agent):
             self._tell(strip.number, TaskState.REFUSED, 0, "no position yet")
             return
         legs = legs_over_strip(strip, self.config.swath_m)
-        pose = (self.nav.x_m, self.nav.y_m, self.nav.heading_rad)
+        pose = Pose(self.nav.x_m, self.nav.y_m, self.nav.heading_rad)
         ordered, distance_m = cheapest_entry(legs, pose, self.config.turn_radius_m, self.config.run_in_m)
         ends_ms = now_ms + round(distance_m / self.config.speed_mps * 1000)
         if self.battery(ends_ms) <= 0.0:

@@ -24,7 +24,7 @@ from comms.topics import CURVE, HOTSPOT, PLAN
 from planner.area import SurveyArea
 from planner.curve import RangeTally, effective_range_m
 from planner.hotspots import HotspotMap, find_hotspots
-from planner.lawnmower import lay_tracks
+from planner.lawnmower import lawnmower
 from planner.risk import residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
 from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision
@@ -51,6 +51,7 @@ class SurveyAgent(Agent):
         self.r_eff_m: list[int] = []
         self._flown_at_decision = 0
         self._tally: RangeTally | None = None
+        self._range_bin_m = 0.0
         self._reach: Reach | None = None
         self._under_way: UnderWay | None = None
         self._plan_revision = 0
@@ -62,7 +63,7 @@ class SurveyAgent(Agent):
     def on_run(self, run: RunInfo, now_ms: int) -> None:
         """Lays the first tracks and begins."""
         spec = run.grid.spec
-        self.area = SurveyArea([(corner.x_m, corner.y_m) for corner in run.area], spec.frame.heading_rad)
+        self.area = SurveyArea(tuple((corner.x_m, corner.y_m) for corner in run.area), spec.frame.heading_rad)
         self._inside = self.area.inside(spec)
         self._rho = run.rho
         self._hotspots = HotspotMap.empty(spec)
@@ -73,6 +74,7 @@ class SurveyAgent(Agent):
         """Adds the look to this track's tally, and notes how far the track has been looked."""
         if self._tally is None:
             self._tally = RangeTally(look.range_bin_m)
+            self._range_bin_m = look.range_bin_m
         self._tally.add(look.p_detect)
         seen = look.p_detect.max(axis=(0, 1)).nonzero()[0]
         if seen.size:
@@ -125,7 +127,7 @@ class SurveyAgent(Agent):
         if self._tally is not None:
             curve = self._tally.curve()
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
-            message = Curve(track.number, self._tally.range_bin_m, curve.p_detect, r_eff_m)
+            message = Curve(track.number, self._range_bin_m, curve.p_detect, r_eff_m)
             self.publish(CURVE.key(vehicle=self.vehicle), message)
         self.r_eff_m.append(r_eff_m)
         self._after_track(now_ms)
@@ -162,7 +164,13 @@ class SurveyAgent(Agent):
         self.r_adpt_m.append(self.decision.range_m)
         self._flown_at_decision = len(self.flown)
         number = self.flown[-1].number + 1 if self.flown else 1
-        self.ahead = lay_tracks(self.area, self.decision.offsets_m, first_number=number, reach_m=self.decision.range_m)
+        self.ahead = lawnmower(
+            self.area,
+            self.decision.offsets_m,
+            self.decision.range_m,
+            first_number=number,
+            first_reverse=number % 2 == 0,
+        )
         if before is None:
             words = f"spacing for {self.decision.range_m} m, {len(self.ahead)} tracks"
         elif before == self.decision.range_m:

@@ -1,0 +1,21 @@
+"""What the coordinator is told before the mission; everything about the fleet it takes from the run's announcement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from coordinator.allocation import Allocator
+
+
+@dataclass(frozen=True)
+class CoordinatorConfig:
+    """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
+    age of a vehicle's state from which it is taken for lost. `min_strip_m`, `max_strip_m`: length of a strip.
+    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying."""
+
+    allocator: Allocator
+    deadline_factor: float
+    lost_after_ms: int
+    min_strip_m: float
+    max_strip_m: float
+    worth_risk: float

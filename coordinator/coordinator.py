@@ -1,0 +1,383 @@
+"""The coordinator: joins the layers, cuts strips from the hotspots, offers them to helpers, follows each to its end,
+and says when the mission is over."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from comms.messages import (
+    AgentState,
+    CoverageTile,
+    Hotspot,
+    HotspotState,
+    MissionOver,
+    Mode,
+    Role,
+    RosterVehicle,
+    RunInfo,
+    StripState,
+    StripStatus,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+from comms.node import Publication, Received, Step
+from comms.topics import MISSION_OVER, STRIP, TASK
+from coordinator.allocation import FreeHelper, OpenStrip
+from coordinator.config import CoordinatorConfig
+from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
+from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
+from planner.area import SurveyArea
+from planner.fleet_map import FleetMap
+from planner.types import BoolArray, FloatArray
+
+log = logging.getLogger("secondlook.coordinator")
+
+SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newly cut strip is an open one revised
+WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is published again
+ANSWER_WITHIN_MS = 10_000
+COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen for the map to agree that it is done
+
+
+@dataclass
+class _Vehicle:
+    entry: RosterVehicle
+    state: AgentState | None = None
+    heard_ms: int = 0
+    lost: bool = False
+    finished_ms: int | None = None
+    refused: set[int] = field(default_factory=set)
+
+
+@dataclass
+class _Hotspot:
+    revision: tuple[int, int]
+    mean_risk: float
+    cells: BoolArray
+
+
+class Coordinator:
+    """See the module. All it knows of the fleet it has from the run's announcement and from the agents."""
+
+    def __init__(self, config: CoordinatorConfig) -> None:
+        self.config = config
+        self.ledger = Ledger()
+        self.vehicles: dict[str, _Vehicle] = {}
+        self.map: FleetMap | None = None
+        self._inside: BoolArray
+        self._hotspots: dict[tuple[str, int], _Hotspot] = {}
+        self._rules: CuttingRules | None = None
+        self._tasks = 0
+        self._outbox: list[Publication] = []
+        self._to_cut = False
+        self._to_assign = False
+        self._over = False
+        self._complained_of: set[str] = set()
+
+    def start(self, now_ms: int) -> Step:
+        """Waits for the run's announcement."""
+        return Step()
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        """Takes in what the agents say; what follows from it is decided at a wake-up of its own, 1 ms later."""
+        message = received.message
+        if isinstance(message, RunInfo) and self.map is None:
+            self._begin(message, now_ms)
+        elif self.map is not None and not self._over:
+            vehicle = self.vehicles.get(received.vehicle)
+            version = received.header.incarnation
+            if isinstance(message, CoverageTile):
+                self._take_tile(received.vehicle, version, message)
+            elif isinstance(message, Hotspot):
+                self._take_hotspot(received, message)
+            elif isinstance(message, AgentState) and vehicle is not None:
+                self._take_state(vehicle, message, now_ms)
+            elif isinstance(message, TaskStatus) and vehicle is not None:
+                self._take_status(received.vehicle, message, now_ms)
+        return self._step(now_ms)
+
+    def on_wake(self, now_ms: int) -> Step:
+        """Cuts, assigns and looks whether anyone is lost and whether the mission is over."""
+        if self.map is not None and not self._over:
+            self._find_lost(now_ms)
+            if self._to_cut:
+                self._to_cut = False
+                self._cut(now_ms)
+                self._to_assign = True
+            if self._to_assign:
+                self._to_assign = False
+                self._assign(now_ms)
+            self._find_end(now_ms)
+        return self._step(now_ms)
+
+    def _begin(self, run: RunInfo, now_ms: int) -> None:
+        spec = run.grid.spec
+        self.map = FleetMap(spec, run.rho)
+        outline = tuple((corner.x_m, corner.y_m) for corner in run.area)
+        self._inside = SurveyArea(outline, spec.frame.heading_rad).inside(spec)
+        self.vehicles = {entry.vehicle: _Vehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
+        helpers = [entry for entry in run.vehicles if entry.role is Role.REVISIT]
+        if helpers:
+            narrowest = min(helpers, key=lambda entry: entry.swath_m)
+            self._rules = CuttingRules(
+                swath_m=2 * narrowest.swath_m,
+                p_detect=narrowest.p_detect,
+                worth_risk=self.config.worth_risk,
+                overhead_m=math.pi * narrowest.turn_radius_m + 2 * narrowest.swath_m + 2 * narrowest.run_in_m,
+                min_strip_m=self.config.min_strip_m,
+                max_strip_m=self.config.max_strip_m,
+            )
+
+    def _take_tile(self, vehicle: str, incarnation: int, tile: CoverageTile) -> None:
+        assert self.map is not None
+        try:
+            self.map.take(
+                vehicle,
+                (incarnation, tile.version),
+                tile.first_row,
+                tile.first_column,
+                tile.sum_levels,
+                tile.largest_levels,
+                tile.settled,
+            )
+        except ValueError as error:
+            self._drop(vehicle, error)
+
+    def _drop(self, vehicle: str, why: object) -> None:
+        if vehicle not in self._complained_of:
+            self._complained_of.add(vehicle)
+            log.warning("dropped a message from %s: %s (said once)", vehicle, why)
+
+    def _take_hotspot(self, received: Received, message: Hotspot) -> None:
+        assert self.map is not None
+        place = (received.vehicle, int(received.key.rsplit("/", 1)[1]))
+        revision = (received.header.incarnation, message.revision)
+        known = self._hotspots.get(place)
+        if known is not None and revision <= known.revision:
+            return
+        cells = np.zeros(self.map.grid.shape, dtype=np.bool_)
+        if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
+            cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
+        self._hotspots[place] = _Hotspot(revision, message.mean_risk, cells)
+        self._to_cut = True
+
+    def _cells_within(self, outline: list[tuple[float, float]]) -> BoolArray:
+        assert self.map is not None
+        grid = self.map.grid
+        corners = np.asarray(outline)
+        across, along = grid.frame.to_sweep(corners[:, 0], corners[:, 1])
+        columns = np.flatnonzero((grid.across_m >= across.min()) & (grid.across_m <= across.max()))
+        rows = np.flatnonzero((grid.along_m >= along.min()) & (grid.along_m <= along.max()))
+        cells = np.zeros(grid.shape, dtype=np.bool_)
+        if columns.size and rows.size:
+            u, v = np.meshgrid(grid.across_m[columns], grid.along_m[rows])
+            shape = shapely.Polygon(np.column_stack([across, along]))
+            cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = shapely.contains_xy(shape, u, v)
+        return cells
+
+    def _take_state(self, vehicle: _Vehicle, state: AgentState, now_ms: int) -> None:
+        was_free = vehicle.state is not None and vehicle.state.mode is Mode.IDLE
+        vehicle.state = state
+        vehicle.heard_ms = now_ms
+        vehicle.lost = False
+        if state.mode is Mode.FINISHED and vehicle.finished_ms is None:
+            vehicle.finished_ms = now_ms
+            self._to_cut = True
+        if state.mode is Mode.IDLE and not was_free:
+            self._to_assign = True
+
+    def _take_status(self, vehicle: str, status: TaskStatus, now_ms: int) -> None:
+        record = self.ledger.get(status.strip)
+        if record is None or record.vehicle != vehicle or record.state not in WITH_A_VEHICLE:
+            return
+        match status.state:
+            case TaskState.ACCEPTED:
+                self._move(record, StripState.ACCEPTED, now_ms, "accepted", vehicle)
+            case TaskState.UNDER_WAY:
+                self._move(record, StripState.UNDER_WAY, now_ms, "under way", vehicle)
+            case TaskState.REFUSED:
+                self.vehicles[vehicle].refused.add(status.strip)
+                self._move(record, StripState.OPEN, now_ms, f"{vehicle} refused: {status.reason}")
+                self._to_assign = True
+            case TaskState.GIVEN_BACK:
+                self._move(record, StripState.OPEN, now_ms, f"given back by {vehicle}")
+                self._to_cut = True
+            case TaskState.FAILED:
+                self._move(record, StripState.FAILED, now_ms, f"{vehicle} failed: {status.reason}", vehicle)
+                self._to_cut = True
+            case TaskState.DONE:
+                self._take_done(record, vehicle, now_ms)
+
+    def _take_done(self, record: StripRecord, vehicle: str, now_ms: int) -> None:
+        """The map decides whether a strip is done, not the word; what is left is cut anew."""
+        assert self.map is not None
+        layer = self.map.layers.get(vehicle)
+        cells = self._inside[record.window.cells]
+        seen = layer.sum_levels[record.window.cells] > 0 if layer is not None else np.zeros_like(cells)
+        share = float(seen[cells].mean()) if cells.any() else 1.0
+        if share >= COVERED_SHARE:
+            self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {vehicle}", vehicle)
+        else:
+            self._move(record, StripState.FAILED, now_ms, f"{vehicle} says done, but saw {share:.0%} of it", vehicle)
+        self._to_cut = True
+
+    def _find_lost(self, now_ms: int) -> None:
+        for name, vehicle in self.vehicles.items():
+            if vehicle.lost or now_ms - vehicle.heard_ms < self.config.lost_after_ms:
+                continue
+            vehicle.lost = True
+            if vehicle.entry.role is Role.SURVEY and vehicle.finished_ms is None:
+                vehicle.finished_ms = now_ms
+            for record in self.ledger.in_state(*WITH_A_VEHICLE):
+                if record.vehicle == name:
+                    self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
+                    self._to_cut = True
+        for record in self.ledger.in_state(StripState.OFFERED):
+            if now_ms - record.since_ms >= ANSWER_WITHIN_MS:
+                self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
+                self._to_assign = True
+
+    def _cut(self, now_ms: int) -> None:
+        assert self.map is not None
+        if self._rules is None:
+            return
+        grid = self.map.grid
+        risk = self._risk_to_serve()
+        for record in self.ledger.in_state(*WITH_A_VEHICLE):
+            risk[record.window.cells] *= 1.0 - self._rules.p_detect
+        primaries = [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
+        open_cells = self._inside & ~self.map.settled_by(primaries)
+        unmatched = self.ledger.in_state(StripState.OPEN)
+        for cut in cut_strips(grid, risk, open_cells, self._rules):
+            same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
+            if same is None or same.window.overlap(cut.window) < SAME_STRIP:
+                number = self.ledger.next_number
+                record = self.ledger.open(
+                    strip_of(grid, cut.window, number), cut.window, cut.removable_m2, now_ms, "badly seen"
+                )
+                self._publish_strip(record)
+            else:
+                unmatched.remove(same)
+                self._revise(same, cut)
+        for record in unmatched:
+            self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
+
+    def _risk_to_serve(self) -> FloatArray:
+        """Residual risk where there are hotspots: the joined map's where tiles have come, else the hotspot's mean."""
+        assert self.map is not None
+        seen = self.map.seen()
+        primaries = [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
+        known = seen | self.map.settled_by(primaries)
+        risk = np.zeros(self.map.grid.shape)
+        for hotspot in self._hotspots.values():
+            cells = hotspot.cells & self._inside
+            np.maximum(risk, np.where(known, self.map.risk, hotspot.mean_risk), out=risk, where=cells)
+        return risk
+
+    def _revise(self, record: StripRecord, cut: Cut) -> None:
+        assert self.map is not None
+        same_place = record.window == cut.window
+        if same_place and abs(cut.removable_m2 - record.removable_m2) <= WORTH_SAYING * record.removable_m2:
+            return
+        strip = strip_of(self.map.grid, cut.window, record.strip.number)
+        self.ledger.revise(record, strip, cut.window, cut.removable_m2)
+        for vehicle in self.vehicles.values():
+            vehicle.refused.discard(strip.number)
+        self._publish_strip(record)
+
+    def _assign(self, now_ms: int) -> None:
+        strips = [OpenStrip(record.strip, record.removable_m2) for record in self.ledger.in_state(StripState.OPEN)]
+        helpers = [helper for name in self.vehicles if (helper := self._free_helper(name, now_ms)) is not None]
+        if not strips or not helpers:
+            return
+        for vehicle, number in sorted(self.config.allocator.assign(strips, helpers).items()):
+            record = self.ledger.get(number)
+            assert record is not None
+            self._tasks += 1
+            strip = record.strip
+            task = Task(TaskAction.TAKE, number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
+            self._outbox.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
+            self._move(record, StripState.OFFERED, now_ms, f"offered to {vehicle}", vehicle)
+
+    def _free_helper(self, name: str, now_ms: int) -> FreeHelper | None:
+        vehicle = self.vehicles[name]
+        state, entry = vehicle.state, vehicle.entry
+        if entry.role is not Role.REVISIT or vehicle.lost or state is None or state.mode is not Mode.IDLE:
+            return None
+        if any(record.vehicle == name for record in self.ledger.in_state(*WITH_A_VEHICLE)):
+            return None
+        return FreeHelper(
+            vehicle=name,
+            x_m=state.x_m,
+            y_m=state.y_m,
+            heading_rad=state.heading_rad,
+            speed_mps=entry.speed_mps,
+            turn_radius_m=entry.turn_radius_m,
+            run_in_m=entry.run_in_m,
+            lasts_s=state.battery * entry.endurance_ms / 1000,
+            refused=frozenset(vehicle.refused),
+        )
+
+    def _find_end(self, now_ms: int) -> None:
+        ends = [one.finished_ms for one in self.vehicles.values() if one.entry.role is Role.SURVEY]
+        if any(end is None for end in ends):
+            return
+        left = len(self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE))
+        if left == 0:
+            reason = "every primary has finished and no strip is left"
+        elif now_ms >= self._deadline_ms():
+            reason = f"{self.config.deadline_factor:g} times the last primary's end is reached, {left} strips are left"
+        else:
+            return
+        self._over = True
+        self._outbox.append(Publication(MISSION_OVER.key(), MissionOver(reason)))
+
+    def _deadline_ms(self) -> int:
+        ends = [one.finished_ms or 0 for one in self.vehicles.values() if one.entry.role is Role.SURVEY]
+        return math.ceil(max(ends) * self.config.deadline_factor)
+
+    def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
+        if record.state is not state and self.ledger.move(record, state, now_ms, reason, vehicle):
+            self._publish_strip(record)
+
+    def _publish_strip(self, record: StripRecord) -> None:
+        strip = record.strip
+        message = StripStatus(
+            revision=record.revision,
+            state=record.state,
+            start_x_m=strip.start[0],
+            start_y_m=strip.start[1],
+            heading_rad=strip.heading_rad,
+            length_m=strip.length_m,
+            width_m=strip.width_m,
+            removable_m2=record.removable_m2,
+            vehicle=record.vehicle,
+            reason=record.reason[:200],
+        )
+        self._outbox.append(Publication(STRIP.key(number=strip.number), message))
+
+    def _step(self, now_ms: int) -> Step:
+        published = tuple(self._outbox)
+        self._outbox.clear()
+        return Step(published, self._next_wake_ms(now_ms))
+
+    def _next_wake_ms(self, now_ms: int) -> int | None:
+        if self.map is None or self._over:
+            return None
+        if self._to_cut or self._to_assign:
+            return now_ms + 1
+        times = [
+            one.heard_ms + self.config.lost_after_ms
+            for one in self.vehicles.values()
+            if not one.lost
+        ]
+        times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
+        if all(one.finished_ms is not None for one in self.vehicles.values() if one.entry.role is Role.SURVEY):
+            times.append(self._deadline_ms())
+        return min((max(time_ms, now_ms + 1) for time_ms in times), default=None)

@@ -1,0 +1,85 @@
+"""The ledger of strips: each has one state at a time, and each change a reason. Nothing is ever taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from comms.messages import StripState
+from coordinator.strips import Window
+from planner.types import Strip
+
+WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
+ENDED = frozenset({StripState.DONE, StripState.FAILED, StripState.WITHDRAWN})
+_ALLOWED: dict[StripState, frozenset[StripState]] = {
+    StripState.OPEN: frozenset({StripState.OPEN, StripState.OFFERED, StripState.WITHDRAWN}),
+    StripState.OFFERED: frozenset(
+        {StripState.ACCEPTED, StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}
+    ),
+    StripState.ACCEPTED: frozenset({StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}),
+    StripState.UNDER_WAY: frozenset({StripState.OPEN, StripState.DONE, StripState.FAILED}),
+    StripState.DONE: frozenset(),
+    StripState.FAILED: frozenset(),
+    StripState.WITHDRAWN: frozenset(),
+}
+
+
+@dataclass
+class StripRecord:
+    """One strip: where it is, what it is worth, how it stands, with whom, since when and why."""
+
+    strip: Strip
+    window: Window
+    removable_m2: float
+    state: StripState
+    revision: int
+    vehicle: str
+    since_ms: int
+    reason: str
+
+
+class Ledger:
+    """All strips of a mission by number, counted from 1."""
+
+    def __init__(self) -> None:
+        self._records: dict[int, StripRecord] = {}
+
+    def __iter__(self) -> Iterator[StripRecord]:
+        return iter(self._records.values())
+
+    def get(self, number: int) -> StripRecord | None:
+        """A strip's record, None for a number that was never given."""
+        return self._records.get(number)
+
+    @property
+    def next_number(self) -> int:
+        """The number of the next new strip."""
+        return len(self._records) + 1
+
+    def open(self, strip: Strip, window: Window, removable_m2: float, now_ms: int, reason: str) -> StripRecord:
+        """Enters a new strip, which has the next number."""
+        if strip.number != self.next_number:
+            raise ValueError(f"strip {strip.number} cannot be opened: the next number is {self.next_number}")
+        record = StripRecord(strip, window, removable_m2, StripState.OPEN, 1, "", now_ms, reason)
+        self._records[strip.number] = record
+        return record
+
+    def revise(self, record: StripRecord, strip: Strip, window: Window, removable_m2: float) -> None:
+        """Changes where an open strip is and what it is worth."""
+        if record.state is not StripState.OPEN:
+            raise ValueError(f"strip {record.strip.number} is {record.state.value}: only an open one can be revised")
+        record.strip, record.window, record.removable_m2 = strip, window, removable_m2
+        record.revision += 1
+
+    def move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> bool:
+        """Moves a strip to a state; returns False, and changes nothing, where its present state does not allow it."""
+        if state not in _ALLOWED[record.state]:
+            return False
+        record.state, record.since_ms, record.reason = state, now_ms, reason
+        record.vehicle = vehicle if state in WITH_A_VEHICLE or state in ENDED else ""
+        record.revision += 1
+        return True
+
+    def in_state(self, *states: StripState) -> list[StripRecord]:
+        """Records in one of these states, by number."""
+        return [record for record in self._records.values() if record.state in states]

@@ -1,0 +1,137 @@
+"""Cuts strips: rectangles along the tracks, as wide as the helper's swath, where a second look removes the most risk.
+
+The risk that one look would remove is summed over every window as wide as the swath; along the window each metre has to
+pay for the time it takes. The best window becomes a strip, its cells count as looked at, and the search goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
+
+MOST_STRIPS_A_CUT = 100
+
+
+@dataclass(frozen=True)
+class CuttingRules:
+    """`swath_m`: the helper's full swath; `p_detect`: its P_d there. `worth_risk`: mean residual risk over the swath
+    from which a further metre is worth flying. `overhead_m`: what getting to a strip costs, in metres flown."""
+
+    swath_m: float
+    p_detect: float
+    worth_risk: float
+    overhead_m: float
+    min_strip_m: float
+    max_strip_m: float
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of whole cells: rows [first_row, end_row), columns [first_column, end_column)."""
+
+    first_row: int
+    end_row: int
+    first_column: int
+    end_column: int
+
+    @property
+    def cells(self) -> tuple[slice, slice]:
+        """The window of the grid's arrays."""
+        return slice(self.first_row, self.end_row), slice(self.first_column, self.end_column)
+
+    def overlap(self, other: Window) -> float:
+        """Shared cells as a share of the cells of both together."""
+        rows = min(self.end_row, other.end_row) - max(self.first_row, other.first_row)
+        columns = min(self.end_column, other.end_column) - max(self.first_column, other.first_column)
+        shared = max(rows, 0) * max(columns, 0)
+        return shared / (self._size + other._size - shared)
+
+    @property
+    def _size(self) -> int:
+        return (self.end_row - self.first_row) * (self.end_column - self.first_column)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A strip's window and the risk that one look along it is expected to remove (residual risk times m2)."""
+
+    window: Window
+    removable_m2: float
+
+
+def cut_strips(grid: GridSpec, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules) -> list[Cut]:
+    """The strips worth flying, best first.
+
+    `risk`: residual risk of the cells that a strip may serve, 0 elsewhere. `open_cells`: inside the area and not
+    settled; a strip that still grows towards such cells is left for later, unless it is as long as a strip may be.
+    """
+    width = min(grid.columns, max(1, round(rules.swath_m / grid.cell_m)))
+    removable = risk * (rules.p_detect * grid.cell_area_m2)
+    row_cost = rules.worth_risk * rules.p_detect * rules.swath_m * grid.cell_m
+    fixed_cost = row_cost * rules.overhead_m / grid.cell_m
+    shortest = max(1, round(rules.min_strip_m / grid.cell_m))
+    longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
+    profit = _window_sums(removable, width) - row_cost
+    touched = _window_sums(open_cells.astype(np.float64), width) > 0
+    cuts: list[Cut] = []
+    for _ in range(MOST_STRIPS_A_CUT):
+        value, first_row, end_row = _best_runs(profit)
+        column = int(value.argmax())
+        if value[column] <= fixed_cost:
+            break
+        rows = (int(first_row[column]), int(end_row[column]))
+        grows = _touches(touched[:, column], rows)
+        for begin, end in _pieces(*rows, longest):
+            window = Window(begin, end, column, column + width)
+            long_enough = end - begin >= (longest if grows else shortest)
+            if long_enough:
+                cuts.append(Cut(window, float(removable[window.cells].sum())))
+            # Looked at, left for later or too short: either way the search goes on elsewhere.
+            removable[window.cells] *= (1.0 - rules.p_detect) if long_enough else 0.0
+        near = slice(max(0, column - width + 1), column + width)
+        profit[:, near] = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
+    return cuts
+
+
+def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
+    """The rectangle of a window, with its centre line along the grid."""
+    across_m = ((window.first_column + window.end_column - 1) / 2) * grid.cell_m
+    x_m, y_m = grid.frame.to_mission(across_m, window.first_row * grid.cell_m)
+    start: Point = (float(x_m), float(y_m))
+    length_m = (window.end_row - window.first_row) * grid.cell_m
+    width_m = (window.end_column - window.first_column) * grid.cell_m
+    return Strip(number, start, grid.frame.heading_rad, length_m, width_m)
+
+
+def _window_sums(values: FloatArray, width: int) -> FloatArray:
+    """Sums over `width` neighbouring columns, shape (rows, columns - width + 1)."""
+    total = np.zeros((values.shape[0], values.shape[1] + 1))
+    np.cumsum(values, axis=1, out=total[:, 1:])
+    return total[:, width:] - total[:, :-width]
+
+
+def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """For each window the run of rows with the largest sum: the sum, its first row, the row behind its last."""
+    total = np.zeros((profit.shape[0] + 1, profit.shape[1]))
+    np.cumsum(profit, axis=0, out=total[1:])
+    lowest_before = np.minimum.accumulate(total, axis=0)
+    gain = total - lowest_before
+    end_row = gain.argmax(axis=0)
+    value = np.take_along_axis(gain, end_row[np.newaxis], axis=0)[0]
+    lowest = np.take_along_axis(lowest_before, end_row[np.newaxis], axis=0)
+    first_row = (total == lowest).argmax(axis=0)
+    return value, first_row, end_row
+
+
+def _touches(touched: BoolArray, rows: tuple[int, int]) -> bool:
+    first, end = rows
+    return bool(touched[max(0, first - 1) : min(touched.size, end + 1)].any())
+
+
+def _pieces(first: int, end: int, longest: int) -> list[tuple[int, int]]:
+    count = -(-(end - first) // longest)
+    edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
+    return list(zip(edges[:-1], edges[1:], strict=True))

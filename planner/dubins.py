@@ -1,0 +1,187 @@
+"""Shortest paths between two poses for a vehicle with a turn radius (L. E. Dubins, 1957).
+
+A shortest path has three stretches, each a turn at full rudder or straight: turn, straight, turn; or three turns to
+alternating sides. Closed form after Shkel and Lumelsky, Classification of the Dubins set, 2001.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from planner.types import FloatArray
+
+_FULL_TURN_RAD = 2 * math.pi
+_ANGLE_TOLERANCE_RAD = 1e-10
+"""A turn that is short of a full one by no more is none: rounding must not add a loop to a path."""
+_TOLERANCE = 1e-9
+"""In turn radii: what differs by no more is decided by the order of the words, not by rounding."""
+
+
+class Pose(NamedTuple):
+    """A position in the mission frame and a compass heading in radians."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+
+
+@dataclass(frozen=True)
+class DubinsPath:
+    """A path of three stretches, any of which may have no length.
+
+    `turns` holds for each stretch -1 for a turn to port, +1 for one to starboard, 0 for straight ahead; `lengths_m`
+    its length along the path. `turn_radius_m` > 0.
+    """
+
+    start: Pose
+    turn_radius_m: float
+    turns: tuple[int, int, int]
+    lengths_m: tuple[float, float, float]
+
+    @property
+    def length_m(self) -> float:
+        """Length of the whole path."""
+        return sum(self.lengths_m)
+
+    def pose_at(self, distance_m: float) -> Pose:
+        """The pose at a distance along the path; beyond either end, the pose at that end.
+
+        The heading lies in [0, 2 pi).
+        """
+        left_m = max(distance_m, 0.0)
+        pose = self.start
+        for turn, length_m in zip(self.turns, self.lengths_m, strict=True):
+            pose = _advance(pose, turn / self.turn_radius_m, min(left_m, length_m))
+            left_m -= length_m
+            if left_m <= 0:
+                break
+        return pose._replace(heading_rad=_turn(pose.heading_rad))
+
+    def poses_at(self, distances_m: FloatArray) -> FloatArray:
+        """The poses at distances along the path, shape (n,); beyond either end, the pose at that end.
+
+        Returns:
+            Shape (n, 3): x_m, y_m and heading_rad, in [0, 2 pi).
+        """
+        ends_m = np.cumsum(self.lengths_m)
+        along_m = np.clip(distances_m, 0.0, ends_m[-1])
+        stretch = np.minimum(np.searchsorted(ends_m, along_m), 2)
+        start = np.array(self._stretch_starts)[stretch]
+        length_m = along_m - (ends_m - self.lengths_m)[stretch]
+        turned_rad = np.array(self.turns)[stretch] * length_m / self.turn_radius_m
+        # The chord of an arc, and of a straight stretch alike.
+        chord_m = length_m * np.sinc(turned_rad / _FULL_TURN_RAD)
+        chord_heading_rad = start[:, 2] + turned_rad / 2
+        return np.column_stack(
+            [
+                start[:, 0] + chord_m * np.sin(chord_heading_rad),
+                start[:, 1] + chord_m * np.cos(chord_heading_rad),
+                _compass(start[:, 2] + turned_rad),
+            ]
+        )
+
+    @cached_property
+    def _stretch_starts(self) -> tuple[Pose, Pose, Pose]:
+        """The pose in which each stretch begins, headings not wrapped."""
+        second = _advance(self.start, self.turns[0] / self.turn_radius_m, self.lengths_m[0])
+        return self.start, second, _advance(second, self.turns[1] / self.turn_radius_m, self.lengths_m[1])
+
+
+def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
+    """The shortest path from one pose to another for a vehicle that only goes ahead.
+
+    Of two paths equally long the one that first turns to port is taken.
+
+    Args:
+        start: where the path begins.
+        end: where it ends; any compass headings.
+        turn_radius_m: the tightest turn, > 0.
+
+    Raises:
+        ValueError: a number is not finite, or the turn radius not above 0.
+    """
+    if not (all(map(math.isfinite, (*start, *end, turn_radius_m))) and turn_radius_m > 0):
+        raise ValueError(
+            f"a path needs finite poses and a turn radius above 0, not {start}, {end} and {turn_radius_m} m"
+        )
+    dx_m, dy_m = end.x_m - start.x_m, end.y_m - start.y_m
+    distance = math.hypot(dx_m, dy_m) / turn_radius_m
+    bearing_rad = math.atan2(dx_m, dy_m)
+    # Headings against the line from start to end, counted to port.
+    alpha, beta = bearing_rad - start.heading_rad, bearing_rad - end.heading_rad
+    best, turns, arcs = math.inf, (-1, 0, -1), (0.0, 0.0, 0.0)
+    for side in (-1, 1):
+        for total, middle, last, word in _words(distance, -side * alpha, -side * beta):
+            if total < best - _TOLERANCE:
+                best, turns, arcs = total, (side, side * middle, side * last), word
+    first, second, third = arcs
+    return DubinsPath(
+        start, turn_radius_m, turns, (first * turn_radius_m, second * turn_radius_m, third * turn_radius_m)
+    )
+
+
+def _words(distance: float, alpha: float, beta: float) -> Iterator[tuple[float, int, int, tuple[float, float, float]]]:
+    """The candidates that begin with a turn to port, for a turn radius of 1.
+
+    The end lies at `distance` along the x axis; `alpha` and `beta` are the headings at start and end, in radians
+    counterclockwise from that axis.
+
+    Yields:
+        Total length; the second and third stretch's turn (1: as the first one, -1: to the other side, 0: straight);
+        the lengths of the three stretches.
+    """
+    sin_a, cos_a, sin_b, cos_b = math.sin(alpha), math.cos(alpha), math.sin(beta), math.cos(beta)
+
+    # From the centre of the first turn to that of a last turn to the same side.
+    x, y = distance + sin_a - sin_b, cos_b - cos_a
+    between = math.hypot(x, y)
+    if between < _TOLERANCE:
+        first, straight, last = _turn(beta - alpha), 0.0, 0.0
+    else:
+        direction = math.atan2(y, x)
+        first, straight, last = _turn(direction - alpha), between, _turn(beta - direction)
+    yield first + straight + last, 0, 1, (first, straight, last)
+    if _TOLERANCE <= between <= 4:
+        middle = _FULL_TURN_RAD - 2 * math.asin(between / 4)
+        first = _turn(direction - alpha + middle / 2)
+        last = _turn(beta - alpha - first + middle)
+        yield first + middle + last, -1, 1, (first, middle, last)
+
+    # To that of a last turn to the other side.
+    x, y = distance + sin_a + sin_b, -cos_a - cos_b
+    straight_squared = x * x + y * y - 4
+    if straight_squared >= -_TOLERANCE:
+        straight = math.sqrt(max(straight_squared, 0.0))
+        direction = math.atan2(y, x) + math.atan2(2, straight)
+        first, last = _turn(direction - alpha), _turn(direction - beta)
+        yield first + straight + last, 0, -1, (first, straight, last)
+
+
+def _turn(angle_rad: float) -> float:
+    """An angle wrapped to [0, 2 pi), just short of a full turn taken as none."""
+    angle_rad %= _FULL_TURN_RAD
+    return 0.0 if _FULL_TURN_RAD - angle_rad < _ANGLE_TOLERANCE_RAD else angle_rad
+
+
+def _compass(heading_rad: FloatArray) -> FloatArray:
+    """Headings wrapped to [0, 2 pi); the remainder of a tiny negative angle rounds to a full turn."""
+    wrapped = heading_rad % _FULL_TURN_RAD
+    return np.where(wrapped == _FULL_TURN_RAD, 0.0, wrapped)
+
+
+def _advance(pose: Pose, curvature: float, length_m: float) -> Pose:
+    """The pose after a stretch of constant curvature (1/m, to starboard), the heading not wrapped."""
+    half_rad = curvature * length_m / 2
+    chord_m = length_m if half_rad == 0 else length_m * math.sin(half_rad) / half_rad
+    chord_heading_rad = pose.heading_rad + half_rad
+    return Pose(
+        pose.x_m + chord_m * math.sin(chord_heading_rad),
+        pose.y_m + chord_m * math.cos(chord_heading_rad),
+        pose.heading_rad + 2 * half_rad,
+    )

@@ -1,0 +1,105 @@
+"""The program of a child process: it is told by its launcher what to hold, and holds it until the run has ended.
+
+Standard input: the length and the pickle of a `ChildOrder`, then, but for the hub, one line with the hub's endpoint; it
+stays open as long as the launcher lives, and the child ends when it closes. The file descriptor named in
+SECONDLOOK_STATUS_FD: one JSON object a line for the launcher.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any, BinaryIO
+
+from comms.access import access_rules
+from comms.clock import RunawayError
+from comms.control import RunKeys
+from comms.routing import Routing
+from comms.runner import NodeError
+from comms.zenoh_host import ListenerHost, serve_nodes
+from comms.zenoh_hub import FleetError, Hub
+from comms.zenoh_session import ConnectionFailedError, open_client, open_hub
+from secondlook.child_order import STATUS_FD, ChildOrder, read_order
+
+ORPHANED = 3  # exit code when the launcher is gone
+
+
+def main() -> int:
+    """Holds what the order says; returns the exit code."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher alone decides what an interrupt means
+    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s")
+    status = os.fdopen(int(os.environ[STATUS_FD]), "w", buffering=1)
+
+    def tell(**words: Any) -> None:
+        status.write(json.dumps(words) + "\n")
+
+    order = read_order(sys.stdin.buffer)
+    try:
+        if order.is_hub:
+            _be_hub(order, tell)
+        elif order.is_listener:
+            _be_listener(order)
+        else:
+            _be_host(order)
+    except (NodeError, FleetError, RunawayError, ConnectionFailedError) as error:
+        tell(failed=str(error))
+        return 1
+    return 0
+
+
+def _read_endpoint(pipe: BinaryIO) -> str:
+    line = pipe.readline()
+    if not line:
+        os._exit(ORPHANED)
+    return line.decode().strip()
+
+
+def _when_launcher_goes(act: Callable[[], None]) -> None:
+    def wait() -> None:
+        # Not through sys.stdin: a thread blocked inside its buffer would break the interpreter's shutdown.
+        while os.read(sys.stdin.fileno(), 1):
+            pass
+        act()
+
+    threading.Thread(target=wait, daemon=True).start()
+
+
+def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
+    assert order.run_info is not None
+    _when_launcher_goes(lambda: os._exit(ORPHANED))
+    routing, keys = Routing(order.roster), RunKeys(order.run)
+    session, endpoint = open_hub(order.passwords, access_rules(routing, order.hosts, keys))
+    with session:
+        tell(endpoint=endpoint)
+        nodes = {node_id: spec.make() for node_id, spec in order.specs.items()}
+        hub = Hub(session, keys, routing, order.hosts, nodes, order.time_limit_ms)
+        result = hub.run(order.run_info)
+        tell(result={**asdict(result), "ending": result.ending.value})
+
+
+def _be_host(order: ChildOrder) -> None:
+    nodes = {node_id: spec.make() for node_id, spec in order.specs.items()}
+    endpoint = _read_endpoint(sys.stdin.buffer)
+    _when_launcher_goes(lambda: os._exit(ORPHANED))
+    with open_client(endpoint, order.host, order.password) as session:
+        serve_nodes(session, RunKeys(order.run), order.host, nodes, Routing(order.roster))
+
+
+def _be_listener(order: ChildOrder) -> None:
+    (node_id, spec), *_ = order.specs.items()
+    listener = spec.make()
+    endpoint = _read_endpoint(sys.stdin.buffer)
+    with open_client(endpoint, order.host, order.password) as session:
+        host = ListenerHost(session, RunKeys(order.run), order.host, node_id, listener, Routing(order.roster))
+        _when_launcher_goes(host.interrupt)
+        host.run()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

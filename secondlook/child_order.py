@@ -1,0 +1,46 @@
+"""What a child process is told to hold, and how the order gets to it."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass, field
+from typing import BinaryIO
+
+from comms.control import HostPlan
+from comms.messages import RunInfo
+from comms.routing import RosterNode
+from secondlook.node_spec import NodeSpec
+
+STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor for words to the launcher
+
+
+@dataclass(frozen=True)
+class ChildOrder:
+    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock."""
+
+    run: str
+    host: str
+    password: str
+    roster: tuple[RosterNode, ...]
+    specs: dict[str, NodeSpec]
+    is_hub: bool = False
+    is_listener: bool = False
+    hosts: tuple[HostPlan, ...] = ()
+    passwords: dict[str, str] = field(default_factory=dict)
+    run_info: RunInfo | None = None
+    time_limit_ms: int = 0
+
+
+def write_order(pipe: BinaryIO, order: ChildOrder) -> None:
+    """Sends an order to a child's standard input."""
+    pickled = pickle.dumps(order)
+    pipe.write(len(pickled).to_bytes(8, "big") + pickled)
+    pipe.flush()
+
+
+def read_order(pipe: BinaryIO) -> ChildOrder:
+    """Waits for the launcher's order."""
+    size = int.from_bytes(pipe.read(8), "big")
+    order = pickle.loads(pipe.read(size))  # noqa: S301 - comes from the launcher that started this process
+    assert isinstance(order, ChildOrder)
+    return order

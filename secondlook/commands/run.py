@@ -1,0 +1,79 @@
+"""`secondlook run`: fly a mission."""
+
+from __future__ import annotations
+
+import json
+import sys
+from datetime import datetime
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from secondlook.errors import UserError
+from secondlook.mission import RunOptions, run_mission
+from secondlook.processes import RunFailedError
+from secondlook.run_display import closing_table, progress_display
+from secondlook.scenario import load_scenario
+
+MISSION_FAILED = 1
+
+
+class BusName(StrEnum):
+    """How the nodes' messages travel."""
+
+    zenoh = "zenoh"
+    local = "local"
+
+
+def run(
+    scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")] = "tellaro",
+    out: Annotated[Path | None, typer.Option(help="Folder for the files of the run, new or empty.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Of everything random in the mission.")] = None,
+    bus: Annotated[BusName, typer.Option(help="Real processes over Zenoh, or all in this process.")] = BusName.zenoh,
+    processes: Annotated[
+        int | None, typer.Option(min=1, help="Over how many processes the nodes are spread; one each if left out.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
+    ] = None,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Without recording and messages.mpk.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
+) -> None:
+    """Fly a mission, and write what happened."""
+    mission = load_scenario(scenario, set_ or (), seed)
+    folder = _folder(out, mission.name)
+    with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
+        options = RunOptions(folder, bus.value, processes, record=not no_record, progress=progress)
+        try:
+            summary = run_mission(mission, options)
+        except RunFailedError as error:
+            failure = str(error)
+        else:
+            failure = ""
+    if failure:
+        sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
+        raise typer.Exit(MISSION_FAILED)
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+    else:
+        closing_table(summary, folder)
+
+
+def _folder(out: Path | None, name: str) -> Path:
+    if out is None:
+        stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+        out = next(
+            path
+            for path in (Path("runs") / f"{name}-{stamp}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
+            if not path.exists()
+        )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        taken = next(out.iterdir(), None)
+    except OSError as error:
+        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
+    if taken is not None:
+        raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
+    return out

@@ -1,0 +1,172 @@
+"""From a scenario to a fleet: the nodes with their configurations, who is who, and the run's announcement."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from comms.codec import SCHEMA_VERSION
+from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
+from comms.routing import RosterNode
+from coordinator.allocation import Allocator, GreedyAllocator, NoAllocator
+from coordinator.config import CoordinatorConfig
+from planner.area import SurveyArea
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
+from secondlook.node_spec import NodeSpec
+from secondlook.scenario import (
+    PatchySeabed,
+    RevisitVehicle,
+    Scenario,
+    SurveyVehicle,
+    scenario_hash,
+)
+from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
+from vehicle_agent.config import RevisitConfig, SurveyConfig
+
+ALLOCATORS: dict[str, Allocator] = {"greedy": GreedyAllocator(), "none": NoAllocator()}
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """A fleet ready to be run. `roster`: every node, clock, recorder and observer included. `specs`: how to make the
+    acting nodes, by node id."""
+
+    run_info: RunInfo
+    roster: tuple[RosterNode, ...]
+    specs: dict[str, NodeSpec]
+    time_limit_ms: int
+
+
+def build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
+    """The fleet of a scenario; `record`: with a recorder."""
+    area = SurveyArea(scenario.area.polygon_m, math.radians(scenario.area.track_heading_deg))
+    grid = area.grid(scenario.area.cell_m)
+    run_info = RunInfo(
+        schema=SCHEMA_VERSION,
+        scenario=scenario.name,
+        scenario_sha256=scenario_hash(scenario),
+        seed=scenario.seed,
+        mode=ClockMode.LOCKSTEP,
+        area=tuple(Vertex(x_m, y_m) for x_m, y_m in scenario.area.polygon_m),
+        grid=Grid(
+            grid.frame.origin_x_m,
+            grid.frame.origin_y_m,
+            grid.frame.heading_rad,
+            grid.cell_m,
+            grid.columns,
+            grid.rows,
+        ),
+        rho=scenario.mission.rho,
+        vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+    )
+    roster = [
+        RosterNode("clock", Role.CLOCK),
+        RosterNode("world", Role.WORLD, tuple(scenario.vehicles)),
+        *(RosterNode(name, _role(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
+        RosterNode("coordinator", Role.COORDINATOR),
+        *([RosterNode("recorder", Role.RECORDER)] if record else []),
+        RosterNode("observer", Role.OBSERVER),
+    ]
+    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))}
+    for name, vehicle in scenario.vehicles.items():
+        specs[name] = _agent_spec(name, vehicle)
+    specs["coordinator"] = NodeSpec("coordinator.coordinator:Coordinator", _coordinator_config(scenario))
+    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000))
+
+
+def _role(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
+    return Role.SURVEY if isinstance(vehicle, SurveyVehicle) else Role.REVISIT
+
+
+def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
+    curve = vehicle.sensor.detection_curve(vehicle.nadir_gap_m)
+    return RosterVehicle(
+        vehicle=name,
+        role=_role(vehicle),
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        run_in_m=vehicle.run_in_m,
+        nadir_gap_m=vehicle.nadir_gap_m,
+        swath_m=vehicle.sensor.reach_m,
+        p_detect=float(curve.p_detect.max()),
+        endurance_ms=round(vehicle.endurance_s * 1000),
+    )
+
+
+def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
+    endurance_ms = round(vehicle.endurance_s * 1000)
+    if isinstance(vehicle, RevisitVehicle):
+        config = RevisitConfig(
+            vehicle=name,
+            swath_m=2 * vehicle.sensor.reach_m,
+            speed_mps=vehicle.speed_mps,
+            turn_radius_m=vehicle.turn_radius_m,
+            run_in_m=vehicle.run_in_m,
+            endurance_ms=endurance_ms,
+        )
+        return NodeSpec("vehicle_agent.revisit:RevisitAgent", config)
+    spacing: SpacingPlanner = (
+        AdaptiveSpacing(vehicle.nadir_gap_m, vehicle.range_m)
+        if vehicle.spacing == "adaptive"
+        else FixedSpacing(vehicle.nadir_gap_m, vehicle.range_m)
+    )
+    survey = SurveyConfig(
+        vehicle=name,
+        spacing=spacing,
+        nadir_gap_m=vehicle.nadir_gap_m,
+        range_m=vehicle.range_m,
+        threshold=vehicle.threshold,
+        hotspot_risk=vehicle.hotspot_risk,
+        run_in_m=vehicle.run_in_m,
+        endurance_ms=endurance_ms,
+    )
+    return NodeSpec("vehicle_agent.survey:SurveyAgent", survey)
+
+
+def _world_config(scenario: Scenario) -> WorldConfig:
+    seabed = scenario.seabed
+    return WorldConfig(
+        seed=scenario.seed,
+        area=tuple(scenario.area.polygon_m),
+        vehicles=tuple(_body(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        seabed=(
+            SeabedConfig(
+                "patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength
+            )
+            if isinstance(seabed, PatchySeabed)
+            else SeabedConfig()
+        ),
+        targets=TargetsConfig(scenario.targets.count),
+    )
+
+
+def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
+    sensor = vehicle.sensor
+    return VehicleConfig(
+        vehicle=name,
+        start_x_m=vehicle.start.x_m,
+        start_y_m=vehicle.start.y_m,
+        start_heading_rad=math.radians(vehicle.start.heading_deg),
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        altitude_m=vehicle.altitude_m,
+        sensor=SensorConfig(
+            curve=sensor.detection_curve(vehicle.nadir_gap_m),
+            along_bin_m=sensor.along_bin_m,
+            range_bin_m=sensor.range_bin_m,
+            look_m=sensor.look_m,
+            noise_cell=sensor.noise_cell,
+            noise_track=sensor.noise_track,
+        ),
+    )
+
+
+def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
+    return CoordinatorConfig(
+        allocator=ALLOCATORS[scenario.coordinator.allocator],
+        deadline_factor=scenario.mission.deadline_factor,
+        lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
+        min_strip_m=scenario.coordinator.min_strip_m,
+        max_strip_m=scenario.coordinator.max_strip_m,
+        worth_risk=scenario.coordinator.worth_risk,
+    )

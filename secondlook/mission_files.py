@@ -1,0 +1,69 @@
+"""The files that hold a mission's messages: messages.mpk for programs, events.jsonl for people."""
+
+from __future__ import annotations
+
+import enum
+import json
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO, Self, TextIO
+
+import msgpack
+import numpy as np
+
+from comms.codec import SCHEMA_VERSION
+from comms.node import Received
+from comms.topics import COVERAGE, LOOK, NAV
+
+FILE_FORMAT = "secondlook-messages"
+NOT_FOR_PEOPLE = (LOOK, COVERAGE, NAV)  # looks and tiles are arrays, positions are better drawn
+
+
+class MissionFiles:
+    """Writes both files as the messages come; what was written stays readable if the run is cut off.
+
+    `messages.mpk` is a stream of MessagePack values: first `[format, schema version]`, then `[key, payload]` for each
+    message. `events.jsonl` has one JSON object a line: time, key and fields.
+    """
+
+    def __init__(self, folder: Path, *, with_messages: bool) -> None:
+        self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
+        self._messages: BinaryIO | None = (folder / "messages.mpk").open("wb") if with_messages else None
+        self._pack = msgpack.Packer().pack
+        if self._messages is not None:
+            self._messages.write(self._pack([FILE_FORMAT, SCHEMA_VERSION]))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def write(self, received: Received) -> None:
+        """Writes one message."""
+        if self._messages is not None:
+            self._messages.write(self._pack([received.key, received.payload]))
+        if received.topic not in NOT_FOR_PEOPLE:
+            event = {"t_s": received.header.sent_ms / 1000, "key": received.key, **_plain(received.message)}
+            self._events.write(json.dumps(event, separators=(", ", ": ")) + "\n")
+
+    def close(self) -> None:
+        """Ends both files."""
+        self._events.close()
+        if self._messages is not None:
+            self._messages.close()
+
+
+def _plain(value: Any) -> Any:
+    if is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, enum.Enum):
+        return value.value
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return value

@@ -1,0 +1,63 @@
+"""One simulated vehicle with its sonar: what it publishes, and when."""
+
+from __future__ import annotations
+
+from comms.messages import Maneuver, ManeuverStatus
+from comms.node import Publication
+from comms.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE
+from sim_world.config import VehicleConfig, WorldConfig
+from sim_world.looks import Looks
+from sim_world.recogniser import Recogniser
+from sim_world.seabed import Seabed
+from sim_world.sonar import CurveSonar
+from sim_world.targets import Targets
+from sim_world.vehicle import SimulatedVehicle
+
+
+class Body:
+    """A vehicle of a world, with the keys under which it speaks."""
+
+    def __init__(self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, targets: Targets) -> None:
+        self._vehicle = SimulatedVehicle(config, world.seed)
+        curve = config.sensor.curve
+        self._looks = Looks(
+            config,
+            offset_m=self._vehicle.offset_m,
+            sonar=CurveSonar(curve, seabed),
+            targets=targets,
+            recogniser=Recogniser(curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
+            seed=world.seed,
+        )
+        self._truth_differs = config.position_error_m > 0.0
+        self._nav_key = NAV.key(vehicle=config.vehicle)
+        self._status_key = MANEUVER_STATUS.key(vehicle=config.vehicle)
+        self._look_key = LOOK.key(vehicle=config.vehicle)
+        self._truth_look_key = TRUTH_LOOK.key(vehicle=config.vehicle)
+        self._truth_pose_key = TRUTH_POSE.key(vehicle=config.vehicle)
+
+    def navigation(self, now_ms: int) -> list[Publication]:
+        """Where the vehicle believes it is and, where that differs, where it is."""
+        publish = [Publication(self._nav_key, self._vehicle.nav(now_ms))]
+        if self._truth_differs:
+            publish.append(Publication(self._truth_pose_key, self._vehicle.truth(now_ms)))
+        return publish
+
+    def command(self, maneuver: Maneuver, now_ms: int) -> Publication:
+        """Begins or refuses a manoeuvre."""
+        return Publication(self._status_key, self._vehicle.command(maneuver, now_ms))
+
+    @property
+    def next_event_ms(self) -> int | None:
+        """When the vehicle has something to say next besides its navigation, None for never."""
+        return self._vehicle.next_event_ms
+
+    def next_event(self, time_ms: int) -> list[Publication]:
+        """What it has to say at that time."""
+        event = self._vehicle.take_event()
+        if isinstance(event, ManeuverStatus):
+            return [Publication(self._status_key, event)]
+        look, truth = self._looks.look(event, time_ms / 1000.0)
+        publish = [Publication(self._look_key, look)]
+        if truth is not None:
+            publish.append(Publication(self._truth_look_key, truth))
+        return publish

@@ -1,0 +1,171 @@
+"""What the simulated sea is made of: the world's configuration, checked where it is built.
+
+All positions are in the mission frame (ENU metres), headings are compass radians. Whatever is out of its range raises
+ValueError with the field's name.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from comms.wire import IDENTIFIER
+from planner.types import DetectionCurve, Point
+
+FARTHEST_M = 1e6
+"""No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
+FARTHEST_RANGE_M = 1e4
+HIGHEST_P_DETECT = 0.999
+"""The wire refuses P_d above this."""
+LARGEST_LOOK_CELLS = 65_536
+LARGEST_LOOK_TARGETS = 1_000
+LARGEST_NOISE = 2.0
+
+
+@dataclass(frozen=True)
+class SeabedConfig:
+    """The seabed's kind: `uniform` weakens nothing; `patchy` has ripple fields and vegetation patches.
+
+    `scale_m`: smallest and largest length of a patch, measured where its effect has fallen to one half, > 0.
+    `strength`: smallest and largest share of P_d that a patch takes away at its centre, within [0, 1).
+    """
+
+    kind: Literal["uniform", "patchy"] = "uniform"
+    ripple_fields: int = 0
+    vegetation_patches: int = 0
+    scale_m: tuple[float, float] = (40.0, 200.0)
+    strength: tuple[float, float] = (0.3, 0.8)
+
+    def __post_init__(self) -> None:
+        _require(self.kind in ("uniform", "patchy"), "kind", self.kind, "uniform or patchy")
+        for name in ("ripple_fields", "vegetation_patches"):
+            _require(0 <= getattr(self, name) <= 10_000, name, getattr(self, name), "0 to 10000")
+        low, high = self.scale_m
+        _require(0.1 <= low <= high <= FARTHEST_M, "scale_m", self.scale_m, f"ascending, 0.1 to {FARTHEST_M:.0f} m")
+        low, high = self.strength
+        _require(0.0 <= low <= high < 1.0, "strength", self.strength, "ascending, within [0, 1)")
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """A side-looking sonar, one to each side.
+
+    `curve`: true P_d over lateral range on a seabed that weakens nothing. A look covers `look_m` of track, a whole
+    number of bins `along_bin_m`; its range bins are centred at whole multiples of `range_bin_m`. `noise_cell` and
+    `noise_track`: standard deviations, on the logit scale, of the error of the P_d that the vehicle estimates, drawn
+    once a cell and once a track, 0 to 2.
+    """
+
+    curve: DetectionCurve
+    along_bin_m: float = 5.0
+    range_bin_m: float = 5.0
+    look_m: float = 20.0
+    noise_cell: float = 0.23
+    noise_track: float = 0.05
+
+    def __post_init__(self) -> None:
+        ranges, values = self.curve.range_m, self.curve.p_detect
+        _require(
+            ranges.ndim == 1 and ranges.shape == values.shape and ranges.size >= 2,
+            "curve", f"{ranges.size} ranges and {values.size} values", "as many values as ranges, at least two",
+        )  # fmt: skip
+        _require(
+            bool(ranges[0] >= 0.0 and np.all(np.diff(ranges) > 0.0) and ranges[-1] <= FARTHEST_RANGE_M),
+            "curve", "its ranges", f"ascending, 0 to {FARTHEST_RANGE_M:.0f} m",
+        )  # fmt: skip
+        sound = bool(np.all((values >= 0.0) & (values <= HIGHEST_P_DETECT)))
+        _require(sound, "curve", "its values", f"0 to {HIGHEST_P_DETECT}")
+        for name in ("along_bin_m", "range_bin_m", "look_m"):
+            _require(0.01 <= getattr(self, name) <= 1e4, name, getattr(self, name), "0.01 to 10000 m")
+        per_look = self.look_m / self.along_bin_m
+        _require(
+            round(per_look) >= 1 and math.isclose(per_look, round(per_look), rel_tol=1e-9),
+            "look_m", self.look_m, f"a whole multiple of along_bin_m, {self.along_bin_m}",
+        )  # fmt: skip
+        cells = 2 * self.bins_per_look * self.range_bins
+        _require(cells <= LARGEST_LOOK_CELLS, "look_m", f"{cells} cells a look", f"at most {LARGEST_LOOK_CELLS}")
+        for name in ("noise_cell", "noise_track"):
+            _require(0.0 <= getattr(self, name) <= LARGEST_NOISE, name, getattr(self, name), "0 to 2")
+
+    @property
+    def bins_per_look(self) -> int:
+        """Along-track bins of a whole look."""
+        return round(self.look_m / self.along_bin_m)
+
+    @property
+    def range_bins(self) -> int:
+        """Range bins a side: bin 0 is at range 0, the last at or just beyond the curve's last range."""
+        return math.ceil(float(self.curve.range_m[-1]) / self.range_bin_m) + 1
+
+
+@dataclass(frozen=True)
+class VehicleConfig:
+    """A simulated vehicle and where it waits for its first manoeuvre.
+
+    `position_error_m`: the constant distance, in a random direction, between where the vehicle is and where it
+    believes it is. The start pose is the believed one.
+    """
+
+    vehicle: str
+    start_x_m: float
+    start_y_m: float
+    start_heading_rad: float
+    speed_mps: float
+    turn_radius_m: float
+    altitude_m: float
+    sensor: SensorConfig
+    position_error_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require(bool(IDENTIFIER.fullmatch(self.vehicle)), "vehicle", self.vehicle, f"a match of {IDENTIFIER.pattern}")
+        for name, low, high in (
+            ("start_x_m", -FARTHEST_M, FARTHEST_M),
+            ("start_y_m", -FARTHEST_M, FARTHEST_M),
+            ("start_heading_rad", -7.0, 7.0),
+            ("speed_mps", 0.01, 100.0),
+            ("turn_radius_m", 0.01, 1e4),
+            ("altitude_m", -1e4, 1e4),
+            ("position_error_m", 0.0, 1e4),
+        ):
+            _require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
+
+
+@dataclass(frozen=True)
+class TargetsConfig:
+    """How many targets lie in the area, at most 1000, and how many false alarms a look raises a square kilometre."""
+
+    count: int = 0
+    false_alarms_per_km2: float = 0.0
+
+    def __post_init__(self) -> None:
+        _require(0 <= self.count <= LARGEST_LOOK_TARGETS, "count", self.count, f"0 to {LARGEST_LOOK_TARGETS}")
+        _require(0.0 <= self.false_alarms_per_km2 <= 1e6, "false_alarms_per_km2", self.false_alarms_per_km2, "0 to 1e6")
+
+
+@dataclass(frozen=True)
+class WorldConfig:
+    """The whole sea: `area` is the survey area's outline, at least three corners; vehicles are those simulated here."""
+
+    seed: int
+    area: tuple[Point, ...]
+    vehicles: tuple[VehicleConfig, ...]
+    seabed: SeabedConfig = field(default_factory=SeabedConfig)
+    targets: TargetsConfig = field(default_factory=TargetsConfig)
+
+    def __post_init__(self) -> None:
+        _require(self.seed >= 0, "seed", self.seed, "0 or more")
+        _require(len(self.area) >= 3, "area", f"{len(self.area)} corners", "at least three")
+        _require(
+            all(abs(coordinate) <= FARTHEST_M for corner in self.area for coordinate in corner),
+            "area", "its corners", f"at most {FARTHEST_M:.0f} m from the origin along each axis",
+        )  # fmt: skip
+        names = [vehicle.vehicle for vehicle in self.vehicles]
+        _require(len(set(names)) == len(names), "vehicles", ", ".join(names), "different names")
+
+
+def _require(holds: bool, name: str, value: object, allowed: str) -> None:
+    if not holds:
+        raise ValueError(f"{name}: {value}; allowed is {allowed}")

@@ -1,0 +1,120 @@
+"""What a vehicle's sonar makes of a stretch of track: the look it publishes, and the truth behind it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from comms.messages import Look, LookContact, TruthLook
+from comms.node import random_stream
+from planner.types import FloatArray
+from sim_world.config import VehicleConfig
+from sim_world.estimate import PDetectEstimate
+from sim_world.recogniser import Recogniser
+from sim_world.sonar import SonarModel
+from sim_world.swath import SIDES, Swath
+from sim_world.targets import Targets
+from sim_world.vehicle import Stretch
+
+MOST_CONTACTS = 200
+"""The wire's limit: of more contacts the best are kept."""
+
+
+class Looks:
+    """The looks of one vehicle, one after the other, numbered from 1.
+
+    What is drawn for a look depends on the seed, the vehicle and the look's number (a track's error: on the number of
+    tracks the vehicle has looked at so far), never on times or other vehicles. A look's cells are where the vehicle
+    believes them, and hold what the sonar made of the places where they truly are, `offset_m` (x, y) beside.
+    """
+
+    def __init__(
+        self,
+        config: VehicleConfig,
+        *,
+        offset_m: tuple[float, float],
+        sonar: SonarModel,
+        targets: Targets,
+        recogniser: Recogniser,
+        seed: int,
+    ) -> None:
+        self._config = config
+        self._offset_m = offset_m
+        self._sonar = sonar
+        self._targets = targets
+        self._recogniser = recogniser
+        self._seed = seed
+        self._estimate = PDetectEstimate(config.sensor.noise_cell, config.sensor.noise_track)
+        self._tracks = 0
+        self._looks = 0
+        self._track_error = 0.0
+
+    def look(self, stretch: Stretch, time_s: float) -> tuple[Look, TruthLook | None]:
+        """The next look, at a stretch just passed; the truth is None where no target could be seen."""
+        self._looks += 1
+        if stretch.first_along_m == 0.0:
+            self._tracks += 1
+            self._track_error = self._estimate.track_error(self._stream("track_noise", self._tracks))
+        config, sensor, maneuver = self._config, self._config.sensor, stretch.maneuver
+        swath = Swath(
+            origin_x_m=maneuver.start_x_m + self._offset_m[0],
+            origin_y_m=maneuver.start_y_m + self._offset_m[1],
+            heading_rad=stretch.heading_rad,
+            first_along_m=stretch.first_along_m,
+            along_bin_m=sensor.along_bin_m,
+            bins=stretch.bins,
+            range_bin_m=sensor.range_bin_m,
+            range_bins=sensor.range_bins,
+        )
+        truly = self._p_detect(swath, swath.ranges_m, SIDES, swath.cell_centres(), time_s)
+        contacts, truth = self._targets_passed(swath, time_s)
+        if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
+            contacts += self._recogniser.false_alarms(swath, self._stream("false_alarms", self._looks))
+        contacts = sorted(contacts, key=lambda contact: contact.score, reverse=True)[:MOST_CONTACTS]
+        look = Look(
+            number=self._looks,
+            maneuver=maneuver.number,
+            origin_x_m=maneuver.start_x_m,
+            origin_y_m=maneuver.start_y_m,
+            heading_rad=stretch.heading_rad,
+            first_along_m=stretch.first_along_m,
+            along_bin_m=sensor.along_bin_m,
+            range_bin_m=sensor.range_bin_m,
+            p_detect=self._estimate.estimate(truly, self._track_error, self._stream("noise", self._looks)),
+            altitude_m=config.altitude_m,
+            position_sigma_m=config.position_error_m,
+            valid=True,
+            contacts=tuple(contacts),
+        )
+        return look, truth
+
+    def _targets_passed(self, swath: Swath, time_s: float) -> tuple[list[LookContact], TruthLook | None]:
+        passed = self._targets.passed(swath)
+        if not passed.numbers.size:
+            return [], None
+        p_detect = self._p_detect(swath, np.abs(passed.lateral_m), passed.lateral_m, (passed.x_m, passed.y_m), time_s)
+        detected, contacts = self._recogniser.detect(passed, p_detect, self._stream("detection", self._looks))
+        seen = p_detect > 0.0
+        if not seen.any():
+            return [], None
+        truth = TruthLook(
+            self._config.vehicle,
+            self._looks,
+            tuple(passed.numbers[seen].tolist()),
+            p_detect[seen],
+            tuple(passed.numbers[detected].tolist()),
+        )
+        return contacts, truth
+
+    def _p_detect(
+        self,
+        swath: Swath,
+        range_m: FloatArray,
+        lateral: FloatArray,
+        position_m: tuple[FloatArray, FloatArray],
+        time_s: float,
+    ) -> FloatArray:
+        bearing_rad = swath.bearings_rad(lateral)
+        return self._sonar.p_detect(range_m, bearing_rad, self._config.altitude_m, position_m, time_s)
+
+    def _stream(self, name: str, number: int) -> np.random.Generator:
+        return random_stream(self._seed, "world", self._config.vehicle, name, str(number))

@@ -1,0 +1,207 @@
+"""How a vehicle moves: in closed form, at one speed, along arcs and straights no tighter than its turn radius."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from bisect import bisect_right
+from dataclasses import dataclass
+from typing import Protocol
+
+from planner.dubins import Pose, shortest_path
+from planner.types import Point
+
+ROUNDING_MS = 1e-6
+"""A time is not rounded up to the next millisecond for as little as this."""
+ROUNDING_M = 1e-6
+
+
+class Leg(Protocol):
+    """A piece of a path."""
+
+    @property
+    def length_m(self) -> float:
+        """Length, >= 0; infinity for a circle without end."""
+
+    def pose_at(self, distance_m: float) -> Pose:
+        """The pose at a distance from the leg's start, 0 to its length."""
+
+
+@dataclass(frozen=True, slots=True)
+class Straight:
+    """A straight leg."""
+
+    start: Pose
+    length_m: float
+
+    def pose_at(self, distance_m: float) -> Pose:
+        """The pose at a distance from the start."""
+        x_m, y_m, heading_rad = self.start
+        return Pose(x_m + distance_m * math.sin(heading_rad), y_m + distance_m * math.cos(heading_rad), heading_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class Loiter:
+    """A circle to starboard without end."""
+
+    start: Pose
+    radius_m: float
+    length_m: float = math.inf
+
+    def pose_at(self, distance_m: float) -> Pose:
+        """The pose at a distance from the start."""
+        x_m, y_m, heading_rad = self.start
+        turned = heading_rad + distance_m / self.radius_m
+        return Pose(
+            x_m + self.radius_m * (math.cos(heading_rad) - math.cos(turned)),
+            y_m + self.radius_m * (math.sin(turned) - math.sin(heading_rad)),
+            compass_rad(turned),
+        )
+
+
+class Path:
+    """Legs one after the other, begun at `start_ms`; the last one has no end.
+
+    `held_m`: stretches, as distances from the path's start, that are sailed to their end even when a new manoeuvre
+    arrives on them.
+    """
+
+    def __init__(self, start_ms: int, speed_mps: float, legs: list[Leg], held_m: list[tuple[float, float]]) -> None:
+        self.start_ms = start_ms
+        self.speed_mps = speed_mps
+        self._legs = legs
+        self._starts_m = [0.0, *itertools.accumulate(leg.length_m for leg in legs[:-1])]
+        self._held_m = held_m
+
+    def distance_at(self, time_ms: int) -> float:
+        """How far along the path the vehicle is."""
+        return (time_ms - self.start_ms) * self.speed_mps / 1000.0
+
+    def pose_at(self, time_ms: int) -> Pose:
+        """The pose at a time from `start_ms`."""
+        distance_m = self.distance_at(time_ms)
+        number = bisect_right(self._starts_m, distance_m) - 1
+        return self._legs[number].pose_at(distance_m - self._starts_m[number])
+
+    def time_ms(self, distance_m: float) -> int:
+        """When the vehicle has come so far, rounded up to the millisecond."""
+        return self.start_ms + math.ceil(distance_m / self.speed_mps * 1000.0 - ROUNDING_MS)
+
+    def still_held_m(self, time_ms: int) -> float:
+        """Length of what is left of the held stretch that the vehicle is on, 0 for none."""
+        distance_m = self.distance_at(time_ms)
+        left = (end - distance_m for start, end in self._held_m if start - ROUNDING_M <= distance_m < end)
+        return max(left, default=0.0)
+
+
+@dataclass(frozen=True)
+class FollowedTrack:
+    """A track as it is sailed: it starts `start_m` down the path and is `length_m` long."""
+
+    path: Path
+    start_m: float
+    length_m: float
+
+    def time_ms(self, along_m: float) -> int:
+        """When the vehicle is so far down the track, rounded up to the millisecond."""
+        return self.path.time_ms(self.start_m + along_m)
+
+
+class Motion:
+    """A vehicle's movement, manoeuvre by manoeuvre.
+
+    It waits at its start pose until the first manoeuvre. After a manoeuvre it loiters: a circle to starboard of the
+    turn radius. A new manoeuvre replaces the one under way from the pose of that moment, except that the run-out of a
+    track that is done is sailed to its end first, so that the sonar stays straight to the end of the swath.
+    """
+
+    def __init__(self, start: Pose, *, speed_mps: float, turn_radius_m: float) -> None:
+        self._start = start._replace(heading_rad=compass_rad(start.heading_rad))
+        self._speed_mps = speed_mps
+        self._turn_radius_m = turn_radius_m
+        self._path: Path | None = None
+
+    def pose_at(self, time_ms: int) -> Pose:
+        """The pose at a time not before the last manoeuvre's start."""
+        return self._start if self._path is None else self._path.pose_at(time_ms)
+
+    @property
+    def speed_mps(self) -> float:
+        """The speed since the last manoeuvre's start: 0 before the first."""
+        return 0.0 if self._path is None else self._speed_mps
+
+    def hold(self, now_ms: int) -> None:
+        """Loiters from here."""
+        legs, held_m, _ = self._departure(now_ms)
+        self._sail(legs, held_m, now_ms)
+
+    def go_to(self, point: Point, heading_rad: float | None, now_ms: int) -> int:
+        """Goes to a point the shortest way and loiters there.
+
+        Args:
+            point: mission frame.
+            heading_rad: the heading on arrival; None for the bearing of the point from where the vehicle departs, or
+                its heading where it is there already.
+            now_ms: when the manoeuvre begins.
+
+        Returns:
+            When it arrives.
+        """
+        legs, held_m, pose = self._departure(now_ms)
+        if heading_rad is None:
+            there = math.dist(pose[:2], point) == 0.0
+            heading_rad = pose.heading_rad if there else bearing_rad(pose[:2], point)
+        legs.append(self._shortest(pose, Pose(*point, heading_rad)))
+        arrival_m = sum(leg.length_m for leg in legs)
+        return self._sail(legs, held_m, now_ms).time_ms(arrival_m)
+
+    def follow(self, start: Point, end: Point, run_in_m: float, now_ms: int) -> FollowedTrack:
+        """Sails a straight track, with a straight run of `run_in_m` >= 0 before its start and after its end.
+
+        Args:
+            start: the track's start, mission frame.
+            end: its end, not the same point.
+            run_in_m: length of run-in and run-out.
+            now_ms: when the manoeuvre begins.
+
+        Returns:
+            When the vehicle is where on the track.
+        """
+        legs, held_m, pose = self._departure(now_ms)
+        heading_rad, length_m = bearing_rad(start, end), math.dist(start, end)
+        run_in = Pose(
+            start[0] - run_in_m * math.sin(heading_rad), start[1] - run_in_m * math.cos(heading_rad), heading_rad
+        )
+        legs.append(self._shortest(pose, run_in))
+        start_m = sum(leg.length_m for leg in legs) + run_in_m
+        legs.append(Straight(run_in, length_m + 2 * run_in_m))
+        held_m.append((start_m + length_m, start_m + length_m + run_in_m))
+        return FollowedTrack(self._sail(legs, held_m, now_ms), start_m, length_m)
+
+    def _departure(self, now_ms: int) -> tuple[list[Leg], list[tuple[float, float]], Pose]:
+        # What has to be sailed before a new manoeuvre, as legs and held stretches, and the pose it starts from.
+        pose = self.pose_at(now_ms)
+        held_m = 0.0 if self._path is None else self._path.still_held_m(now_ms)
+        if held_m == 0.0:
+            return [], [], pose
+        run_out = Straight(pose, held_m)
+        return [run_out], [(0.0, held_m)], run_out.pose_at(held_m)
+
+    def _shortest(self, start: Pose, end: Pose) -> Leg:
+        return shortest_path(start, end, self._turn_radius_m)
+
+    def _sail(self, legs: list[Leg], held_m: list[tuple[float, float]], now_ms: int) -> Path:
+        last = legs[-1].pose_at(legs[-1].length_m) if legs else self.pose_at(now_ms)
+        self._path = Path(now_ms, self._speed_mps, [*legs, Loiter(last, self._turn_radius_m)], held_m)
+        return self._path
+
+
+def bearing_rad(start: Point, end: Point) -> float:
+    """Compass bearing of one point from another, [0, 2 pi)."""
+    return compass_rad(math.atan2(end[0] - start[0], end[1] - start[1]))
+
+
+def compass_rad(angle_rad: float) -> float:
+    """An angle as a heading in [0, 2 pi)."""
+    heading_rad = angle_rad % (2 * math.pi)
+    return 0.0 if heading_rad == 2 * math.pi else heading_rad  # the remainder of a tiny negative angle is a full turn

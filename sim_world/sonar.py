@@ -1,0 +1,51 @@
+"""How well a sonar truly detects: P_d of one look, by range, bearing, altitude, place and time."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from planner.types import DetectionCurve, FloatArray
+from sim_world.seabed import Seabed
+
+Position = tuple[FloatArray, FloatArray]
+"""x and y, mission frame."""
+
+
+class SonarModel(Protocol):
+    """A sonar's true P_d."""
+
+    def p_detect(
+        self,
+        range_m: FloatArray,
+        look_bearing_rad: FloatArray | float,
+        altitude_m: float,
+        position_m: Position,
+        time_s: float,
+    ) -> FloatArray:
+        """P_d in [0, 1) of what lies at `position_m` (mission frame, true), seen at the lateral range `range_m` >= 0
+        along the compass bearing `look_bearing_rad` from `altitude_m` above the seabed at `time_s`. The arguments
+        broadcast."""
+
+
+class CurveSonar:
+    """A sonar whose P_d is one curve over lateral range, weakened by the seabed (paper, section III-B).
+
+    The curve holds for the altitude that the vehicle keeps and for the whole mission: altitude and time change nothing.
+    """
+
+    def __init__(self, curve: DetectionCurve, seabed: Seabed) -> None:
+        self._curve = curve
+        self._seabed = seabed
+
+    def p_detect(
+        self,
+        range_m: FloatArray,
+        look_bearing_rad: FloatArray | float,
+        altitude_m: float,  # noqa: ARG002 - part of the protocol
+        position_m: Position,
+        time_s: float,  # noqa: ARG002 - part of the protocol
+    ) -> FloatArray:
+        """The curve at the range times the seabed's factor at the position."""
+        return np.multiply(self._curve.at(range_m), self._seabed.factor(*position_m, look_bearing_rad))

@@ -1,0 +1,129 @@
+"""A simulated vehicle: takes manoeuvres, says how far they got, and tells which stretches of track it has passed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from comms.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
+from comms.node import random_stream
+from planner.dubins import Pose
+from planner.types import Point
+from sim_world.config import FARTHEST_M, VehicleConfig
+from sim_world.motion import FollowedTrack, Motion, bearing_rad
+
+TRACK_ROUNDING_M = 0.02
+"""Two ends in whole centimetres make a track up to 1.5 cm too long; no bin is added for that."""
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A stretch of a followed track that the vehicle has passed: what one look covers, `bins` along-track bins."""
+
+    maneuver: Maneuver
+    heading_rad: float
+    first_along_m: float
+    bins: int
+
+
+Event = ManeuverStatus | Stretch
+
+
+class SimulatedVehicle:
+    """One vehicle's body. It steers by its believed pose; the true one lies a constant `offset_m` (x, y) beside it.
+
+    A vehicle does what it was told last. Of a manoeuvre that is replaced nothing more is heard, and the stretch of
+    track it was on is not looked at.
+    """
+
+    def __init__(self, config: VehicleConfig, seed: int) -> None:
+        self.config = config
+        direction = random_stream(seed, "world", config.vehicle, "position_error").uniform(0.0, 2 * math.pi)
+        self.offset_m = (config.position_error_m * math.sin(direction), config.position_error_m * math.cos(direction))
+        self._motion = Motion(
+            Pose(config.start_x_m, config.start_y_m, config.start_heading_rad),
+            speed_mps=config.speed_mps,
+            turn_radius_m=config.turn_radius_m,
+        )
+        self._to_come: Iterator[tuple[int, Event]] = iter(())
+        self._next: tuple[int, Event] | None = None
+
+    def nav(self, now_ms: int) -> Nav:
+        """Where it believes it is; the error's length is what it gives as the position's sigma."""
+        pose, config = self._motion.pose_at(now_ms), self.config
+        return Nav(*pose, self._motion.speed_mps, config.altitude_m, config.position_error_m)
+
+    def truth(self, now_ms: int) -> TruthPose:
+        """Where it is."""
+        x_m, y_m, heading_rad = self._motion.pose_at(now_ms)
+        return TruthPose(x_m + self.offset_m[0], y_m + self.offset_m[1], heading_rad)
+
+    def command(self, maneuver: Maneuver, now_ms: int) -> ManeuverStatus:
+        """Begins a manoeuvre, or refuses it and goes on with what it does.
+
+        A hold has no end: it is accepted with `ends_ms` 0 and never done.
+        """
+        reason = _reason_to_refuse(maneuver)
+        if reason:
+            return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, reason)
+        start, end = (maneuver.start_x_m, maneuver.start_y_m), (maneuver.end_x_m, maneuver.end_y_m)
+        ends_ms = 0
+        match maneuver.kind:
+            case ManeuverKind.HOLD:
+                self._motion.hold(now_ms)
+                self._to_come = iter(())
+            case ManeuverKind.GOTO:
+                ends_ms = self._motion.go_to(end, None if start == end else bearing_rad(start, end), now_ms)
+                self._to_come = iter([(ends_ms, ManeuverStatus(maneuver.number, ManeuverState.DONE, ends_ms, ""))])
+            case ManeuverKind.FOLLOW:
+                track = self._motion.follow(start, end, maneuver.run_in_m, now_ms)
+                ends_ms = track.time_ms(track.length_m)
+                self._to_come = self._on_track(maneuver, track, bearing_rad(start, end))
+        self._next = next(self._to_come, None)
+        return ManeuverStatus(maneuver.number, ManeuverState.ACCEPTED, ends_ms, "")
+
+    @property
+    def next_event_ms(self) -> int | None:
+        """When `take_event` has something next, None for never."""
+        return None if self._next is None else self._next[0]
+
+    def take_event(self) -> Event:
+        """The next event, once its time has come.
+
+        Raises:
+            LookupError: there is none.
+        """
+        if self._next is None:
+            raise LookupError("nothing is to come")
+        _, event = self._next
+        self._next = next(self._to_come, None)
+        return event
+
+    def _on_track(self, maneuver: Maneuver, track: FollowedTrack, heading_rad: float) -> Iterator[tuple[int, Event]]:
+        sensor = self.config.sensor
+        ends_ms = track.time_ms(track.length_m)
+        yield track.time_ms(0.0), ManeuverStatus(maneuver.number, ManeuverState.ON_TRACK, ends_ms, "")
+        all_bins = max(1, math.ceil((track.length_m - TRACK_ROUNDING_M) / sensor.along_bin_m))
+        for first_bin in range(0, all_bins, sensor.bins_per_look):
+            bins = min(sensor.bins_per_look, all_bins - first_bin)
+            last = first_bin + bins == all_bins
+            passed_ms = ends_ms if last else track.time_ms((first_bin + bins) * sensor.along_bin_m)
+            yield passed_ms, Stretch(maneuver, heading_rad, first_bin * sensor.along_bin_m, bins)
+        yield ends_ms, ManeuverStatus(maneuver.number, ManeuverState.DONE, ends_ms, "")
+
+
+def _reason_to_refuse(maneuver: Maneuver) -> str:
+    """Why a manoeuvre cannot be sailed, "" where it can."""
+    if maneuver.kind is ManeuverKind.HOLD:
+        return ""
+    start: Point = (maneuver.start_x_m, maneuver.start_y_m)
+    end: Point = (maneuver.end_x_m, maneuver.end_y_m)
+    if any(abs(coordinate) > FARTHEST_M for coordinate in (*start, *end)):
+        return f"a point lies more than {FARTHEST_M / 1000:.0f} km from the origin along an axis"
+    if maneuver.kind is ManeuverKind.FOLLOW:
+        if start == end:
+            return "the track has no length"
+        if not 0.0 <= maneuver.run_in_m <= FARTHEST_M:
+            return f"a run-in of {maneuver.run_in_m} m is not within 0 to {FARTHEST_M / 1000:.0f} km"
+    return ""

@@ -1,0 +1,186 @@
+"""One conformance suite for every bus: order, addressing, wake-ups, equal times, publishing from within a handler."""
+
+from __future__ import annotations
+
+import pytest
+from fleets import BUSES, Bus, Notes, Scripted, say_nav, say_over, say_state, says
+
+from comms.clock import RunawayError
+from comms.messages import RunInfo
+from comms.node import Step
+from comms.result import Ending
+from comms.runner import NodeError
+from comms.topics import TRUTH_TARGETS
+
+
+@pytest.fixture(params=BUSES)
+def bus(request: pytest.FixtureRequest) -> Bus:
+    """Each bus in turn."""
+    return BUSES[request.param]
+
+
+def test_everyone_is_started_and_told_of_the_run_first(bus: Bus) -> None:
+    nodes = {name: Scripted() for name in ("world", "alpha", "beta", "coordinator")}
+    notes = Notes()
+    result = bus(nodes, notes)
+    for node in nodes.values():
+        assert node.log == [("start", 0), (1, "run", "clock", 0, 0)]
+    assert [type(one.message) for one in notes.heard] == [RunInfo]
+    assert (result.ending, notes.closed) == (Ending.IDLE, 1)
+
+
+def test_a_message_reaches_its_readers_and_nobody_else(bus: Bus) -> None:
+    world = Scripted(starts=lambda now_ms: says(say_nav("alpha", 3.0)))
+    alpha, beta, coordinator, notes = Scripted(), Scripted(), Scripted(), Notes()
+    bus({"world": world, "alpha": alpha, "beta": beta, "coordinator": coordinator}, notes)
+    assert (1, "veh/alpha/nav", "world", 0, 0) in alpha.log
+    assert all("nav" not in str(entry) for entry in beta.log + coordinator.log + world.log)
+    assert [one.key for one in notes.heard] == ["run", "veh/alpha/nav"]
+    assert notes.heard[1].message.x_m == 3.0  # type: ignore[union-attr]
+
+
+def test_wake_ups_come_when_asked_for_and_not_otherwise(bus: Bus) -> None:
+    times = iter([10, 11, 5000, None])
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=7), wakes=lambda now_ms: Step(wake_ms=next(times)))
+    bus({"world": world}, Notes())
+    assert [entry for entry in world.log if entry[0] == "wake"] == [
+        ("wake", 7),
+        ("wake", 10),
+        ("wake", 11),
+        ("wake", 5000),
+    ]
+
+
+def test_mail_due_at_a_wake_up_comes_before_it(bus: Bus) -> None:
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=99), wakes=lambda now_ms: says(say_nav("alpha")))
+    alpha = Scripted(starts=lambda now_ms: Step(wake_ms=100))
+    bus({"world": world, "alpha": alpha}, Notes())
+    assert alpha.log[-2:] == [(100, "veh/alpha/nav", "world", 0, 99), ("wake", 100)]
+
+
+def test_messages_of_one_time_are_ordered_by_sender_and_sequence(bus: Bus) -> None:
+    def speak(name: str) -> Scripted:
+        return Scripted(
+            starts=lambda now_ms: Step(wake_ms=50),
+            wakes=lambda now_ms: says(*(say_state(name, works_on=n) for n in range(5))),
+        )
+
+    coordinator, notes = Scripted(), Notes()
+    bus({"alpha": speak("alpha"), "beta": speak("beta"), "coordinator": coordinator}, notes)
+    heard = [(entry[2], entry[3]) for entry in coordinator.log if entry[0] == 51]
+    assert heard == [(name, n) for name in ("alpha", "beta") for n in range(5)]
+    assert [(one.header.sender, one.header.sequence) for one in notes.heard[1:]] == heard
+
+
+def test_a_handler_may_publish_and_the_answer_comes_a_delay_later(bus: Bus) -> None:
+    world = Scripted(starts=lambda now_ms: says(say_nav("alpha")))
+    alpha = Scripted(hears=lambda received, now_ms: says(say_state("alpha")) if received.vehicle else None)
+    coordinator = Scripted()
+    bus({"world": world, "alpha": alpha, "coordinator": coordinator}, Notes())
+    assert (2, "agent/alpha/state", "alpha", 0, 1) in coordinator.log
+
+
+def test_everyone_hears_of_the_end_and_says_a_last_word(bus: Bus) -> None:
+    coordinator = Scripted(starts=lambda now_ms: Step(wake_ms=2000), wakes=lambda now_ms: says(say_over()))
+    alpha = Scripted(
+        starts=lambda now_ms: Step(wake_ms=90_000),
+        hears=lambda received, now_ms: says(say_state("alpha", 9)) if now_ms > 2000 else None,
+    )
+    notes = Notes()
+    result = bus({"alpha": alpha, "coordinator": coordinator}, notes)
+    assert (result.ending, result.mission_ms) == (Ending.OVER, 2000)
+    assert [one.key for one in notes.heard[1:]] == ["coord/mission_over", "agent/alpha/state"]
+    assert ("wake", 90_000) not in alpha.log
+
+
+def test_a_fleet_that_goes_on_for_ever_ends_at_its_time_limit(bus: Bus) -> None:
+    world = Scripted(
+        starts=lambda now_ms: Step(wake_ms=1000), wakes=lambda now_ms: Step(wake_ms=now_ms + 1000)
+    )
+    result = bus({"world": world}, Notes(), time_limit_ms=10_500)
+    assert result.ending is Ending.TIME_LIMIT
+    assert world.log[-1] == ("wake", 10_000)
+
+
+def _fleet_that_talks() -> dict[str, Scripted]:
+    def tick(now_ms: int) -> Step:
+        return says(say_nav("alpha", now_ms), say_nav("beta", -now_ms), wake_ms=now_ms + 700)
+
+    return {
+        "world": Scripted(starts=tick, wakes=tick),
+        "alpha": Scripted(hears=lambda received, now_ms: says(say_state("alpha", now_ms))),
+        "beta": Scripted(hears=lambda received, now_ms: says(say_state("beta", 1), say_state("beta", 2))),
+        "coordinator": Scripted(
+            hears=lambda received, now_ms: says(say_over()) if now_ms > 20_000 else None,
+        ),
+    }
+
+
+def test_all_buses_give_one_digest_and_tell_every_node_the_same() -> None:
+    told = []
+    for run_on in BUSES.values():
+        nodes, notes = _fleet_that_talks(), Notes()
+        result = run_on(nodes, notes)
+        heard = [(one.key, one.header, one.payload) for one in notes.heard]
+        told.append((result.digest, result.messages, {name: node.log for name, node in nodes.items()}, heard))
+    assert len(told[0][3]) > 100
+    assert told[1] == told[0]
+    assert told[2] == told[0]
+
+
+def test_the_digest_tells_one_changed_message() -> None:
+    nodes = _fleet_that_talks()
+    before = BUSES["local"](_fleet_that_talks(), Notes()).digest
+    nodes["alpha"].hears = lambda received, now_ms: says(say_state("alpha", now_ms + (now_ms == 7001)))
+    assert BUSES["local"](nodes, Notes()).digest != before
+
+
+@pytest.mark.parametrize("bus_name", ["local"])
+def test_nodes_that_answer_each_other_without_end_are_stopped(bus_name: str) -> None:
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=1), wakes=lambda now_ms: Step(wake_ms=now_ms + 1))
+    alpha = Scripted(hears=lambda received, now_ms: says(say_state("alpha")))
+    coordinator = Scripted()
+    # One wake-up a millisecond are 1,000 rounds a second: allowed.
+    result = BUSES[bus_name]({"world": world, "alpha": alpha, "coordinator": coordinator}, Notes(), time_limit_ms=3000)
+    assert result.ending is Ending.TIME_LIMIT
+
+
+def test_a_node_that_raises_ends_the_run_with_a_sentence_that_names_it() -> None:
+    def break_down(now_ms: int) -> Step:
+        raise RuntimeError("flooded")
+
+    alpha = Scripted(starts=lambda now_ms: Step(wake_ms=1500), wakes=break_down)
+    notes = Notes()
+    with pytest.raises(NodeError, match=r"^alpha has failed at 1\.500 s: RuntimeError: flooded$"):
+        BUSES["local"]({"alpha": alpha}, notes)
+    assert notes.closed == 1
+
+
+@pytest.mark.parametrize(
+    ("publication", "sentence"),
+    [
+        (say_nav("alpha"), "alpha may not publish a Nav under veh/alpha/nav"),
+        (say_state("beta"), "alpha may not publish a AgentState under agent/beta/state"),
+    ],
+)
+def test_the_local_bus_refuses_what_a_node_may_not_write(publication: object, sentence: str) -> None:
+    alpha = Scripted(starts=lambda now_ms: Step((publication,)))  # type: ignore[arg-type]
+    with pytest.raises(NodeError, match=sentence):
+        BUSES["local"]({"alpha": alpha}, Notes())
+
+
+def test_agents_have_no_route_to_the_truth() -> None:
+    assert {role.value for role in TRUTH_TARGETS.readers} == {"recorder", "observer"}
+
+
+def test_runaway_is_told_with_its_topics() -> None:
+    from comms import clock
+
+    monkey = pytest.MonkeyPatch()
+    monkey.setattr(clock, "MOST_ROUNDS_A_SECOND", 500)
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=1), wakes=lambda now_ms: says(say_nav("alpha"), wake_ms=now_ms + 1))
+    try:
+        with pytest.raises(RunawayError, match=r"more than 500 rounds within simulated second 0; .* nav 4\d\d"):
+            BUSES["local"]({"world": world}, Notes())
+    finally:
+        monkey.undo()

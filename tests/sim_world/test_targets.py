@@ -1,0 +1,108 @@
+"""Targets, what a look passes over, and what the recogniser makes of it."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.types import DetectionCurve
+from sim_world.area import uniform_points
+from sim_world.recogniser import Recogniser
+from sim_world.swath import Swath
+from sim_world.targets import Passed, Targets
+
+AREA = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0))
+CURVE = DetectionCurve(np.array([0.0, 20.0, 30.0, 70.0, 130.0, 140.0]), np.array([0.0, 0.0, 0.2, 0.5, 0.1, 0.0]))
+
+
+def passed(count: int) -> Passed:
+    return Passed(
+        np.arange(count), np.linspace(0.0, 20.0, count), np.linspace(-100.0, 100.0, count), *np.zeros((2, count))
+    )
+
+
+def test_points_lie_uniformly_within_a_concave_outline() -> None:
+    # An L: the lower half of a square and the upper left quarter.
+    outline = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
+    points = uniform_points(outline, 6000, np.random.default_rng(1))
+    x, y = points[:, 0], points[:, 1]
+    quarters = [np.mean((x < 1) & (y < 1)), np.mean((x > 1) & (y < 1)), np.mean((x < 1) & (y > 1))]
+    assert quarters == pytest.approx([1 / 3, 1 / 3, 1 / 3], abs=0.025)  # 4 standard deviations
+    assert sum(quarters) == 1.0
+
+
+@pytest.mark.parametrize("outline", [((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), ((5.0, 5.0), (5.0, 5.0), (5.0, 5.0))])
+def test_an_outline_around_nothing_is_refused(outline: tuple[tuple[float, float], ...]) -> None:
+    with pytest.raises(ValueError, match="encloses"):
+        uniform_points(outline, 1, np.random.default_rng(1))
+
+
+def test_a_seed_puts_targets_in_one_place_and_they_are_all_told() -> None:
+    one, same, other = (Targets(AREA, 50, seed).truth() for seed in (1, 1, 2))
+    assert one == same != other
+    assert len(one.targets) == 50
+    assert all(0.0 <= target.x_m <= 1000.0 and 0.0 <= target.y_m <= 400.0 for target in one.targets)
+    assert Targets(AREA, 0, 1).truth().targets == ()
+
+
+@given(seed=st.integers(0, 20), heading_rad=st.floats(0.0, 6.28), look_m=st.sampled_from([5.0, 20.0, 35.0]))
+def test_each_target_beside_a_track_is_passed_by_exactly_one_of_its_looks(
+    seed: int, heading_rad: float, look_m: float
+) -> None:
+    targets = Targets(AREA, 300, seed)
+    looks = [Swath(500.0, 200.0, heading_rad, n * look_m, look_m, 1, 5.0, 28) for n in range(round(420 / look_m))]
+    seen = [number for look in looks for number in targets.passed(look).numbers.tolist()]
+    assert len(seen) == len(set(seen))
+    for number, target in enumerate(targets.truth().targets):
+        dx, dy = target.x_m - 500.0, target.y_m - 200.0
+        along_m = dx * math.sin(heading_rad) + dy * math.cos(heading_rad)
+        lateral_m = dx * math.cos(heading_rad) - dy * math.sin(heading_rad)
+        assert (number in seen) == (0.0 <= along_m < 420.0 and abs(lateral_m) <= 135.0)
+
+
+def test_port_is_negative() -> None:
+    targets = Targets(AREA, 1, 1)
+    (target,) = targets.truth().targets
+    beside = targets.passed(Swath(target.x_m + 30.0, target.y_m - 12.0, 0.0, 0.0, 20.0, 1, 5.0, 28))
+    assert (beside.along_m.tolist(), beside.lateral_m.tolist()) == ([pytest.approx(12.0)], [pytest.approx(-30.0)])
+
+
+def test_the_recogniser_detects_as_often_as_p_detect_says_and_scores_above_one_half() -> None:
+    recogniser, generator = Recogniser(CURVE, false_alarms_per_km2=0.0), np.random.default_rng(2)
+    count = 20_000
+    p_detect = np.repeat([0.0, 0.1, 0.5, 0.9], count // 4)
+    detected, contacts = recogniser.detect(passed(count), p_detect, generator)
+    shares = detected.reshape(4, -1).mean(axis=1)
+    assert shares[0] == 0.0
+    assert shares[1:] == pytest.approx(np.array([0.1, 0.5, 0.9]), abs=4 * 0.5 / math.sqrt(count / 4))
+    assert [contact.along_m for contact in contacts] == passed(count).along_m[detected].tolist()
+    assert [contact.lateral_m for contact in contacts] == passed(count).lateral_m[detected].tolist()
+    assert all(0.5 < contact.score < 1.0 for contact in contacts)
+
+
+def test_false_alarms_are_as_many_as_asked_for_within_the_swath_and_score_lower() -> None:
+    recogniser, generator = Recogniser(CURVE, false_alarms_per_km2=1000.0), np.random.default_rng(3)
+    assert recogniser.raises_false_alarms
+    look = Swath(0.0, 0.0, 0.5, 40.0, 5.0, 4, 5.0, 29)
+    looks = [recogniser.false_alarms(look, generator) for _ in range(2000)]
+    # The swath is 20 m long and 2 * (140 - 20) m wide: 4.8 a look.
+    counts = np.array([len(contacts) for contacts in looks])
+    assert counts.mean() == pytest.approx(4.8, abs=4 * math.sqrt(4.8 / 2000))
+    assert counts.var() == pytest.approx(4.8, rel=0.15)
+    contacts = [contact for look in looks for contact in look]
+    assert all(40.0 <= contact.along_m < 60.0 and 20.0 <= abs(contact.lateral_m) <= 140.0 for contact in contacts)
+    assert np.mean([contact.lateral_m > 0.0 for contact in contacts]) == pytest.approx(0.5, abs=0.025)
+    assert np.mean([contact.score for contact in contacts]) == pytest.approx(0.3, abs=0.01)
+    assert all(0.0 <= contact.score < 0.75 for contact in contacts)
+
+
+def test_no_false_alarms_unless_asked_for() -> None:
+    assert not Recogniser(CURVE, false_alarms_per_km2=0.0).raises_false_alarms
+
+
+def test_a_sonar_that_sees_nothing_raises_no_false_alarms() -> None:
+    blind = Recogniser(DetectionCurve(np.array([0.0, 100.0]), np.zeros(2)), false_alarms_per_km2=1e6)
+    look = Swath(0.0, 0.0, 0.0, 0.0, 5.0, 4, 5.0, 29)
+    assert blind.false_alarms(look, np.random.default_rng(1)) == []

@@ -1,0 +1,61 @@
+"""A world that cannot be is refused where it is described."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from planner.types import DetectionCurve
+from sim_world.config import SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
+
+SENSOR = SensorConfig(DetectionCurve(np.array([0.0, 130.9]), np.array([0.5, 0.1])))
+VEHICLE = VehicleConfig("a", 0.0, 0.0, 0.0, speed_mps=2.0, turn_radius_m=20.0, altitude_m=10.0, sensor=SENSOR)
+WORLD = WorldConfig(1, ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), (VEHICLE,))
+
+
+def curve(ranges: list[float], values: list[float]) -> DetectionCurve:
+    return DetectionCurve(np.array(ranges), np.array(values))
+
+
+def test_bins_follow_from_the_lengths() -> None:
+    assert (SENSOR.bins_per_look, SENSOR.range_bins) == (4, 28)
+    assert replace(SENSOR, along_bin_m=0.1, look_m=0.3, range_bin_m=130.9).bins_per_look == 3
+    assert replace(SENSOR, range_bin_m=130.9).range_bins == 2
+
+
+@pytest.mark.parametrize(
+    ("config", "name", "value"),
+    [
+        (SENSOR, "curve", curve([0.0, 1.0], [0.5])),
+        (SENSOR, "curve", curve([0.0], [0.5])),
+        (SENSOR, "curve", curve([0.0, 0.0], [0.5, 0.5])),
+        (SENSOR, "curve", curve([-1.0, 1.0], [0.5, 0.5])),
+        (SENSOR, "curve", curve([0.0, 1.0], [0.5, 0.9991])),
+        (SENSOR, "curve", curve([0.0, 1.0], [0.5, float("nan")])),
+        (SENSOR, "curve", curve([0.0, float("nan")], [0.5, 0.5])),
+        (SENSOR, "curve", curve([0.0, float("inf")], [0.5, 0.5])),
+        (SENSOR, "look_m", 12.0),
+        (SENSOR, "look_m", 1e4),
+        (SENSOR, "along_bin_m", 0.0),
+        (SENSOR, "range_bin_m", float("nan")),
+        (SENSOR, "noise_cell", -0.1),
+        (SENSOR, "noise_track", 3.0),
+        (VEHICLE, "vehicle", "Not An Id"),
+        (VEHICLE, "speed_mps", 0.0),
+        (VEHICLE, "turn_radius_m", 0.0),
+        (VEHICLE, "start_x_m", float("inf")),
+        (VEHICLE, "start_heading_rad", 360.0),
+        (VEHICLE, "position_error_m", -1.0),
+        (WORLD, "seed", -1),
+        (WORLD, "area", ((0.0, 0.0), (1.0, 0.0))),
+        (WORLD, "area", ((0.0, 0.0), (1.0, 0.0), (0.0, float("nan")))),
+        (WORLD, "vehicles", (VEHICLE, VEHICLE)),
+        (TargetsConfig(), "count", 1001),
+        (TargetsConfig(), "false_alarms_per_km2", -1.0),
+    ],
+)
+def test_a_value_out_of_range_is_refused_by_name(
+    config: SensorConfig | VehicleConfig | WorldConfig | TargetsConfig, name: str, value: object
+) -> None:
+    with pytest.raises(ValueError, match=name):
+        replace(config, **{name: value})  # type: ignore[arg-type]
