@@ -1,0 +1,95 @@
+"""What a mission's recording looks like when it is opened: the map, the curves over time, who does what, the log."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import rerun.blueprint as rrb
+
+from viz import palette, paths
+from viz.shapes import Extent
+
+FIELD_OF_VIEW_RAD = math.radians(55.0)  # vertical, of the viewer's camera
+MARGIN = 1.18  # room around the area for turns and the colour scale
+WIDE_VIEW, TALL_VIEW = 3.0, 0.9  # width over height of the map's view in either layout
+
+
+def mission_blueprint(extent: Extent, vehicles: Sequence[str]) -> rrb.Blueprint:
+    """The blueprint for an area: a wide one lies above the other views, a tall one beside them."""
+    wide = extent.width_m > 1.5 * extent.height_m
+    area = _map_view(extent, vehicles, WIDE_VIEW if wide else TALL_VIEW)
+    log = _log_view()
+    if wide:
+        layout: rrb.Container = rrb.Vertical(
+            area,
+            rrb.Horizontal(_metrics_view(), _curve_view(), _activity_view(), log, column_shares=[4, 3, 4, 5]),
+            row_shares=[5, 4],
+        )
+    else:
+        beside = rrb.Vertical(
+            rrb.Horizontal(_metrics_view(), _curve_view()), _activity_view(), log, row_shares=[4, 3, 4]
+        )
+        layout = rrb.Horizontal(area, beside, column_shares=[1, 1])
+    return rrb.Blueprint(
+        layout,
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=paths.TIMELINE),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _map_view(extent: Extent, vehicles: Sequence[str], aspect: float) -> rrb.Spatial3DView:
+    x_m, y_m = extent.centre
+    height_m = MARGIN * max(extent.height_m * 1.25, extent.width_m / aspect) / (2 * math.tan(FIELD_OF_VIEW_RAD / 2))
+    # Of these each entry adds to those before, so the view shows all up to the time cursor.
+    adding = [paths.TRUTH_DETECTED]
+    adding += [f"{root}/{vehicle}" for root in (paths.FLOWN, paths.CONTACTS) for vehicle in vehicles]
+    so_far = rrb.VisibleTimeRanges(
+        timeline=paths.TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.cursor_relative()
+    )
+    return rrb.Spatial3DView(
+        origin="/",
+        name="Area from above: residual risk, grey where nobody has looked yet",
+        contents=[f"+ {root}/**" for root in (
+            "/area", paths.PLAN, paths.FLOWN, paths.HOTSPOTS, paths.STRIPS, paths.CONTACTS, paths.FLEET, paths.TRUTH
+        )],
+        overrides={paths.TRUTH: rrb.EntityBehavior(visible=False), **dict.fromkeys(adding, so_far)},
+        background=rrb.Background(kind=rrb.BackgroundKind.SolidColor, color=palette.BACKGROUND),
+        line_grid=rrb.LineGrid3D(visible=False),
+        # Not quite straight down: the camera needs to know which way is up.
+        eye_controls=rrb.EyeControls3D(
+            position=(x_m, y_m - 0.001 * height_m, height_m), look_target=(x_m, y_m, 0.0), eye_up=(0.0, 1.0, 0.0)
+        ),
+    )  # fmt: skip
+
+
+def _whole_mission() -> rrb.TimeAxis:
+    return rrb.TimeAxis(
+        view_range=rrb.TimeRange(start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite())
+    )
+
+
+def _metrics_view() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=paths.METRICS,
+        name="Risk and coverage over time",
+        axis_x=_whole_mission(),
+        axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom),
+    )
+
+
+def _log_view() -> rrb.TextLogView:
+    body = rrb.encodings.TextLogColumn(rrb.encodings.TextLogColumnKind.Body)
+    return rrb.TextLogView(origin=paths.LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=[body]))
+
+
+def _curve_view() -> rrb.BarChartView:
+    return rrb.BarChartView(origin=paths.CURVE, name="P(y) of the latest track")
+
+
+def _activity_view() -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(origin=paths.ACTIVITY, name="Who does what", time_view=_whole_mission())

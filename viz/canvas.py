@@ -1,0 +1,85 @@
+"""The recording as something to draw on: single entries at a simulated time, and long columns sent in pieces."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+
+from planner.types import FloatArray
+from viz.paths import TIMELINE
+
+Build = Callable[[FloatArray], Iterable[rr.ComponentColumn]]
+
+
+class Column:
+    """Rows of numbers of one entity, held until the canvas sends them: a call a row would cost far more."""
+
+    def __init__(self, path: str, build: Build) -> None:
+        self.path = path
+        self._build = build
+        self._times_ms: list[int] = []
+        self._rows: list[tuple[float, ...]] = []
+
+    def add(self, time_ms: int, *numbers: float) -> None:
+        """Holds one row."""
+        self._times_ms.append(time_ms)
+        self._rows.append(numbers)
+
+    def send(self, stream: rr.RecordingStream) -> None:
+        """Sends what is held."""
+        if self._times_ms:
+            times = np.array(self._times_ms, dtype="timedelta64[ms]")
+            rows = np.array(self._rows, dtype=np.float64)
+            stream.send_columns(self.path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(rows))
+            self._times_ms, self._rows = [], []
+
+
+class Canvas:
+    """One recording, written to a file. Its only timeline is the simulated time.
+
+    `piece_ms`: how much simulated time the columns hold back at most; so much is lost if the process is killed.
+    """
+
+    def __init__(self, path: Path, recording_id: str, piece_ms: int) -> None:
+        self.stream = rr.RecordingStream("secondlook", recording_id=recording_id, send_properties=False)
+        # The wall clock has no place in a recording of simulated time.
+        self.stream.set_log_time_enabled(False)
+        self.stream.set_log_tick_enabled(False)
+        self.stream.save(path)
+        self._piece_ms = piece_ms
+        self._piece_from_ms = 0
+        self._columns: list[Column] = []
+
+    def put(self, time_ms: int, path: str, *parts: rr.AsComponents) -> None:
+        """Logs one entry at a simulated time."""
+        self.stream.set_time(TIMELINE, duration=np.timedelta64(time_ms, "ms"))
+        self.stream.log(path, parts[0], *parts[1:])
+
+    def put_static(self, path: str, *parts: rr.AsComponents) -> None:
+        """Logs what holds at all times."""
+        self.stream.log(path, parts[0], *parts[1:], static=True)
+
+    def column(self, path: str, build: Build) -> Column:
+        """A column that is sent in pieces; `build` makes its components from an array of shape (rows, numbers)."""
+        column = Column(path, build)
+        self._columns.append(column)
+        return column
+
+    def advance(self, time_ms: int) -> None:
+        """Sends the columns if they hold a whole piece."""
+        if abs(time_ms - self._piece_from_ms) >= self._piece_ms:
+            self._piece_from_ms = time_ms
+            self._send()
+
+    def close(self) -> None:
+        """Sends what is held and completes the file."""
+        self._send()
+        self.stream.flush()
+        self.stream.disconnect()
+
+    def _send(self) -> None:
+        for column in self._columns:
+            column.send(self.stream)

@@ -1,0 +1,48 @@
+"""Where things lie in a recording: the entity paths, shared by what is logged and by the blueprint that shows it."""
+
+from __future__ import annotations
+
+TIMELINE = "sim_time"
+
+OUTLINE = "/area/outline"
+RISK = "/area/risk"
+UNSEEN = "/area/unseen"
+SCALE = "/area/scale"
+SCALE_LABELS = "/area/scale_labels"
+FLEET = "/fleet"
+PLAN = "/plan"
+FLOWN = "/flown"
+HOTSPOTS = "/hotspots"
+STRIPS = "/strips"
+CONTACTS = "/contacts"
+TRUTH = "/truth"
+TRUTH_TARGETS = f"{TRUTH}/targets/missed"
+TRUTH_DETECTED = f"{TRUTH}/targets/detected"
+TRUTH_FLEET = f"{TRUTH}/fleet"
+CURVE = "/curve"
+METRICS = "/metrics"
+MEAN_RISK = f"{METRICS}/mean_risk"
+WORST_RISK = f"{METRICS}/worst30_mean"
+COVERED_SHARE = f"{METRICS}/covered_share"
+ACTIVITY = "/activity"
+LOG = "/log"
+
+
+def pose(vehicle: str) -> str:
+    """The vehicle's body frame: y forward, x to starboard; `glyph`, `name` and `swath` hang on it."""
+    return f"{FLEET}/{vehicle}"
+
+
+def curve(vehicle: str) -> tuple[str, str]:
+    """The two parts of a P(y) curve: up to r_eff, and beyond it."""
+    return f"{CURVE}/{vehicle}/up_to_r_eff", f"{CURVE}/{vehicle}/beyond"
+
+
+def mode(vehicle: str) -> str:
+    """What an agent is doing."""
+    return f"{ACTIVITY}/{vehicle}/mode"
+
+
+def task(vehicle: str) -> str:
+    """How a vehicle's task stands."""
+    return f"{ACTIVITY}/{vehicle}/task"

@@ -1,0 +1,126 @@
+"""The recorder: listens to a run and writes it as a Rerun recording that shows the mission from above, over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+
+from comms.messages import (
+    AgentState,
+    Contact,
+    CoverageTile,
+    Curve,
+    Hotspot,
+    Message,
+    Nav,
+    Plan,
+    RunInfo,
+    StripStatus,
+    TaskStatus,
+    TruthLook,
+    TruthPose,
+    TruthTargets,
+)
+from comms.node import Received
+from viz import palette, paths
+from viz.blueprint import mission_blueprint
+from viz.canvas import Canvas
+from viz.curves import Curves
+from viz.fleet import Fleet
+from viz.risk_map import RiskMap
+from viz.second_looks import SecondLooks
+from viz.shapes import extent_of
+from viz.story import Story
+from viz.truth import Truth
+
+
+class Recorder:
+    """Writes `path` (comms.node.Listener). The file is complete after `close`, and readable up to the last piece of
+    `piece_s` if the process is killed before.
+
+    `recording_id` is the run's. `draw_every_s`: the risk map is drawn at most once in so much simulated time.
+    Everything drawn comes from the messages; what came before the run's first message is kept until it is there.
+    """
+
+    def __init__(
+        self, path: Path, recording_id: str, *, draw_every_s: float = 10.0, piece_s: float = 60.0
+    ) -> None:  # fmt: skip
+        self._canvas = Canvas(path, recording_id, round(piece_s * 1000))
+        self._draw_every_ms = round(draw_every_s * 1000)
+        self._mission: _Mission | None = None
+        self._early: list[Received] = []
+
+    def on_message(self, received: Received) -> None:
+        """Draws one message of the run."""
+        if self._mission is not None:
+            self._mission.draw(received)
+        elif isinstance(received.message, RunInfo):
+            self._mission = _Mission(self._canvas, received.message, self._draw_every_ms)
+            self._mission.draw(received)
+            for early in self._early:
+                self._mission.draw(early)
+            self._early = []
+        else:
+            self._early.append(received)
+
+    def close(self) -> None:
+        """Writes what is held and completes the file."""
+        if self._mission is not None:
+            self._mission.finish()
+        self._canvas.close()
+
+
+class _Mission:
+    """Everything that is drawn of one mission, once area, grid and roster are known."""
+
+    def __init__(self, canvas: Canvas, run: RunInfo, draw_every_ms: int) -> None:
+        self._canvas = canvas
+        extent = extent_of(run)
+        vehicles = tuple(vehicle.vehicle for vehicle in run.vehicles)
+        canvas.stream.send_recording_name(run.scenario)
+        canvas.stream.send_property("mission", rr.AnyValues(scenario=run.scenario, seed=run.seed))
+        canvas.stream.send_blueprint(mission_blueprint(extent, vehicles))
+        self._map = RiskMap(canvas, run, extent, draw_every_ms)
+        self._story = Story()
+        fleet, second_looks, curves, truth = (
+            Fleet(canvas, run, extent),
+            SecondLooks(canvas),
+            Curves(canvas),
+            Truth(canvas),
+        )
+        self._draw: dict[type[Message], Callable[[Received, Any], None]] = {
+            CoverageTile: self._map.on_tile,
+            Nav: fleet.on_nav,
+            Plan: fleet.on_plan,
+            AgentState: fleet.on_state,
+            TaskStatus: fleet.on_task_status,
+            Contact: fleet.on_contact,
+            Hotspot: second_looks.on_hotspot,
+            StripStatus: second_looks.on_strip,
+            Curve: curves.on_curve,
+            TruthTargets: truth.on_targets,
+            TruthLook: truth.on_look,
+            TruthPose: truth.on_pose,
+        }
+
+    def draw(self, received: Received) -> None:
+        time_ms = received.header.sent_ms
+        self._map.advance(time_ms)
+        self._canvas.advance(time_ms)
+        draw = self._draw.get(type(received.message))
+        if draw is not None:
+            draw(received, received.message)
+        line = self._story.tell(received)
+        if line is not None:
+            level, colour = (
+                (rr.TextLogLevel.WARN, palette.WARNING) if line.warns else (rr.TextLogLevel.INFO, palette.TEXT)
+            )
+            sender = received.header.sender
+            words = rr.TextLog(f"{sender}: {line.text}", level=level, color=colour)
+            self._canvas.put(time_ms, f"{paths.LOG}/{sender}", words)
+
+    def finish(self) -> None:
+        self._map.finish()
