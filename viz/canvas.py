@@ -49,6 +49,8 @@ class Canvas:
         self.stream.set_log_time_enabled(False)
         self.stream.set_log_tick_enabled(False)
         self.stream.save(path)
+        # A name from the start: without any entry the file would not get the footer that completes it.
+        self.stream.send_recording_name(recording_id)
         self._piece_ms = piece_ms
         self._piece_from_ms = 0
         self._columns: list[Column] = []

@@ -86,7 +86,7 @@ class Fleet:
             received.header.sent_ms,
             f"{paths.CONTACTS}/{received.vehicle}",
             rr.Points3D(
-                [[contact.x_m, contact.y_m, POINT_Z_M]], colors=palette.CONTACT, radii=rr.Radius.ui_points(3.0)
+                [[contact.x_m, contact.y_m, POINT_Z_M]], colors=[palette.CONTACT], radii=rr.Radius.ui_points(3.0)
             ),
         )
 
@@ -101,7 +101,7 @@ class Fleet:
         self._canvas.put_static(
             f"{here}/name",
             rr.Points3D(
-                [[0.0, 0.0, 0.0]], labels=vehicle, show_labels=True, colors=colour, radii=rr.Radius.ui_points(1.0)
+                [[0.0, 0.0, 0.0]], labels=vehicle, show_labels=True, colors=[colour], radii=rr.Radius.ui_points(1.0)
             ),
         )
         flown = f"{paths.FLOWN}/{vehicle}"

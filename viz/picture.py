@@ -27,6 +27,8 @@ DRIVER_FOLDERS = tuple(
     Path(root) / "vulkan" / "icd.d" for root in ("/usr/share", "/usr/local/share", "/etc", "/usr/local/etc")
 )
 DRIVER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
+DRIVER_HINT = "On Debian and Ubuntu the package mesa-vulkan-drivers has one that needs no graphics card."
+NO_DRIVER_USED = re.compile("graphics adapter|render context")
 SOFTWARE_DRIVER = "lvp_icd*.json"
 LISTENING = re.compile(r"Listening for gRPC connections on (127\.0\.0\.1:\d+)")
 READY_WITHIN_S = 60.0
@@ -35,16 +37,16 @@ STEADY_S = 4.5  # longer than the notes last that the viewer shows in a corner
 
 
 class PictureError(RuntimeError):
-    """No picture could be made; the text says in one sentence what is missing or went wrong."""
+    """No picture could be made; the text says what is missing or went wrong, and what helps."""
 
 
 def what_is_missing() -> str | None:
-    """In one sentence what the machine lacks for drawing, None if nothing."""
+    """What the machine lacks for drawing and what helps, None if nothing."""
     if ctypes.util.find_library("vulkan") is None:
-        return "Pictures need the Vulkan loader, which is not installed (on Debian and Ubuntu: libvulkan1)."
+        return "Pictures need the Vulkan loader, which is not installed (Debian, Ubuntu: libvulkan1)."
     chosen = any(os.environ.get(variable) for variable in DRIVER_VARIABLES)
     if not chosen and not any(any(folder.glob("*.json")) for folder in DRIVER_FOLDERS):
-        return "Pictures need a Vulkan driver, and none is installed (on Debian and Ubuntu: mesa-vulkan-drivers)."
+        return f"Pictures need a Vulkan driver, and none is installed. {DRIVER_HINT}"
     return None
 
 
@@ -71,7 +73,7 @@ def headless_viewer(recording: Path, size: tuple[int, int] = (1600, 900)) -> Ite
         try:
             yield _connect(process, log)
         except ConnectionError as error:
-            raise PictureError(f"The viewer does not answer: {_last_line(log)}") from error
+            raise PictureError(_why(log)) from error
         finally:
             process.kill()
             process.wait()
@@ -131,14 +133,18 @@ def _connect(process: subprocess.Popen[bytes], log: Path) -> ViewerClient:
         if listening:
             return ViewerClient.connect(f"rerun+http://{listening[1]}/proxy")
         if process.poll() is not None:
-            raise PictureError(f"The viewer ended before it was ready: {_last_line(log)}")
+            raise PictureError(_why(log))
         time.sleep(POLL_S)
-    raise PictureError(f"The viewer was not ready after {READY_WITHIN_S:.0f} s: {_last_line(log)}")
+    raise PictureError(f"The viewer was not ready after {READY_WITHIN_S:.0f} s.")
 
 
-def _last_line(log: Path) -> str:
-    lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
-    return lines[-1] if lines else "it said nothing."
+def _why(log: Path) -> str:
+    """One sentence out of what the viewer wrote before it failed."""
+    text = log.read_text(errors="replace")
+    if NO_DRIVER_USED.search(text):
+        return f"The viewer cannot draw with the Vulkan drivers that are there. {DRIVER_HINT}"
+    lines = [line for line in text.splitlines() if "ERROR" in line or "panicked" in line]
+    return f"The viewer failed: {lines[-1] if lines else 'it does not say why.'}"
 
 
 def main(arguments: list[str] | None = None) -> int:

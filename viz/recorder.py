@@ -38,17 +38,20 @@ from viz.truth import Truth
 
 
 class Recorder:
-    """Writes `path` (comms.node.Listener). The file is complete after `close`, and readable up to the last piece of
-    `piece_s` if the process is killed before.
+    """Writes `path` (comms.node.Listener). The file is complete after `close`; what was written before a process is
+    killed stays readable.
 
-    `recording_id` is the run's. `draw_every_s`: the risk map is drawn at most once in so much simulated time.
-    Everything drawn comes from the messages; what came before the run's first message is kept until it is there.
+    `recording_id`: recordings of one id open as one; the name of the file's folder, the run's, if not given.
+    `draw_every_s`: the risk map is drawn at most once in so much simulated time. `piece_s`: positions and statistics
+    are held back for so much simulated time and written together.
+
+    Everything drawn comes from the messages; what comes before the run's first message is kept until that is there.
     """
 
     def __init__(
-        self, path: Path, recording_id: str, *, draw_every_s: float = 10.0, piece_s: float = 60.0
-    ) -> None:  # fmt: skip
-        self._canvas = Canvas(path, recording_id, round(piece_s * 1000))
+        self, path: Path, recording_id: str | None = None, *, draw_every_s: float = 10.0, piece_s: float = 60.0
+    ) -> None:
+        self._canvas = Canvas(path, recording_id or path.absolute().parent.name, round(piece_s * 1000))
         self._draw_every_ms = round(draw_every_s * 1000)
         self._mission: _Mission | None = None
         self._early: list[Received] = []

@@ -58,7 +58,7 @@ class RiskMap:
             self._map.take(received.vehicle, version, *place, tile.sum_levels, tile.largest_levels, tile.settled)
         except ValueError:
             return
-        self._changed_ms = received.header.sent_ms
+        self._changed_ms = max(self._changed_ms, received.header.sent_ms)
 
     def advance(self, time_ms: int) -> None:
         """Draws if it is time and all tiles sent together are in."""
@@ -127,7 +127,7 @@ class RiskMap:
                 [[west_m + share * SCALE_CELLS * cell_m, south_m - 1.5 * cell_m, OUTLINE_Z_M] for share in (0, 0.5, 1)],
                 labels=["0", "residual risk", "1"],
                 show_labels=True,
-                colors=palette.TEXT,
+                colors=[palette.TEXT],
                 radii=rr.Radius.ui_points(0.1),
             ),
         )

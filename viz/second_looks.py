@@ -55,7 +55,7 @@ class SecondLooks:
                 [southern_end(outline)],
                 labels=words,
                 show_labels=True,
-                colors=palette.TEXT,
+                colors=[palette.TEXT],
                 radii=rr.Radius.ui_points(0.1),
             ),
         )

@@ -215,12 +215,8 @@ def _fly(stream: MissionStream, vehicle: str, legs: list[Leg], end_s: int, home:
         stream.say("world", time_s, TRUTH_POSE, TruthPose(x_m + 0.4, y_m - 0.3, heading), vehicle=vehicle)
 
 
-def _state(
-    stream: MissionStream, vehicle: str, time_s: float, mode: Mode, works_on: int, legs: list[Leg],
-    home: tuple[float, float],
-) -> None:  # fmt: skip
-    x_m, y_m = stream.place(*_position(legs, time_s, home)[:2])
-    stream.say(vehicle, time_s, STATE, AgentState(mode, works_on, 0.9, 0, x_m, y_m, 0.0), vehicle=vehicle)
+def _state(stream: MissionStream, vehicle: str, time_s: float, mode: Mode, works_on: int = 0) -> None:
+    stream.say(vehicle, time_s, STATE, AgentState(mode, works_on, 0.9, 0, 0.0, 0.0, 0.0), vehicle=vehicle)
 
 
 def _plan(stream: MissionStream, legs: list[Leg], flown: int, time_s: float) -> None:
@@ -237,9 +233,9 @@ def _survey(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
     home = (-30.0, -40.0)
     _fly(stream, PRIMARY, legs, end_s, home)
     _plan(stream, legs, 0, 0)
-    _state(stream, PRIMARY, 0, Mode.TRANSIT, 1, legs, home)
-    grid, left = _grid(stream), seabed(_grid(stream))
-    layer, published, versions = RiskLayer(grid), np.zeros((80, 243), dtype=np.uint8), {}  # type: ignore[var-annotated]
+    _state(stream, PRIMARY, 0, Mode.TRANSIT, 1)
+    own = Publisher(stream, PRIMARY)
+    grid, left = own.grid, seabed(own.grid)
     curve_ranges = np.arange(0, 151, 5.0)
     for number, leg in enumerate(legs, start=1):
         stream.say(PRIMARY, leg.start_s - 1, MANEUVER, Maneuver(
@@ -248,40 +244,48 @@ def _survey(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
         stream.say("world", leg.start_s, MANEUVER_STATUS, ManeuverStatus(
             number, ManeuverState.ON_TRACK, leg.end_s * 1000, ""
         ), vehicle=PRIMARY)  # fmt: skip
-        _state(stream, PRIMARY, leg.start_s, Mode.SURVEY, number, legs, home)
+        _state(stream, PRIMARY, leg.start_s, Mode.SURVEY, number)
         for time_s in range(leg.start_s, leg.end_s, REPORT_EVERY_S):
             low, high = sorted((
                 _position(legs, time_s, home)[1], _position(legs, min(time_s + REPORT_EVERY_S, leg.end_s), home)[1]
             ))  # fmt: skip
             rows = slice(math.ceil(low / CELL_M - 0.5), math.ceil(high / CELL_M - 0.5))
             p_detect = p_detect_at(np.abs(grid.across_m - leg.start[0])) * left[rows]
-            layer.add_look(rows, slice(0, grid.columns), p_detect)
-            _tiles(stream, PRIMARY, layer, published, versions, min(time_s + REPORT_EVERY_S, leg.end_s))
-            _state(stream, PRIMARY, time_s + REPORT_EVERY_S - 1, Mode.SURVEY, number, legs, home)
+            own.layer.add_look(rows, slice(0, grid.columns), p_detect)
+            own.publish(min(time_s + REPORT_EVERY_S, leg.end_s))
+            _state(stream, PRIMARY, time_s + REPORT_EVERY_S - 1, Mode.SURVEY, number)
         noise = 1.0 + 0.05 * np.sin(curve_ranges / 7.0 + number)
         curve = Curve(number, 5.0, p_detect_at(curve_ranges) * noise, R_EFF_M)
         stream.say(PRIMARY, leg.end_s, CURVE, curve, vehicle=PRIMARY)
         _plan(stream, legs, number, leg.end_s)
         over = number == len(legs)
-        _state(
-            stream, PRIMARY, leg.end_s, Mode.FINISHED if over else Mode.TRANSIT, 0 if over else number + 1, legs, home
-        )
+        _state(stream, PRIMARY, leg.end_s, Mode.FINISHED if over else Mode.TRANSIT, 0 if over else number + 1)
 
 
-def _tiles(
-    stream: MissionStream, vehicle: str, layer: RiskLayer, published: np.ndarray, versions: dict[str, int],  # type: ignore[type-arg]
-    time_s: float,
-) -> None:  # fmt: skip
-    sums, largest = layer.sum_levels(), layer.largest_levels()
-    for tile in tiles(_grid(stream)):
-        if (sums[tile.window] != published[tile.window]).any():
-            versions[tile.name] = versions.get(tile.name, 0) + 1
-            message = CoverageTile(
-                versions[tile.name], tile.first_row, tile.first_column, sums[tile.window], largest[tile.window],
-                sums[tile.window] > 0,
-            )  # fmt: skip
-            stream.say(vehicle, time_s, COVERAGE, message, vehicle=vehicle, tile=tile.name)
-    published[:] = sums
+@dataclass
+class Publisher:
+    """A vehicle's own layer, and what it has published of it."""
+
+    stream: MissionStream
+    vehicle: str
+
+    def __post_init__(self) -> None:
+        self.grid = _grid(self.stream)
+        self.layer = RiskLayer(self.grid)
+        self._published = np.zeros(self.grid.shape, dtype=np.uint8)
+        self._versions: dict[str, int] = {}
+
+    def publish(self, time_s: float) -> None:
+        """Says the tiles that have changed."""
+        sums, largest = self.layer.sum_levels(), self.layer.largest_levels()
+        for tile in tiles(self.grid):
+            if (sums[tile.window] == self._published[tile.window]).all():
+                continue
+            version = self._versions[tile.name] = self._versions.get(tile.name, 0) + 1
+            arrays = (sums[tile.window], largest[tile.window], sums[tile.window] > 0)
+            message = CoverageTile(version, tile.first_row, tile.first_column, *arrays)
+            self.stream.say(self.vehicle, time_s, COVERAGE, message, vehicle=self.vehicle, tile=tile.name)
+        self._published = sums
 
 
 def _second_looks(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
@@ -289,7 +293,7 @@ def _second_looks(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
     home = (180.0, 440.0)
     sweeps: list[Leg] = []
     free_s = 0
-    taken: list[tuple[int, Leg, float]] = []
+    taken: list[tuple[int, Leg, int]] = []
     for number, ((across, along, radius), after) in enumerate(zip(PATCHES, (4, 5), strict=True), start=1):
         if after > len(legs):
             continue
@@ -303,9 +307,9 @@ def _second_looks(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
         free_s = sweep.end_s
         taken.append((number, sweep, found_s))
     _fly(stream, HELPER, sweeps, end_s, home)
-    _state(stream, HELPER, 0, Mode.IDLE, 0, sweeps, home)
-    grid = _grid(stream)
-    layer, published, versions = RiskLayer(grid), np.zeros((80, 243), dtype=np.uint8), {}  # type: ignore[var-annotated]
+    _state(stream, HELPER, 0, Mode.IDLE, 0)
+    own = Publisher(stream, HELPER)
+    grid = own.grid
     for number, sweep, found_s in taken:
         across, along, radius = PATCHES[number - 1]
         outline = tuple(
@@ -314,29 +318,29 @@ def _second_looks(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
         )
         hotspot = Hotspot(1, HotspotState.ACTIVE, outline, 0.87, 560, growing=False, merged_into=0)
         stream.say(PRIMARY, found_s, HOTSPOT, hotspot, vehicle=PRIMARY, number=number)
-        _strip(stream, number, found_s + 1, StripState.OPEN, sweep, "", 1)
+        _strip(stream, number, found_s + 1, StripState.OPEN, sweep, revision=1)
         asked_s = sweep.start_s - 120
-        _strip(stream, number, asked_s, StripState.OFFERED, sweep, HELPER, 2)
+        _strip(stream, number, asked_s, StripState.OFFERED, sweep, vehicle=HELPER, revision=2)
         stream.say("coordinator", asked_s, TASK, Task(
             TaskAction.TAKE, number, *_strip_place(stream, sweep)
         ), vehicle=HELPER, number=number)  # fmt: skip
-        _task(stream, number, asked_s + 1, TaskState.ACCEPTED, 0.0, sweep)
-        _strip(stream, number, asked_s + 2, StripState.ACCEPTED, sweep, HELPER, 3)
-        _state(stream, HELPER, asked_s + 1, Mode.TRANSIT, number, sweeps, home)
-        _task(stream, number, sweep.start_s, TaskState.UNDER_WAY, 0.0, sweep)
-        _strip(stream, number, sweep.start_s + 1, StripState.UNDER_WAY, sweep, HELPER, 4)
-        _state(stream, HELPER, sweep.start_s, Mode.REVISIT, number, sweeps, home)
+        _task(stream, number, asked_s + 1, TaskState.ACCEPTED, sweep)
+        _strip(stream, number, asked_s + 2, StripState.ACCEPTED, sweep, vehicle=HELPER, revision=3)
+        _state(stream, HELPER, asked_s + 1, Mode.TRANSIT, number)
+        _task(stream, number, sweep.start_s, TaskState.UNDER_WAY, sweep)
+        _strip(stream, number, sweep.start_s + 1, StripState.UNDER_WAY, sweep, vehicle=HELPER, revision=4)
+        _state(stream, HELPER, sweep.start_s, Mode.REVISIT, number)
         for time_s in range(sweep.start_s, sweep.end_s, REPORT_EVERY_S):
             low = _position(sweeps, time_s, home)[1]
             high = _position(sweeps, min(time_s + REPORT_EVERY_S, sweep.end_s), home)[1]
             rows = slice(math.ceil(low / CELL_M - 0.5), math.ceil(high / CELL_M - 0.5))
             p_detect = np.where(np.abs(grid.across_m - across) <= STRIP_WIDTH_M / 2, 0.75, 0.0)
-            layer.add_look(rows, slice(0, grid.columns), np.repeat(p_detect[None], rows.stop - rows.start, axis=0))
-            _tiles(stream, HELPER, layer, published, versions, min(time_s + REPORT_EVERY_S, sweep.end_s))
-            _task(stream, number, time_s + 5, TaskState.UNDER_WAY, 0.5, sweep)
-        _task(stream, number, sweep.end_s, TaskState.DONE, 1.0, sweep)
-        _strip(stream, number, sweep.end_s + 1, StripState.DONE, sweep, HELPER, 5)
-        _state(stream, HELPER, sweep.end_s, Mode.IDLE, 0, sweeps, home)
+            own.layer.add_look(rows, slice(0, grid.columns), np.repeat(p_detect[None], rows.stop - rows.start, axis=0))
+            own.publish(min(time_s + REPORT_EVERY_S, sweep.end_s))
+            _task(stream, number, time_s + 5, TaskState.UNDER_WAY, sweep, progress=0.5)
+        _task(stream, number, sweep.end_s, TaskState.DONE, sweep, progress=1.0)
+        _strip(stream, number, sweep.end_s + 1, StripState.DONE, sweep, vehicle=HELPER, revision=5)
+        _state(stream, HELPER, sweep.end_s, Mode.IDLE, 0)
         withdrawn = Hotspot(2, HotspotState.WITHDRAWN, outline, 0.3, 560, growing=False, merged_into=0)
         stream.say(PRIMARY, sweep.end_s + 15, HOTSPOT, withdrawn, vehicle=PRIMARY, number=number)
         x_m, y_m = stream.place(across, along)
@@ -344,11 +348,11 @@ def _second_looks(stream: MissionStream, legs: list[Leg], end_s: int) -> None:
     if taken:
         found_s = taken[-1][2] + 30
         small = Leg((720.0, 250.0), (720.0, 330.0), 0, 0)
-        _strip(stream, 9, found_s, StripState.OPEN, small, "", 1)
-        _strip(stream, 9, found_s + 200, StripState.WITHDRAWN, small, "", 2)
+        _strip(stream, 9, found_s, StripState.OPEN, small, revision=1)
+        _strip(stream, 9, found_s + 200, StripState.WITHDRAWN, small, revision=2)
     open_strip = Leg((1060.0, 260.0), (1060.0, 360.0), 0, 0)
     if len(legs) == len(OFFSETS_M):
-        _strip(stream, 10, legs[-1].start_s + 60, StripState.OPEN, open_strip, "", 1)
+        _strip(stream, 10, legs[-1].start_s + 60, StripState.OPEN, open_strip, revision=1)
 
 
 def _strip_place(stream: MissionStream, leg: Leg) -> tuple[float, float, float, float, float]:
@@ -357,14 +361,16 @@ def _strip_place(stream: MissionStream, leg: Leg) -> tuple[float, float, float, 
 
 
 def _strip(
-    stream: MissionStream, number: int, time_s: float, state: StripState, leg: Leg, vehicle: str, revision: int
+    stream: MissionStream, number: int, time_s: float, state: StripState, leg: Leg, *, vehicle: str = "", revision: int
 ) -> None:
     reason = "seen well since" if state is StripState.WITHDRAWN else ""
     status = StripStatus(revision, state, *_strip_place(stream, leg), 1840.0 + 310.0 * number, vehicle, reason)
     stream.say("coordinator", time_s, STRIP, status, number=number)
 
 
-def _task(stream: MissionStream, number: int, time_s: float, state: TaskState, progress: float, leg: Leg) -> None:
+def _task(
+    stream: MissionStream, number: int, time_s: float, state: TaskState, leg: Leg, *, progress: float = 0.0
+) -> None:
     status = TaskStatus(number, state, progress, leg.end_s * 1000, "")
     stream.say(HELPER, time_s, TASK_STATUS, status, vehicle=HELPER, number=stream.sequences.get(HELPER, 0))
 

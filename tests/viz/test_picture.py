@@ -1,0 +1,111 @@
+from __future__ import annotations
+
+import os
+import socket
+import struct
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from viz import picture
+from viz.picture import PictureError, headless_viewer, main, reports, show, what_is_missing
+
+
+@pytest.fixture
+def drawable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Skips where nothing can be drawn; fails instead where all tests are required to run."""
+    missing = what_is_missing()
+    if missing is not None:
+        if os.environ.get("SECONDLOOK_REQUIRE_ALL") == "1":
+            pytest.fail(missing)
+        pytest.skip(missing)
+    monkeypatch.setattr(picture, "STEADY_S", 0.2)
+
+
+def listens(url: str) -> bool:
+    parts = urlsplit(url.replace("rerun+http", "http"))
+    assert parts.hostname == "127.0.0.1"
+    with socket.socket() as probe:
+        return probe.connect_ex((parts.hostname, parts.port or 0)) == 0
+
+
+def override(blueprint: object, entity: str, name: str) -> object:
+    """A field of what the blueprint lays over an entity, looked for at any depth."""
+    if isinstance(blueprint, dict):
+        for key, value in blueprint.items():
+            if str(key).endswith(f"/overrides{entity}/visualizers"):
+                return value[name]
+            found = override(value, entity, name)
+            if found is not None:
+                return found
+    return None
+
+
+@pytest.mark.usefixtures("drawable")
+def test_the_viewer_draws_every_view_and_is_gone_afterwards(recording: Path) -> None:
+    with headless_viewer(recording, size=(800, 500)) as client:
+        url = client.url
+        assert listens(url)
+        early, late = show(client, 600.0), show(client, 1500.0)
+        assert reports(client) == []
+        views = {view.view_class for view in client.get_state().views}
+        blueprint = client.get_blueprint()
+    assert not listens(url)
+    assert early != late
+    assert early[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">II", late[16:24]) == (800, 500)
+    assert views == {"3D", "TimeSeries", "BarChart", "StateTimeline", "TextLog"}
+    assert override(blueprint.blueprint, "/truth", "EntityBehavior") == {"visible": False}
+
+
+@pytest.mark.usefixtures("drawable")
+def test_the_viewer_is_gone_after_an_error_too(recording: Path) -> None:
+    urls: list[str] = []
+
+    def fail_while_it_runs() -> None:
+        with headless_viewer(recording) as client:
+            urls.append(client.url)
+            raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        fail_while_it_runs()
+    assert [listens(url) for url in urls] == [False]
+
+
+@pytest.mark.usefixtures("drawable")
+def test_a_driver_that_does_not_work_is_named(
+    recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for variable in picture.DRIVER_VARIABLES:
+        monkeypatch.setenv(variable, str(tmp_path / "none.json"))
+    out = tmp_path / "mission.png"
+    assert main([str(recording), "--time", "10", "--out", str(out)]) == 1
+    assert "mesa-vulkan-drivers" in capsys.readouterr().err
+    assert not out.exists()
+
+
+def test_a_missing_driver_is_named(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, "DRIVER_FOLDERS", ())
+    monkeypatch.setattr("ctypes.util.find_library", lambda _: "libvulkan.so.1")
+    for variable in picture.DRIVER_VARIABLES:
+        monkeypatch.delenv(variable, raising=False)
+    with pytest.raises(PictureError, match=r"^Pictures need a Vulkan driver.*mesa-vulkan-drivers"):
+        headless_viewer(recording).__enter__()
+    monkeypatch.setattr("ctypes.util.find_library", lambda _: None)
+    with pytest.raises(PictureError, match=r"^Pictures need the Vulkan loader.*libvulkan1"):
+        headless_viewer(recording).__enter__()
+
+
+@pytest.mark.usefixtures("drawable")
+def test_a_missing_recording_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    missing = tmp_path / "nothing.rrd"
+    assert main([str(missing), "--time", "10", "--out", str(tmp_path / "out.png")]) == 1
+    assert capsys.readouterr().err == f"There is no recording {missing}.\n"
+
+
+@pytest.mark.usefixtures("drawable")
+def test_the_command_writes_a_picture(recording: Path, tmp_path: Path) -> None:
+    out = tmp_path / "mission.png"
+    assert main([str(recording), "--time", "1500", "--out", str(out)]) == 0
+    assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"

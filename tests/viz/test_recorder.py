@@ -1,0 +1,348 @@
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from comms.messages import (
+    AgentState,
+    CoverageTile,
+    Curve,
+    Hotspot,
+    Look,
+    Message,
+    MissionOver,
+    Nav,
+    Plan,
+    RunInfo,
+    StripState,
+    StripStatus,
+    TaskStatus,
+    TruthLook,
+    TruthPose,
+    TruthTargets,
+)
+from comms.node import Received
+from comms.topics import TOPICS
+from tests.viz.mission_stream import HELPER, PRIMARY, mission
+from tests.viz.recordings import entities, rows, static, timelines, verify
+from viz import palette
+from viz.recorder import Recorder
+
+Record = Callable[[list[Received], Path], Path]
+ROWS, COLUMNS = 80, 243
+
+
+def of(messages: list[Received], kind: type[Message], vehicle: str = "") -> list[tuple[int, Any]]:
+    """(send time, message) of one kind, and of one vehicle if named."""
+    return [
+        (received.header.sent_ms, received.message)
+        for received in messages
+        if isinstance(received.message, kind) and received.vehicle == (vehicle or received.vehicle)
+    ]
+
+
+def risk_of(messages: list[Received], until_ms: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """The fleet's residual risk, joined here without the planner: rho is 0, so sums alone count."""
+    newest: dict[str, tuple[int, str, CoverageTile]] = {}
+    for received in messages:
+        if isinstance(received.message, CoverageTile) and received.header.sent_ms <= until_ms:
+            tile = received.message
+            if received.key not in newest or newest[received.key][0] < tile.version:
+                newest[received.key] = (tile.version, received.vehicle, tile)
+    sums = {vehicle: np.zeros((ROWS, COLUMNS)) for _, vehicle, _ in newest.values()}
+    for _, vehicle, tile in newest.values():
+        height, width = tile.sum_levels.shape
+        window = np.s_[tile.first_row : tile.first_row + height, tile.first_column : tile.first_column + width]
+        sums[vehicle][window] = tile.sum_levels
+    return np.exp(-0.02 * sum(sums.values(), start=np.zeros((ROWS, COLUMNS))))
+
+
+def image(value: list[bytes] | list[list[int]]) -> np.ndarray[Any, np.dtype[np.uint8]]:
+    """A grid map's bytes, whichever way Arrow hands them out."""
+    return np.frombuffer(bytes(value[0]), dtype=np.uint8)
+
+
+def test_the_risk_is_one_byte_a_cell_with_the_farthest_row_first(messages: list[Received], recording: Path) -> None:
+    drawn = rows(recording, "/area/risk", "GridMap:data")
+    for time_ms, data in (drawn[len(drawn) // 2], drawn[-1]):
+        levels = image(data).reshape(ROWS, COLUMNS)
+        np.testing.assert_array_equal(levels[::-1], np.rint(risk_of(messages, time_ms) * 255))
+    assert drawn[-1][0] == max(time_ms for time_ms, _ in of(messages, CoverageTile))
+
+
+def test_cells_without_a_look_are_covered(messages: list[Received], recording: Path) -> None:
+    drawn = rows(recording, "/area/unseen", "GridMap:data")
+    time_ms, data = drawn[len(drawn) // 2]
+    opaque = image(data).reshape(ROWS, COLUMNS, 4)[::-1, :, 3] == 255
+    np.testing.assert_array_equal(opaque, risk_of(messages, time_ms) == 1.0)
+    assert 0 < np.count_nonzero(opaque) < opaque.size
+    assert (image(drawn[0][1]).reshape(-1, 4) == [*palette.UNSEEN, 255]).all()
+
+
+def test_the_map_is_drawn_at_most_every_ten_seconds(recording: Path) -> None:
+    times_ms = [time_ms for time_ms, _ in rows(recording, "/area/risk", "GridMap:data")]
+    assert min(np.diff(times_ms)) >= 10_000
+    assert len(times_ms) > 150
+
+
+def test_the_grid_lies_where_the_run_says(record: Record, tmp_path: Path) -> None:
+    heading_rad = 0.6
+    turned = record(mission(heading_rad, tracks=1), tmp_path / "turned.rrd")
+    # Half a cell to port of the sweep frame's origin (100, -50); the map's x axis is the across axis.
+    corner = (100.0 - 2.5 * math.cos(heading_rad), -50.0 + 2.5 * math.sin(heading_rad), 0.0)
+    assert static(turned, "/area/risk", "Transform3D:translation")[0] == pytest.approx(corner, abs=1e-3)
+    turn = static(turned, "/area/risk", "Transform3D:rotation_axis_angle")[0]
+    assert turn["axis"] == pytest.approx([0.0, 0.0, 1.0])
+    assert turn["angle"] == pytest.approx(-heading_rad, abs=1e-5)
+    assert static(turned, "/area/risk", "GridMap:cell_size")[0] == 5.0
+
+
+@pytest.mark.parametrize("vehicle", [PRIMARY, HELPER])
+def test_every_position_is_kept(messages: list[Received], recording: Path, vehicle: str) -> None:
+    said = of(messages, Nav, vehicle)
+    places = rows(recording, f"/fleet/{vehicle}", "Transform3D:translation")
+    turns = rows(recording, f"/fleet/{vehicle}", "Transform3D:quaternion")
+    assert [time_ms for time_ms, _ in places] == [time_ms for time_ms, _ in said]
+    np.testing.assert_allclose([p[0][:2] for _, p in places], [(nav.x_m, nav.y_m) for _, nav in said], atol=1e-3)
+    # A quaternion (0, 0, z, w) turns the body's y axis to (-2 z w, w² - z²): compass (sin, cos) of the heading.
+    z, w = np.array([turn[0][2:] for _, turn in turns]).T
+    headings = np.array([nav.heading_rad for _, nav in said])
+    np.testing.assert_allclose(-2 * z * w, np.sin(headings), atol=1e-5)
+    np.testing.assert_allclose(w * w - z * z, np.cos(headings), atol=1e-5)
+
+
+def test_the_flown_track_is_a_chain_of_short_segments(messages: list[Received], recording: Path) -> None:
+    said = {time_ms: (nav.x_m, nav.y_m) for time_ms, nav in of(messages, Nav, PRIMARY)}
+    segments = rows(recording, f"/flown/{PRIMARY}", "LineStrips3D:strips")
+    assert len(segments) == max(said) // 5000
+    end = said[0]
+    for time_ms, strips in segments:
+        (first, last) = strips[0]
+        assert first[:2] == pytest.approx(end, abs=1e-3)
+        end = said[time_ms]
+        assert last[:2] == pytest.approx(end, abs=1e-3)
+
+
+def test_a_plan_shows_what_is_still_to_be_flown(messages: list[Received], recording: Path) -> None:
+    drawn = rows(recording, f"/plan/{PRIMARY}", "LineStrips3D:strips")
+    labels = rows(recording, f"/plan/{PRIMARY}", "LineStrips3D:labels")
+    for (time_ms, plan), (drawn_ms, lines), (_, names) in zip(of(messages, Plan), drawn, labels, strict=True):
+        ahead = [track for track in plan.tracks if not track.flown]
+        assert drawn_ms == time_ms
+        assert names == [str(track.number) for track in ahead]
+        ends = [[[t.start_x_m, t.start_y_m], [t.end_x_m, t.end_y_m]] for t in ahead]
+        assert [[point[:2] for point in line] for line in lines] == [
+            [pytest.approx(end, abs=1e-3) for end in line] for line in ends
+        ]
+    assert drawn[-1][1] == []
+
+
+def test_strips_have_the_colour_of_their_state(messages: list[Received], recording: Path) -> None:
+    said = [(time_ms, strip) for time_ms, strip in of(messages, StripStatus) if strip.removable_m2 == 2150.0]
+    colours = rows(recording, "/strips/1", "LineStrips3D:colors")
+    words = rows(recording, "/strips/1/label", "Points3D:labels")
+    assert [time_ms for time_ms, _ in colours] == [time_ms for time_ms, _ in said]
+    for (_, strip), (_, colour), (_, label) in zip(said, colours, words, strict=True):
+        red, green, blue = palette.STRIP[strip.state]
+        assert colour == [(red << 24) | (green << 16) | (blue << 8) | 0xFF]
+        assert strip.state.value.replace("_", " ") in label[0]
+        assert label[0].startswith("strip 1 ")
+    assert words[0][1] == ["strip 1 open, 2150 m²"]
+
+
+def test_what_is_withdrawn_disappears(messages: list[Received], recording: Path) -> None:
+    withdrawn_ms = [t for t, strip in of(messages, StripStatus) if strip.state is StripState.WITHDRAWN]
+    assert [t for t, _ in rows(recording, "/strips/9", "Clear:is_recursive")] == withdrawn_ms
+    drawn, gone = of(messages, Hotspot)[::2], of(messages, Hotspot)[1::2]
+    cleared = [t for n in (1, 2) for t, _ in rows(recording, f"/hotspots/{PRIMARY}/{n}", "Clear:is_recursive")]
+    assert sorted(cleared) == sorted(t for t, hotspot in of(messages, Hotspot) if hotspot.state.value == "withdrawn")
+    assert len(drawn) == len(gone) == 2
+    outline = rows(recording, f"/hotspots/{PRIMARY}/1", "LineStrips3D:strips")[0][1][0]
+    corners = [(vertex.x_m, vertex.y_m) for vertex in drawn[0][1].outline]
+    np.testing.assert_allclose([point[:2] for point in outline], [*corners, corners[0]], atol=1e-3)
+
+
+def test_a_curve_is_split_at_r_eff(messages: list[Received], recording: Path) -> None:
+    within = rows(recording, f"/curve/{PRIMARY}/up_to_r_eff", "BarChart:values")
+    beyond = rows(recording, f"/curve/{PRIMARY}/beyond", "BarChart:values")
+    for (time_ms, curve), (drawn_ms, near), (_, far) in zip(of(messages, Curve), within, beyond, strict=True):
+        assert drawn_ms == time_ms
+        near_values, far_values = (np.array(part[0]["buffer"]) for part in (near, far))
+        np.testing.assert_allclose(near_values + far_values, curve.p_detect)
+        assert not near_values[curve.r_eff_m // 5 + 1 :].any()
+        assert not far_values[: curve.r_eff_m // 5 + 1].any()
+
+
+def test_statistics_are_those_of_the_map_drawn(messages: list[Received], recording: Path) -> None:
+    metrics = {
+        name: rows(recording, f"/metrics/{name}", "Scalars:scalars")
+        for name in ("mean_risk", "worst30_mean", "covered_share")
+    }
+    drawn_ms = [time_ms for time_ms, _ in rows(recording, "/area/risk", "GridMap:data")]
+    over_ms = of(messages, MissionOver)[0][0]
+    for row in metrics.values():
+        assert [time_ms for time_ms, _ in row] == [*drawn_ms, over_ms]
+    # The corners of this area are those of the grid's cells, so that every cell counts.
+    for place in (0, len(drawn_ms) // 2, -1):
+        risk = np.sort(risk_of(messages, metrics["mean_risk"][place][0]), axis=None)
+        worst = risk[-round(0.3 * risk.size) :]
+        assert metrics["mean_risk"][place][1][0] == pytest.approx(risk.mean())
+        assert metrics["worst30_mean"][place][1][0] == pytest.approx(worst.mean())
+        assert metrics["covered_share"][place][1][0] == pytest.approx(np.count_nonzero(risk < 1) / risk.size)
+
+
+def changes(said: list[tuple[int, Any]], value: Callable[[Any], str]) -> list[tuple[int, list[str]]]:
+    found: list[tuple[int, list[str]]] = []
+    for time_ms, message in said:
+        if not found or found[-1][1] != [value(message)]:
+            found.append((time_ms, [value(message)]))
+    return found
+
+
+def test_states_are_noted_when_they_change(messages: list[Received], recording: Path) -> None:
+    for vehicle in (PRIMARY, HELPER):
+        expected = changes(of(messages, AgentState, vehicle), lambda state: str(state.mode.value))
+        assert rows(recording, f"/activity/{vehicle}/mode", "StateChange:state") == expected
+    expected = changes(of(messages, TaskStatus), lambda status: str(status.state.value))
+    assert rows(recording, f"/activity/{HELPER}/task", "StateChange:state") == expected
+    known = static(recording, f"/activity/{HELPER}/task", "StateConfiguration:values")
+    assert {state for _, (state,) in expected} <= set(known)
+
+
+def test_the_swath_shows_while_the_sonar_is_on(recording: Path) -> None:
+    shown = rows(recording, f"/fleet/{PRIMARY}/swath", "LineStrips3D:strips")
+    surveys = [state for _, (state,) in rows(recording, f"/activity/{PRIMARY}/mode", "StateChange:state")]
+    assert len(shown) == 2 * surveys.count("survey")
+    assert [len(lines) for _, lines in shown] == [2, 0] * surveys.count("survey")
+    assert shown[0][1] == [[[-40, 0, 0], [-130, 0, 0]], [[40, 0, 0], [130, 0, 0]]]
+
+
+def test_the_truth_stays_under_its_own_path(messages: list[Received], recording: Path) -> None:
+    (_, truth), *_ = of(messages, TruthTargets)
+    places = [(target.x_m, target.y_m) for target in truth.targets]
+    (_, missed), *_ = rows(recording, "/truth/targets/missed", "Points3D:positions")
+    np.testing.assert_allclose([place[:2] for place in missed], places, atol=1e-3)
+    detected = {n for _, look in of(messages, TruthLook) for n in look.detected}
+    shown = [tuple(p[:2]) for _, new in rows(recording, "/truth/targets/detected", "Points3D:positions") for p in new]
+    assert len(shown) == len(detected) > 3
+    np.testing.assert_allclose(sorted(shown), sorted(places[n] for n in detected), atol=1e-3)
+    assert len(rows(recording, f"/truth/fleet/{PRIMARY}", "Points3D:positions")) == len(
+        of(messages, TruthPose, PRIMARY)
+    )
+
+
+def test_the_log_names_who_speaks(recording: Path) -> None:
+    said = rows(recording, "/log/coordinator", "TextLog:text")
+    assert [text for _, text in said][:2] == [
+        ["coordinator: strip 1 open: 156 m x 60 m, 2150 m² of risk to remove"],
+        ["coordinator: helper, take strip 1"],
+    ]
+    assert said[-1][1] == ["coordinator: the mission is over: every strip is settled and the survey is finished"]
+
+
+def test_entities_are_known_and_looks_are_left_out(recording: Path) -> None:
+    roots = {path.split("/")[1] for path in entities(recording)}
+    assert roots == {
+        "activity", "area", "contacts", "curve", "fleet", "flown", "hotspots", "log", "metrics", "plan", "strips",
+        "truth",
+    }  # fmt: skip
+    assert timelines(recording) == {"sim_time"}
+
+
+def test_the_file_is_sound_and_small(messages: list[Received], recording: Path) -> None:
+    verdict = verify(recording)
+    assert verdict.returncode == 0, verdict.stderr
+    hours = messages[-1].header.sent_ms / 3_600_000
+    assert recording.stat().st_size < 10e6 * hours
+
+
+def test_a_mission_costs_little(messages: list[Received], record: Record, tmp_path: Path) -> None:
+    began_s = time.process_time()
+    record(messages, tmp_path / "mission.rrd")
+    assert time.process_time() - began_s < 1.5
+
+
+def test_a_run_without_messages_leaves_a_sound_file(record: Record, tmp_path: Path) -> None:
+    empty = record([], tmp_path / "empty.rrd")
+    assert verify(empty).returncode == 0
+    assert entities(empty) == set()
+
+
+def test_messages_wait_for_the_run_info(record: Record, tmp_path: Path) -> None:
+    stream = mission(tracks=1)
+    run = next(received for received in stream if isinstance(received.message, RunInfo))
+    late = record([received for received in stream if received is not run] + [run], tmp_path / "late.rrd")
+    tiles_ms = [time_ms for time_ms, _ in of(stream, CoverageTile)]
+    assert rows(late, "/area/risk", "GridMap:data")[-1][0] == tiles_ms[-1]
+    never = record([received for received in stream if received is not run], tmp_path / "never.rrd")
+    assert verify(never).returncode == 0
+    assert entities(never) == set()
+
+
+def test_a_tile_beside_the_grid_is_left_out(messages: list[Received], record: Record, tmp_path: Path) -> None:
+    run, tile = (next(r for r in messages if isinstance(r.message, kind)) for kind in (RunInfo, CoverageTile))
+    assert isinstance(tile.message, CoverageTile)
+    outside = CoverageTile(9, 79, 0, tile.message.sum_levels, tile.message.largest_levels, tile.message.settled)
+    path = record([run, Received(tile.key, tile.topic, tile.vehicle, tile.header, outside)], tmp_path / "outside.rrd")
+    assert len(rows(path, "/area/risk", "GridMap:data")) == 1
+
+
+@pytest.mark.filterwarnings("ignore:RRD file has no footer")
+def test_what_was_written_before_a_kill_is_readable(tmp_path: Path) -> None:
+    program = """
+import os, pathlib, sys, time
+from tests.viz.mission_stream import mission
+from viz.recorder import Recorder
+path = pathlib.Path(sys.argv[1])
+recorder = Recorder(path)
+for received in mission(tracks=1):
+    recorder.on_message(received)
+for _ in range(600):  # the writing itself is done by a thread of the library
+    if path.stat().st_size > 50_000:
+        break
+    time.sleep(0.05)
+os._exit(9)
+"""
+    path = tmp_path / "killed.rrd"
+    root = Path(__file__).parents[2]
+    assert subprocess.run([sys.executable, "-c", program, path], cwd=root, check=False).returncode == 9
+    assert len(rows(path, f"/fleet/{PRIMARY}", "Transform3D:translation")) > 60
+
+
+SHORT = mission(tracks=5)
+FEW = [
+    received
+    for place, received in enumerate(SHORT)
+    if not isinstance(received.message, (Nav, TruthPose, CoverageTile, AgentState)) or place % 90 == 0
+]
+
+
+def test_the_short_stream_has_every_message_but_looks() -> None:
+    assert {type(received.message) for received in FEW} == {topic.message for topic in TOPICS} - {Look}
+
+
+@settings(max_examples=15, deadline=None)
+@given(order=st.permutations(range(len(FEW))), repeated=st.lists(st.integers(0, len(FEW) - 1), max_size=20))
+def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated: list[int]) -> None:
+    stream = [FEW[place] for place in (*order, *repeated)]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "mission.rrd"
+        recorder = Recorder(path)
+        for received in stream:
+            recorder.on_message(received)
+        recorder.close()
+        drawn = rows(path, "/area/risk", "GridMap:data")
+    np.testing.assert_array_equal(
+        image(drawn[-1][1]).reshape(ROWS, COLUMNS)[::-1], np.rint(risk_of(FEW, FEW[-1].header.sent_ms) * 255)
+    )
