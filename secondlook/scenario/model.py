@@ -70,7 +70,7 @@ class Coordinator(Mapping):
     lost_after_s: Duration = 30.0
     min_strip_m: Length = 30.0
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
-    worth_risk: OpenShare = 0.25
+    worth_risk: OpenShare = 0.3
 
     @field_validator("max_strip_m")
     @classmethod

@@ -82,7 +82,7 @@ class SurveyVehicle(VehicleBase):
     range_m: Length
     spacing: Literal["adaptive", "fixed"] = "adaptive"
     threshold: OpenShare = 0.05
-    hotspot_risk: OpenShare = 0.6
+    hotspot_risk: OpenShare = 0.55
 
     @field_validator("range_m")
     @classmethod
