@@ -17,10 +17,11 @@ from comms.topics import MISSION_OVER
 
 WRAP_UP_MS = 100  # simulated time in which the fleet's last words are delivered after the mission is over
 MOST_ROUNDS_A_SECOND = 10_000
+MOST_MESSAGES_A_SECOND = 200_000
 
 
 class RunawayError(Exception):
-    """Too many rounds within one simulated second: nodes answer each other without end."""
+    """Too many rounds or messages within one simulated second: nodes answer each other without end."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +114,7 @@ class LockstepClock:
     def next_round(self) -> Round | None:
         """The next grants, or None when the mission is over, nothing is left to happen, or the time limit has passed.
 
-        Raises RunawayError after more than 10,000 rounds within one simulated second.
+        Raises RunawayError after more than 10,000 rounds or 200,000 messages within one simulated second.
         """
         if self._waiting:
             raise ValueError(f"the round is not over: no answer from {', '.join(sorted(self._waiting))}")
@@ -156,9 +157,12 @@ class LockstepClock:
             self._rounds_in_second = 0
             self._topics_in_second.clear()
         self._rounds_in_second += 1
-        if self._rounds_in_second > MOST_ROUNDS_A_SECOND:
-            topics = ", ".join(f"{name} {count}" for name, count in self._topics_in_second.most_common(5))
-            raise RunawayError(
-                f"more than {MOST_ROUNDS_A_SECOND} rounds within simulated second {self._second}; "
-                f"messages in it: {topics or 'none'}"
-            )
+        for what, count, most in (
+            ("rounds", self._rounds_in_second, MOST_ROUNDS_A_SECOND),
+            ("messages", self._topics_in_second.total(), MOST_MESSAGES_A_SECOND),
+        ):
+            if count > most:
+                topics = ", ".join(f"{name} {number}" for name, number in self._topics_in_second.most_common(5))
+                raise RunawayError(
+                    f"more than {most} {what} within simulated second {self._second}; messages in it: {topics}"
+                )

@@ -73,4 +73,6 @@ class Listener(Protocol):
 
 def random_stream(seed: int, *names: str) -> np.random.Generator:
     """A generator of its own for (seed, names): the same on every machine, independent of all others."""
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *(zlib.crc32(n.encode()) for n in names)])))
+    return np.random.Generator(
+        np.random.PCG64(np.random.SeedSequence([seed, *(zlib.crc32(n.encode()) for n in names)]))
+    )

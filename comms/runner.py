@@ -61,7 +61,7 @@ class Stamp:
             raise NodeError(f"{self.sender} has published a message that does not fit: {error}") from error
         if len(payload) > route.topic.max_bytes:
             raise NodeError(
-                f"{self.sender} has published {len(payload)} bytes under {key}, where {route.topic.max_bytes} are allowed"
+                f"{self.sender} has published {len(payload)} bytes under {key}; at most {route.topic.max_bytes} fit"
             )
         self._count += 1
         self._hash.update(b"%s %d\n" % (key.encode(), len(payload)))

@@ -100,15 +100,13 @@ _BODIES_OWN = {Role.WORLD: Reach.OWN, Role.BODY: Reach.OWN}
 _COORDINATOR = {Role.COORDINATOR: Reach.ALL}
 _EVERYONE = dict.fromkeys(Role, Reach.ALL)
 
-RUN = Topic(
-    "run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 20_000, 0.01, Keep.LATEST, crosses_water=False
-)
+RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 20_000, 0.01, Keep.LATEST, crosses_water=False)
 NAV = Topic(
     "nav", "veh/{vehicle}/nav", Nav, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 200, 1.0, Keep.LATEST, crosses_water=False
 )
 LOOK = Topic(
-    "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | {Role.OBSERVER: Reach.ALL}, 150_000, 0.2, Keep.NOTHING,
-    crosses_water=False,
+    "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | {Role.OBSERVER: Reach.ALL}, 150_000, 0.2,
+    Keep.NOTHING, crosses_water=False,
 )  # fmt: skip
 MANEUVER_STATUS = Topic(
     "maneuver_status", "veh/{vehicle}/maneuver_status", ManeuverStatus, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 400, 0.1,

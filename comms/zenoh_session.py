@@ -39,7 +39,7 @@ def open_hub(users: Mapping[str, str], access_control: dict[str, Any] | None) ->
     for reply in session.get(f"@/{session.info.zid()}/router"):
         if reply.ok is not None:
             return session, str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
-    session.close()
+    session.close()  # type: ignore[no-untyped-call]
     raise ConnectionFailedError("the hub does not say which port it listens on")
 
 

@@ -372,11 +372,7 @@ class Coordinator:
             return None
         if self._to_cut or self._to_assign:
             return now_ms + 1
-        times = [
-            one.heard_ms + self.config.lost_after_ms
-            for one in self.vehicles.values()
-            if not one.lost
-        ]
+        times = [one.heard_ms + self.config.lost_after_ms for one in self.vehicles.values() if not one.lost]
         times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
         if all(one.finished_ms is not None for one in self.vehicles.values() if one.entry.role is Role.SURVEY):
             times.append(self._deadline_ms())

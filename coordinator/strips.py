@@ -7,6 +7,7 @@ pay for the time it takes. The best window becomes a strip, its cells count as l
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -113,7 +114,7 @@ def _window_sums(values: FloatArray, width: int) -> FloatArray:
     return total[:, width:] - total[:, :-width]
 
 
-def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
     """For each window the run of rows with the largest sum: the sum, its first row, the row behind its last."""
     total = np.zeros((profit.shape[0] + 1, profit.shape[1]))
     np.cumsum(profit, axis=0, out=total[1:])
@@ -134,4 +135,4 @@ def _touches(touched: BoolArray, rows: tuple[int, int]) -> bool:
 def _pieces(first: int, end: int, longest: int) -> list[tuple[int, int]]:
     count = -(-(end - first) // longest)
     edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
-    return list(zip(edges[:-1], edges[1:], strict=True))
+    return list(pairwise(edges))

@@ -9,7 +9,7 @@ import numpy as np
 
 from planner.types import FloatArray, GridSpec, Point, SweepFrame
 
-# Positions travel in centimetres and headings in microradians: a cell centre this close to a bin's edge counts as on it.
+# Positions travel in centimetres, headings in microradians: a cell centre this close to a bin's edge counts as on it.
 EDGE_TOLERANCE_M = 1e-3
 
 

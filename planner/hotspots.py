@@ -146,12 +146,16 @@ def _outline(grid: GridSpec, cells: BoolArray, window: tuple[slice, slice]) -> t
         (columns + first_column + 0.5) * grid.cell_m,
         (ends + first_row) * grid.cell_m,
     )
-    outer = shapely.Polygon(shapely.union_all(boxes).exterior)
+    whole = shapely.union_all(boxes)
+    assert isinstance(whole, shapely.Polygon)
+    outer = shapely.Polygon(whole.exterior)
     simple = outer
     tolerance_m = grid.cell_m
     while len(simple.exterior.coords) - 1 > MOST_CORNERS:
         # Widened by what simplifying may cut off, so that the outline goes on covering its cells.
-        simple = shapely.Polygon(outer.buffer(tolerance_m, join_style="mitre").simplify(tolerance_m).exterior)
+        widened = outer.buffer(tolerance_m, join_style="mitre").simplify(tolerance_m)
+        assert isinstance(widened, shapely.Polygon)
+        simple = shapely.Polygon(widened.exterior)
         tolerance_m *= 1.5
     across, along = np.asarray(simple.exterior.coords[:-1]).T
     x_m, y_m = grid.frame.to_mission(across, along)

@@ -1,7 +1,7 @@
 """Residual risk: what looks leave undetected, kept in two channels so that correlated looks can be told apart.
 
-A layer holds, per cell, the sum of -ln(1 - P_d) over its looks and the largest of them. What travels and what is decided
-on are both in whole levels of 0.02, so that everyone sees one map.
+A layer holds, per cell, the sum of -ln(1 - P_d) over its looks and the largest of them. What travels, and what is
+decided on, is in whole levels of 0.02, so that everyone sees one map.
 """
 
 from __future__ import annotations
@@ -60,11 +60,14 @@ def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.in
     `rho` in [0, 1]: how far looks at one cell tell the same story; 0 is the paper's product over looks (equation 2).
     """
     if rho == 0.0:
-        risk: FloatArray = np.exp(sum_levels * -NATS_PER_LEVEL)
-        return risk
+        return _exp(-NATS_PER_LEVEL * sum_levels.astype(np.float64))
     largest = largest_levels.astype(np.float64)
-    risk = np.exp(-NATS_PER_LEVEL * (largest + (1.0 - rho) * (sum_levels - largest)))
-    return risk
+    return _exp(-NATS_PER_LEVEL * (largest + (1.0 - rho) * (sum_levels - largest)))
+
+
+def _exp(exponents: FloatArray) -> FloatArray:
+    powers: FloatArray = np.exp(exponents)
+    return powers
 
 
 @dataclass(frozen=True)

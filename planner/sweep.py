@@ -27,9 +27,7 @@ def legs_over_strip(strip: Strip, swath_m: float) -> list[Track]:
     return legs
 
 
-def cheapest_entry(
-    legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float
-) -> tuple[list[Track], float]:
+def cheapest_entry(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> tuple[list[Track], float]:
     """The legs in the order and direction that is shortest from `pose`, and the whole distance in metres.
 
     The legs are kept in sequence, from the first or from the last, and in their directions or all turned round; each

@@ -15,7 +15,7 @@ import sys
 import threading
 from collections.abc import Callable
 from dataclasses import asdict
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from comms.access import access_rules
 from comms.clock import RunawayError
@@ -53,7 +53,7 @@ def main() -> int:
     return 0
 
 
-def _read_endpoint(pipe: BinaryIO) -> str:
+def _read_endpoint(pipe: IO[bytes]) -> str:
     line = pipe.readline()
     if not line:
         os._exit(ORPHANED)

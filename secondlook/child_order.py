@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, field
-from typing import BinaryIO
+from typing import IO
 
 from comms.control import HostPlan
 from comms.messages import RunInfo
@@ -31,16 +31,16 @@ class ChildOrder:
     time_limit_ms: int = 0
 
 
-def write_order(pipe: BinaryIO, order: ChildOrder) -> None:
+def write_order(pipe: IO[bytes], order: ChildOrder) -> None:
     """Sends an order to a child's standard input."""
     pickled = pickle.dumps(order)
     pipe.write(len(pickled).to_bytes(8, "big") + pickled)
     pipe.flush()
 
 
-def read_order(pipe: BinaryIO) -> ChildOrder:
+def read_order(pipe: IO[bytes]) -> ChildOrder:
     """Waits for the launcher's order."""
     size = int.from_bytes(pipe.read(8), "big")
-    order = pickle.loads(pipe.read(size))  # noqa: S301 - comes from the launcher that started this process
+    order = pickle.loads(pipe.read(size))
     assert isinstance(order, ChildOrder)
     return order

@@ -130,9 +130,7 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         area=tuple(scenario.area.polygon_m),
         vehicles=tuple(_body(name, vehicle) for name, vehicle in scenario.vehicles.items()),
         seabed=(
-            SeabedConfig(
-                "patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength
-            )
+            SeabedConfig("patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength)
             if isinstance(seabed, PatchySeabed)
             else SeabedConfig()
         ),

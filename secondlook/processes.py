@@ -228,7 +228,7 @@ class Processes:
                 self._listener_host.run()
         except ConnectionFailedError as error:
             self._observer_error = error
-        except BaseException as error:  # noqa: BLE001 - told to the main thread, which raises it
+        except BaseException as error:
             self._observer_error = error
 
     def _end(self, result: dict[str, Any]) -> BusResult:

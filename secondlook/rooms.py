@@ -19,6 +19,6 @@ def check_rooms() -> None:
         origin = Path(spec.origin).resolve() if spec is not None and spec.origin else None
         if origin != home / room / "__init__.py":
             raise UserError(
-                f"the package {room!r} is taken from {origin or 'nowhere'} and not from {home / room}: something of the "
-                "same name is in the way, in the working directory or on PYTHONPATH"
+                f"the package {room!r} is taken from {origin or 'nowhere'} and not from {home / room}: something of "
+                "the same name is in the way, in the working directory or on PYTHONPATH"
             )

@@ -46,7 +46,7 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     time, risk, alone = summary["time"], summary["risk"], summary["risk_primary_alone"]
     table.add_row(
         "mission",
-        f"{time['mission_s']:.0f} s simulated in {time['wall_s']:.1f} s ({time['real_time_factor']:.0f} times real time)",
+        f"{time['mission_s']:.0f} s simulated in {time['wall_s']:.1f} s: {time['real_time_factor']:.0f} x real time",
     )
     for name, vehicle in summary["vehicles"].items():
         told = f"{vehicle['path_m'] / 1000:.1f} km"

@@ -43,9 +43,9 @@ class CurveSonar:
         self,
         range_m: FloatArray,
         look_bearing_rad: FloatArray | float,
-        altitude_m: float,  # noqa: ARG002 - part of the protocol
+        altitude_m: float,
         position_m: Position,
-        time_s: float,  # noqa: ARG002 - part of the protocol
+        time_s: float,
     ) -> FloatArray:
         """The curve at the range times the seabed's factor at the position."""
         return np.multiply(self._curve.at(range_m), self._seabed.factor(*position_m, look_bearing_rad))

@@ -66,7 +66,9 @@ def _folder(out: Path | None, name: str) -> Path:
         stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
         out = next(
             path
-            for path in (Path("runs") / f"{name}-{stamp}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 1000))))
+            for path in (
+                Path("runs") / f"{name}-{stamp}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 1000)))
+            )
             if not path.exists()
         )
     try:

@@ -1,0 +1,55 @@
+"""The command line: `secondlook COMMAND ...`."""
+
+from __future__ import annotations
+
+import sys
+from importlib.metadata import version
+from typing import Annotated
+
+import typer
+
+from secondlook.commands.check import check
+from secondlook.commands.plan import plan
+from secondlook.commands.run import run
+from secondlook.commands.scenarios import scenarios
+from secondlook.errors import UserError
+
+WRONG_USE = 2
+"""Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""
+
+# Plain messages: no boxes for a user's mistake, and Python's own traceback for ours.
+app = typer.Typer(
+    name="secondlook",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"secondlook {version('secondlook')}")
+        raise typer.Exit
+
+
+@app.callback()
+def secondlook(
+    _version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Survey and revisit vehicles that share a mission."""
+
+
+for command in (run, scenarios, check, plan):
+    app.command()(command)
+
+
+def main() -> None:
+    """Run the command line, and exit: 0 done, 1 the mission failed, 2 wrong use or bad input."""
+    try:
+        app()
+    except UserError as error:
+        sys.stderr.write(f"{error}\n")
+        sys.exit(WRONG_USE)

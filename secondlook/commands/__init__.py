@@ -1,0 +1,1 @@
+"""The commands of `secondlook`, one a module."""

@@ -1,0 +1,40 @@
+"""Scenarios: what a mission is made of, read from YAML, validated, with every mistake told by line.
+
+Use `load_scenario`, `bundled_scenarios`, `scenario_hash` and the classes of the model from here.
+"""
+
+from secondlook.scenario.area import Area
+from secondlook.scenario.errors import Place, Problem, ScenarioError
+from secondlook.scenario.load import bundled_scenarios, load_scenario
+from secondlook.scenario.model import (
+    Coordinator,
+    Mission,
+    PatchySeabed,
+    Scenario,
+    Targets,
+    UniformSeabed,
+    scenario_hash,
+)
+from secondlook.scenario.sensor import Curve, Sensor
+from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle
+
+__all__ = [
+    "Area",
+    "Coordinator",
+    "Curve",
+    "Mission",
+    "PatchySeabed",
+    "Place",
+    "Problem",
+    "RevisitVehicle",
+    "Scenario",
+    "ScenarioError",
+    "Sensor",
+    "Start",
+    "SurveyVehicle",
+    "Targets",
+    "UniformSeabed",
+    "bundled_scenarios",
+    "load_scenario",
+    "scenario_hash",
+]

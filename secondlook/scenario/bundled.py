@@ -1,0 +1,41 @@
+"""What comes with the package: scenarios and detection curves, by name."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+from secondlook.scenario.dialect import Value
+from secondlook.scenario.reader import read
+
+_PACKAGE = files("secondlook")
+
+
+def scenario_names() -> list[str]:
+    """Names of the bundled scenarios, sorted."""
+    return _names("scenarios")
+
+
+def scenario_text(name: str) -> str:
+    """The YAML text of a bundled scenario."""
+    return _text("scenarios", name)
+
+
+def curve_names() -> list[str]:
+    """Names of the bundled detection curves, sorted."""
+    return _names("curves")
+
+
+@cache
+def curve(name: str) -> dict[str, Value]:
+    """A bundled detection curve: `range_m` and `p_detect`, lists of the same length."""
+    return read(_text("curves", name), name).data
+
+
+def _names(folder: str) -> list[str]:
+    names = (file.name for file in (_PACKAGE / folder).iterdir())
+    return sorted(name.removesuffix(".yaml") for name in names if name.endswith(".yaml"))
+
+
+def _text(folder: str, name: str) -> str:
+    return (_PACKAGE / folder / f"{name}.yaml").read_text(encoding="utf-8")

@@ -1,0 +1,137 @@
+"""What pydantic found wrong, in sentences for the user."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic_core import ErrorDetails
+
+from secondlook.scenario.dialect import Value
+from secondlook.scenario.errors import Path, Place, Problem, dotted, shown
+from secondlook.scenario.model import PatchySeabed, UniformSeabed
+from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle
+
+# Pydantic puts the chosen member of a union into the location of an error, and this where a key itself is wrong.
+_TAGS = frozenset({"survey", "revisit", "uniform", "patchy"})
+_KEY_MARK = "[key]"
+
+# What has keys that the other member of its union lacks.
+_FULLER: dict[type[BaseModel] | None, tuple[type[BaseModel] | None, str]] = {
+    RevisitVehicle: (SurveyVehicle, "a survey vehicle"),
+    UniformSeabed: (PatchySeabed, "a patchy seabed"),
+}
+
+_ALLOWED = {
+    "dict_type": "must be a mapping",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:g}",
+    "int_type": "must be a whole number",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:g}",
+    "literal_error": "must be {expected}",
+    "model_attributes_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "refused": "{allowed}",
+    "string_pattern_mismatch": "must consist of a-z, 0-9, _ and -",
+    "string_too_long": "must have at most {max_length} characters",
+    "string_type": "must be a text",
+    "string_unicode": "must be a text of whole characters",
+    "too_long": "must have at most {max_length} entries",
+    "too_short": "must have at least {min_length} entries",
+    "tuple_type": "must be a list",
+    "union_tag_invalid": "must be {expected_tags}",
+}
+
+
+def explain(
+    errors: Iterable[ErrorDetails],
+    data: dict[str, Value],
+    places: Mapping[Path, Place],
+    classes: Mapping[int, type[BaseModel]],
+) -> list[Problem]:
+    """One problem for each error.
+
+    Args:
+        errors: what pydantic reports.
+        data: what was validated.
+        places: where each value of `data` stands, the whole under `()`.
+        classes: for the `id()` of a mapping within `data`, the class it was taken for.
+    """
+    problems = (_problem(error, data, places, classes) for error in errors)
+    return [problem for problem in problems if problem]
+
+
+def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
+    """Where a value stands, or else the nearest mapping or list around it."""
+    while path not in places:
+        path = path[:-1]
+    return places[path]
+
+
+def nearest(name: str, names: Iterable[str]) -> str | None:
+    """The one of the names that was probably meant, if any is near."""
+    matches = difflib.get_close_matches(name, list(names), n=1)
+    return matches[0] if matches else None
+
+
+def _problem(
+    error: ErrorDetails, data: dict[str, Value], places: Mapping[Path, Place], classes: Mapping[int, type[BaseModel]]
+) -> Problem | None:
+    kind, context = error["type"], error.get("ctx", {})
+    path, holder, value = _locate(error["loc"], data)
+    if kind in {"union_tag_invalid", "union_tag_not_found"}:
+        # The error lies with the key that tells the members of the union apart.
+        tag = context["discriminator"].strip("'")
+        path, holder = (*path, tag), value
+        value = value.get(tag) if isinstance(value, dict) else None
+    if kind in {"missing", "union_tag_not_found"}:
+        return Problem(place_of(path, places), f"{dotted(path)}: missing; must be given")
+    if kind == "extra_forbidden":
+        what = _unknown_key(str(path[-1]), classes.get(id(holder)))
+    elif kind == "too_short" and isinstance(value, list) and len(value) >= context["min_length"]:
+        # Pydantic counts the good entries alone; the bad ones are told of by themselves.
+        return None
+    elif _KEY_MARK in error["loc"]:
+        value, what = path[-1], _allowed(error)
+    else:
+        what = _allowed(error)
+    return Problem(place_of(path, places), f"{dotted(path)}: {shown(value)} is not allowed; {what}")
+
+
+def _locate(location: Iterable[str | int], data: dict[str, Value]) -> tuple[Path, Any, Any]:
+    """The path in the user's data, the mapping or list that holds the value, and the value (None where missing)."""
+    path: Path = ()
+    holder: Any = None
+    value: Any = data
+    for step in location:
+        inside = step in value if isinstance(value, dict) else isinstance(value, list) and step in range(len(value))
+        if inside or not (step in _TAGS or step == _KEY_MARK):
+            path = (*path, step)
+            holder, value = value, value[step] if inside else None
+    return path, holder, value
+
+
+def _allowed(error: ErrorDetails) -> str:
+    sentence = _ALLOWED.get(error["type"])
+    if sentence is None:
+        return error["msg"][0].lower() + error["msg"][1:]
+    words = {key: _listed(value) if isinstance(value, str) else value for key, value in error.get("ctx", {}).items()}
+    return sentence.format(**words)
+
+
+def _listed(choices: str) -> str:
+    return choices.replace("', '", " or ").replace("'", "") if choices.startswith("'") else choices
+
+
+def _unknown_key(key: str, taken_for: type[BaseModel] | None) -> str:
+    known = list(taken_for.model_fields) if taken_for else []
+    other, whose = _FULLER.get(taken_for, (None, ""))
+    if other and key in other.model_fields:
+        return f"only {whose} has this key"
+    near = nearest(key, known)
+    return f"no such key, did you mean {near}?" if near else f"no such key here, there are {', '.join(known)}"

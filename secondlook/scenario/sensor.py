@@ -1,0 +1,89 @@
+"""A vehicle's sonar: what it detects over range, how noisy that is, and how finely it reports."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+
+from planner.types import DetectionCurve
+from secondlook.scenario import bundled
+from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, refused
+
+
+class Curve(Mapping):
+    """A detection curve P(y): P_d over lateral range, linear between its points and 0 outside."""
+
+    range_m: Annotated[tuple[LengthOrZero, ...], Field(strict=False, min_length=2, max_length=10_000)]
+    p_detect: Annotated[tuple[PDetect, ...], Field(strict=False)]
+
+    @field_validator("range_m")
+    @classmethod
+    def _check_ascending(cls, range_m: tuple[float, ...]) -> tuple[float, ...]:
+        for before_m, after_m in pairwise(range_m):
+            if after_m <= before_m:
+                raise refused(f"must ascend, but {after_m:g} follows {before_m:g}")
+        return range_m
+
+    @field_validator("p_detect")
+    @classmethod
+    def _check_length(cls, p_detect: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if "range_m" in info.data and len(p_detect) != len(info.data["range_m"]):
+            raise refused(f"must have as many entries as range_m, {len(info.data['range_m'])} and not {len(p_detect)}")
+        return p_detect
+
+
+def _take_bundled(value: object) -> object:
+    if not isinstance(value, str):
+        return value
+    names = bundled.curve_names()
+    if value not in names:
+        raise refused(f"must be a bundled curve ({', '.join(names)}), or a mapping with range_m and p_detect")
+    return bundled.curve(value)
+
+
+class Sensor(Mapping):
+    """A side-looking sonar.
+
+    What it detects is either a `curve`, bundled or inline, or, flat, `p_detect` up to `range_m`. `noise_cell`,
+    `noise_track`: standard deviation of P_d per cell and per track, in logits. `look_m`: length of track in one look;
+    `along_bin_m`, `range_bin_m`: the bins of a look.
+    """
+
+    curve: Annotated[Curve | None, BeforeValidator(_take_bundled)] = None
+    p_detect: PDetect | None = None
+    range_m: Length | None = None
+    noise_cell: Noise = 0.23
+    noise_track: Noise = 0.05
+    along_bin_m: Bin = 5.0
+    range_bin_m: Bin = 1.0
+    look_m: Length = 20.0
+
+    @field_validator("look_m")
+    @classmethod
+    def _check_whole_bins(cls, look_m: float, info: ValidationInfo) -> float:
+        if "along_bin_m" in info.data:
+            bins = look_m / info.data["along_bin_m"]
+            if round(bins) < 1 or abs(bins - round(bins)) > TOLERANCE:
+                raise refused(f"must be a multiple of along_bin_m, {info.data['along_bin_m']:g}")
+        return look_m
+
+    @model_validator(mode="after")
+    def _check_one_curve(self) -> Self:
+        flat = (self.p_detect is not None, self.range_m is not None)
+        if any(flat) if self.curve is not None else not all(flat):
+            raise refused("must have either curve, or p_detect and range_m")
+        return self
+
+    @property
+    def reach_m(self) -> float:
+        """The range up to which it detects anything."""
+        return self.curve.range_m[-1] if self.curve is not None else self.range_m or 0.0
+
+    def detection_curve(self, nadir_gap_m: float) -> DetectionCurve:
+        """P(y): the curve as given, or the flat one from the nadir gap to `range_m`."""
+        if self.curve is not None:
+            return DetectionCurve(np.array(self.curve.range_m), np.array(self.curve.p_detect))
+        return DetectionCurve(np.array([nadir_gap_m, self.range_m]), np.array([self.p_detect, self.p_detect]))

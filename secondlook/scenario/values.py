@@ -1,0 +1,57 @@
+"""The kinds of value a scenario holds, and what all its mappings share.
+
+Numbers are strict: a text or a truth value is not a number, NaN and infinity are refused, a whole number stands for a
+float.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic_core import PydanticCustomError
+
+TOLERANCE = 1e-6
+"""By how much numbers may differ that must fit each other."""
+
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Length = Annotated[float, Field(gt=0, le=1000)]
+LengthOrZero = Annotated[float, Field(ge=0, le=1000)]
+Bin = Annotated[float, Field(gt=0, le=100)]
+Duration = Annotated[float, Field(gt=0, le=1e7)]
+Speed = Annotated[float, Field(gt=0, le=30)]
+Heading = Annotated[float, Field(ge=0, lt=360)]
+Share = Annotated[float, Field(ge=0, le=1)]
+OpenShare = Annotated[float, Field(gt=0, lt=1)]
+# P_d above 0.999 would need more than the coverage map's largest value.
+PDetect = Annotated[float, Field(ge=0, le=0.999)]
+Noise = Annotated[float, Field(ge=0, le=5)]
+
+
+def refused(allowed: str) -> PydanticCustomError:
+    """The error to raise for a value, in the words that follow `... is not allowed; `."""
+    return PydanticCustomError("refused", "{allowed}", {"allowed": allowed})
+
+
+def check_pair(value: object) -> object:
+    """Refuses what is no list of two: told at the list, where pydantic would tell of its entries."""
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise refused("must be a list of two numbers")
+    return value
+
+
+class Mapping(BaseModel):
+    """A mapping of a scenario; each field is one of its keys.
+
+    Validated with a dict as context, each notes there which class a mapping was taken for, under the `id()` of the
+    mapping: whoever explains an unknown key can then tell which keys are known.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _note_class(cls, data: object, info: ValidationInfo) -> object:
+        if isinstance(info.context, dict):
+            info.context[id(data)] = cls
+        return data

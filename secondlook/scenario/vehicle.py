@@ -1,0 +1,105 @@
+"""The vehicles of a scenario, by role."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+
+from secondlook.scenario.sensor import Sensor
+from secondlook.scenario.values import (
+    TOLERANCE,
+    Coordinate,
+    Duration,
+    Heading,
+    Length,
+    LengthOrZero,
+    Mapping,
+    OpenShare,
+    Speed,
+    refused,
+)
+
+RESERVED_IDS = ("clock", "coordinator", "observer", "recorder", "world")
+"""Ids of the nodes that are no vehicles."""
+
+
+def _check_free(vehicle_id: str) -> str:
+    if vehicle_id in RESERVED_IDS:
+        raise refused(f"must be none of {', '.join(RESERVED_IDS)}, which other nodes are called")
+    return vehicle_id
+
+
+VehicleId = Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=32), AfterValidator(_check_free)]
+
+
+class Start(Mapping):
+    """Where a vehicle is when the mission starts: mission frame, compass heading."""
+
+    x_m: Coordinate
+    y_m: Coordinate
+    heading_deg: Heading = 0.0
+
+
+class VehicleBase(Mapping):
+    """What every vehicle has, whatever its role.
+
+    `body`: moved by the simulated world, or by an external node. `endurance_s`: how long its battery lasts.
+    `run_in_m`: straight run before and after each track. `nadir_gap_m`: what it does not see beside its track, per
+    side.
+    """
+
+    role: str
+    body: Literal["simulated", "external"] = "simulated"
+    start: Start
+    speed_mps: Speed
+    turn_radius_m: Length
+    endurance_s: Duration
+    altitude_m: Length
+    run_in_m: LengthOrZero
+    nadir_gap_m: LengthOrZero
+    sensor: Sensor
+
+    @field_validator("sensor")
+    @classmethod
+    def _check_reach(cls, sensor: Sensor, info: ValidationInfo) -> Sensor:
+        if "nadir_gap_m" in info.data and sensor.reach_m <= info.data["nadir_gap_m"]:
+            raise refused(f"must see beyond nadir_gap_m, {info.data['nadir_gap_m']:g}")
+        return sensor
+
+
+class SurveyVehicle(VehicleBase):
+    """A vehicle that surveys the area, track by track.
+
+    `spacing`: whether it adapts its track spacing to what it sees, or keeps to the plan. `range_m`: r_max, the range it
+    is told to plan with until it has flown the first pair of tracks. `threshold`: P_d from which data is admissible.
+    `hotspot_risk`: residual risk from which a cell is worth a second look.
+    """
+
+    role: Literal["survey"]
+    altitude_m: Length = 15.0
+    run_in_m: LengthOrZero = 20.0
+    range_m: Length
+    spacing: Literal["adaptive", "fixed"] = "adaptive"
+    threshold: OpenShare = 0.05
+    hotspot_risk: OpenShare = 0.6
+
+    @field_validator("range_m")
+    @classmethod
+    def _check_range(cls, range_m: float, info: ValidationInfo) -> float:
+        lowest_m = 3 * info.data.get("nadir_gap_m", 0.0)
+        if range_m < lowest_m - TOLERANCE:
+            raise refused(f"must be at least 3 times nadir_gap_m, {lowest_m:g}")
+        return range_m
+
+
+class RevisitVehicle(VehicleBase):
+    """A vehicle that takes a second look at the strips it is given."""
+
+    role: Literal["revisit"]
+    altitude_m: Length = 5.0
+    run_in_m: LengthOrZero = 5.0
+    nadir_gap_m: LengthOrZero = 0.0
+
+
+Vehicle = Annotated[SurveyVehicle | RevisitVehicle, Field(discriminator="role")]

@@ -1,0 +1,92 @@
+"""The command line as a user meets it: what it prints, where, and its exit codes."""
+
+import json
+from collections.abc import Callable
+
+import pytest
+
+from secondlook import cli
+
+SecondLook = Callable[..., tuple[int | str | None, str, str]]
+
+
+@pytest.fixture
+def secondlook(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> SecondLook:
+    """Runs a command; gives its exit code, and what it prints on standard output and standard error."""
+
+    def run(*arguments: str) -> tuple[int | str | None, str, str]:
+        monkeypatch.setattr("sys.argv", ["secondlook", *arguments])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        return stopped.value.code, *capsys.readouterr()
+
+    return run
+
+
+PLAN = ("plan", "--width", "1212", "--nadir", "40", "--range")
+
+
+def test_plan_prints_the_published_spacing_as_json_alone(secondlook: SecondLook) -> None:
+    code, out, err = secondlook(*PLAN, "120", "145", "--json")
+    assert (code, err) == (0, "")
+    plan = json.loads(out)
+    # Three pairs of 3 * 138 - 40 = 374 m each leave 90 m, which one track at 1212 - 138 covers.
+    assert plan == {"r_adpt_m": 138, "tracks": 7, "offsets_m": [138, 236, 512, 610, 886, 984, 1074]}
+
+
+def test_plan_prints_a_sentence_for_people(secondlook: SecondLook) -> None:
+    code, out, err = secondlook(*PLAN, "120", "130")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0] == "8 tracks at a range of 120 m, laid at"
+    assert len(out.splitlines()[1].split(",")) == 8
+
+
+@pytest.mark.parametrize(
+    ("width", "nadir", "lowest", "highest", "expected"),
+    [
+        ("nan", "40", "120", "145", "--width: nan is not allowed; must be a number of metres up to 100000"),
+        ("inf", "40", "120", "145", "--width: inf is not allowed; must be a number of metres up to 100000"),
+        ("0", "40", "120", "145", "--width: 0 is not allowed; must be greater than 0"),
+        ("1212", "-1", "120", "145", "--nadir: -1 is not allowed; must be at least 0"),
+        ("1212", "40", "119", "145", "--range A: 119 is not allowed; must be at least 3 times --nadir, 120"),
+        ("1212", "0", "0", "145", "--range A: 0 is not allowed; must be at least 1"),
+        ("1212", "40", "145", "120", "--range: 145 120 is not allowed; a whole metre must lie from A to B"),
+        ("1212", "40", "120.2", "120.8", "--range: 120.2 120.8 is not allowed; a whole metre must lie from A to B"),
+        ("1212", "40", "120", "1e9", "--range B: 1e+09 is not allowed; must be a number of metres up to 100000"),
+    ],
+)
+def test_plan_refuses_bad_numbers_in_one_sentence(
+    secondlook: SecondLook, width: str, nadir: str, lowest: str, highest: str, expected: str
+) -> None:
+    arguments = ("plan", "--width", width, "--nadir", nadir, "--range", lowest, highest)
+    assert secondlook(*arguments) == (2, "", f"{expected}\n")
+
+
+def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
+    expected = "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
+    assert secondlook("check", "tellaro") == (0, expected, "")
+
+
+def test_check_tells_all_mistakes_without_a_traceback(
+    secondlook: SecondLook, write: Callable[[str], str], valid_text: str
+) -> None:
+    name = write(valid_text.replace("speed_mps: 1.5", "speed_mps: 0").replace("range_m: 145", "range_m: 5"))
+    expected = (
+        "bad.yaml:8: vehicles.primary.speed_mps: 0 is not allowed; must be greater than 0\n"
+        "bad.yaml:12: vehicles.primary.range_m: 5 is not allowed; must be at least 3 times nadir_gap_m, 120\n"
+    )
+    assert secondlook("check", name) == (2, "", expected)
+
+
+def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
+    code, out, err = secondlook("scenarios")
+    assert (code, err) == (0, "")
+    assert [line.split()[0] for line in out.splitlines()] == ["patchy", "tellaro"]
+
+
+@pytest.mark.parametrize("arguments", [["fly"], ["check"], ["plan", "--width", "wide"], ["check", "tellaro", "--fast"]])
+def test_wrong_use_is_told_without_a_traceback(secondlook: SecondLook, arguments: list[str]) -> None:
+    code, out, err = secondlook(*arguments)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1].startswith("Error: ")
+    assert "Traceback" not in err

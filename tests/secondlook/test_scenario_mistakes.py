@@ -1,0 +1,419 @@
+"""Every mistake in a scenario file is told in one line: file, line, key, value, what is allowed."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from secondlook.scenario import ScenarioError, load_scenario
+
+Write = Callable[[str | bytes], str]
+
+
+def lines_of(source: str, overrides: tuple[str, ...] = (), seed: int | None = None) -> list[str]:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(source, overrides, seed)
+    return str(caught.value).splitlines()
+
+
+TOP_KEYS = "name, description, seed, area, mission, seabed, targets, vehicles, coordinator"
+POLYGON = "[[0, 0], [500, 0], [500, 400], [0, 400]]"
+
+# What of the valid text is replaced, by what, and the lines that come of it.
+MISTAKES = {
+    "zero speed": (
+        "speed_mps: 1.5",
+        "speed_mps: 0",
+        ["bad.yaml:8: vehicles.primary.speed_mps: 0 is not allowed; must be greater than 0"],
+    ),
+    "speed beyond any vehicle": (
+        "speed_mps: 1.5",
+        "speed_mps: 31",
+        ["bad.yaml:8: vehicles.primary.speed_mps: 31 is not allowed; must be at most 30"],
+    ),
+    "text for a number": (
+        "speed_mps: 1.5",
+        "speed_mps: '1.5'",
+        ['bad.yaml:8: vehicles.primary.speed_mps: "1.5" is not allowed; must be a number'],
+    ),
+    "truth value for a number": (
+        "speed_mps: 1.5",
+        "speed_mps: true",
+        ["bad.yaml:8: vehicles.primary.speed_mps: true is not allowed; must be a number"],
+    ),
+    "nothing for a number": (
+        "speed_mps: 1.5",
+        "speed_mps:",
+        ["bad.yaml:8: vehicles.primary.speed_mps: nothing is not allowed; must be a number"],
+    ),
+    "not a number": (
+        "speed_mps: 1.5",
+        "speed_mps: .nan",
+        ["bad.yaml:8: vehicles.primary.speed_mps: NaN is not allowed; must be a finite number"],
+    ),
+    "a number too large for a float": (
+        "speed_mps: 1.5",
+        "speed_mps: 1e999",
+        ["bad.yaml:8: vehicles.primary.speed_mps: Infinity is not allowed; must be a finite number"],
+    ),
+    "fraction of a target": (
+        "name: trial",
+        "name: trial\ntargets: {count: 1.5}",
+        ["bad.yaml:2: targets.count: 1.5 is not allowed; must be a whole number"],
+    ),
+    "misspelt key": (
+        "speed_mps: 1.5",
+        "speed_mps: 1.5\n    nadir_gapm: 3",
+        ["bad.yaml:9: vehicles.primary.nadir_gapm: 3 is not allowed; no such key, did you mean nadir_gap_m?"],
+    ),
+    "key that resembles none": (
+        "name: trial",
+        "name: trial\ntargets: {xyz: 1}",
+        ["bad.yaml:2: targets.xyz: 1 is not allowed; no such key here, there are count"],
+    ),
+    "missing key": (
+        "    speed_mps: 1.5\n",
+        "",
+        ["bad.yaml:5: vehicles.primary.speed_mps: missing; must be given"],
+    ),
+    "missing name": ("name: trial", "", ["bad.yaml:2: name: missing; must be given"]),
+    "name that is no folder's": (
+        "name: trial",
+        "name: ../trial",
+        ['bad.yaml:1: name: "../trial" is not allowed; must consist of a-z, 0-9, _ and -'],
+    ),
+    "range below three nadir gaps": (
+        "range_m: 145",
+        "range_m: 119.9",
+        ["bad.yaml:12: vehicles.primary.range_m: 119.9 is not allowed; must be at least 3 times nadir_gap_m, 120"],
+    ),
+    "survey key on a revisit vehicle": (
+        "speed_mps: 2",
+        "speed_mps: 2\n    threshold: 0.1",
+        ["bad.yaml:18: vehicles.helper.threshold: 0.1 is not allowed; only a survey vehicle has this key"],
+    ),
+    "threshold of 0": (
+        "range_m: 145",
+        "range_m: 145\n    threshold: 0",
+        ["bad.yaml:13: vehicles.primary.threshold: 0 is not allowed; must be greater than 0"],
+    ),
+    "threshold of 1": (
+        "range_m: 145",
+        "range_m: 145\n    threshold: 1",
+        ["bad.yaml:13: vehicles.primary.threshold: 1 is not allowed; must be less than 1"],
+    ),
+    "spacing of its own": (
+        "range_m: 145",
+        "range_m: 145\n    spacing: wide",
+        ['bad.yaml:13: vehicles.primary.spacing: "wide" is not allowed; must be adaptive or fixed'],
+    ),
+    "unknown role": (
+        "role: revisit",
+        "role: tow",
+        ['bad.yaml:15: vehicles.helper.role: "tow" is not allowed; must be survey or revisit'],
+    ),
+    "role that is a list": (
+        "role: revisit",
+        "role: [revisit]",
+        ['bad.yaml:15: vehicles.helper.role: ["revisit"] is not allowed; must be survey or revisit'],
+    ),
+    "missing role": ("    role: revisit\n", "", ["bad.yaml:14: vehicles.helper.role: missing; must be given"]),
+    "no survey vehicle": (
+        "role: survey",
+        "role: revisit",
+        [
+            "bad.yaml:12: vehicles.primary.range_m: 145 is not allowed; only a survey vehicle has this key",
+        ],
+    ),
+    "no vehicles": (
+        "vehicles:",
+        "vehicles: {}\nx:",
+        [
+            "bad.yaml:4: vehicles: {} is not allowed; must have a vehicle with role survey",
+            "bad.yaml:5: x: "
+            '{"primary": {"role": "survey", "start": {"x_m": 0, "y_m":... is not allowed; '
+            f"no such key here, there are {TOP_KEYS}",
+        ],
+    ),
+    "vehicle id in capitals": (
+        "  helper:",
+        "  Helper:",
+        ['bad.yaml:14: vehicles.Helper: "Helper" is not allowed; must consist of a-z, 0-9, _ and -'],
+    ),
+    "vehicle id of another node": (
+        "  helper:",
+        "  world:",
+        [
+            'bad.yaml:14: vehicles.world: "world" is not allowed; must be none of clock, coordinator, observer, '
+            "recorder, world, which other nodes are called"
+        ],
+    ),
+    "vehicle id given twice": (
+        "  helper:",
+        "  primary:",
+        ["bad.yaml:14: vehicles.primary: given twice; the first is in line 5"],
+    ),
+    "key given twice": (
+        "speed_mps: 1.5",
+        "speed_mps: 1.5\n    speed_mps: 1.5",
+        ["bad.yaml:9: vehicles.primary.speed_mps: given twice; the first is in line 8"],
+    ),
+    "vehicle that is no mapping": (
+        "vehicles:",
+        "vehicles:\n  third: 3",
+        ["bad.yaml:5: vehicles.third: 3 is not allowed; must be a mapping"],
+    ),
+    "crossing sides": (
+        POLYGON,
+        "[[0, 0], [500, 400], [500, 0], [0, 400]]",
+        [
+            "bad.yaml:3: area.polygon_m: [[0, 0], [500, 400], [500, 0], [0, 400]] is not allowed; "
+            "must be the corners in order, but its sides cross"
+        ],
+    ),
+    "two corners": (
+        POLYGON,
+        "[[0, 0], [500, 400]]",
+        ["bad.yaml:3: area.polygon_m: [[0, 0], [500, 400]] is not allowed; must have at least 3 entries"],
+    ),
+    "corners on a line": (
+        POLYGON,
+        "[[0, 0], [250, 200], [500, 400]]",
+        [
+            "bad.yaml:3: area.polygon_m: [[0, 0], [250, 200], [500, 400]] is not allowed; "
+            "must have an area, but all corners lie on one line"
+        ],
+    ),
+    "a closed outline": (
+        POLYGON,
+        "[[0, 0], [9, 0], [9, 9], [0, 0]]",
+        [
+            "bad.yaml:3: area.polygon_m: [[0, 0], [9, 0], [9, 9], [0, 0]] is not allowed; "
+            "must be the corners in order, each once, but (0, 0) is repeated"
+        ],
+    ),
+    "concave": (
+        POLYGON,
+        "[[0, 0], [50, 9], [99, 0], [50, 99]]",
+        ["bad.yaml:3: area.polygon_m: [[0, 0], [50, 9], [99, 0], [50, 99]] is not allowed; must be convex"],
+    ),
+    "corner with a third number": (
+        POLYGON,
+        "\n  - [0, 0]\n  - [500, 0, 1]\n  - [500, 400]\n",
+        ["bad.yaml:5: area.polygon_m[1]: [500, 0, 1] is not allowed; must be a list of two numbers"],
+    ),
+    "corner with a text": (
+        POLYGON,
+        "\n  - [0, 0]\n  - [500,\n    zero]\n  - [500, 400]\n",
+        ['bad.yaml:6: area.polygon_m[1][1]: "zero" is not allowed; must be a number'],
+    ),
+    "heading of a full turn": (
+        POLYGON,
+        POLYGON + "\n  track_heading_deg: 360",
+        ["bad.yaml:4: area.track_heading_deg: 360 is not allowed; must be less than 360"],
+    ),
+    "cell larger than the area": (
+        POLYGON,
+        "[[0, 0], [500, 0], [500, 4], [0, 4]]\n  cell_m: 5",
+        ["bad.yaml:4: area.cell_m: 5 is not allowed; must be at most the area's shorter side, 4"],
+    ),
+    "too many cells": (
+        POLYGON,
+        POLYGON + "\n  cell_m: 0.0999",
+        ["bad.yaml:4: area.cell_m: 0.0999 is not allowed; must be larger, the map would have more than 20000000 cells"],
+    ),
+    "unknown curve": (
+        "curve: muscle",
+        "curve: mussel",
+        [
+            'bad.yaml:13: vehicles.primary.sensor.curve: "mussel" is not allowed; '
+            "must be a bundled curve (muscle), or a mapping with range_m and p_detect"
+        ],
+    ),
+    "curve that does not ascend": (
+        "curve: muscle",
+        "curve: {range_m: [0, 50, 50], p_detect: [0.1, 0.2, 0.1]}",
+        [
+            "bad.yaml:13: vehicles.primary.sensor.curve.range_m: [0, 50, 50] is not allowed; "
+            "must ascend, but 50 follows 50"
+        ],
+    ),
+    "curve with a column short": (
+        "curve: muscle",
+        "curve: {range_m: [0, 50, 60], p_detect: [0.1, 0.2]}",
+        [
+            "bad.yaml:13: vehicles.primary.sensor.curve.p_detect: [0.1, 0.2] is not allowed; "
+            "must have as many entries as range_m, 3 and not 2"
+        ],
+    ),
+    "certain detection": (
+        "curve: muscle",
+        "curve: {range_m: [0, 50], p_detect: [0.1, 0.9991]}",
+        ["bad.yaml:13: vehicles.primary.sensor.curve.p_detect[1]: 0.9991 is not allowed; must be at most 0.999"],
+    ),
+    "curve and flat sensor at once": (
+        "curve: muscle",
+        "curve: muscle, p_detect: 0.5",
+        [
+            'bad.yaml:13: vehicles.primary.sensor: {"curve": "muscle", "p_detect": 0.5} is not allowed; '
+            "must have either curve, or p_detect and range_m"
+        ],
+    ),
+    "flat sensor without a range": (
+        "p_detect: 0.7, range_m: 25",
+        "p_detect: 0.7",
+        [
+            'bad.yaml:20: vehicles.helper.sensor: {"p_detect": 0.7} is not allowed; '
+            "must have either curve, or p_detect and range_m"
+        ],
+    ),
+    "sensor that sees nothing beyond its nadir gap": (
+        "    sensor: {p_detect: 0.7, range_m: 25}",
+        "    nadir_gap_m: 25\n    sensor: {p_detect: 0.7, range_m: 25}",
+        [
+            'bad.yaml:21: vehicles.helper.sensor: {"p_detect": 0.7, "range_m": 25} is not allowed; '
+            "must see beyond nadir_gap_m, 25"
+        ],
+    ),
+    "look of a bin and a half": (
+        "curve: muscle",
+        "curve: muscle, look_m: 7.5",
+        ["bad.yaml:13: vehicles.primary.sensor.look_m: 7.5 is not allowed; must be a multiple of along_bin_m, 5"],
+    ),
+    "deadline before the end": (
+        "name: trial",
+        "name: trial\nmission: {deadline_factor: 0.99}",
+        ["bad.yaml:2: mission.deadline_factor: 0.99 is not allowed; must be at least 1"],
+    ),
+    "unknown seabed": (
+        "name: trial",
+        "name: trial\nseabed: {kind: rocky}",
+        ['bad.yaml:2: seabed.kind: "rocky" is not allowed; must be uniform or patchy'],
+    ),
+    "patchy key on a uniform seabed": (
+        "name: trial",
+        "name: trial\nseabed: {kind: uniform, strength: [0.3, 0.8]}",
+        ["bad.yaml:2: seabed.strength: [0.3, 0.8] is not allowed; only a patchy seabed has this key"],
+    ),
+    "strength the wrong way round": (
+        "name: trial",
+        "name: trial\nseabed: {kind: patchy, strength: [0.8, 0.3]}",
+        ["bad.yaml:2: seabed.strength: [0.8, 0.3] is not allowed; must be the least, then the largest"],
+    ),
+    "strips longer at least than at most": (
+        "name: trial",
+        "name: trial\ncoordinator: {min_strip_m: 50, max_strip_m: 40}",
+        ["bad.yaml:2: coordinator.max_strip_m: 40 is not allowed; must be at least min_strip_m, 50"],
+    ),
+    "negative seed": (
+        "name: trial",
+        "name: trial\nseed: -1",
+        ["bad.yaml:2: seed: -1 is not allowed; must be at least 0"],
+    ),
+    "a number of 5000 digits": (
+        "name: trial",
+        "name: trial\nseed: " + "9" * 5000,
+        ["bad.yaml:2: seed: Infinity is not allowed; must be a whole number"],
+    ),
+    "several at once, in the order of lines": (
+        "speed_mps: 1.5\n    turn_radius_m: 20",
+        "turn_radius_m: -1\n    speed_mps: fast\n    speed_mps: 1",
+        [
+            "bad.yaml:8: vehicles.primary.turn_radius_m: -1 is not allowed; must be greater than 0",
+            'bad.yaml:9: vehicles.primary.speed_mps: "fast" is not allowed; must be a number',
+            "bad.yaml:10: vehicles.primary.speed_mps: given twice; the first is in line 9",
+        ],
+    ),
+    "a list as a key": (
+        "speed_mps: 1.5",
+        "speed_mps: 1.5\n    ? [a]\n    : 1",
+        ["bad.yaml:9: vehicles.primary: a list or mapping is not allowed as a key; must be a name"],
+    ),
+    "a key with a line break": (
+        "name: trial",
+        'name: trial\n"a\\nb": 1',
+        [f"bad.yaml:2: a\\nb: 1 is not allowed; no such key here, there are {TOP_KEYS}"],
+    ),
+    "an anchor": (
+        "start: {x_m: 0, y_m: -40}\n    speed_mps: 1.5",
+        "start: &here {x_m: 0, y_m: -40}\n    speed_mps: 1.5",
+        ["bad.yaml:7: column 12: anchors and aliases (& and *) are not allowed"],
+    ),
+    "a tag": (
+        "speed_mps: 1.5",
+        "speed_mps: !!python/object:os.system 1.5",
+        ["bad.yaml:8: column 16: tags (!) are not allowed"],
+    ),
+    "half of a surrogate pair": (
+        "name: trial",
+        'name: trial\ndescription: "\\uD800"',
+        ['bad.yaml:2: description: "\\ud800" is not allowed; must be a text of whole characters'],
+    ),
+    "a tab for indentation": (
+        "    speed_mps: 1.5",
+        "\tspeed_mps: 1.5",
+        ["bad.yaml:8: column 1: a tab is not allowed here; must be indented with spaces"],
+    ),
+    "an open bracket": (
+        "{x_m: 0, y_m: -40}\n    speed_mps: 1.5",
+        "{x_m: 0, y_m: -40\n    speed_mps: 1.5",
+        [
+            "bad.yaml:8: column 14: not valid YAML: expected ',' or '}', but got ':' (while parsing a flow mapping)",
+        ],
+    ),
+    "two documents": (
+        "name: trial",
+        "name: trial\n---\nname: other",
+        ["bad.yaml:2: column 1: not valid YAML: but found another document (expected a single document in the stream)"],
+    ),
+    "nested beyond reason": (
+        "speed_mps: 1.5",
+        "speed_mps: " + "[" * 2000,
+        ["bad.yaml:8: column 34: nested more than 20 deep"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "expected"), MISTAKES.values(), ids=MISTAKES)
+def test_a_mistake_is_told_by_line(write: Write, valid_text: str, old: str, new: str, expected: list[str]) -> None:
+    assert old in valid_text
+    assert lines_of(write(valid_text.replace(old, new, 1))) == expected
+
+
+FILES = {
+    "empty": (b"", "bad.yaml:1: the file is empty; must be a mapping of keys to values"),
+    "comments alone": (b"# nothing\n", "bad.yaml:1: the file is empty; must be a mapping of keys to values"),
+    "a list": (b"\n- 1\n- 2\n", "bad.yaml:2: [1, 2] is not allowed; must be a mapping of keys to values"),
+    "a word": (b"tellaro", 'bad.yaml:1: "tellaro" is not allowed; must be a mapping of keys to values'),
+    "Latin-1": (b"name: a\ndescription: M\xfcll\n", "bad.yaml:2: byte 0xfc is not allowed; must be UTF-8 text"),
+    "a control character": (b"name: a\nseed: \x07\n", "bad.yaml:2: a control character is not allowed"),
+    "an escape out of range": (
+        b'name: "\\UFFFFFFFF"',
+        "bad.yaml: not valid YAML: an escape or number is out of range",
+    ),
+    "a million bytes and one": (
+        b"#" * 1_000_001,
+        "bad.yaml: larger than 1000000 bytes, which no scenario is",
+    ),
+    "aliases that explode": (
+        b"a: &a [x, x]\nb: &b [*a, *a]\nc: &c [*b, *b]\n",
+        "bad.yaml:1: column 4: anchors and aliases (& and *) are not allowed",
+    ),
+}
+
+
+@pytest.mark.parametrize(("content", "expected"), FILES.values(), ids=FILES)
+def test_a_file_that_is_no_scenario_is_told(write: Write, content: bytes, expected: str) -> None:
+    assert lines_of(write(content)) == [expected]
+
+
+def test_a_name_that_is_not_bundled_is_told_with_those_that_are() -> None:
+    assert lines_of("telaro") == ["telaro: no such scenario, did you mean tellaro? (there are patchy, tellaro)"]
+    assert lines_of("xyz") == ["xyz: no such scenario (there are patchy, tellaro)"]
+
+
+def test_paths_that_are_no_readable_file_are_told(tmp_path: Path) -> None:
+    assert lines_of(f"{tmp_path}") == [f"{tmp_path}: a folder; must be a YAML file"]
+    assert lines_of("absent.yaml") == ["absent.yaml: no such file"]
+    assert lines_of("./tellaro") == ["./tellaro: no such file"]
+    assert lines_of("a\0b") == ["a\\x00b: cannot be read: embedded null byte"]
