@@ -55,7 +55,7 @@ class PatchySeabed(Mapping):
 class Targets(Mapping):
     """The targets on the seabed, spread at random; no agent knows of them, they serve evaluation alone."""
 
-    count: Annotated[int, Field(ge=0, le=100_000)] = 200
+    count: Annotated[int, Field(ge=0, le=1000)] = 200
 
 
 class Coordinator(Mapping):
