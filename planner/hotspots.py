@@ -15,7 +15,7 @@ from planner.groups import label_groups
 from planner.types import BoolArray, FloatArray, GridSpec, Point
 
 BLOCK_M = 500.0
-FEWEST_CELLS = 4
+SMALLEST_M2 = 400.0
 MOST_CORNERS = 40
 
 IdArray = NDArray[np.int32]
@@ -77,7 +77,7 @@ def find_hotspots(
         pairs, counts = np.unique(np.stack([flat_groups[both], flat_previous[both]]), axis=1, return_counts=True)
         for group, old, shared in zip(pairs[0].tolist(), pairs[1].tolist(), counts.tolist(), strict=True):
             votes.setdefault(group, []).append((shared, old))
-    large_enough = [group for group in range(1, count + 1) if sizes[group] >= FEWEST_CELLS]
+    large_enough = [group for group in range(1, count + 1) if sizes[group] * grid.cell_area_m2 >= SMALLEST_M2]
     for group in sorted(large_enough, key=lambda group: (-int(sizes[group]), group)):
         for _, old in sorted(votes.get(group, []), key=lambda vote: (-vote[0], vote[1])):
             if old not in claimed:

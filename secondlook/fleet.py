@@ -12,6 +12,7 @@ from coordinator.allocation import Allocator, GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from planner.area import SurveyArea
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
+from secondlook.errors import UserError
 from secondlook.node_spec import NodeSpec
 from secondlook.scenario import (
     PatchySeabed,
@@ -38,7 +39,17 @@ class Fleet:
 
 
 def build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
-    """The fleet of a scenario; `record`: with a recorder."""
+    """The fleet of a scenario; `record`: with a recorder.
+
+    Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
+    """
+    try:
+        return _build_fleet(scenario, record=record)
+    except ValueError as error:
+        raise UserError(f"scenario {scenario.name}: {error}") from error
+
+
+def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
     area = SurveyArea(scenario.area.polygon_m, math.radians(scenario.area.track_heading_deg))
     grid = area.grid(scenario.area.cell_m)
     run_info = RunInfo(

@@ -55,7 +55,7 @@ class PatchySeabed(Mapping):
 class Targets(Mapping):
     """The targets on the seabed, spread at random; no agent knows of them, they serve evaluation alone."""
 
-    count: Annotated[int, Field(ge=0, le=100_000)] = 200
+    count: Annotated[int, Field(ge=0, le=1000)] = 200
 
 
 class Coordinator(Mapping):
@@ -70,7 +70,7 @@ class Coordinator(Mapping):
     lost_after_s: Duration = 30.0
     min_strip_m: Length = 30.0
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
-    worth_risk: OpenShare = 0.25
+    worth_risk: OpenShare = 0.3
 
     @field_validator("max_strip_m")
     @classmethod

@@ -44,13 +44,13 @@ class Start(Mapping):
 class VehicleBase(Mapping):
     """What every vehicle has, whatever its role.
 
-    `body`: moved by the simulated world, or by an external node. `endurance_s`: how long its battery lasts.
+    `body`: what moves it, for now always the simulated world. `endurance_s`: how long its battery lasts.
     `run_in_m`: straight run before and after each track. `nadir_gap_m`: what it does not see beside its track, per
     side.
     """
 
     role: str
-    body: Literal["simulated", "external"] = "simulated"
+    body: Literal["simulated"] = "simulated"
     start: Start
     speed_mps: Speed
     turn_radius_m: Length
@@ -82,7 +82,7 @@ class SurveyVehicle(VehicleBase):
     range_m: Length
     spacing: Literal["adaptive", "fixed"] = "adaptive"
     threshold: OpenShare = 0.05
-    hotspot_risk: OpenShare = 0.6
+    hotspot_risk: OpenShare = 0.55
 
     @field_validator("range_m")
     @classmethod
