@@ -19,6 +19,8 @@ from by_hand import (
     tell_status,
     to_follow,
 )
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from one_node import OneNode, Said
 
 from comms.messages import (
@@ -32,6 +34,7 @@ from comms.messages import (
     Maneuver,
     ManeuverKind,
     ManeuverState,
+    MissionOver,
     Mode,
     Plan,
     Role,
@@ -159,6 +162,63 @@ class TestThePapersExperiments:
         assert curves[0].p_detect[[24, 25, 130, 131]].tolist() == [0, 0.3, 0.3, 0]
 
 
+class TestSpacingAtItsLimits:
+    def test_below_three_nadir_gaps_it_says_so_and_goes_on_to_the_end(self) -> None:
+        agent = on_its_way(survey(), run_info())
+        fly_all(agent, flat(0.3, 25, 50))
+        plan = agent.last(Plan)
+        assert plan.r_adpt_m == (138, 120, 120, 120)
+        assert plan.r_eff_m == (50,) * 8
+        # Planned with 120 m, 120 m count as covered: 236 + 120 + 120 = 476.
+        assert offsets(plan) == [138, 236, 476, 556, 796, 876, 1012, 1092]
+        notes = [one.note for one in agent.all(Plan) if "spacing 138 to 120" in one.note]
+        assert notes == [
+            "r_eff 50 m after track 2, spacing 138 to 120 m; r_eff 50 m is below 3 r_min: planning with 120 m, "
+            "gaps remain"
+        ]
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+    @pytest.mark.parametrize(
+        ("nadir_gap_m", "p_detect", "second"),
+        [
+            (40.2, flat(0.3, 25, 60), 121),  # 3 r_min is 120.6 m: no whole metre
+            (0.0, flat(0.3, 0, 60), 58),  # beyond 234 + 60 m: two pairs of 174 m and a single of 58 m
+            (0.0, flat(0.0, 0, 60), 117),  # nothing admissible and no nadir gap: up to 145 m, as told
+        ],
+    )
+    def test_any_nadir_gap_can_be_planned_with(self, nadir_gap_m: float, p_detect: P_Detect, second: int) -> None:
+        run = run_info(700, 200, cell_m=10)
+        agent = on_its_way(survey(AdaptiveSpacing(nadir_gap_m, 145), nadir_gap_m=nadir_gap_m), run)
+        fly_all(agent, p_detect)
+        assert agent.last(Plan).r_adpt_m[1] == second
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+    @settings(max_examples=25, deadline=None)
+    @given(
+        width_m=st.integers(50, 900),
+        nadir_gap_m=st.sampled_from([10.0, 40.0]),
+        reaches_m=st.lists(st.integers(0, 140), min_size=1, max_size=5),
+        refused=st.sets(st.integers(1, 12)),
+    )
+    def test_every_survey_comes_to_an_end(
+        self, width_m: int, nadir_gap_m: float, reaches_m: list[int], refused: set[int]
+    ) -> None:
+        agent = on_its_way(survey(nadir_gap_m=nadir_gap_m), run_info(width_m, 100, cell_m=25))
+        lowest_m = 3 * nadir_gap_m
+        most = 2 * math.ceil(width_m / (3 * lowest_m - nadir_gap_m)) + 4 + len(refused)
+        for number in range(1, most + 2):
+            maneuver = to_follow(agent)
+            if maneuver is None:
+                break
+            if number in refused:
+                tell_status(agent, PRIMARY, maneuver.number, ManeuverState.REFUSED, agent.now_ms + 1)
+            else:
+                reach_m = reaches_m[number % len(reaches_m)]
+                fly(agent, PRIMARY, maneuver, flat(0.3, min(10, reach_m), reach_m), looks=1)
+        assert to_follow(agent) is None
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+
 class TestWaiting:
     def test_it_says_nothing_before_the_run_is_announced(self) -> None:
         agent = survey()
@@ -203,6 +263,16 @@ class TestTracksThatGoWrong:
         # The nadir gap of the first track, at 138 m, which the second should have seen.
         assert any(inside(agent, one, 138, 200) for one in agent.all(Hotspot))
 
+    def test_when_every_track_is_refused_the_whole_area_is_a_hotspot(self) -> None:
+        agent = on_its_way(survey(), run_info(360, 200))
+        for _ in range(9):
+            maneuver = to_follow(agent)
+            if maneuver is not None:
+                tell_status(agent, PRIMARY, maneuver.number, ManeuverState.REFUSED)
+        assert agent.last(AgentState).mode is Mode.FINISHED
+        assert sum(one.cells for one in agent.all(Hotspot)) == 73 * 40
+        assert agent.last(Hotspot).mean_risk == 1.0
+
     def test_words_on_other_manoeuvres_change_nothing(self) -> None:
         agent = on_its_way()
         first = command(agent)
@@ -215,6 +285,18 @@ class TestTracksThatGoWrong:
         assert command(agent) == second != first
         assert len(agent.last(Plan).r_eff_m) == 1
 
+    def test_a_look_of_another_manoeuvre_is_coverage_but_teaches_nothing_about_this_track(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        stray = replace(look(maneuver, 1, 0, 4, flat(0.9, 25, 140)), maneuver=maneuver.number + 1)
+        agent.hear(f"veh/{PRIMARY}/look", stray)
+        fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+        curve = agent.last(Curve)
+        assert (curve.r_eff_m, curve.p_detect[40]) == (130, 0.3)
+        layer = agent.node.coverage.layer  # type: ignore[attr-defined]
+        column = round((maneuver.start_x_m + 50) / 10)
+        assert layer.sum_nats[0, column] == pytest.approx(-math.log(0.1) - math.log(0.7))
+
     def test_an_invalid_look_is_no_coverage(self) -> None:
         agent = on_its_way()
         maneuver = command(agent)
@@ -222,6 +304,27 @@ class TestTracksThatGoWrong:
         tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
         assert agent.all(CoverageTile) == []
         assert (agent.all(Curve), agent.last(Plan).r_eff_m) == ([], (0,))
+
+    def test_a_track_whose_looks_change_their_range_bins_is_judged_by_the_first_kind(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        agent.hear(f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 4, SEES_TO_130_M), range_bin_m=2))
+        fly(agent, PRIMARY, maneuver, flat(0.3, 25, 60))
+        curve = agent.last(Curve)
+        assert (curve.range_bin_m, curve.r_eff_m, curve.p_detect[130]) == (2, 261, 0.3)
+
+    def test_a_curve_of_very_many_bins_is_published_coarser(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        ranges_m = np.arange(10_001) * 0.02
+        fine = np.broadcast_to(np.where(ranges_m <= 130, 0.3, 0), (2, 1, 10_001))
+        agent.hear(
+            f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 1, SEES_TO_130_M), range_bin_m=0.02, p_detect=fine)
+        )
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
+        curve = agent.last(Curve)
+        assert (curve.r_eff_m, curve.range_bin_m, curve.p_detect.size) == (130, 0.06, 3334)
+        assert curve.p_detect[[2166, 2167]].tolist() == [0.3, 0]  # 129.96 m and 130.02 m
 
 
 def inside(agent: OneNode, hotspot: Hotspot, across_m: float, along_m: float) -> bool:
@@ -256,6 +359,16 @@ class TestHotspots:
                     assert 0.6 <= hotspot.mean_risk <= 1
                     held += 1
         assert held > 20
+
+    def test_a_settled_cell_stays_settled_and_is_not_seen_again(self, experiment_1: OneNode) -> None:
+        before: dict[tuple[int, int], CoverageTile] = {}
+        for tile in experiment_1.all(CoverageTile):
+            old = before.get((tile.first_row, tile.first_column))
+            if old is not None:
+                assert not (old.settled & ~tile.settled).any()
+                assert (tile.sum_levels == old.sum_levels)[old.settled].all()
+            before[tile.first_row, tile.first_column] = tile
+        assert len(before) == 13 * 4
 
     def test_one_grows_under_its_id_from_revision_to_revision(self, experiment_1: OneNode) -> None:
         revisions: dict[int, list[Hotspot]] = {}
@@ -367,3 +480,17 @@ class TestContactsAndTheEnd:
         assert experiment_1.last(Maneuver).kind is ManeuverKind.HOLD
         state = experiment_1.last(AgentState)
         assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.FINISHED, 0, 0)
+
+    def test_when_the_mission_is_over_it_stops_says_what_it_has_and_falls_silent(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M))
+        said = agent.hear("coord/mission_over", MissionOver("enough"))
+        assert [one.kind for one in agent.all(Maneuver, said)] == [ManeuverKind.HOLD]
+        assert agent.all(CoverageTile, said)
+        assert agent.all(AgentState, said)[-1].mode is Mode.FINISHED
+        assert agent.wake_ms is None
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 2, 20, 4, SEES_TO_130_M))
+        assert agent.hear(f"veh/{PRIMARY}/nav", nav(3)) == []
+        assert agent.said[-1] is said[-1]
