@@ -227,6 +227,15 @@ class TestWaiting:
         agent.wait(60)
         assert (agent.said, agent.wake_ms) == ([], None)
 
+    def test_it_has_no_state_before_it_knows_where_it_is(self) -> None:
+        agent = survey()
+        agent.hear("run", SMALL, at_ms=1)
+        agent.wait(25)
+        assert agent.all(AgentState) == []
+        agent.hear(f"veh/{PRIMARY}/nav", nav(7, 8, 1))
+        state = agent.last(AgentState)
+        assert (state.x_m, state.y_m, state.heading_rad, state.mode) == (7, 8, 1, Mode.TRANSIT)
+
     def test_an_announcement_repeated_changes_nothing(self) -> None:
         agent = on_its_way()
         fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
@@ -304,6 +313,36 @@ class TestTracksThatGoWrong:
         tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
         assert agent.all(CoverageTile) == []
         assert (agent.all(Curve), agent.last(Plan).r_eff_m) == ([], (0,))
+
+    @pytest.mark.parametrize(
+        "spoilt",
+        [
+            {"p_detect": np.zeros((2, 0, 5))},
+            {"p_detect": np.zeros((1, 3, 5))},
+            {"p_detect": np.zeros((3, 3, 5))},
+            {"p_detect": np.full((2, 3, 1), 0.5)},
+            {"p_detect": np.zeros((2, 3, 0))},
+            {"along_bin_m": 0.0},
+            {"along_bin_m": -5.0},
+            {"range_bin_m": 0.0},
+            {"range_bin_m": 1e6},
+            {"origin_x_m": 9e6},
+            {"contacts": (LookContact(9e6, 9e6, 0.5),)},
+        ],
+    )
+    def test_a_look_that_makes_no_sense_is_dropped(
+        self, spoilt: dict[str, object], caplog: pytest.LogCaptureFixture
+    ) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        bad = replace(look(maneuver, 1, 0, 3, flat(0.5, 0, 60)), **spoilt)  # type: ignore[arg-type]
+        assert agent.hear(f"veh/{PRIMARY}/look", bad) == []
+        assert agent.hear(f"veh/{PRIMARY}/look", bad) == []
+        assert [record.message for record in caplog.records] == [
+            "primary: dropped a look that makes no sense (said once)"
+        ]
+        fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+        assert agent.last(Curve).r_eff_m == 130
 
     def test_a_track_whose_looks_change_their_range_bins_is_judged_by_the_first_kind(self) -> None:
         agent = on_its_way()
