@@ -23,7 +23,6 @@ from secondlook.fleet import Fleet, build_fleet
 from secondlook.node_spec import NodeSpec
 from secondlook.observer import Observer, Progress
 from secondlook.processes import OBSERVER, RECORDER, Processes, RunFailedError
-from secondlook.rooms import check_rooms
 from secondlook.scenario import Scenario
 
 Bus = Literal["zenoh", "local"]
@@ -48,7 +47,6 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     and when the run is interrupted; what was recorded until then is readable.
     """
     began = time.perf_counter()
-    check_rooms()
     fleet = build_fleet(scenario, record=options.record)
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +33,7 @@ from viz.fleet import Fleet
 from viz.risk_map import RiskMap
 from viz.second_looks import SecondLooks
 from viz.shapes import extent_of
-from viz.story import Story
+from viz.story import Line, Story
 from viz.truth import Truth
 
 
@@ -116,14 +116,16 @@ class _Mission:
         draw = self._draw.get(type(received.message))
         if draw is not None:
             draw(received, received.message)
-        line = self._story.tell(received)
-        if line is not None:
-            level, colour = (
-                (rr.TextLogLevel.WARN, palette.WARNING) if line.warns else (rr.TextLogLevel.INFO, palette.TEXT)
-            )
-            sender = received.header.sender
-            words = rr.TextLog(f"{sender}: {line.text}", level=level, color=colour)
-            self._canvas.put(time_ms, f"{paths.LOG}/{sender}", words)
+        self._put_lines(self._story.tell(received))
 
     def finish(self) -> None:
         self._map.finish()
+        self._put_lines(self._story.rest())
+
+    def _put_lines(self, lines: Iterable[Line]) -> None:
+        for line in lines:
+            level, colour = (
+                (rr.TextLogLevel.WARN, palette.WARNING) if line.warns else (rr.TextLogLevel.INFO, palette.TEXT)
+            )
+            words = rr.TextLog(f"{line.sender}: {line.text}", level=level, color=colour)
+            self._canvas.put(line.time_ms, f"{paths.LOG}/{line.sender}", words)
