@@ -342,7 +342,7 @@ def test_the_short_stream_has_every_message_but_looks() -> None:
     assert {type(received.message) for received in FEW} == {topic.message for topic in TOPICS} - {Look}
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(order=st.permutations(range(len(FEW))), repeated=st.lists(st.integers(0, len(FEW) - 1), max_size=20))
 def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated: list[int]) -> None:
     stream = [FEW[place] for place in (*order, *repeated)]
