@@ -248,13 +248,11 @@ class Coordinator:
         if self._rules is None:
             return
         grid = self.map.grid
-        risk = self._risk_to_serve()
-        for record in self.ledger.in_state(*WITH_A_VEHICLE):
-            risk[record.window.cells] *= 1.0 - self._rules.p_detect
+        taken = [record.window for record in self.ledger.in_state(*WITH_A_VEHICLE)]
         primaries = [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
         open_cells = self._inside & ~self.map.settled_by(primaries)
         unmatched = self.ledger.in_state(StripState.OPEN)
-        for cut in cut_strips(grid, risk, open_cells, self._rules):
+        for cut in cut_strips(grid, self._risk_to_serve(), open_cells, self._rules, taken):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is None or same.window.overlap(cut.window) < SAME_STRIP:
                 number = self.ledger.next_number
