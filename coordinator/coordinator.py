@@ -341,7 +341,7 @@ class Coordinator:
         return math.ceil(max(ends) * self.config.deadline_factor)
 
     def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
-        if record.state is not state and self.ledger.move(record, state, now_ms, reason, vehicle):
+        if self.ledger.move(record, state, now_ms, reason, vehicle):
             self._publish_strip(record)
 
     def _publish_strip(self, record: StripRecord) -> None:
