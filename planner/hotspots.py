@@ -89,7 +89,7 @@ def find_hotspots(
             id_of_group[group] = next_id
             next_id += 1
     ids = id_of_group[groups]
-    touches_open = _beside(open_cells)
+    touches_open = beside(open_cells)
     growing: set[int] = set()
     changed: list[HotspotArea] = []
     for number, window in _windows(ids):
@@ -108,7 +108,7 @@ def find_hotspots(
     return HotspotChange(HotspotMap(ids, frozenset(growing), next_id), tuple(changed), withdrawn)
 
 
-def _beside(cells: BoolArray) -> BoolArray:
+def beside(cells: BoolArray) -> BoolArray:
     """The cells and their four neighbours."""
     beside = cells.copy()
     beside[1:] |= cells[:-1]
