@@ -1,4 +1,4 @@
-"""Keeps a listener to the rules of the house: what it raises is told as a node's failure, and it is closed once."""
+"""Keeps a listener to the rules of the house: what it raises is told as a node's failure."""
 
 from __future__ import annotations
 
@@ -15,7 +15,6 @@ class KeptListener:
     def __init__(self, node_id: str, listener: Listener) -> None:
         self._node_id = node_id
         self._listener = listener
-        self._closed = False
 
     def on_message(self, received: Received) -> None:
         """Passes one message on."""
@@ -25,10 +24,7 @@ class KeptListener:
             raise failure_of(self._node_id, error, at_ms=received.header.sent_ms) from error
 
     def close(self) -> None:
-        """Closes the listener, the first time."""
-        if self._closed:
-            return
-        self._closed = True
+        """Closes the listener."""
         try:
             self._listener.close()
         except Exception as error:
