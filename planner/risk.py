@@ -44,12 +44,12 @@ class RiskLayer:
         self._largest_levels[rows, columns] = to_levels(self.largest_nats[rows, columns])
 
     def sum_levels(self) -> LevelArray:
-        """The sums in levels; they saturate at 255, a residual risk of 0.006. Not to be written to."""
-        return self._sum_levels
+        """The sums in levels; they saturate at 255, a residual risk of 0.006."""
+        return self._sum_levels.copy()
 
     def largest_levels(self) -> LevelArray:
-        """The largest single looks in levels; they saturate at 255 (one look of P_d 0.994). Not to be written to."""
-        return self._largest_levels
+        """The largest single looks in levels; they saturate at 255 (one look of P_d 0.994)."""
+        return self._largest_levels.copy()
 
 
 def to_levels(nats: FloatArray) -> LevelArray:
