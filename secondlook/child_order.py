@@ -17,13 +17,15 @@ STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor 
 
 @dataclass(frozen=True)
 class ChildOrder:
-    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock."""
+    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock.
+    `patience_s`: wall time after which someone silent is given up."""
 
     run: str
     host: str
     password: str
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
+    patience_s: float
     is_hub: bool = False
     is_listener: bool = False
     hosts: tuple[HostPlan, ...] = ()
