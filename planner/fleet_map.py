@@ -18,11 +18,13 @@ from planner.types import BoolArray, FloatArray, GridSpec
 
 @dataclass
 class VehicleLayer:
-    """What one vehicle has published: levels and settled cells, grid shape, and the version of each tile."""
+    """What one vehicle has published: levels, settled cells and of which cells it has told, all of grid shape, and the
+    version of each tile."""
 
     sum_levels: LevelArray
     largest_levels: LevelArray
     settled: BoolArray
+    told: BoolArray
     versions: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
 
 
@@ -61,6 +63,7 @@ class FleetMap:
                 sum_levels=np.zeros(self.grid.shape, dtype=np.uint8),
                 largest_levels=np.zeros(self.grid.shape, dtype=np.uint8),
                 settled=np.zeros(self.grid.shape, dtype=np.bool_),
+                told=np.zeros(self.grid.shape, dtype=np.bool_),
             )
         place = (first_row, first_column)
         if version <= layer.versions.get(place, (-1, -1)):
@@ -70,6 +73,7 @@ class FleetMap:
         layer.sum_levels[window] = sum_levels
         layer.largest_levels[window] = largest_levels
         layer.settled[window] = settled
+        layer.told[window] = True
         self.risk[window] = residual_risk(*self._joined(window, self.layers), self.rho)
         self.changes += 1
         return True
@@ -88,6 +92,14 @@ class FleetMap:
             if vehicle in self.layers:
                 settled |= self.layers[vehicle].settled
         return settled
+
+    def told_by(self, vehicles: Iterable[str]) -> BoolArray:
+        """Cells in a tile of one of these vehicles."""
+        told = np.zeros(self.grid.shape, dtype=np.bool_)
+        for vehicle in vehicles:
+            if vehicle in self.layers:
+                told |= self.layers[vehicle].told
+        return told
 
     def risk_of(self, vehicles: set[str]) -> tuple[FloatArray, BoolArray]:
         """Residual risk, and which cells are seen, from these vehicles' layers alone."""

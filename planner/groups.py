@@ -10,6 +10,16 @@ from planner.types import BoolArray
 IndexArray = NDArray[np.intp]
 
 
+def neighbours(cells: BoolArray) -> BoolArray:
+    """The cells that share a side with one of the given, which may be among them."""
+    found = np.zeros_like(cells)
+    found[1:] |= cells[:-1]
+    found[:-1] |= cells[1:]
+    found[:, 1:] |= cells[:, :-1]
+    found[:, :-1] |= cells[:, 1:]
+    return found
+
+
 def label_groups(cells: BoolArray, block: int) -> tuple[NDArray[np.int32], int]:
     """Numbers the groups of cells that touch by their sides.
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.groups import label_groups
+from planner.groups import label_groups, neighbours
 from planner.outline import outline
 from planner.types import BoolArray, FloatArray, GridSpec, Point
 
@@ -122,7 +122,7 @@ def update_hotspots(
     moved = np.flatnonzero(numbers != previous.numbers)
     reshaped = {*np.unique(numbers.ravel()[moved]).tolist(), *np.unique(previous.numbers.ravel()[moved]).tolist()}
     risk_sums = np.bincount(labels_there, weights=risk.ravel()[occupied], minlength=count + 1)
-    growing = np.bincount(labels_there[_beside(unsettled).ravel()[occupied]], minlength=count + 1)
+    growing = np.bincount(labels_there[neighbours(unsettled).ravel()[occupied]], minlength=count + 1)
 
     hotspots, changed = {}, []
     for label in kept:
@@ -178,16 +178,6 @@ def _carried_on(labels: NumberArray, previous_numbers: NumberArray, sizes: Index
                         taken.add(number)
                         break
     return number_of
-
-
-def _beside(cells: BoolArray) -> BoolArray:
-    """The cells that share a side with one of the given."""
-    beside = np.zeros_like(cells)
-    beside[1:] |= cells[:-1]
-    beside[:-1] |= cells[1:]
-    beside[:, 1:] |= cells[:, :-1]
-    beside[:, :-1] |= cells[:, 1:]
-    return beside
 
 
 def _outline(grid: GridSpec, patch: IndexArray) -> tuple[Point, ...]:
