@@ -109,8 +109,10 @@ class TestCheapestEntry:
 
     @pytest.mark.parametrize("heading_rad", [0.3 * k for k in range(21)])
     def test_of_equal_ways_takes_the_first(self, heading_rad: float) -> None:
-        legs = legs_over_strip(Strip(1, (30, 0), heading_rad, 100, 60), 20)
-        behind = Pose(30 - 100 * math.sin(heading_rad), -100 * math.cos(heading_rad), heading_rad)
+        # Where rounding makes one of them shorter, now this and now that.
+        x_m, y_m = 123.4, -567.8
+        legs = legs_over_strip(Strip(1, (x_m, y_m), heading_rad, 100, 60), 20)
+        behind = Pose(x_m - 100 * math.sin(heading_rad), y_m - 100 * math.cos(heading_rad), heading_rad)
         ordered, _ = cheapest_entry(legs, behind, 10, 0)
         assert [leg.across_m for leg in ordered] == [10, 30, 50]
 
