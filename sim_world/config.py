@@ -9,15 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from comms.wire import IDENTIFIER
 from planner.types import DetectionCurve, Point
-
-if TYPE_CHECKING:
-    from sim_world.sonar import SonarModel
+from sim_world.sonar_model import SonarModel
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
