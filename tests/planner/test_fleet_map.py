@@ -1,7 +1,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +13,9 @@ from planner.fleet_map import FleetMap
 from planner.risk import LevelArray
 from planner.types import BoolArray, GridSpec, SweepFrame
 
-GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=7, rows=5)
-# Windows of a 5 x 7 grid in tiles of 3 x 4: (first row, first column, rows, columns).
-PLACES = ((0, 0, 3, 4), (0, 4, 3, 3), (3, 0, 2, 4), (3, 4, 2, 3))
+GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=23, rows=22)
+# Its four tiles: (first row, first column, rows, columns).
+PLACES = ((0, 0, 20, 20), (0, 20, 20, 3), (20, 0, 2, 20), (20, 20, 2, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +91,43 @@ def joined(told: list[TileNews], rho: float) -> np.ndarray[tuple[int, ...], np.d
 def test_any_order_with_losses_and_repeats_ends_in_one_map(
     data: st.DataObject, told: list[TileNews], rho: float
 ) -> None:
-    latest = newest(told)
-    # Of what is not the newest anything may be lost; anything may come again, and late.
-    older = [news for news in told if news not in latest]
-    arriving = latest + data.draw(st.lists(st.sampled_from(told), max_size=8) if told else st.just([]))
-    arriving += [news for news in older if data.draw(st.booleans())]
-    fleet = FleetMap(GRID, rho)
-    for news in data.draw(st.permutations(arriving)):
+    # Anything may be lost, come again, and late.
+    arriving = data.draw(st.lists(st.sampled_from(told), max_size=20)) if told else []
+    fleet, other = FleetMap(GRID, rho), FleetMap(GRID, rho)
+    for news in arriving:
         news.give(fleet)
-    np.testing.assert_allclose(fleet.risk, joined(told, rho), rtol=1e-12)
+    for news in data.draw(st.permutations(arriving)):
+        news.give(other)
+    np.testing.assert_allclose(fleet.risk, joined(arriving, rho), rtol=1e-12)
+    np.testing.assert_array_equal(fleet.risk, other.risk)
+    np.testing.assert_array_equal(fleet.seen(), other.seen())
+    np.testing.assert_array_equal(fleet.settled_by(["alpha", "gamma"]), other.settled_by(["alpha", "gamma"]))
+
+
+@given(st.data(), published())
+def test_two_listeners_who_tell_each_other_what_they_heard_agree(data: st.DataObject, told: list[TileNews]) -> None:
+    heard = [data.draw(st.lists(st.sampled_from(told))) if told else [] for _ in range(2)]
+    one, other, both = FleetMap(GRID), FleetMap(GRID), FleetMap(GRID)
+    for news in heard[0] + newest(heard[1]):
+        news.give(one)
+    for news in heard[1] + newest(heard[0]):
+        news.give(other)
+    for news in newest(heard[0] + heard[1]):
+        news.give(both)
+    np.testing.assert_array_equal(one.risk, both.risk)
+    np.testing.assert_array_equal(other.risk, both.risk)
+
+
+@given(published(), st.sampled_from([0.0, 0.3, 1.0]))
+def test_what_is_seen_is_what_has_a_risk_below_1(told: list[TileNews], rho: float) -> None:
+    fleet = FleetMap(GRID, rho)
+    for news in told:
+        # A layer's largest look has a level where the sum has.
+        replace(news, largest_levels=np.maximum(news.largest_levels, np.minimum(news.sum_levels, 1))).give(fleet)
+    np.testing.assert_array_equal(fleet.seen(), fleet.risk < 1)
+    risk, seen = fleet.risk_of({"alpha", "beta", "gamma"})
+    np.testing.assert_array_equal(risk, fleet.risk)
+    np.testing.assert_array_equal(seen, fleet.seen())
 
 
 @given(published())
@@ -119,7 +148,7 @@ def test_sums_add_and_maxima_take_the_maximum() -> None:
     tile("beta", (0, 1), PLACES[0], 30).give(fleet)
     # Sum 80, largest 40: exp(-0.02 (40 + 0.5 * 40)).
     assert fleet.risk[0, 0] == pytest.approx(math.exp(-1.2))
-    assert fleet.risk[0, 4] == 1.0
+    assert fleet.risk[0, 20] == 1.0
 
 
 def test_a_restarted_vehicle_starts_its_layer_anew() -> None:
@@ -135,9 +164,9 @@ def test_layers_can_be_told_apart() -> None:
     tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
     tile("beta", (0, 1), PLACES[1], 30).give(fleet)
     risk, seen = fleet.risk_of({"alpha"})
-    assert (risk[0, 0], risk[0, 4]) == (pytest.approx(math.exp(-1.0)), 1.0)
-    assert (seen[0, 0], seen[0, 4]) == (True, False)
-    assert np.count_nonzero(fleet.seen()) == 12 + 9
+    assert (risk[0, 0], risk[0, 20]) == (pytest.approx(math.exp(-1.0)), 1.0)
+    assert (seen[0, 0], seen[0, 20]) == (True, False)
+    assert np.count_nonzero(fleet.seen()) == 400 + 60
 
 
 def test_settled_is_what_one_of_them_says() -> None:
@@ -145,22 +174,65 @@ def test_settled_is_what_one_of_them_says() -> None:
     tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
     tile("beta", (0, 1), PLACES[1], 30).give(fleet)
     tile("gamma", (0, 1), PLACES[2], 30).give(fleet)
-    assert np.count_nonzero(fleet.settled_by(["alpha"])) == 12
-    assert np.count_nonzero(fleet.settled_by(["alpha", "beta", "silent"])) == 12 + 9
+    assert np.count_nonzero(fleet.settled_by(["alpha"])) == 400
+    assert np.count_nonzero(fleet.settled_by(["alpha", "beta", "silent"])) == 400 + 60
     assert not fleet.settled_by([]).any()
 
 
-@pytest.mark.parametrize("place", [(3, 0, 3, 4), (0, 4, 3, 4)])
-def test_a_tile_beside_the_grid_is_refused(place: tuple[int, int, int, int]) -> None:
-    with pytest.raises(ValueError, match="is not on the grid"):
-        tile("alpha", (0, 1), place, 50).give(FleetMap(GRID))
+@pytest.mark.parametrize(
+    "place",
+    [
+        (20, 0, 20, 20),
+        (0, 20, 20, 20),
+        (40, 0, 2, 20),
+        (-20, 0, 20, 20),
+        (0, -20, 20, 20),
+        (-1, -1, 20, 20),
+        (2, 0, 20, 20),
+        (0, 3, 20, 20),
+        (0, 0, 19, 20),
+        (0, 0, 20, 19),
+        (0, 0, 22, 23),
+        (0, 0, 0, 0),
+        (2**31 - 1, 0, 20, 20),
+        (0, 2**80, 20, 20),
+    ],
+)
+def test_what_is_no_tile_of_the_grid_is_refused(place: tuple[int, int, int, int]) -> None:
+    check_refused(tile("alpha", (5, 1), place, 50))
+    check_refused(tile("stranger", (0, 1), place, 50))
 
 
-def test_channels_of_different_shape_are_refused() -> None:
-    fleet = FleetMap(GRID)
-    levels = np.zeros((2, 2), dtype=np.uint8)
-    with pytest.raises(ValueError, match="is not on the grid"):
-        fleet.take("alpha", (0, 1), 0, 0, levels, levels[:1], np.zeros((2, 2), dtype=np.bool_))
-    with pytest.raises(ValueError, match="is not on the grid"):
-        fleet.take("alpha", (0, 1), 0, 0, levels, levels, np.zeros((1, 2), dtype=np.bool_))
-    assert fleet.changes == 0
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        {"sum_levels": np.zeros((20, 19), dtype=np.uint8)},
+        {"largest_levels": np.zeros((19, 20), dtype=np.uint8)},
+        {"settled": np.zeros((1, 20), dtype=np.bool_)},
+        {"settled": np.zeros(20, dtype=np.bool_)},
+        {"sum_levels": np.zeros((20, 20, 1), dtype=np.uint8)},
+        {"sum_levels": np.uint8(3)},
+    ],
+)
+def test_arrays_of_another_shape_are_refused(spoilt: dict[str, Any]) -> None:
+    check_refused(replace(tile("alpha", (5, 1), PLACES[0], 50), **spoilt))
+
+
+def check_refused(misfit: TileNews) -> None:
+    """It raises and changes nothing."""
+    fleet, twin = FleetMap(GRID), FleetMap(GRID)
+    for one in (fleet, twin):
+        tile("alpha", (0, 1), PLACES[0], 50).give(one)
+        tile("beta", (0, 2), PLACES[3], 20).give(one)
+    with pytest.raises(ValueError, match="tile"):
+        misfit.give(fleet)
+    assert fleet.changes == 2
+    assert set(fleet.layers) == {"alpha", "beta"}
+    np.testing.assert_array_equal(fleet.risk, twin.risk)
+    # Nor did it use up a version.
+    assert tile("alpha", (0, 2), PLACES[0], 60).give(fleet)
+    for vehicle, layer in twin.layers.items():
+        if vehicle != "alpha":
+            np.testing.assert_array_equal(fleet.layers[vehicle].sum_levels, layer.sum_levels)
+            np.testing.assert_array_equal(fleet.layers[vehicle].settled, layer.settled)
+            assert fleet.layers[vehicle].versions == layer.versions
