@@ -24,20 +24,25 @@ from secondlook.node_spec import NodeSpec
 from secondlook.observer import Observer, Progress
 from secondlook.processes import OBSERVER, RECORDER, Processes, RunFailedError
 from secondlook.scenario import Scenario
+from viz.recorder_config import RecorderConfig
 
 Bus = Literal["zenoh", "local"]
+
+RECORDED_PIECE_S, WATCHED_PIECE_S = 60.0, 5.0
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """`folder`: where the files of the run go; it exists. `processes`: see `processes.plan_hosts`. `record`: with
-    recording and messages.mpk. `progress`: told the figures as the mission goes on."""
+    recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
+    shows the mission while it runs, see `viz.live_server.LiveServer`."""
 
     folder: Path
     bus: Bus = "zenoh"
     processes: int | None = None
     record: bool = True
     progress: Progress | None = None
+    live_pipe: Path | None = None
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -85,7 +90,10 @@ def _run_zenoh(fleet: Fleet, observer: Observer, options: RunOptions) -> tuple[i
 def _recorder(options: RunOptions) -> NodeSpec | None:
     if not options.record:
         return None
-    return NodeSpec("viz.recorder:Recorder", options.folder / "mission.rrd")
+    # Watched, positions are wanted in shorter pieces.
+    piece_s = RECORDED_PIECE_S if options.live_pipe is None else WATCHED_PIECE_S
+    config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe, piece_s=piece_s)
+    return NodeSpec("viz.recorder:Recorder", config)
 
 
 @contextmanager
