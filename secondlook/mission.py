@@ -22,21 +22,26 @@ from secondlook.processes import Processes, RunFailedError
 from secondlook.scenario import Scenario
 from secondlook.signals import signals_interrupt
 from secondlook.summary import summarise
+from viz.recorder_config import RecorderConfig
 
 Bus = Literal["zenoh", "local"]
 LOGS = "logs"
+
+RECORDED_PIECE_S, WATCHED_PIECE_S = 60.0, 5.0
 
 
 @dataclass(frozen=True)
 class RunOptions:
     """`folder`: where the files of the run go; it exists. `processes`: see `host_plans.plan_hosts`. `record`: with
-    recording and messages.mpk. `progress`: told the figures as the mission goes on."""
+    recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
+    shows the mission while it runs, see `viz.live_server.LiveServer`."""
 
     folder: Path
     bus: Bus = "zenoh"
     processes: int | None = None
     record: bool = True
     progress: Progress | None = None
+    live_pipe: Path | None = None
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -84,8 +89,10 @@ class _Run:
         self._fleet = fleet
         self._observer = observer
         self._options = options
-        recorder = NodeSpec("viz.recorder:Recorder", options.folder / "mission.rrd")
-        self._recorder = {RECORDER: recorder} if options.record else {}
+        # Watched, positions are wanted in shorter pieces.
+        piece_s = RECORDED_PIECE_S if options.live_pipe is None else WATCHED_PIECE_S
+        config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe, piece_s=piece_s)
+        self._recorder = {RECORDER: NodeSpec("viz.recorder:Recorder", config)} if options.record else {}
 
     def on_local(self) -> BusResult:
         fleet = self._fleet

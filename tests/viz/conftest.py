@@ -8,6 +8,7 @@ import pytest
 from comms.node import Received
 from tests.viz.mission_stream import mission
 from viz.recorder import Recorder
+from viz.recorder_config import RecorderConfig
 
 Record = Callable[[list[Received], Path], Path]
 
@@ -20,7 +21,7 @@ def messages() -> list[Received]:
 @pytest.fixture(scope="session")
 def record() -> Record:
     def write(stream: list[Received], path: Path) -> Path:
-        recorder = Recorder(path)
+        recorder = Recorder(RecorderConfig(path))
         for received in stream:
             recorder.on_message(received)
         recorder.close()
