@@ -28,8 +28,6 @@ from viz.recorder_config import RecorderConfig
 
 Bus = Literal["zenoh", "local"]
 
-RECORDED_PIECE_S, WATCHED_PIECE_S = 60.0, 5.0
-
 
 @dataclass(frozen=True)
 class RunOptions:
@@ -90,9 +88,7 @@ def _run_zenoh(fleet: Fleet, observer: Observer, options: RunOptions) -> tuple[i
 def _recorder(options: RunOptions) -> NodeSpec | None:
     if not options.record:
         return None
-    # Watched, positions are wanted in shorter pieces.
-    piece_s = RECORDED_PIECE_S if options.live_pipe is None else WATCHED_PIECE_S
-    config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe, piece_s=piece_s)
+    config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe)
     return NodeSpec("viz.recorder:Recorder", config)
 
 

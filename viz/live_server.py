@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -100,7 +101,13 @@ class LiveServer:
         command = [PROGRAM, *WINDOW, *BIND, "--connect", self.url]
         wrapper = ["/bin/sh", "-c", WINDOW_WITH_SERVER, "sh", str(self.server.pid), *command]
         window = _start(wrapper, self.window_log, subprocess.DEVNULL)
-        self._wait_for(DRAWS, window, self.window_log)
+        try:
+            self._wait_for(DRAWS, window, self.window_log)
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(window.pid, signal.SIGKILL)
+            window.wait()
+            raise
         self.window = window
 
     def wait(self) -> None:
@@ -125,10 +132,9 @@ class LiveServer:
                 return found[found.lastindex or 0]
             if ended:
                 said = [line for line in text.splitlines() if "rror" in line or "panicked" in line]
-                raise LiveViewError(f"--live: the viewer does not start: {said[-1] if said else 'it does not say why'}")
+                why = said[-1].rsplit(": ", 1)[-1] if said else "it does not say why"
+                raise LiveViewError(f"--live: the viewer does not start: {why}")
             time.sleep(POLL_S)
-        if process is not self.server:
-            process.terminate()
         raise LiveViewError(f"--live: the viewer was not ready after {READY_WITHIN_S:.0f} s")
 
 
