@@ -164,11 +164,13 @@ def test_what_a_stalled_reader_does_not_take_is_bounded_and_counted(
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     feed = LiveFeed(pipe, RUN, held_bytes=200_000)
     noise = np.random.default_rng(1).integers(256, size=100_000, dtype=np.uint8)  # cannot be compressed
-    for wanted in (1, 2):
+
+    def drops(wanted: int) -> bool:
         # At least 100 kB a piece: the pipe takes less than one.
-        while feed.dropped < wanted:
-            feed.stream.log("noise", rr.Tensor(noise))
-            time.sleep(0.01)
+        feed.stream.log("noise", rr.Tensor(noise))
+        return feed.dropped >= wanted
+
+    wait_until(lambda: drops(2))
     feed.close()
     assert feed.dropped >= 2
     os.close(reader)
