@@ -31,16 +31,17 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
         server = LiveServer(folder.absolute().name, web=web)
     except LiveViewError as error:
         raise UserError(str(error)) from error
+    watched = sys.stderr.isatty()
     with server:
         if web:
-            sys.stderr.write(f"The mission is shown at {server.page}\n")
+            sys.stderr.write(f"The mission is shown at {server.page}{'' if watched else ' until it is over'}\n")
         else:
             try:
                 server.open_window()
             except LiveViewError as error:
                 raise UserError(f"{error}; add --web to watch in a browser") from error
         yield folder, server.pipe
-        if web and sys.stderr.isatty():
-            sys.stderr.write(f"Still shown at {server.page}; Ctrl-C ends it\n")
+        if web and watched:
             with contextlib.suppress(KeyboardInterrupt):
+                sys.stderr.write(f"Still shown at {server.page}; Ctrl-C ends it\n")
                 server.wait()

@@ -27,8 +27,6 @@ from viz.recorder_config import RecorderConfig
 Bus = Literal["zenoh", "local"]
 LOGS = "logs"
 
-RECORDED_PIECE_S, WATCHED_PIECE_S = 60.0, 5.0
-
 
 @dataclass(frozen=True)
 class RunOptions:
@@ -89,9 +87,7 @@ class _Run:
         self._fleet = fleet
         self._observer = observer
         self._options = options
-        # Watched, positions are wanted in shorter pieces.
-        piece_s = RECORDED_PIECE_S if options.live_pipe is None else WATCHED_PIECE_S
-        config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe, piece_s=piece_s)
+        config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe)
         self._recorder = {RECORDER: NodeSpec("viz.recorder:Recorder", config)} if options.record else {}
 
     def on_local(self) -> BusResult:

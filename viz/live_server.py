@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import re
+import signal
 import subprocess
 import sys
 import tempfile
@@ -27,6 +28,7 @@ DRAWS = re.compile(r"wgpu adapter")
 WINDOW = ("--expect-data-soon", "--hide-welcome-screen")
 SERVER_MEMORY = "1GiB"  # of this, the oldest entries go first
 READY_WITHIN_S = 20.0
+WINDOW_WITHIN_S = 8.0  # a window that is still there then is taken for open, even if it has not said so
 POLL_S = 0.05
 
 # Both outlive this process if they must, and need no Python for it.
@@ -81,8 +83,12 @@ class LiveServer:
         try:
             # The server opens its ports once it has read something.
             os.write(self._writer, _opening(recording_id))
-            self.url = f"rerun+http://{self._wait_for(LISTENING, self.server, log)}/proxy"
-            self.page = f"{self._wait_for(WEB_PAGE, self.server, log)}/?url={quote(self.url, safe='')}" if web else ""
+            listening = _wait_for(LISTENING, self.server, log, READY_WITHIN_S)
+            page = _wait_for(WEB_PAGE, self.server, log, READY_WITHIN_S) if web else ""
+            if listening is None or page is None:
+                raise LiveViewError(f"--live: the viewer was not ready after {READY_WITHIN_S:.0f} s")
+            self.url = f"rerun+http://{listening}/proxy"
+            self.page = f"{page}/?url={quote(self.url, safe='')}" if web else ""
         except BaseException:
             self.close()
             raise
@@ -100,7 +106,13 @@ class LiveServer:
         command = [PROGRAM, *WINDOW, *BIND, "--connect", self.url]
         wrapper = ["/bin/sh", "-c", WINDOW_WITH_SERVER, "sh", str(self.server.pid), *command]
         window = _start(wrapper, self.window_log, subprocess.DEVNULL)
-        self._wait_for(DRAWS, window, self.window_log)
+        try:
+            _wait_for(DRAWS, window, self.window_log, WINDOW_WITHIN_S)
+        except BaseException:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(window.pid, signal.SIGKILL)
+            window.wait()
+            raise
         self.window = window
 
     def wait(self) -> None:
@@ -116,20 +128,21 @@ class LiveServer:
         if not stays:
             self.server.wait()
 
-    def _wait_for(self, words: re.Pattern[str], process: subprocess.Popen[bytes], log: Path) -> str:
-        deadline = time.monotonic() + READY_WITHIN_S
-        while time.monotonic() < deadline:
-            ended = process.poll() is not None  # before the log is read: then it is complete
-            text = log.read_text(errors="replace")
-            if found := words.search(text):
-                return found[found.lastindex or 0]
-            if ended:
-                said = [line for line in text.splitlines() if "rror" in line or "panicked" in line]
-                raise LiveViewError(f"--live: the viewer does not start: {said[-1] if said else 'it does not say why'}")
-            time.sleep(POLL_S)
-        if process is not self.server:
-            process.terminate()
-        raise LiveViewError(f"--live: the viewer was not ready after {READY_WITHIN_S:.0f} s")
+
+def _wait_for(words: re.Pattern[str], process: subprocess.Popen[bytes], log: Path, within_s: float) -> str | None:
+    """What a program says, None where it has not after a while; raises LiveViewError where it has ended instead."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        ended = process.poll() is not None  # before the log is read: then it is complete
+        text = log.read_text(errors="replace")
+        if found := words.search(text):
+            return found[found.lastindex or 0]
+        if ended:
+            said = [line for line in text.splitlines() if "rror" in line or "panicked" in line]
+            why = said[-1].rsplit(": ", 1)[-1] if said else "it does not say why"
+            raise LiveViewError(f"--live: the viewer does not start: {why}")
+        time.sleep(POLL_S)
+    return None
 
 
 def _opening(recording_id: str) -> bytes:

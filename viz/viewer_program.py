@@ -19,5 +19,6 @@ def quiet_environment() -> dict[str, str]:
     """This process's environment, changed so that the viewer sends no usage statistics and looks for no update."""
     # CI is the viewer's switch for usage statistics that needs no file in anyone's home.
     environment = {**os.environ, "CI": "1", "NO_COLOR": "1"}
+    environment.pop("RUST_LOG", None)  # it would hide what the viewer says of its ports
     # The viewer would ask a host outside for a newer version of itself: a proxy that is not there keeps it from that.
     return environment | dict.fromkeys(("HTTPS_PROXY", "https_proxy"), "http://127.0.0.1:1")
