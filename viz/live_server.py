@@ -65,7 +65,7 @@ class LiveServer:
         self.window: subprocess.Popen[bytes] | None = None
         os.mkfifo(self.pipe)
         reader = os.open(self.pipe, os.O_RDONLY | os.O_NONBLOCK)
-        # Held open: with nobody to write, the server would take the recording for ended.
+        # Held open as long as the server lives: with nobody to write it would look again and again, a core's worth.
         self._writer = os.open(self.pipe, os.O_WRONLY)
         os.set_blocking(reader, True)
         how = ("--serve-web", "--web-viewer-port", "0") if web else ("--serve-grpc",)
@@ -105,7 +105,7 @@ class LiveServer:
         """Opens the viewer's window, and returns when it draws. Raises LiveViewError where it cannot."""
         command = [PROGRAM, *WINDOW, *BIND, "--connect", self.url]
         wrapper = ["/bin/sh", "-c", WINDOW_WITH_SERVER, "sh", str(self.server.pid), *command]
-        window = _start(wrapper, self.window_log, subprocess.DEVNULL)
+        window = _start(wrapper, self.window_log, subprocess.DEVNULL, held_open=(self._writer,))
         try:
             _wait_for(DRAWS, window, self.window_log, WINDOW_WITHIN_S)
         except BaseException:
@@ -121,12 +121,12 @@ class LiveServer:
 
     def close(self) -> None:
         """Ends the server, or leaves it to the window."""
-        os.close(self._writer)
         stays = self.window is not None
         with contextlib.suppress(BrokenPipeError):
             self._guard.communicate(b"keep\n" if stays else b"")
         if not stays:
             self.server.wait()
+        os.close(self._writer)
 
 
 def _wait_for(words: re.Pattern[str], process: subprocess.Popen[bytes], log: Path, within_s: float) -> str | None:
@@ -153,9 +153,16 @@ def _opening(recording_id: str) -> bytes:
     return opening.read() or b""
 
 
-def _start(command: list[str], log: Path, stdin: int) -> subprocess.Popen[bytes]:
+def _start(command: list[str], log: Path, stdin: int, held_open: tuple[int, ...] = ()) -> subprocess.Popen[bytes]:
     """Starts a program in a session of its own: Ctrl-C is for the mission."""
     with log.open("wb") as output:
         return subprocess.Popen(
-            command, stdin=stdin, stdout=output, stderr=output, env=quiet_environment(), cwd="/", start_new_session=True
+            command,
+            stdin=stdin,
+            stdout=output,
+            stderr=output,
+            env=quiet_environment(),
+            cwd="/",
+            start_new_session=True,
+            pass_fds=held_open,
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import select
 import signal
 import subprocess
 import sys
@@ -178,6 +179,26 @@ def test_what_a_stalled_reader_does_not_take_is_bounded_and_counted(
     assert told[0] == "the live view is too far behind"
     assert len(told) == 2
     assert told[1].startswith("the live view lacks ")
+
+
+@pytest.mark.usefixtures("drawable")
+def test_the_pipe_stays_open_as_long_as_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise the server that it leaves behind would keep a core busy."""
+    monkeypatch.setattr(live_server, "WINDOW", ("--headless",))
+    with LiveServer(RUN, web=False) as server:
+        server.open_window()
+        reader = os.open(server.pipe, os.O_RDONLY | os.O_NONBLOCK)
+    ends = select.poll()
+    ends.register(reader, select.POLLHUP)
+    open_afterwards, serves_afterwards = ends.poll(0) == [], server.server.poll() is None
+    assert server.window is not None
+    for viewer in psutil.Process(server.window.pid).children():
+        viewer.kill()
+    server.window.wait()
+    wait_until(lambda: server.server.poll() is not None)
+    closed_at_last = ends.poll(0) == [(reader, select.POLLHUP)]
+    os.close(reader)
+    assert (open_afterwards, serves_afterwards, closed_at_last) == (True, True, True)
 
 
 @pytest.mark.usefixtures("drawable")
