@@ -5,11 +5,12 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
+from comms.codec import Header
 from comms.messages import (
     AgentState,
     CoverageTile,
@@ -18,7 +19,6 @@ from comms.messages import (
     MissionOver,
     Mode,
     Role,
-    RosterVehicle,
     RunInfo,
     StripState,
     StripStatus,
@@ -33,32 +33,26 @@ from coordinator.allocation import FreeHelper, OpenStrip
 from coordinator.config import CoordinatorConfig
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
+from coordinator.vehicles import KnownVehicle
 from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
-from planner.types import BoolArray, FloatArray
+from planner.groups import neighbours
+from planner.types import BoolArray, FloatArray, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
 SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newly cut strip is an open one revised
 WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is published again
 ANSWER_WITHIN_MS = 10_000
+CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen for the map to agree that it is done
-
-
-@dataclass
-class _Vehicle:
-    entry: RosterVehicle
-    state: AgentState | None = None
-    heard_ms: int = 0
-    lost: bool = False
-    finished_ms: int | None = None
-    refused: set[int] = field(default_factory=set)
 
 
 @dataclass
 class _Hotspot:
     revision: tuple[int, int]
     mean_risk: float
+    growing: bool
     cells: BoolArray
 
 
@@ -68,7 +62,7 @@ class Coordinator:
     def __init__(self, config: CoordinatorConfig) -> None:
         self.config = config
         self.ledger = Ledger()
-        self.vehicles: dict[str, _Vehicle] = {}
+        self.vehicles: dict[str, KnownVehicle] = {}
         self.map: FleetMap | None = None
         self._inside: BoolArray
         self._hotspots: dict[tuple[str, int], _Hotspot] = {}
@@ -76,6 +70,7 @@ class Coordinator:
         self._tasks = 0
         self._outbox: list[Publication] = []
         self._to_cut = False
+        self._cut_by_ms: int | None = None
         self._to_assign = False
         self._over = False
         self._complained_of: set[str] = set()
@@ -91,23 +86,23 @@ class Coordinator:
             self._begin(message, now_ms)
         elif self.map is not None and not self._over:
             vehicle = self.vehicles.get(received.vehicle)
-            version = received.header.incarnation
             if isinstance(message, CoverageTile):
-                self._take_tile(received.vehicle, version, message)
+                self._take_tile(received, message, now_ms)
             elif isinstance(message, Hotspot):
                 self._take_hotspot(received, message)
             elif isinstance(message, AgentState) and vehicle is not None:
-                self._take_state(vehicle, message, now_ms)
+                self._take_state(vehicle, received.header, message, now_ms)
             elif isinstance(message, TaskStatus) and vehicle is not None:
-                self._take_status(received.vehicle, message, now_ms)
+                self._take_status(vehicle, received.header, message, now_ms)
         return self._step(now_ms)
 
     def on_wake(self, now_ms: int) -> Step:
         """Cuts, assigns and looks whether anyone is lost and whether the mission is over."""
         if self.map is not None and not self._over:
             self._find_lost(now_ms)
-            if self._to_cut:
+            if self._to_cut or (self._cut_by_ms is not None and self._cut_by_ms <= now_ms):
                 self._to_cut = False
+                self._cut_by_ms = None
                 self._cut(now_ms)
                 self._to_assign = True
             if self._to_assign:
@@ -121,7 +116,7 @@ class Coordinator:
         self.map = FleetMap(spec, run.rho)
         outline = tuple((corner.x_m, corner.y_m) for corner in run.area)
         self._inside = SurveyArea(outline, spec.frame.heading_rad).inside(spec)
-        self.vehicles = {entry.vehicle: _Vehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
+        self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
         helpers = [entry for entry in run.vehicles if entry.role is Role.REVISIT]
         if helpers:
             narrowest = min(helpers, key=lambda entry: entry.swath_m)
@@ -134,12 +129,12 @@ class Coordinator:
                 max_strip_m=self.config.max_strip_m,
             )
 
-    def _take_tile(self, vehicle: str, incarnation: int, tile: CoverageTile) -> None:
+    def _take_tile(self, received: Received, tile: CoverageTile, now_ms: int) -> None:
         assert self.map is not None
         try:
-            self.map.take(
-                vehicle,
-                (incarnation, tile.version),
+            news = self.map.take(
+                received.vehicle,
+                (received.header.incarnation, tile.version),
                 tile.first_row,
                 tile.first_column,
                 tile.sum_levels,
@@ -147,7 +142,10 @@ class Coordinator:
                 tile.settled,
             )
         except ValueError as error:
-            self._drop(vehicle, error)
+            self._drop(received.vehicle, error)
+            return
+        if news and self._cut_by_ms is None:
+            self._cut_by_ms = now_ms + CUT_WITHIN_MS
 
     def _drop(self, vehicle: str, why: object) -> None:
         if vehicle not in self._complained_of:
@@ -164,7 +162,7 @@ class Coordinator:
         cells = np.zeros(self.map.grid.shape, dtype=np.bool_)
         if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
             cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
-        self._hotspots[place] = _Hotspot(revision, message.mean_risk, cells)
+        self._hotspots[place] = _Hotspot(revision, message.mean_risk, message.growing, cells)
         self._to_cut = True
 
     def _cells_within(self, outline: list[tuple[float, float]]) -> BoolArray:
@@ -181,59 +179,82 @@ class Coordinator:
             cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = shapely.contains_xy(shape, u, v)
         return cells
 
-    def _take_state(self, vehicle: _Vehicle, state: AgentState, now_ms: int) -> None:
-        was_free = vehicle.state is not None and vehicle.state.mode is Mode.IDLE
-        vehicle.state = state
-        vehicle.heard_ms = now_ms
-        vehicle.lost = False
-        if state.mode is Mode.FINISHED and vehicle.finished_ms is None:
-            vehicle.finished_ms = now_ms
-            self._to_cut = True
-        if state.mode is Mode.IDLE and not was_free:
-            self._to_assign = True
+    def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
+        was_idle, was_finished = vehicle.is_idle, vehicle.is_finished
+        if not vehicle.take_state(header, state, now_ms):
+            return
+        self._to_cut |= vehicle.is_finished and not was_finished
+        self._to_assign |= vehicle.is_idle and not was_idle
+        if vehicle.entry.role is Role.REVISIT and state.mode in (Mode.TRANSIT, Mode.REVISIT):
+            # Its state tells too that it is at a strip: the answer may be lost.
+            record = self.ledger.get(state.works_on)
+            if record is not None and vehicle.tells_news_of(state.works_on, header):
+                self._take_at_work(record, vehicle, now_ms, under_way=state.mode is Mode.REVISIT)
 
-    def _take_status(self, vehicle: str, status: TaskStatus, now_ms: int) -> None:
+    def _take_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:
         record = self.ledger.get(status.strip)
-        if record is None or record.vehicle != vehicle or record.state not in WITH_A_VEHICLE:
+        if record is None or not vehicle.tells_news_of(status.strip, header):
+            return
+        if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
+            self._take_at_work(record, vehicle, now_ms, under_way=status.state is TaskState.UNDER_WAY)
+            return
+        name = vehicle.entry.vehicle
+        if record.vehicle != name or record.state not in WITH_A_VEHICLE:
+            self._to_cut |= status.state is TaskState.DONE  # by one that was taken for lost: the map tells what is left
             return
         match status.state:
-            case TaskState.ACCEPTED:
-                self._move(record, StripState.ACCEPTED, now_ms, "accepted", vehicle)
-            case TaskState.UNDER_WAY:
-                self._move(record, StripState.UNDER_WAY, now_ms, "under way", vehicle)
             case TaskState.REFUSED:
-                self.vehicles[vehicle].refused.add(status.strip)
-                self._move(record, StripState.OPEN, now_ms, f"{vehicle} refused: {status.reason}")
+                vehicle.refused.add(status.strip)
+                self._move(record, StripState.OPEN, now_ms, f"{name} refused: {status.reason}")
                 self._to_assign = True
             case TaskState.GIVEN_BACK:
-                self._move(record, StripState.OPEN, now_ms, f"given back by {vehicle}")
+                vehicle.refused.add(status.strip)
+                self._move(record, StripState.OPEN, now_ms, f"given back by {name}")
                 self._to_cut = True
             case TaskState.FAILED:
-                self._move(record, StripState.FAILED, now_ms, f"{vehicle} failed: {status.reason}", vehicle)
+                vehicle.failed_at.append(record.window)
+                self._move(record, StripState.FAILED, now_ms, f"{name} failed: {status.reason}", name)
                 self._to_cut = True
             case TaskState.DONE:
                 self._take_done(record, vehicle, now_ms)
 
-    def _take_done(self, record: StripRecord, vehicle: str, now_ms: int) -> None:
+    def _take_at_work(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
+        """A vehicle says that it is at a strip.
+
+        Where the strip is not with it, because it was taken for lost, it gets the strip back if nobody else has it and
+        it lies where it lay. Else the vehicle is to give it back, so that no two are at one strip.
+        """
+        name = vehicle.entry.vehicle
+        if record.state is StripState.OPEN and vehicle.offered.get(record.strip.number) == record.strip:
+            self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
+        if record.vehicle == name and record.state in WITH_A_VEHICLE:
+            if under_way:
+                self._move(record, StripState.UNDER_WAY, now_ms, "under way", name)
+            else:
+                self._move(record, StripState.ACCEPTED, now_ms, "accepted", name)
+        else:
+            self._say(TaskAction.GIVE_BACK, record.strip, name)
+
+    def _take_done(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int) -> None:
         """The map decides whether a strip is done, not the word; what is left is cut anew."""
         assert self.map is not None
-        layer = self.map.layers.get(vehicle)
+        name = vehicle.entry.vehicle
+        layer = self.map.layers.get(name)
         cells = self._inside[record.window.cells]
         seen = layer.sum_levels[record.window.cells] > 0 if layer is not None else np.zeros_like(cells)
         share = float(seen[cells].mean()) if cells.any() else 1.0
         if share >= COVERED_SHARE:
-            self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {vehicle}", vehicle)
+            self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         else:
-            self._move(record, StripState.FAILED, now_ms, f"{vehicle} says done, but saw {share:.0%} of it", vehicle)
+            vehicle.failed_at.append(record.window)
+            self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
         self._to_cut = True
 
     def _find_lost(self, now_ms: int) -> None:
         for name, vehicle in self.vehicles.items():
             if vehicle.lost or now_ms - vehicle.heard_ms < self.config.lost_after_ms:
                 continue
-            vehicle.lost = True
-            if vehicle.entry.role is Role.SURVEY and vehicle.finished_ms is None:
-                vehicle.finished_ms = now_ms
+            vehicle.lose(now_ms)
             for record in self.ledger.in_state(*WITH_A_VEHICLE):
                 if record.vehicle == name:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
@@ -248,13 +269,10 @@ class Coordinator:
         if self._rules is None:
             return
         grid = self.map.grid
-        risk = self._risk_to_serve()
-        for record in self.ledger.in_state(*WITH_A_VEHICLE):
-            risk[record.window.cells] *= 1.0 - self._rules.p_detect
-        primaries = [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
-        open_cells = self._inside & ~self.map.settled_by(primaries)
+        taken = [record.window for record in self.ledger.in_state(*WITH_A_VEHICLE)]
+        open_cells = self._still_open()
         unmatched = self.ledger.in_state(StripState.OPEN)
-        for cut in cut_strips(grid, risk, open_cells, self._rules):
+        for cut in cut_strips(grid, self._risk_to_serve(), open_cells, self._rules, taken):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is None or same.window.overlap(cut.window) < SAME_STRIP:
                 number = self.ledger.next_number
@@ -268,12 +286,24 @@ class Coordinator:
         for record in unmatched:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
 
+    def _still_open(self) -> BoolArray:
+        """Cells that the survey may still improve: those that tiles tell are not settled; where no tile has come, those
+        in and about hotspots that grow."""
+        assert self.map is not None
+        told_open = self.map.told_by(self._primaries)
+        for hotspot in self._hotspots.values():
+            if hotspot.growing:
+                told_open |= hotspot.cells | neighbours(hotspot.cells)
+        return self._inside & told_open & ~self.map.settled_by(self._primaries)
+
+    @property
+    def _primaries(self) -> list[str]:
+        return [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
+
     def _risk_to_serve(self) -> FloatArray:
         """Residual risk where there are hotspots: the joined map's where tiles have come, else the hotspot's mean."""
         assert self.map is not None
-        seen = self.map.seen()
-        primaries = [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
-        known = seen | self.map.settled_by(primaries)
+        known = self.map.seen() | self.map.settled_by(self._primaries)
         risk = np.zeros(self.map.grid.shape)
         for hotspot in self._hotspots.values():
             cells = hotspot.cells & self._inside
@@ -299,16 +329,19 @@ class Coordinator:
         for vehicle, number in sorted(self.config.allocator.assign(strips, helpers).items()):
             record = self.ledger.get(number)
             assert record is not None
-            self._tasks += 1
-            strip = record.strip
-            task = Task(TaskAction.TAKE, number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
-            self._outbox.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
+            self._say(TaskAction.TAKE, record.strip, vehicle)
+            self.vehicles[vehicle].offered[number] = record.strip
             self._move(record, StripState.OFFERED, now_ms, f"offered to {vehicle}", vehicle)
+
+    def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:
+        self._tasks += 1
+        task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
+        self._outbox.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
 
     def _free_helper(self, name: str, now_ms: int) -> FreeHelper | None:
         vehicle = self.vehicles[name]
         state, entry = vehicle.state, vehicle.entry
-        if entry.role is not Role.REVISIT or vehicle.lost or state is None or state.mode is not Mode.IDLE:
+        if entry.role is not Role.REVISIT or not vehicle.is_idle or state is None:
             return None
         if any(record.vehicle == name for record in self.ledger.in_state(*WITH_A_VEHICLE)):
             return None
@@ -321,7 +354,9 @@ class Coordinator:
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
             lasts_s=state.battery * entry.endurance_ms / 1000,
-            refused=frozenset(vehicle.refused),
+            refused=frozenset(
+                record.strip.number for record in self.ledger.in_state(StripState.OPEN) if vehicle.is_not_for_it(record)
+            ),
         )
 
     def _find_end(self, now_ms: int) -> None:
@@ -340,10 +375,10 @@ class Coordinator:
 
     def _deadline_ms(self) -> int:
         ends = [one.finished_ms or 0 for one in self.vehicles.values() if one.entry.role is Role.SURVEY]
-        return math.ceil(max(ends) * self.config.deadline_factor)
+        return math.ceil(max(ends, default=0) * self.config.deadline_factor)
 
     def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
-        if record.state is not state and self.ledger.move(record, state, now_ms, reason, vehicle):
+        if self.ledger.move(record, state, now_ms, reason, vehicle):
             self._publish_strip(record)
 
     def _publish_strip(self, record: StripRecord) -> None:
@@ -374,6 +409,8 @@ class Coordinator:
             return now_ms + 1
         times = [one.heard_ms + self.config.lost_after_ms for one in self.vehicles.values() if not one.lost]
         times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
+        if self._cut_by_ms is not None:
+            times.append(self._cut_by_ms)
         if all(one.finished_ms is not None for one in self.vehicles.values() if one.entry.role is Role.SURVEY):
             times.append(self._deadline_ms())
         return min((max(time_ms, now_ms + 1) for time_ms in times), default=None)

@@ -12,7 +12,7 @@ from planner.types import Strip
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
 ENDED = frozenset({StripState.DONE, StripState.FAILED, StripState.WITHDRAWN})
 _ALLOWED: dict[StripState, frozenset[StripState]] = {
-    StripState.OPEN: frozenset({StripState.OPEN, StripState.OFFERED, StripState.WITHDRAWN}),
+    StripState.OPEN: frozenset({StripState.OFFERED, StripState.WITHDRAWN}),
     StripState.OFFERED: frozenset(
         {StripState.ACCEPTED, StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}
     ),
@@ -68,6 +68,8 @@ class Ledger:
         """Changes where an open strip is and what it is worth."""
         if record.state is not StripState.OPEN:
             raise ValueError(f"strip {record.strip.number} is {record.state.value}: only an open one can be revised")
+        if strip.number != record.strip.number:
+            raise ValueError(f"strip {record.strip.number} cannot be revised as strip {strip.number}")
         record.strip, record.window, record.removable_m2 = strip, window, removable_m2
         record.revision += 1
 

@@ -6,6 +6,8 @@ pay for the time it takes. The best window becomes a strip, its cells count as l
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,6 +16,8 @@ import numpy as np
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
 MOST_STRIPS_A_CUT = 100
+SAME_PLACE = 0.75  # share of a run's cells
+TOLERANCE = 1e-9  # relative: sums that differ by no more are taken as equal
 
 
 @dataclass(frozen=True)
@@ -45,13 +49,18 @@ class Window:
 
     def overlap(self, other: Window) -> float:
         """Shared cells as a share of the cells of both together."""
+        shared = self.shared(other)
+        return shared / (self.size + other.size - shared)
+
+    def shared(self, other: Window) -> int:
+        """Number of cells that lie in both."""
         rows = min(self.end_row, other.end_row) - max(self.first_row, other.first_row)
         columns = min(self.end_column, other.end_column) - max(self.first_column, other.first_column)
-        shared = max(rows, 0) * max(columns, 0)
-        return shared / (self._size + other._size - shared)
+        return max(rows, 0) * max(columns, 0)
 
     @property
-    def _size(self) -> int:
+    def size(self) -> int:
+        """Number of cells."""
         return (self.end_row - self.first_row) * (self.end_column - self.first_column)
 
 
@@ -63,14 +72,22 @@ class Cut:
     removable_m2: float
 
 
-def cut_strips(grid: GridSpec, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules) -> list[Cut]:
+def cut_strips(
+    grid: GridSpec, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules, taken: Sequence[Window] = ()
+) -> list[Cut]:
     """The strips worth flying, best first.
 
     `risk`: residual risk of the cells that a strip may serve, 0 elsewhere. `open_cells`: inside the area and not
-    settled; a strip that still grows towards such cells is left for later, unless it is as long as a strip may be.
+    settled; what still grows towards such cells is left for later, unless it is as long as a strip may be. A strip is
+    from `min_strip_m` to `max_strip_m` long, in whole cells. Best first: by what a run of rows removes beyond its cost.
+    `taken`: strips that are being served; their cells count as looked at. No strip lies by three quarters or more on
+    another one, or on one that is taken: whether a place is worth two looks is asked when it has had the first.
     """
-    width = min(grid.columns, max(1, round(rules.swath_m / grid.cell_m)))
+    width = min(grid.columns, max(1, math.floor(rules.swath_m / grid.cell_m + TOLERANCE)))
     removable = risk * (rules.p_detect * grid.cell_area_m2)
+    looked_at = list(taken)
+    for window in taken:
+        removable[window.cells] *= 1.0 - rules.p_detect
     row_cost = rules.worth_risk * rules.p_detect * rules.swath_m * grid.cell_m
     fixed_cost = row_cost * rules.overhead_m / grid.cell_m
     shortest = max(1, round(rules.min_strip_m / grid.cell_m))
@@ -80,18 +97,26 @@ def cut_strips(grid: GridSpec, risk: FloatArray, open_cells: BoolArray, rules: C
     cuts: list[Cut] = []
     for _ in range(MOST_STRIPS_A_CUT):
         value, first_row, end_row = _best_runs(profit)
-        column = int(value.argmax())
-        if value[column] <= fixed_cost:
+        best = float(value.max())
+        if best <= fixed_cost:
             break
+        column = int((value >= best * (1 - TOLERANCE)).argmax())
         rows = (int(first_row[column]), int(end_row[column]))
-        grows = _touches(touched[:, column], rows)
-        for begin, end in _pieces(*rows, longest):
-            window = Window(begin, end, column, column + width)
-            long_enough = end - begin >= (longest if grows else shortest)
-            if long_enough:
-                cuts.append(Cut(window, float(removable[window.cells].sum())))
-            # Looked at, left for later or too short: either way the search goes on elsewhere.
-            removable[window.cells] *= (1.0 - rules.p_detect) if long_enough else 0.0
+        column = _centred(removable[rows[0] : rows[1]], column, width)
+        run = Window(*rows, column, column + width)
+        least = longest if _touches(touched[:, column], rows) else shortest
+        if rows[1] - rows[0] < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
+            removable[run.cells] = 0.0  # the search goes on elsewhere
+        else:
+            for begin, end in _pieces(*rows, shortest, longest):
+                window = Window(begin, end, column, column + width)
+                cut = Cut(window, float(removable[window.cells].sum()))
+                if cut.removable_m2 - (end - begin) * row_cost > fixed_cost:
+                    cuts.append(cut)
+                    looked_at.append(window)
+                    removable[window.cells] *= 1.0 - rules.p_detect
+                else:
+                    removable[window.cells] = 0.0
         near = slice(max(0, column - width + 1), column + width)
         profit[:, near] = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
     return cuts
@@ -132,7 +157,19 @@ def _touches(touched: BoolArray, rows: tuple[int, int]) -> bool:
     return bool(touched[max(0, first - 1) : min(touched.size, end + 1)].any())
 
 
-def _pieces(first: int, end: int, longest: int) -> list[tuple[int, int]]:
+def _centred(removable: FloatArray, column: int, width: int) -> int:
+    """The window of columns moved so that what it holds lies in its middle, where it holds it with room to spare."""
+    filled = np.flatnonzero(removable[:, column : column + width].any(axis=0))
+    spare_left, spare_right = int(filled[0]), width - 1 - int(filled[-1])
+    last: int = removable.shape[1] - width
+    return min(max(column + (spare_left - spare_right) // 2, 0), last)
+
+
+def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:
+    """A run of rows in equal pieces; where these would be too short, in longest ones, and a rest that is left out."""
     count = -(-(end - first) // longest)
-    edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
+    if end - first < count * shortest:
+        edges = list(range(first, end + 1, longest))
+    else:
+        edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
     return list(pairwise(edges))

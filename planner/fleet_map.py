@@ -12,16 +12,19 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.risk import LevelArray, residual_risk
+from planner.tiles import tile_shape
 from planner.types import BoolArray, FloatArray, GridSpec
 
 
 @dataclass
 class VehicleLayer:
-    """What one vehicle has published: levels and settled cells, grid shape, and the version of each tile."""
+    """What one vehicle has published: levels, settled cells and of which cells it has told, all of grid shape, and the
+    version of each tile."""
 
     sum_levels: LevelArray
     largest_levels: LevelArray
     settled: BoolArray
+    told: BoolArray
     versions: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
 
 
@@ -47,19 +50,20 @@ class FleetMap:
     ) -> bool:
         """Takes one tile; returns whether it was news.
 
-        `version`: (incarnation, version). A tile that does not lie on the grid, or whose arrays differ in shape, raises
-        ValueError.
+        `version`: (incarnation, version). What is not one of the grid's tiles, whole and in its place, raises
+        ValueError and changes nothing: pieces that overlap would make the map depend on the order in which they come.
         """
-        rows, columns = sum_levels.shape
-        fits = first_row + rows <= self.grid.rows and first_column + columns <= self.grid.columns
-        if not fits or largest_levels.shape != sum_levels.shape or settled.shape != sum_levels.shape:
-            raise ValueError(f"a tile of {rows} x {columns} cells at {first_row}, {first_column} is not on the grid")
+        rows, columns = shape = tile_shape(self.grid, first_row, first_column)
+        if not sum_levels.shape == largest_levels.shape == settled.shape == shape:
+            told = f"{sum_levels.shape}, {largest_levels.shape} and {settled.shape}"
+            raise ValueError(f"the tile at {first_row}, {first_column} has {shape} cells, not {told}")
         layer = self.layers.get(vehicle)
         if layer is None:
             layer = self.layers[vehicle] = VehicleLayer(
                 sum_levels=np.zeros(self.grid.shape, dtype=np.uint8),
                 largest_levels=np.zeros(self.grid.shape, dtype=np.uint8),
                 settled=np.zeros(self.grid.shape, dtype=np.bool_),
+                told=np.zeros(self.grid.shape, dtype=np.bool_),
             )
         place = (first_row, first_column)
         if version <= layer.versions.get(place, (-1, -1)):
@@ -69,6 +73,7 @@ class FleetMap:
         layer.sum_levels[window] = sum_levels
         layer.largest_levels[window] = largest_levels
         layer.settled[window] = settled
+        layer.told[window] = True
         self.risk[window] = residual_risk(*self._joined(window, self.layers), self.rho)
         self.changes += 1
         return True
@@ -87,6 +92,14 @@ class FleetMap:
             if vehicle in self.layers:
                 settled |= self.layers[vehicle].settled
         return settled
+
+    def told_by(self, vehicles: Iterable[str]) -> BoolArray:
+        """Cells in a tile of one of these vehicles."""
+        told = np.zeros(self.grid.shape, dtype=np.bool_)
+        for vehicle in vehicles:
+            if vehicle in self.layers:
+                told |= self.layers[vehicle].told
+        return told
 
     def risk_of(self, vehicles: set[str]) -> tuple[FloatArray, BoolArray]:
         """Residual risk, and which cells are seen, from these vehicles' layers alone."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -27,6 +28,9 @@ class SpacingDecision:
 class SpacingPlanner(Protocol):
     """Lays tracks over a width; asked at the start and, where its decision says so, after each pair."""
 
+    def counted_range_m(self, r_eff_m: int | None) -> float:
+        """How far from a track what it covers is counted. `r_eff_m`: as for `decide`."""
+
     def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
         """Tracks for [covered_m, width_m]. `r_eff_m`: the effective range after the last track flown (0: nothing
         admissible), None before the first pair is flown."""
@@ -42,15 +46,26 @@ class AdaptiveSpacing:
     nadir_gap_m: float
     told_range_m: float
 
+    def counted_range_m(self, r_eff_m: int | None) -> float:
+        """r_eff; where it is less than planning can use, what planning uses instead.
+
+        What a track misses nearer than that stays a gap. If it were planned for again, a survey with such a sensor
+        would fly its last tracks for ever.
+        """
+        lowest_m = lowest_range_m(self.nadir_gap_m)
+        if r_eff_m is None or (r_eff_m == 0 and self.nadir_gap_m == 0.0):
+            # Without a nadir gap no range is too short to plan with, and one that nothing was seen at tells of none.
+            return max(self.told_range_m, lowest_m)
+        return max(r_eff_m, lowest_m)
+
     def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
         """See `SpacingPlanner`."""
-        lowest_m = 3 * self.nadir_gap_m
-        highest_m = self.told_range_m if r_eff_m is None else float(r_eff_m)
+        lowest_m, highest_m = lowest_range_m(self.nadir_gap_m), self.counted_range_m(r_eff_m)
         note = ""
-        if highest_m < lowest_m:
+        if r_eff_m is not None and r_eff_m < highest_m:
             # Paired tracks cannot close the nadir gap at such a range (equation 1): the gaps become hotspots.
-            note = f"r_eff {highest_m:.0f} m is below 3 r_min: planning with {lowest_m:.0f} m, gaps remain"
-            highest_m = lowest_m
+            why = "is below 3 r_min" if self.nadir_gap_m > 0 else "is nothing to plan with"
+            note = f"r_eff {r_eff_m} m {why}: planning with {highest_m:g} m, gaps remain"
         choice = adapt_range(width_m - covered_m, self.nadir_gap_m, lowest_m, highest_m)
         offsets = track_offsets(width_m, self.nadir_gap_m, choice.range_m, covered_m=covered_m)
         return SpacingDecision(choice.range_m, tuple(offsets), replans=True, note=note)
@@ -63,8 +78,17 @@ class FixedSpacing:
     nadir_gap_m: float
     told_range_m: float
 
+    def counted_range_m(self, r_eff_m: int | None) -> float:
+        """The range told, in whole metres; what was measured changes nothing."""
+        return max(math.floor(self.told_range_m + LENGTH_TOLERANCE_M), lowest_range_m(self.nadir_gap_m))
+
     def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
         """See `SpacingPlanner`; what was measured changes nothing."""
-        range_m = int(self.told_range_m + LENGTH_TOLERANCE_M)
+        range_m = int(self.counted_range_m(r_eff_m))
         offsets = track_offsets(width_m, self.nadir_gap_m, range_m, covered_m=covered_m)
         return SpacingDecision(range_m, tuple(offsets), replans=False)
+
+
+def lowest_range_m(nadir_gap_m: float) -> int:
+    """The least whole metre that can space pairs: they cover each other's nadir gap from 3 r_min on (equation 1)."""
+    return max(1, math.ceil(3 * nadir_gap_m - LENGTH_TOLERANCE_M))

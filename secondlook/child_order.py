@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 from dataclasses import dataclass, field
 from typing import IO
 
@@ -34,8 +35,8 @@ class ChildOrder:
 
 
 def write_order(pipe: IO[bytes], order: ChildOrder) -> None:
-    """Sends an order to a child's standard input."""
-    pickled = pickle.dumps(order)
+    """Sends an order to a child's standard input, with the launcher's import path: a user's own parts may lie there."""
+    pickled = pickle.dumps((sys.path, pickle.dumps(order)))
     pipe.write(len(pickled).to_bytes(8, "big") + pickled)
     pipe.flush()
 
@@ -43,6 +44,9 @@ def write_order(pipe: IO[bytes], order: ChildOrder) -> None:
 def read_order(pipe: IO[bytes]) -> ChildOrder:
     """Waits for the launcher's order."""
     size = int.from_bytes(pipe.read(8), "big")
-    order = pickle.loads(pipe.read(size))
+    path, pickled = pickle.loads(pipe.read(size))
+    # Behind our own path, so that nothing there can stand in a room's way.
+    sys.path.extend(entry for entry in path if entry not in sys.path)
+    order = pickle.loads(pickled)
     assert isinstance(order, ChildOrder)
     return order

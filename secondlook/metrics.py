@@ -74,11 +74,11 @@ class Metrics:
         message = received.message
         self._pass_time(received.header.sent_ms)
         vehicle = self.vehicles.get(received.vehicle)
-        if isinstance(message, RunInfo):
+        if isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
         elif isinstance(message, Nav) and vehicle is not None:
             self._take_nav(vehicle, message)
-        elif isinstance(message, Look) and vehicle is not None:
+        elif isinstance(message, Look) and message.valid and vehicle is not None:
             vehicle.looked_m += message.p_detect.shape[1] * message.along_bin_m
         elif isinstance(message, CoverageTile):
             self._take_tile(received, message)
@@ -196,7 +196,7 @@ class Metrics:
         if strip is None:
             strip = self.strips[number] = StripFigures(status, received.header.sent_ms)
         strip.status = status
-        if status.state is StripState.ACCEPTED and strip.accepted_ms is None:
+        if status.state in (StripState.ACCEPTED, StripState.UNDER_WAY) and strip.accepted_ms is None:
             strip.accepted_ms = received.header.sent_ms
 
     def _truth_summary(self) -> dict[str, Any]:
@@ -211,7 +211,7 @@ class Metrics:
         rows = np.clip(np.floor(along / grid.cell_m).astype(int), 0, grid.rows - 1)
         return {
             "targets": count,
-            "missed_share": 1.0 - len(self.detected) / count,
+            "missed_share": len(set(range(count)) - self.detected) / count,
             "predicted_missed_share": float(self.map.risk[rows, columns].mean()),
         }
 

@@ -19,10 +19,10 @@ from secondlook.log_file import log_to_file
 from secondlook.node_spec import NodeSpec, make_nodes
 from secondlook.observer import Observer, Progress
 from secondlook.processes import Processes, RunFailedError
-from secondlook.rooms import check_rooms
 from secondlook.scenario import Scenario
 from secondlook.signals import signals_interrupt
 from secondlook.summary import summarise
+from viz.recorder_config import RecorderConfig
 
 Bus = Literal["zenoh", "local"]
 LOGS = "logs"
@@ -31,13 +31,15 @@ LOGS = "logs"
 @dataclass(frozen=True)
 class RunOptions:
     """`folder`: where the files of the run go; it exists. `processes`: see `host_plans.plan_hosts`. `record`: with
-    recording and messages.mpk. `progress`: told the figures as the mission goes on."""
+    recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
+    shows the mission while it runs, see `viz.live_server.LiveServer`."""
 
     folder: Path
     bus: Bus = "zenoh"
     processes: int | None = None
     record: bool = True
     progress: Progress | None = None
+    live_pipe: Path | None = None
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -47,7 +49,6 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     and when the run is interrupted; what was recorded until then is readable, and summary.json tells how it ended.
     """
     began_s = time.perf_counter()
-    check_rooms()
     fleet = build_fleet(scenario, record=options.record)
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress)
@@ -86,8 +87,8 @@ class _Run:
         self._fleet = fleet
         self._observer = observer
         self._options = options
-        recorder = NodeSpec("viz.recorder:Recorder", options.folder / "mission.rrd")
-        self._recorder = {RECORDER: recorder} if options.record else {}
+        config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe)
+        self._recorder = {RECORDER: NodeSpec("viz.recorder:Recorder", config)} if options.record else {}
 
     def on_local(self) -> BusResult:
         fleet = self._fleet

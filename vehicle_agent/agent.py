@@ -25,6 +25,8 @@ from vehicle_agent.coverage import CoverageLayer
 log = logging.getLogger("secondlook.agent")
 
 REPORT_EVERY_MS = 10_000
+FARTHEST_M = 1e6  # a look farther away is none: what follows from its places would not fit the wire's metres
+FARTHEST_RANGE_M = 1e4
 
 
 class Agent:
@@ -58,7 +60,7 @@ class Agent:
         """Takes in what the vehicle and the coordinator say."""
         message = received.message
         if isinstance(message, Nav):
-            self.nav = message
+            self._take_nav(message, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
             self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
             self._wake_ms = now_ms + REPORT_EVERY_MS
@@ -109,7 +111,7 @@ class Agent:
 
     def hold(self) -> None:
         """Commands the vehicle to stay where it is."""
-        here = self.position
+        here = (self.nav.x_m, self.nav.y_m) if self.nav else (0.0, 0.0)  # a hold needs no place
         self._command(ManeuverKind.HOLD, here, here, 0.0)
 
     def report(self, now_ms: int) -> None:
@@ -119,16 +121,17 @@ class Agent:
         self.report_state(now_ms)
 
     def report_state(self, now_ms: int) -> None:
-        """Publishes the state alone."""
-        x_m, y_m = self.position
+        """Publishes the state alone, once the vehicle has said where it is."""
+        if self.nav is None:
+            return
         message = AgentState(
             mode=self.mode,
             works_on=self.works_on,
             battery=self.battery(now_ms),
             expected_end_ms=self.expected_end_ms,
-            x_m=x_m,
-            y_m=y_m,
-            heading_rad=self.nav.heading_rad if self.nav else 0.0,
+            x_m=self.nav.x_m,
+            y_m=self.nav.y_m,
+            heading_rad=self.nav.heading_rad,
         )
         self.publish(STATE.key(vehicle=self.vehicle), message)
 
@@ -136,10 +139,11 @@ class Agent:
         """Share of the endurance that is left."""
         return max(0.0, 1.0 - now_ms / self._endurance_ms)
 
-    @property
-    def position(self) -> Point:
-        """Where the vehicle was at its last nav message; the mission frame's origin before the first."""
-        return (self.nav.x_m, self.nav.y_m) if self.nav else (0.0, 0.0)
+    def _take_nav(self, nav: Nav, now_ms: int) -> None:
+        first = self.nav is None
+        self.nav = nav
+        if first and self.coverage is not None and not self._over:
+            self.report_state(now_ms)
 
     def _command(self, kind: ManeuverKind, start: Point, end: Point, run_in_m: float) -> None:
         self._maneuvers += 1
@@ -150,7 +154,7 @@ class Agent:
         if not _makes_sense(look):
             if not self._complained:
                 self._complained = True
-                log.warning("%s: dropped a look without bins (said once)", self.vehicle)
+                log.warning("%s: dropped a look that makes no sense (said once)", self.vehicle)
             return
         for contact in look.contacts:
             self._contacts += 1
@@ -169,7 +173,13 @@ class Agent:
 
 def _makes_sense(look: Look) -> bool:
     sides, along_bins, range_bins = look.p_detect.shape
-    return sides == 2 and along_bins > 0 and range_bins > 1 and look.along_bin_m > 0 and look.range_bin_m > 0
+    if sides != 2 or along_bins == 0 or range_bins < 2 or look.along_bin_m <= 0 or look.range_bin_m <= 0:
+        return False
+    end_along_m = look.first_along_m + along_bins * look.along_bin_m
+    places_m = [look.origin_x_m, look.origin_y_m, look.first_along_m, end_along_m]
+    places_m += [metres for contact in look.contacts for metres in (contact.along_m, contact.lateral_m)]
+    near_enough = all(abs(place_m) <= FARTHEST_M for place_m in places_m)
+    return near_enough and range_bins * look.range_bin_m <= FARTHEST_RANGE_M
 
 
 def _in_mission_frame(look: Look, along_m: float, lateral_m: float) -> Point:

@@ -17,8 +17,10 @@ from comms.topics import TASK_STATUS
 from planner.dubins import Pose
 from planner.sweep import cheapest_entry, legs_over_strip
 from planner.types import Strip, Track
-from vehicle_agent.agent import Agent
+from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
+
+BATTERY_TOO_LOW = "the battery does not last"
 
 
 class RevisitAgent(Agent):
@@ -45,15 +47,17 @@ class RevisitAgent(Agent):
         if task.action is TaskAction.GIVE_BACK:
             self._give_back(task.strip, now_ms)
         elif self.strip is not None and self.strip.number == task.strip:
-            self._tell(task.strip, TaskState.UNDER_WAY if self._swept_m else TaskState.ACCEPTED, self.expected_end_ms)
+            under_way = self.mode is Mode.REVISIT
+            self._tell(task.strip, TaskState.UNDER_WAY if under_way else TaskState.ACCEPTED, self.expected_end_ms)
         elif known == strip and answer is TaskState.DONE:
             self._tell(task.strip, TaskState.DONE, now_ms)
         else:
             self._consider(strip, now_ms)
 
     def on_look(self, look: Look, now_ms: int) -> None:
-        """Counts what has been swept."""
-        self._swept_m += look.p_detect.shape[1] * look.along_bin_m
+        """Counts what has been swept of the present leg."""
+        if self.maneuver is not None and look.maneuver == self.maneuver.number:
+            self._swept_m += look.p_detect.shape[1] * look.along_bin_m
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Goes from leg to leg."""
@@ -78,6 +82,7 @@ class RevisitAgent(Agent):
         if self.strip is not None:
             self._leave(TaskState.FAILED, now_ms, "the mission is over")
         self.mode = Mode.FINISHED
+        self.hold()
 
     def report(self, now_ms: int) -> None:
         """Adds the progress of a strip under way to the report."""
@@ -92,12 +97,19 @@ class RevisitAgent(Agent):
         if self.nav is None:
             self._tell(strip.number, TaskState.REFUSED, 0, "no position yet")
             return
+        if not _makes_sense(strip):
+            self._tell(strip.number, TaskState.REFUSED, 0, "that is no strip")
+            return
+        least_ms = round((strip.length_m + strip.width_m - self.config.swath_m) / self.config.speed_mps * 1000)
+        if self.battery(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
+            self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
+            return
         legs = legs_over_strip(strip, self.config.swath_m)
         pose = Pose(self.nav.x_m, self.nav.y_m, self.nav.heading_rad)
         ordered, distance_m = cheapest_entry(legs, pose, self.config.turn_radius_m, self.config.run_in_m)
         ends_ms = now_ms + round(distance_m / self.config.speed_mps * 1000)
         if self.battery(ends_ms) <= 0.0:
-            self._tell(strip.number, TaskState.REFUSED, 0, "the battery does not last")
+            self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         self.strip = strip
         self._legs = ordered
@@ -137,3 +149,8 @@ class RevisitAgent(Agent):
         self._status_number += 1
         key = TASK_STATUS.key(vehicle=self.vehicle, number=self._status_number)
         self.publish(key, TaskStatus(number, state, progress, ends_ms, reason))
+
+
+def _makes_sense(strip: Strip) -> bool:
+    near_enough = all(abs(place_m) <= FARTHEST_M for place_m in strip.start)
+    return near_enough and 0 < strip.length_m <= FARTHEST_M and 0 < strip.width_m <= FARTHEST_M

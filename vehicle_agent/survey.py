@@ -23,17 +23,18 @@ from comms.messages import (
 from comms.topics import CURVE, HOTSPOT, PLAN
 from planner.area import SurveyArea
 from planner.curve import RangeTally, effective_range_m
-from planner.hotspots import HotspotMap, find_hotspots
+from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
 from planner.risk import residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
-from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision
+from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision, lowest_range_m
 from planner.types import FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import SurveyConfig
 
 HOTSPOTS_EVERY_MS = 30_000
 TRACKS_A_PAIR = 2
+MOST_CURVE_POINTS = 4096  # what a curve may hold on the wire
 
 
 class SurveyAgent(Agent):
@@ -50,6 +51,7 @@ class SurveyAgent(Agent):
         self.r_adpt_m: list[int] = []
         self.r_eff_m: list[int] = []
         self._flown_at_decision = 0
+        self._last_number = 0
         self._tally: RangeTally | None = None
         self._range_bin_m = 0.0
         self._reach: Reach | None = None
@@ -71,19 +73,21 @@ class SurveyAgent(Agent):
         self._begin_track(now_ms)
 
     def on_look(self, look: Look, now_ms: int) -> None:
-        """Adds the look to this track's tally, and notes how far the track has been looked."""
-        if self._tally is None:
-            self._tally = RangeTally(look.range_bin_m)
-            self._range_bin_m = look.range_bin_m
-        self._tally.add(look.p_detect)
+        """Notes how far the sonar sees; of a look at the present track also its P_d and how far the track is looked."""
+        self._new_looks = True
         seen = look.p_detect.max(axis=(0, 1)).nonzero()[0]
         if seen.size:
             near_m, far_m = float(seen[0] * look.range_bin_m), float(seen[-1] * look.range_bin_m)
             reach = self._reach or Reach(near_m, far_m)
             self._reach = Reach(min(near_m, reach.near_m), max(far_m, reach.far_m))
-        if self.ahead:
-            self._under_way = self._looked(self.ahead[0], look)
-        self._new_looks = True
+        if not self.ahead or self.maneuver is None or look.maneuver != self.maneuver.number:
+            return
+        if self._tally is None:
+            self._tally = RangeTally(look.range_bin_m)
+            self._range_bin_m = look.range_bin_m
+        if look.range_bin_m == self._range_bin_m:
+            self._tally.add(look.p_detect)
+        self._under_way = self._looked(self.ahead[0], look)
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Reacts to a track's start and end."""
@@ -101,7 +105,9 @@ class SurveyAgent(Agent):
             self._after_track(now_ms)
 
     def on_over(self, now_ms: int) -> None:
-        """Says a last time where the hotspots are."""
+        """Stops, and says a last time where the hotspots are."""
+        if self.mode is not Mode.FINISHED:
+            self._finish()
         self._find_hotspots(now_ms)
 
     def report(self, now_ms: int) -> None:
@@ -112,6 +118,7 @@ class SurveyAgent(Agent):
 
     def _begin_track(self, now_ms: int) -> None:
         track = self.ahead[0]
+        self._last_number = track.number
         self.mode = Mode.TRANSIT
         self.works_on = track.number
         self._under_way = None
@@ -127,31 +134,35 @@ class SurveyAgent(Agent):
         if self._tally is not None:
             curve = self._tally.curve()
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
-            message = Curve(track.number, self._range_bin_m, curve.p_detect, r_eff_m)
+            every = math.ceil(curve.p_detect.size / MOST_CURVE_POINTS)
+            message = Curve(track.number, self._range_bin_m * every, curve.p_detect[::every], r_eff_m)
             self.publish(CURVE.key(vehicle=self.vehicle), message)
         self.r_eff_m.append(r_eff_m)
         self._after_track(now_ms)
 
     def _after_track(self, now_ms: int) -> None:
-        pair_flown = len(self.flown) - self._flown_at_decision >= TRACKS_A_PAIR or not self.ahead
-        if self.decision.replans and pair_flown and self.flown:
+        new = len(self.flown) - self._flown_at_decision
+        # Where all that a decision laid was refused there is nothing new to decide on.
+        if self.decision.replans and (new >= TRACKS_A_PAIR or (new > 0 and not self.ahead)):
             self._replan()
         else:
             self._publish_plan("")
         if self.ahead:
             self._begin_track(now_ms)
         else:
-            self.mode = Mode.FINISHED
-            self.works_on = 0
-            self.expected_end_ms = 0
-            self.hold()
+            self._finish()
         self._find_hotspots(now_ms)
         self.report(now_ms)
 
+    def _finish(self) -> None:
+        self.mode = Mode.FINISHED
+        self.works_on = 0
+        self.expected_end_ms = 0
+        self.hold()
+
     def _replan(self) -> None:
-        r_eff_m = self.r_eff_m[-1] if self.r_eff_m else 0
-        outermost_m = max(track.across_m for track in self.flown)
-        self.covered_m = max(self.covered_m, outermost_m + min(self.decision.range_m, r_eff_m))
+        r_eff_m = self.r_eff_m[-1]
+        self.covered_m = max(self.covered_m, self._edge_m(self.flown, r_eff_m))
         if self.covered_m < self.area.width_m - LENGTH_TOLERANCE_M:
             self._decide(r_eff_m)
         else:
@@ -163,7 +174,7 @@ class SurveyAgent(Agent):
         self.decision = self.config.spacing.decide(self.area.width_m, self.covered_m, r_eff_m)
         self.r_adpt_m.append(self.decision.range_m)
         self._flown_at_decision = len(self.flown)
-        number = self.flown[-1].number + 1 if self.flown else 1
+        number = self._last_number + 1
         self.ahead = lawnmower(
             self.area,
             self.decision.offsets_m,
@@ -201,8 +212,11 @@ class SurveyAgent(Agent):
         return UnderWay(track.across_m, float(along_m), ascending=bool(ends_m > starts_m))
 
     def _settle(self) -> None:
-        """Marks the cells that no remaining track of the plan can improve."""
+        """Marks the cells that no remaining track of the plan can improve; before the first look that is not known."""
         assert self.coverage is not None
+        if not self.ahead:
+            self.coverage.settled = self._inside
+            return
         if self._reach is None:
             return
         remaining = self.ahead if self._under_way is None else self.ahead[1:]
@@ -216,15 +230,24 @@ class SurveyAgent(Agent):
 
     def _frontier_m(self, reach: Reach) -> float | None:
         """The column beyond which the next replanning may still lay tracks that see; None where it will not."""
+        assert self.coverage is not None
         if not self.decision.replans or not self.ahead:
             return None
         pair = [*self.flown[self._flown_at_decision :], *self.ahead][:TRACKS_A_PAIR]
-        r_eff_m = self.r_eff_m[-1] if self.r_eff_m else self.decision.range_m
-        edge_m = max(track.across_m for track in pair) + min(self.decision.range_m, r_eff_m)
+        r_eff_m = self.r_eff_m[-1] if self.r_eff_m else math.floor(reach.far_m)
+        edge_m = self._edge_m(pair, r_eff_m)
         if edge_m >= self.area.width_m - LENGTH_TOLERANCE_M:
             return None
-        # The nearest track that a next decision can lay is 3 r_min beyond the covered edge, and looks back from there.
-        return edge_m + 3 * self.config.nadir_gap_m - reach.far_m
+        # Whatever r_eff will be, a next pair begins no nearer to this one than at twice the least range. Where the far
+        # side is near its tracks are pulled in; then they lie as they would with what is known now.
+        nearest_m = max(track.across_m for track in pair) + 2 * lowest_range_m(self.config.nadir_gap_m)
+        pulled_in_m = min(self.config.spacing.decide(self.area.width_m, edge_m, r_eff_m).offsets_m)
+        return min(nearest_m, pulled_in_m) - reach.far_m - self.coverage.grid.cell_m
+
+    def _edge_m(self, tracks: list[Track], r_eff_m: int) -> float:
+        """The edge up to which these tracks cover the area."""
+        counted_m = self.config.spacing.counted_range_m(r_eff_m)
+        return max(track.across_m for track in tracks) + min(self.decision.range_m, counted_m)
 
     def _find_hotspots(self, now_ms: int) -> None:
         assert self.coverage is not None
@@ -234,16 +257,22 @@ class SurveyAgent(Agent):
         layer = self.coverage.layer
         risk = residual_risk(layer.sum_levels(), layer.largest_levels(), self._rho)
         hot = self.coverage.settled & (risk >= self.config.hotspot_risk)
-        open_cells = self._inside & ~self.coverage.settled
-        change = find_hotspots(self.coverage.grid, hot, open_cells, risk, self._hotspots)
-        self._hotspots = change.map
-        for area in change.changed:
-            outline = tuple(Vertex(x_m, y_m) for x_m, y_m in area.outline)
+        unsettled = self._inside & ~self.coverage.settled
+        update = update_hotspots(self.coverage.grid, hot, unsettled, risk, self._hotspots)
+        self._hotspots = update.map
+        for hotspot in update.changed:
+            outline = tuple(Vertex(x_m, y_m) for x_m, y_m in hotspot.outline)
             self._publish_hotspot(
-                area.number, HotspotState.ACTIVE, outline, area.mean_risk, area.cells, area.growing, merged_into=0
+                hotspot.number,
+                HotspotState.ACTIVE,
+                outline,
+                hotspot.mean_risk,
+                hotspot.cells,
+                hotspot.growing,
+                merged_into=0,
             )
-        for number, heir in change.withdrawn.items():
-            self._publish_hotspot(number, HotspotState.WITHDRAWN, (), 0.0, 0, growing=False, merged_into=heir)
+        for number, heir in update.withdrawn.items():
+            self._publish_hotspot(number, HotspotState.WITHDRAWN, (), 0.0, 0, growing=False, merged_into=heir or 0)
 
     def _publish_hotspot(
         self,

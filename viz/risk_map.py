@@ -64,6 +64,7 @@ class RiskMap:
         """Draws if it is time and all tiles sent together are in."""
         self._now_ms = max(self._now_ms, time_ms)
         if time_ms > self._changed_ms and time_ms >= self._due_ms and self._map.changes != self._drawn_changes:
+            self._due_ms = time_ms + self._draw_every_ms
             self._draw(self._changed_ms)
 
     def finish(self) -> None:
@@ -74,7 +75,6 @@ class RiskMap:
 
     def _draw(self, time_ms: int) -> None:
         self._drawn_changes = self._map.changes
-        self._due_ms = time_ms + self._draw_every_ms
         seen = self._map.seen()
         # The first row of an image is drawn at the far end of the along axis.
         levels = np.rint(self._map.risk[::-1] * 255).astype(np.uint8)

@@ -6,12 +6,14 @@ from typing import Annotated
 
 import typer
 
+from secondlook.fleet import build_fleet
 from secondlook.scenario import load_scenario
 
 
 def check(scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")]) -> None:
     """Validate a scenario, and tell all that is wrong with it by line."""
     valid = load_scenario(scenario)
+    build_fleet(valid, record=False)
     across_m, along_m = valid.area.extent_m
     vehicles = ", ".join(f"{key} ({vehicle.role})" for key, vehicle in valid.vehicles.items())
     typer.echo(f"{scenario}: valid; {across_m:g} m by {along_m:g} m, {vehicles}")

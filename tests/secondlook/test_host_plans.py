@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from flights import BRIEF
 from hypothesis import given
 from hypothesis import strategies as st
-from runs import BRIEF
 
 from comms.messages import Role
 from comms.routing import RosterNode

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from runs import BRIEF, events, flight, messages
+from flights import BRIEF, events, flight, messages
 
 from comms.codec import decode
 from comms.topics import topic_of

@@ -77,7 +77,7 @@ def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: st
     assert (scenario.mission.deadline_factor, scenario.seabed.kind, scenario.targets.count) == (1.05, "uniform", 200)
     primary, helper = scenario.vehicles["primary"], scenario.vehicles["helper"]
     assert isinstance(primary, SurveyVehicle)
-    assert (primary.spacing, primary.hotspot_risk, primary.run_in_m, primary.altitude_m) == ("adaptive", 0.6, 20, 15)
+    assert (primary.spacing, primary.hotspot_risk, primary.run_in_m, primary.altitude_m) == ("adaptive", 0.55, 20, 15)
     assert isinstance(helper, RevisitVehicle)
     assert (helper.nadir_gap_m, helper.run_in_m, helper.altitude_m) == (0, 5, 5)
     assert scenario.coordinator.allocator == "greedy"

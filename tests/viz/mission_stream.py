@@ -377,10 +377,11 @@ def _task(
 
 def _truth(stream: MissionStream, legs: list[Leg]) -> None:
     generator = np.random.Generator(np.random.PCG64(7))
-    places = np.column_stack([generator.uniform(0, WIDTH_M, 40), generator.uniform(0, LENGTH_M, 40)])
+    places = np.column_stack([generator.uniform(0, WIDTH_M, 90), generator.uniform(0, LENGTH_M, 90)])
     targets = tuple(TruthTarget(*stream.place(*place)) for place in places)
     stream.say("world", 0, TRUTH_TARGETS, TruthTargets(targets))
     look = 0
+    found: list[int] = []
     for leg in legs:
         low, high = sorted((leg.start[1], leg.end[1]))
         for along in np.arange(low, high, 20.0):
@@ -392,3 +393,6 @@ def _truth(stream: MissionStream, legs: list[Leg]) -> None:
             message = TruthLook(PRIMARY, look, tuple(map(int, over)), p_all[over], tuple(map(int, detected)))
             time_s = leg.start_s + share * (leg.end_s - leg.start_s)
             stream.say("world", time_s, TRUTH_LOOK, message, vehicle=PRIMARY)
+            found.extend(message.detected)
+    again = TruthLook(HELPER, 1, tuple(found[:2]), np.full(len(found[:2]), 0.7), tuple(found[:1]))
+    stream.say("world", legs[-1].end_s, TRUTH_LOOK, again, vehicle=HELPER)

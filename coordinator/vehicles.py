@@ -1,0 +1,82 @@
+"""What the coordinator knows of a vehicle: its newest state, whether it is lost, and which strips are not for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from comms.codec import Header
+from comms.messages import AgentState, Mode, Role, RosterVehicle
+from coordinator.ledger import StripRecord
+from coordinator.strips import SAME_PLACE, Window
+from planner.types import Strip
+
+Order = tuple[int, int]
+"""Incarnation and sequence number of a sender's message."""
+
+_NONE_YET: Order = (-1, -1)
+
+
+@dataclass
+class KnownVehicle:
+    """One vehicle of the fleet.
+
+    `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was lost; for a primary.
+    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: the strips that it
+    was offered, as they were then.
+    """
+
+    entry: RosterVehicle
+    heard_ms: int
+    state: AgentState | None = None
+    lost: bool = False
+    finished_ms: int | None = None
+    refused: set[int] = field(default_factory=set)
+    failed_at: list[Window] = field(default_factory=list)
+    offered: dict[int, Strip] = field(default_factory=dict)
+    _state_order: Order = _NONE_YET
+    _task_orders: dict[int, Order] = field(default_factory=dict)
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether it is there and without work."""
+        return not self.lost and self.state is not None and self.state.mode is Mode.IDLE
+
+    @property
+    def is_finished(self) -> bool:
+        """Whether it has said that it will do no more."""
+        return self.state is not None and self.state.mode is Mode.FINISHED
+
+    def take_state(self, header: Header, state: AgentState, now_ms: int) -> bool:
+        """Takes its state; returns False, and changes nothing, for one that is not newer than the newest."""
+        order = (header.incarnation, header.sequence)
+        if order <= self._state_order:
+            return False
+        self._state_order = order
+        self.state = state
+        self.heard_ms = header.sent_ms
+        if self.lost:
+            self.lost = False
+            self.finished_ms = None
+        if state.mode is Mode.FINISHED and self.finished_ms is None:
+            self.finished_ms = now_ms
+        return True
+
+    def lose(self, now_ms: int) -> None:
+        """Nothing has been heard of it for too long: the mission no longer waits for it."""
+        self.lost = True
+        if self.entry.role is Role.SURVEY and self.finished_ms is None:
+            self.finished_ms = now_ms
+
+    def tells_news_of(self, strip: int, header: Header) -> bool:
+        """Whether a message about a strip is newer than all that it has told of it; takes note of it."""
+        order = (header.incarnation, header.sequence)
+        if order <= self._task_orders.get(strip, _NONE_YET):
+            return False
+        self._task_orders[strip] = order
+        return True
+
+    def is_not_for_it(self, record: StripRecord) -> bool:
+        """Whether it has refused this strip as it is, or failed at its place."""
+        window = record.window
+        failed = any(window.shared(place) >= SAME_PLACE * window.size for place in self.failed_at)
+        return failed or record.strip.number in self.refused

@@ -1,0 +1,267 @@
+"""The revisit agent, driven by hand: offers, answers, sweeps, and giving back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from by_hand import HELPER, flat, fly, look, nav, run_info, tell_status, to_follow
+from one_node import OneNode, Said
+
+from comms.messages import (
+    AgentState,
+    CoverageTile,
+    Maneuver,
+    ManeuverKind,
+    ManeuverState,
+    MissionOver,
+    Mode,
+    Role,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+from vehicle_agent.config import RevisitConfig
+from vehicle_agent.revisit import RevisitAgent
+
+RUN = run_info(400, 400)
+SEES_25_M = flat(0.7, 0, 25)
+STRIP = Task(TaskAction.TAKE, 3, 100, 50, 0, 200, 50)
+
+
+def revisit(endurance_ms: int = 14_400_000, *, at_m: tuple[float, float] | None = (100, 0)) -> OneNode:
+    """A helper of 2 m/s with a swath of 50 m, told of the run and of where it is."""
+    config = RevisitConfig(HELPER, swath_m=50, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=endurance_ms)
+    agent = OneNode(RevisitAgent(config), Role.REVISIT)
+    agent.hear("run", RUN, at_ms=1)
+    if at_m is not None:
+        agent.hear(f"veh/{HELPER}/nav", nav(*at_m))
+    return agent
+
+
+def tell(agent: OneNode, task: Task, at_ms: int | None = None) -> list[Said]:
+    """The coordinator's word."""
+    return agent.hear(f"coord/task/{HELPER}/1", task, at_ms=at_ms)
+
+
+def answer(agent: OneNode, task: Task) -> TaskStatus:
+    """What the agent says to a task."""
+    statuses = agent.all(TaskStatus, tell(agent, task))
+    assert len(statuses) == 1
+    return statuses[0]
+
+
+def give_back(strip: int = STRIP.strip) -> Task:
+    return replace(STRIP, action=TaskAction.GIVE_BACK, strip=strip)
+
+
+class TestAnOffer:
+    def test_a_free_helper_takes_it_and_sets_out_along_the_strip(self) -> None:
+        agent = revisit()
+        said = tell(agent, STRIP)
+        status = agent.all(TaskStatus, said)[0]
+        # From (100, 0) straight ahead: 45 m to the run-in, 5 m of it, 200 m along the strip, at 2 m/s.
+        assert status == TaskStatus(3, TaskState.ACCEPTED, 0, 125_001, "")
+        assert agent.last(Maneuver) == Maneuver(1, ManeuverKind.FOLLOW, 100, 50, 100, 250, 5)
+        state = agent.last(AgentState)
+        assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.TRANSIT, 3, 125_001)
+
+    def test_it_enters_from_the_end_that_is_nearer(self) -> None:
+        agent = revisit(at_m=(100, 400))
+        tell(agent, STRIP)
+        assert (agent.last(Maneuver).start_y_m, agent.last(Maneuver).end_y_m) == (250, 50)
+
+    def test_a_strip_wider_than_the_swath_takes_several_legs(self) -> None:
+        agent = revisit()
+        tell(agent, replace(STRIP, width_m=100))
+        first = agent.last(Maneuver)
+        fly(agent, HELPER, first, SEES_25_M)
+        second = agent.last(Maneuver)
+        assert second.number == first.number + 1
+        assert {first.start_x_m, second.start_x_m} == {75, 125}
+        assert (first.start_y_m, second.start_y_m) == (50, 250)
+        assert agent.last(TaskStatus).state is TaskState.UNDER_WAY
+        fly(agent, HELPER, second, SEES_25_M)
+        assert agent.last(TaskStatus).state is TaskState.DONE
+
+    def test_a_helper_at_work_refuses_another(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        commands = len(agent.all(Maneuver))
+        status = answer(agent, replace(STRIP, strip=4))
+        assert (status.strip, status.state, status.reason) == (4, TaskState.REFUSED, "at work on strip 3")
+        assert len(agent.all(Maneuver)) == commands
+
+    def test_a_helper_that_does_not_know_where_it_is_refuses(self) -> None:
+        agent = revisit(at_m=None)
+        status = answer(agent, STRIP)
+        assert (status.state, status.reason) == (TaskState.REFUSED, "no position yet")
+        agent.hear(f"veh/{HELPER}/nav", nav())
+        assert agent.last(AgentState).mode is Mode.IDLE
+        assert answer(agent, STRIP).state is TaskState.ACCEPTED
+
+    @pytest.mark.parametrize(("endurance_ms", "state"), [(125_001, TaskState.REFUSED), (125_002, TaskState.ACCEPTED)])
+    def test_it_takes_a_strip_only_if_the_battery_lasts_to_its_end(self, endurance_ms: int, state: TaskState) -> None:
+        status = answer(revisit(endurance_ms), STRIP)
+        assert status.state is state
+        assert ("battery" in status.reason) is (state is TaskState.REFUSED)
+
+    @pytest.mark.parametrize(
+        "spoilt",
+        [{"length_m": 0}, {"length_m": -9}, {"width_m": 0}, {"width_m": -50}, {"start_x_m": 9e6}, {"length_m": 9e6}],
+    )
+    def test_it_refuses_what_is_no_strip(self, spoilt: dict[str, float]) -> None:
+        status = answer(revisit(), replace(STRIP, **spoilt))  # type: ignore[arg-type]
+        assert (status.state, status.reason) == (TaskState.REFUSED, "that is no strip")
+
+    def test_it_refuses_what_is_far_too_wide(self) -> None:
+        status = answer(revisit(), replace(STRIP, width_m=900_000))
+        assert (status.state, status.reason) == (TaskState.REFUSED, "the battery does not last")
+
+
+class TestAWordRepeated:
+    def test_an_offer_repeated_is_answered_alike_and_changes_nothing(self) -> None:
+        agent = revisit()
+        first = answer(agent, STRIP)
+        assert answer(agent, STRIP) == first
+        tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 20_000)
+        assert answer(agent, STRIP).state is TaskState.UNDER_WAY
+        assert len(agent.all(Maneuver)) == 1
+
+    def test_a_strip_done_is_not_swept_again(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        assert (answer(agent, STRIP).state, agent.last(TaskStatus).progress) == (TaskState.DONE, 1.0)
+        assert len(agent.all(Maneuver)) == 1
+
+    def test_a_strip_done_but_laid_anew_is(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        assert answer(agent, replace(STRIP, start_x_m=150)).state is TaskState.ACCEPTED
+
+    def test_statuses_are_numbered_on(self) -> None:
+        agent = revisit()
+        for _ in range(3):
+            tell(agent, STRIP)
+        assert [one.number for one in agent.said if isinstance(one.message, TaskStatus)] == [1, 2, 3]
+
+    def test_words_on_other_manoeuvres_change_nothing(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        for state in (ManeuverState.ON_TRACK, ManeuverState.DONE, ManeuverState.REFUSED):
+            tell_status(agent, HELPER, 7, state)
+        assert (agent.last(TaskStatus).state, agent.last(AgentState).mode) == (TaskState.ACCEPTED, Mode.TRANSIT)
+
+
+class TestTheSweep:
+    def test_it_tells_its_progress_every_10_s(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 25_000)
+        assert agent.all(TaskStatus)[-1].state is TaskState.UNDER_WAY
+        assert agent.last(AgentState).mode is Mode.REVISIT
+        agent.hear(f"veh/{HELPER}/look", look(agent.last(Maneuver), 1, 0, 10, SEES_25_M), at_ms=50_000)
+        said = agent.wait_until(60_500)
+        assert [(one.at_ms, one.message.progress) for one in said if isinstance(one.message, TaskStatus)] == [
+            (50_001, 0.25),  # 50 of 200 m
+            (60_001, 0.25),
+        ]
+
+    def test_a_look_of_another_manoeuvre_is_no_progress(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 25_000)
+        stray = replace(look(agent.last(Maneuver), 1, 0, 10, SEES_25_M), maneuver=7)
+        agent.hear(f"veh/{HELPER}/look", stray)
+        agent.wait(10)
+        assert agent.last(TaskStatus).progress == 0
+        assert agent.all(CoverageTile)  # but coverage it is
+
+    def test_the_tiles_go_out_before_it_says_that_it_is_done(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        kinds = [type(one.message) for one in agent.said if one.at_ms == agent.now_ms]
+        assert kinds[-2:] == [AgentState, TaskStatus]
+        assert CoverageTile in kinds[:-2]
+        status, state = agent.last(TaskStatus), agent.last(AgentState)
+        assert (status.state, status.progress, status.ends_ms) == (TaskState.DONE, 1.0, agent.now_ms)
+        assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.IDLE, 0, 0)
+        agent.wait(60)
+        assert agent.last(TaskStatus) is status
+
+    def test_a_leg_that_the_vehicle_refuses_ends_the_task(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell_status(agent, HELPER, 1, ManeuverState.REFUSED)
+        assert (agent.last(TaskStatus).state, agent.last(AgentState).mode) == (TaskState.FAILED, Mode.IDLE)
+        assert answer(agent, replace(STRIP, strip=4)).state is TaskState.ACCEPTED
+
+
+class TestGivingBack:
+    def test_it_stops_and_says_so_after_what_it_has_seen(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 25_000)
+        agent.hear(f"veh/{HELPER}/look", look(agent.last(Maneuver), 1, 0, 10, SEES_25_M))
+        said = tell(agent, give_back())
+        assert [type(one.message) for one in said if not isinstance(one.message, CoverageTile)] == [
+            AgentState,
+            TaskStatus,
+            Maneuver,
+        ]
+        assert isinstance(said[0].message, CoverageTile)
+        assert agent.last(TaskStatus).state is TaskState.GIVEN_BACK
+        assert (agent.last(Maneuver).kind, agent.last(AgentState).mode) == (ManeuverKind.HOLD, Mode.IDLE)
+
+    def test_giving_back_what_it_has_not_changes_nothing(self) -> None:
+        agent = revisit()
+        assert answer(agent, give_back()).state is TaskState.GIVEN_BACK
+        tell(agent, STRIP)
+        status = answer(agent, give_back(9))
+        assert (status.strip, status.state, status.progress) == (9, TaskState.GIVEN_BACK, 0)
+        assert agent.last(AgentState).works_on == STRIP.strip
+        assert to_follow(agent) is not None
+
+    def test_what_was_given_back_can_be_taken_again(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell(agent, give_back())
+        assert answer(agent, STRIP).state is TaskState.ACCEPTED
+        assert agent.last(Maneuver).kind is ManeuverKind.FOLLOW
+
+
+class TestTheEnd:
+    def test_when_the_mission_is_over_it_stops_and_what_it_was_at_has_failed(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 25_000)
+        agent.hear(f"veh/{HELPER}/look", look(agent.last(Maneuver), 1, 0, 10, SEES_25_M))
+        said = agent.hear("coord/mission_over", MissionOver("enough"))
+        status = agent.all(TaskStatus, said)[-1]
+        assert (status.strip, status.state, status.reason) == (3, TaskState.FAILED, "the mission is over")
+        assert agent.all(CoverageTile, said)
+        assert agent.all(AgentState, said)[-1].mode is Mode.FINISHED
+        assert agent.all(Maneuver, said)[-1].kind is ManeuverKind.HOLD
+        assert agent.wake_ms is None
+        assert tell(agent, STRIP) == []
+
+    def test_an_idle_helper_has_nothing_to_fail(self) -> None:
+        agent = revisit()
+        agent.wait(35)
+        said = agent.hear("coord/mission_over", MissionOver("enough"))
+        assert agent.all(TaskStatus) == []
+        assert agent.all(AgentState, said)[-1].mode is Mode.FINISHED
+        assert agent.last(AgentState).battery == pytest.approx(1 - 35.001 / 14_400, abs=1e-4)
+
+    def test_the_heading_of_the_strip_is_kept_whichever_way_it_points(self) -> None:
+        agent = revisit(at_m=(0, 0))
+        tell(agent, replace(STRIP, heading_rad=math.radians(120), start_x_m=50, start_y_m=50))
+        maneuver = agent.last(Maneuver)
+        assert (maneuver.start_x_m, maneuver.start_y_m) == (50, 50)
+        assert maneuver.end_x_m == pytest.approx(50 + 200 * math.sin(math.radians(120)), abs=0.01)
+        assert maneuver.end_y_m == pytest.approx(50 + 200 * math.cos(math.radians(120)), abs=0.01)

@@ -1,0 +1,535 @@
+"""The survey agent, driven by hand: what it says follows from what it is told, and from nothing else."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from by_hand import (
+    PRIMARY,
+    P_Detect,
+    flat,
+    fly,
+    look,
+    nav,
+    run_info,
+    tell_status,
+    to_follow,
+)
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from one_node import OneNode, Said
+
+from comms.messages import (
+    AgentState,
+    Contact,
+    CoverageTile,
+    Curve,
+    Hotspot,
+    HotspotState,
+    LookContact,
+    Maneuver,
+    ManeuverKind,
+    ManeuverState,
+    MissionOver,
+    Mode,
+    Plan,
+    Role,
+    RunInfo,
+)
+from planner.fleet_map import FleetMap
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
+from planner.types import BoolArray, GridSpec
+from vehicle_agent.config import SurveyConfig
+from vehicle_agent.survey import SurveyAgent
+
+SEES_TO_130_M = flat(0.3, 25, 130)
+SMALL = run_info(360, 200, cell_m=10)
+
+
+def survey(spacing: SpacingPlanner | None = None, *, nadir_gap_m: float = 40, range_m: float = 145) -> OneNode:
+    """A survey agent that waits for the run."""
+    config = SurveyConfig(
+        vehicle=PRIMARY,
+        spacing=spacing or AdaptiveSpacing(nadir_gap_m, range_m),
+        nadir_gap_m=nadir_gap_m,
+        range_m=range_m,
+        threshold=0.05,
+        hotspot_risk=0.6,
+        run_in_m=20,
+        endurance_ms=36_000_000,
+    )
+    return OneNode(SurveyAgent(config), Role.SURVEY)
+
+
+def on_its_way(agent: OneNode | None = None, run: RunInfo = SMALL) -> OneNode:
+    """The same, told of the run and of where its vehicle is."""
+    agent = agent or survey()
+    agent.hear("run", run, at_ms=1)
+    agent.hear(f"veh/{PRIMARY}/nav", nav())
+    return agent
+
+
+def command(agent: OneNode) -> Maneuver:
+    """The track that the agent wants followed."""
+    maneuver = to_follow(agent)
+    assert maneuver is not None
+    return maneuver
+
+
+def fly_all(agent: OneNode, p_detect: P_Detect, *, most: int = 40) -> None:
+    """Flies every track that the agent asks for."""
+    for _ in range(most):
+        maneuver = to_follow(agent)
+        if maneuver is None:
+            return
+        fly(agent, PRIMARY, maneuver, p_detect)
+    raise AssertionError(f"the agent asks for more than {most} tracks")
+
+
+def offsets(plan: Plan) -> list[float]:
+    return [track.across_m for track in plan.tracks]
+
+
+def joined(agent: OneNode, said: list[Said], fleet: FleetMap | None = None) -> FleetMap:
+    """The tiles of what was said, joined."""
+    node = agent.node
+    assert isinstance(node, SurveyAgent)
+    assert node.coverage is not None
+    fleet = fleet or FleetMap(node.coverage.grid)
+    for tile in agent.all(CoverageTile, said):
+        fleet.take(
+            PRIMARY,
+            (0, tile.version),
+            tile.first_row,
+            tile.first_column,
+            tile.sum_levels,
+            tile.largest_levels,
+            tile.settled,
+        )
+    return fleet
+
+
+@pytest.fixture(scope="module")
+def experiment_1() -> OneNode:
+    """The paper's first experiment, adaptive: told 145 m, sees to 130 m."""
+    agent = on_its_way(survey(), run_info())
+    fly_all(agent, SEES_TO_130_M)
+    return agent
+
+
+class TestThePapersExperiments:
+    def test_experiment_1_adapts_from_138_to_120_m_and_flies_eight_tracks(self, experiment_1: OneNode) -> None:
+        plan = experiment_1.last(Plan)
+        assert plan.r_adpt_m == (138, 120, 120, 120)
+        assert plan.r_eff_m == (130,) * 8
+        assert [track.flown for track in plan.tracks] == [True] * 8
+        # By hand: a pair at 138 and 138 + 98; then pairs from the edge 236 + 130 on, at 120 m; the last pulled in.
+        assert offsets(plan) == [138, 236, 486, 566, 806, 886, 1012, 1092]
+
+    def test_the_first_plan_needs_seven_tracks_and_says_what_changes(self, experiment_1: OneNode) -> None:
+        plans = experiment_1.all(Plan)
+        assert [plan.revision for plan in plans] == list(range(1, len(plans) + 1))
+        assert len(plans[0].tracks) == 7
+        assert plans[0].note == "spacing for 138 m, 7 tracks"
+        assert "r_eff 130 m after track 2, spacing 138 to 120 m" in [plan.note for plan in plans]
+
+    def test_tracks_are_flown_to_and_fro_under_numbers_from_1(self, experiment_1: OneNode) -> None:
+        tracks = experiment_1.last(Plan).tracks
+        assert [track.number for track in tracks] == list(range(1, 9))
+        assert [(track.start_y_m, track.end_y_m) for track in tracks] == [(0, 400), (400, 0)] * 4
+        flown = [one for one in experiment_1.all(Maneuver) if one.kind is ManeuverKind.FOLLOW]
+        assert [(one.start_x_m, one.start_y_m, one.end_y_m) for one in flown] == [
+            (track.start_x_m, track.start_y_m, track.end_y_m) for track in tracks
+        ]
+        assert {one.run_in_m for one in flown} == {20}
+
+    def test_the_control_keeps_to_its_seven_tracks(self) -> None:
+        agent = on_its_way(survey(FixedSpacing(40, 145)), run_info())
+        fly_all(agent, SEES_TO_130_M)
+        plan = agent.last(Plan)
+        assert plan.r_adpt_m == (145,)
+        assert offsets(plan) == [145, 250, 540, 645, 935, 1040, 1067]
+        assert len(plan.r_eff_m) == 7
+
+    def test_a_curve_follows_each_track(self, experiment_1: OneNode) -> None:
+        curves = experiment_1.all(Curve)
+        assert [curve.track for curve in curves] == list(range(1, 9))
+        assert all(curve.r_eff_m == 130 and curve.range_bin_m == 1 for curve in curves)
+        assert curves[0].p_detect[[24, 25, 130, 131]].tolist() == [0, 0.3, 0.3, 0]
+
+
+class TestSpacingAtItsLimits:
+    def test_below_three_nadir_gaps_it_says_so_and_goes_on_to_the_end(self) -> None:
+        agent = on_its_way(survey(), run_info())
+        fly_all(agent, flat(0.3, 25, 50))
+        plan = agent.last(Plan)
+        assert plan.r_adpt_m == (138, 120, 120, 120)
+        assert plan.r_eff_m == (50,) * 8
+        # Planned with 120 m, 120 m count as covered: 236 + 120 + 120 = 476.
+        assert offsets(plan) == [138, 236, 476, 556, 796, 876, 1012, 1092]
+        notes = [one.note for one in agent.all(Plan) if "spacing 138 to 120" in one.note]
+        assert notes == [
+            "r_eff 50 m after track 2, spacing 138 to 120 m; r_eff 50 m is below 3 r_min: planning with 120 m, "
+            "gaps remain"
+        ]
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+    @pytest.mark.parametrize(
+        ("nadir_gap_m", "p_detect", "second"),
+        [
+            (40.2, flat(0.3, 25, 60), 121),  # 3 r_min is 120.6 m: no whole metre
+            (0.0, flat(0.3, 0, 60), 58),  # beyond 234 + 60 m: two pairs of 174 m and a single of 58 m
+            (0.0, flat(0.0, 0, 60), 117),  # nothing admissible and no nadir gap: up to 145 m, as told
+        ],
+    )
+    def test_any_nadir_gap_can_be_planned_with(self, nadir_gap_m: float, p_detect: P_Detect, second: int) -> None:
+        run = run_info(700, 200, cell_m=10)
+        agent = on_its_way(survey(AdaptiveSpacing(nadir_gap_m, 145), nadir_gap_m=nadir_gap_m), run)
+        fly_all(agent, p_detect)
+        assert agent.last(Plan).r_adpt_m[1] == second
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+    @settings(max_examples=25)
+    @given(
+        width_m=st.integers(50, 900),
+        nadir_gap_m=st.sampled_from([10.0, 40.0]),
+        reaches_m=st.lists(st.integers(0, 140), min_size=1, max_size=5),
+        refused=st.sets(st.integers(1, 12)),
+    )
+    def test_every_survey_comes_to_an_end(
+        self, width_m: int, nadir_gap_m: float, reaches_m: list[int], refused: set[int]
+    ) -> None:
+        agent = on_its_way(survey(nadir_gap_m=nadir_gap_m), run_info(width_m, 100, cell_m=25))
+        lowest_m = 3 * nadir_gap_m
+        most = 2 * math.ceil(width_m / (3 * lowest_m - nadir_gap_m)) + 4 + len(refused)
+        for number in range(1, most + 2):
+            maneuver = to_follow(agent)
+            if maneuver is None:
+                break
+            if number in refused:
+                tell_status(agent, PRIMARY, maneuver.number, ManeuverState.REFUSED, agent.now_ms + 1)
+            else:
+                reach_m = reaches_m[number % len(reaches_m)]
+                fly(agent, PRIMARY, maneuver, flat(0.3, min(10, reach_m), reach_m), looks=1)
+        assert to_follow(agent) is None
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+
+class TestWaiting:
+    def test_it_says_nothing_before_the_run_is_announced(self) -> None:
+        agent = survey()
+        agent.hear(f"veh/{PRIMARY}/nav", nav(), at_ms=5)
+        tell_status(agent, PRIMARY, 1, ManeuverState.DONE, 10)
+        agent.wait(60)
+        assert (agent.said, agent.wake_ms) == ([], None)
+
+    def test_it_has_no_state_before_it_knows_where_it_is(self) -> None:
+        agent = survey()
+        agent.hear("run", SMALL, at_ms=1)
+        agent.wait(25)
+        assert agent.all(AgentState) == []
+        agent.hear(f"veh/{PRIMARY}/nav", nav(7, 8, 1))
+        state = agent.last(AgentState)
+        assert (state.x_m, state.y_m, state.heading_rad, state.mode) == (7, 8, 1, Mode.TRANSIT)
+
+    def test_an_announcement_repeated_changes_nothing(self) -> None:
+        agent = on_its_way()
+        fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
+        assert agent.hear("run", SMALL) == []
+        assert agent.hear("run", run_info(900, 900)) == []
+        fly_all(agent, SEES_TO_130_M)
+        assert agent.last(Plan).tracks[-1].across_m < 360
+
+    def test_it_reports_every_10_s_and_at_every_change(self) -> None:
+        agent = on_its_way()
+        said = agent.wait_until(30_001)
+        assert [one.at_ms for one in said if isinstance(one.message, AgentState)] == [10_001, 20_001, 30_001]
+        tell_status(agent, PRIMARY, 1, ManeuverState.ON_TRACK, 35_000)
+        assert (agent.said[-1].at_ms, agent.last(AgentState).mode) == (35_000, Mode.SURVEY)
+        assert agent.last(AgentState).works_on == 1
+        assert agent.last(AgentState).expected_end_ms == 330_001  # as the vehicle has just said
+
+    def test_the_battery_empties_with_time(self) -> None:
+        agent = on_its_way()
+        agent.wait_until(9_000_000)
+        assert agent.last(AgentState).battery == pytest.approx(0.75, abs=1e-3)
+
+
+class TestTracksThatGoWrong:
+    def test_a_refused_track_is_left_out_and_found_badly_seen(self) -> None:
+        agent = on_its_way(survey(), run_info())
+        fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
+        tell_status(agent, PRIMARY, command(agent).number, ManeuverState.REFUSED)
+        fly_all(agent, SEES_TO_130_M)
+        flown = [track.number for track in agent.last(Plan).tracks]
+        assert 2 not in flown
+        assert len(set(flown)) == len(flown)
+        assert agent.last(AgentState).mode is Mode.FINISHED
+        # The nadir gap of the first track, at 138 m, which the second should have seen.
+        assert any(inside(agent, one, 138, 200) for one in agent.all(Hotspot))
+
+    def test_when_every_track_is_refused_the_whole_area_is_a_hotspot(self) -> None:
+        agent = on_its_way(survey(), run_info(360, 200))
+        for _ in range(9):
+            maneuver = to_follow(agent)
+            if maneuver is not None:
+                tell_status(agent, PRIMARY, maneuver.number, ManeuverState.REFUSED)
+        assert agent.last(AgentState).mode is Mode.FINISHED
+        assert sum(one.cells for one in agent.all(Hotspot)) == 73 * 40
+        assert agent.last(Hotspot).mean_risk == 1.0
+
+    def test_words_on_other_manoeuvres_change_nothing(self) -> None:
+        agent = on_its_way()
+        first = command(agent)
+        tell_status(agent, PRIMARY, first.number + 5, ManeuverState.DONE)
+        tell_status(agent, PRIMARY, first.number + 5, ManeuverState.REFUSED)
+        assert command(agent) == first
+        fly(agent, PRIMARY, first, SEES_TO_130_M)
+        second = command(agent)
+        tell_status(agent, PRIMARY, first.number, ManeuverState.DONE)
+        assert command(agent) == second != first
+        assert len(agent.last(Plan).r_eff_m) == 1
+
+    def test_a_look_of_another_manoeuvre_is_coverage_but_teaches_nothing_about_this_track(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        stray = replace(look(maneuver, 1, 0, 4, flat(0.9, 25, 140)), maneuver=maneuver.number + 1)
+        agent.hear(f"veh/{PRIMARY}/look", stray)
+        fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+        curve = agent.last(Curve)
+        assert (curve.r_eff_m, curve.p_detect[40]) == (130, 0.3)
+        layer = agent.node.coverage.layer  # type: ignore[attr-defined]
+        column = round((maneuver.start_x_m + 50) / 10)
+        assert layer.sum_nats[0, column] == pytest.approx(-math.log(0.1) - math.log(0.7))
+
+    def test_an_invalid_look_is_no_coverage(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M, valid=False))
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
+        assert agent.all(CoverageTile) == []
+        assert (agent.all(Curve), agent.last(Plan).r_eff_m) == ([], (0,))
+
+    @pytest.mark.parametrize(
+        "spoilt",
+        [
+            {"p_detect": np.zeros((2, 0, 5))},
+            {"p_detect": np.zeros((1, 3, 5))},
+            {"p_detect": np.zeros((3, 3, 5))},
+            {"p_detect": np.full((2, 3, 1), 0.5)},
+            {"p_detect": np.zeros((2, 3, 0))},
+            {"along_bin_m": 0.0},
+            {"along_bin_m": -5.0},
+            {"range_bin_m": 0.0},
+            {"range_bin_m": 1e6},
+            {"origin_x_m": 9e6},
+            {"contacts": (LookContact(9e6, 9e6, 0.5),)},
+        ],
+    )
+    def test_a_look_that_makes_no_sense_is_dropped(
+        self, spoilt: dict[str, object], caplog: pytest.LogCaptureFixture
+    ) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        bad = replace(look(maneuver, 1, 0, 3, flat(0.5, 0, 60)), **spoilt)  # type: ignore[arg-type]
+        assert agent.hear(f"veh/{PRIMARY}/look", bad) == []
+        assert agent.hear(f"veh/{PRIMARY}/look", bad) == []
+        assert [record.message for record in caplog.records] == [
+            "primary: dropped a look that makes no sense (said once)"
+        ]
+        fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+        assert agent.last(Curve).r_eff_m == 130
+
+    def test_a_track_whose_looks_change_their_range_bins_is_judged_by_the_first_kind(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        agent.hear(f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 4, SEES_TO_130_M), range_bin_m=2))
+        fly(agent, PRIMARY, maneuver, flat(0.3, 25, 60))
+        curve = agent.last(Curve)
+        assert (curve.range_bin_m, curve.r_eff_m, curve.p_detect[130]) == (2, 261, 0.3)
+
+    def test_a_curve_of_very_many_bins_is_published_coarser(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        ranges_m = np.arange(10_001) * 0.02
+        fine = np.broadcast_to(np.where(ranges_m <= 130, 0.3, 0), (2, 1, 10_001))
+        agent.hear(
+            f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 1, SEES_TO_130_M), range_bin_m=0.02, p_detect=fine)
+        )
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
+        curve = agent.last(Curve)
+        assert (curve.r_eff_m, curve.range_bin_m, curve.p_detect.size) == (130, 0.06, 3334)
+        assert curve.p_detect[[2166, 2167]].tolist() == [0.3, 0]  # 129.96 m and 130.02 m
+
+
+def inside(agent: OneNode, hotspot: Hotspot, across_m: float, along_m: float) -> bool:
+    """Whether a hotspot's outline holds a place (mission frame and sweep frame are one)."""
+    corners = [(corner.x_m, corner.y_m) for corner in hotspot.outline]
+    return len(corners) > 2 and bool(shapely.contains_xy(shapely.Polygon(corners), across_m, along_m))
+
+
+def cells_within(grid: GridSpec, hotspot: Hotspot) -> BoolArray:
+    outline = shapely.Polygon([(corner.x_m, corner.y_m) for corner in hotspot.outline])
+    return np.asarray(shapely.contains_xy(outline, *np.meshgrid(grid.across_m, grid.along_m)))
+
+
+class TestHotspots:
+    def test_they_are_published_long_before_the_survey_ends(self, experiment_1: OneNode) -> None:
+        first_ms = next(one.at_ms for one in experiment_1.said if isinstance(one.message, Hotspot))
+        commands_ms = [one.at_ms for one in experiment_1.said if isinstance(one.message, Maneuver)]
+        assert first_ms < commands_ms[2]  # of eight tracks and a hold
+
+    def test_they_lie_on_settled_cells_badly_seen_by_the_tiles_of_the_same_moment(self, experiment_1: OneNode) -> None:
+        said = experiment_1.said
+        fleet = joined(experiment_1, [])
+        held = 0
+        for at_ms in sorted({one.at_ms for one in said}):
+            now = [one for one in said if one.at_ms == at_ms]
+            joined(experiment_1, now, fleet)
+            hot = fleet.settled_by([PRIMARY]) & (fleet.risk >= 0.6) if fleet.layers else np.zeros(fleet.grid.shape)
+            for hotspot in experiment_1.all(Hotspot, now):
+                if hotspot.state is HotspotState.ACTIVE:
+                    cells = cells_within(fleet.grid, hotspot) & hot.astype(bool)
+                    assert np.count_nonzero(cells) >= hotspot.cells > 0
+                    assert 0.6 <= hotspot.mean_risk <= 1
+                    held += 1
+        assert held > 20
+
+    def test_a_settled_cell_stays_settled_and_is_not_seen_again(self, experiment_1: OneNode) -> None:
+        before: dict[tuple[int, int], CoverageTile] = {}
+        for tile in experiment_1.all(CoverageTile):
+            old = before.get((tile.first_row, tile.first_column))
+            if old is not None:
+                assert not (old.settled & ~tile.settled).any()
+                assert (tile.sum_levels == old.sum_levels)[old.settled].all()
+            before[tile.first_row, tile.first_column] = tile
+        assert len(before) == 13 * 4
+
+    def test_one_grows_under_its_id_from_revision_to_revision(self, experiment_1: OneNode) -> None:
+        revisions: dict[int, list[Hotspot]] = {}
+        for one in experiment_1.said:
+            if isinstance(one.message, Hotspot):
+                revisions.setdefault(one.number, []).append(one.message)
+        for history in revisions.values():
+            assert [one.revision for one in history] == list(range(1, len(history) + 1))
+        grown = [history for history in revisions.values() if len(history) > 1 and history[0].growing]
+        assert grown
+        assert all(history[1].cells > history[0].cells for history in grown)
+        assert not any(history[-1].growing for history in revisions.values())
+
+    def test_one_that_is_seen_well_after_all_is_withdrawn(self) -> None:
+        agent = on_its_way(survey(FixedSpacing(40, 145)), run_info(360, 200))
+        fly_all(agent, SEES_TO_130_M)
+        assert {one.state for one in agent.all(Hotspot)} == {HotspotState.ACTIVE}
+        numbers = {one.number for one in agent.said if isinstance(one.message, Hotspot)}
+        for x_m in range(0, 361, 90):
+            over_all = Maneuver(99, ManeuverKind.FOLLOW, x_m, 0, x_m, 200, 0)
+            agent.hear(f"veh/{PRIMARY}/look", look(over_all, 9000 + x_m, 0, 40, flat(0.9, 0, 50)))
+        said = agent.wait(40)
+        withdrawn = {one.number: one.message for one in said if isinstance(one.message, Hotspot)}
+        assert withdrawn.keys() == numbers
+        for hotspot in withdrawn.values():
+            assert (hotspot.state, hotspot.outline, hotspot.merged_into) == (HotspotState.WITHDRAWN, (), 0)
+
+    def test_two_that_grow_together_become_one_and_the_other_names_it(self) -> None:
+        # One track beside a narrow area: on its first half the sonar sees badly in two bands, then everywhere.
+        agent = on_its_way(survey(FixedSpacing(0, 60), nadir_gap_m=0, range_m=60), run_info(60, 400))
+        maneuver = command(agent)
+
+        def in_bands(range_m: np.ndarray) -> np.ndarray:
+            return np.where((range_m >= 10) & (range_m <= 20) | (range_m >= 40), 0.2, 0.8)
+
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.ON_TRACK, 10_000)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 40, in_bands), at_ms=100_000)
+        agent.wait(40)
+        before = {one.number: one.message for one in agent.said if isinstance(one.message, Hotspot)}
+        assert len(before) == 2
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 2, 200, 20, flat(0.2, 0, 140)), at_ms=200_000)
+        said = [one for one in agent.wait(40) if isinstance(one.message, Hotspot)]
+        gone = [one for one in said if one.message.state is HotspotState.WITHDRAWN]  # type: ignore[union-attr]
+        assert len(gone) == 1
+        assert gone[0].message.merged_into in before.keys() - {gone[0].number}  # type: ignore[union-attr]
+
+
+class TestTiles:
+    def test_they_hold_the_layer(self, experiment_1: OneNode) -> None:
+        fleet = joined(experiment_1, experiment_1.said)
+        coverage = experiment_1.node.coverage  # type: ignore[attr-defined]
+        assert (fleet.layers[PRIMARY].sum_levels == coverage.layer.sum_levels()).all()
+        assert (fleet.layers[PRIMARY].largest_levels == coverage.layer.largest_levels()).all()
+        assert (fleet.layers[PRIMARY].settled == coverage.settled).all()
+        # -ln(1 - 0.3) is 0.357: 18 levels of 0.02 for one look, 36 for two, 54 for three.
+        assert set(np.unique(fleet.layers[PRIMARY].sum_levels)) == {0, 18, 36, 54}
+
+    def test_they_are_published_when_they_have_changed_and_at_most_every_10_s(self, experiment_1: OneNode) -> None:
+        last: dict[str, CoverageTile] = {}
+        versions = []
+        for one in experiment_1.said:
+            if isinstance(one.message, CoverageTile):
+                tile, old = one.message, last.get(one.key)
+                assert old is None or not all(
+                    np.array_equal(getattr(tile, name), getattr(old, name))
+                    for name in ("sum_levels", "largest_levels", "settled")
+                )
+                last[one.key] = tile
+                versions.append(tile.version)
+        assert versions == list(range(1, len(versions) + 1))
+
+    def test_an_agent_that_sees_nothing_new_publishes_none(self) -> None:
+        agent = on_its_way()
+        fly_all(agent, SEES_TO_130_M)
+        agent.wait(40)
+        assert agent.all(CoverageTile, agent.wait(120)) == []
+
+    def test_the_last_ones_go_out_before_the_agent_says_that_it_has_finished(self, experiment_1: OneNode) -> None:
+        kinds = [type(one.message) for one in experiment_1.said]
+        finished = next(
+            place
+            for place, one in enumerate(experiment_1.said)
+            if isinstance(one.message, AgentState) and one.message.mode is Mode.FINISHED
+        )
+        assert CoverageTile in kinds[:finished]
+        assert Hotspot in kinds[:finished]
+        assert not {CoverageTile, Hotspot} & set(kinds[finished:])
+        assert joined(experiment_1, experiment_1.said[:finished]).settled_by([PRIMARY]).all()
+
+
+class TestContactsAndTheEnd:
+    def test_a_contact_lies_beside_the_track_where_the_look_saw_it(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        eastward = replace(
+            look(maneuver, 7, 0, 4, SEES_TO_130_M),
+            origin_x_m=100.0,
+            origin_y_m=50.0,
+            heading_rad=math.pi / 2,
+            position_sigma_m=1.5,
+            contacts=(LookContact(10, -30, 0.8), LookContact(15, 40, 0.6)),
+        )
+        said = agent.hear(f"veh/{PRIMARY}/look", eastward)
+        # Heading east, port is north: x = 100 + along, y = 50 - lateral.
+        assert agent.all(Contact, said) == [Contact(110, 80, 1.5, 0.8, 7), Contact(115, 10, 1.5, 0.6, 7)]
+        assert [one.number for one in said] == [1, 2]
+
+    def test_it_holds_when_it_has_finished(self, experiment_1: OneNode) -> None:
+        assert experiment_1.last(Maneuver).kind is ManeuverKind.HOLD
+        state = experiment_1.last(AgentState)
+        assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.FINISHED, 0, 0)
+
+    def test_when_the_mission_is_over_it_stops_says_what_it_has_and_falls_silent(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M))
+        said = agent.hear("coord/mission_over", MissionOver("enough"))
+        assert [one.kind for one in agent.all(Maneuver, said)] == [ManeuverKind.HOLD]
+        assert agent.all(CoverageTile, said)
+        assert agent.all(AgentState, said)[-1].mode is Mode.FINISHED
+        assert agent.wake_ms is None
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 2, 20, 4, SEES_TO_130_M))
+        assert agent.hear(f"veh/{PRIMARY}/nav", nav(3)) == []
+        assert agent.said[-1] is said[-1]
