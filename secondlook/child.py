@@ -83,21 +83,22 @@ class _LauncherWatch:
 def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
     assert order.run_info is not None
     _LauncherWatch()
+    nodes = make_nodes(order.specs)
     routing, keys = Routing(order.roster), RunKeys(order.run)
     rules = access_rules(routing, order.hosts, keys)
     session, endpoint = open_hub(order.passwords, rules, patience_s=order.patience_s)
     with session:
-        tell(endpoint=endpoint)
         hub = Hub(
             session,
             keys,
             routing,
             order.hosts,
-            make_nodes(order.specs),
+            nodes,
             order.time_limit_ms,
             patience_s=order.patience_s,
             alive=lambda now_ms: tell(alive_ms=now_ms),
         )
+        tell(endpoint=endpoint)  # now that the hub hears whoever connects
         result = hub.run(order.run_info)
         tell(result={**asdict(result), "ending": result.ending.value})
 

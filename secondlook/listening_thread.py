@@ -41,11 +41,15 @@ class ListeningThread:
         """Waits for its end after the run's."""
         self._thread.join(timeout_s)
 
-    def stop(self, timeout_s: float) -> None:
-        """Ends it early, if it has not ended yet."""
+    def interrupt(self) -> None:
+        """Lets it end early, if it has not ended yet."""
         self._stopping.set()
         if self._host is not None:
             self._host.interrupt()
+
+    def stop(self, timeout_s: float) -> None:
+        """Interrupts it and waits for its end."""
+        self.interrupt()
         if self._thread.is_alive():
             self._thread.join(timeout_s)
         if self._host is None:  # it never came to listen

@@ -60,6 +60,7 @@ class Processes:
         self._children: dict[str, ChildProcess] = {}
         self._verdict = Verdict(HUB)
         self._hub_heard_s = 0.0
+        self._hub_alive_ms = 0
         self._selector = selectors.DefaultSelector()
         self._listening = ListeningThread(
             OBSERVER, observer, self._keys, Routing(fleet.roster), self._passwords[OBSERVER], patience_s
@@ -98,7 +99,8 @@ class Processes:
             if self._listening.error is not None:
                 self._verdict.says(str(self._listening.error))
             if now_s - self._hub_heard_s >= HUB_PATIENCE * self._patience_s:
-                self._verdict.says(f"{HUB} has fallen silent")
+                last_s = self._hub_alive_ms / 1000
+                self._verdict.says(f"{HUB} has fallen silent, last heard at {last_s:.3f} s of the mission")
             sentence = self._verdict.sentence(now_s)
             if sentence is not None:
                 raise RunFailedError(sentence)
@@ -108,7 +110,7 @@ class Processes:
         try:
             for child in self._children.values():
                 child.let_go()
-            self._listening.stop(GRACE_S)
+            self._listening.interrupt()
             deadline_s = time.monotonic() + GRACE_S
             for child in self._children.values():
                 child.wait(deadline_s)
@@ -117,6 +119,8 @@ class Processes:
                 child.bury()
             self._children.clear()
             self._selector.close()
+            # Last: a session cannot be closed as long as a frozen hub holds the other end.
+            self._listening.stop(GRACE_S)
 
     def _start_all(self) -> None:
         fleet = self._fleet
@@ -175,6 +179,8 @@ class Processes:
                     if other is not child:
                         other.tell(endpoint)
                 self._listening.start(endpoint)
+            case {"alive_ms": now_ms}:
+                self._hub_alive_ms = now_ms
             case {"failed": sentence}:
                 self._verdict.says(sentence)
             case {"lost": host, "at_ms": at_ms}:
