@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from flights import BRIEF, LONG, Flight, events, flight, has_ended, messages, until
 from rerun.chunk import RrdReader
-from runs import BRIEF, LONG, Flight, events, flight, has_ended, messages, until
 
 from comms.codec import decode
 from comms.node import Received
