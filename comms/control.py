@@ -91,15 +91,13 @@ def pack_answers(answers: list[tuple[str, int | None, list[Sent]]]) -> bytes:
 
 def unpack_answers(words: list[Any]) -> list[tuple[str, int | None, list[Sent]]]:
     """The answers of an `answer`; raises ControlError."""
-    try:
-        answers = [(node, wake, [Sent(*one) for one in sent]) for node, wake, sent in words[1]]
-    except (TypeError, ValueError, IndexError) as error:
-        raise ControlError(f"an answer that is none: {error}") from None
-    for node, wake, sent in answers:
-        fits = type(node) is str and (wake is None or type(wake) is int)
-        if not fits or any(type(one.key) is not str or type(one.size) is not int or one.size < 0 for one in sent):
-            raise ControlError("an answer with a part of the wrong type")
-    return answers
+    match words:
+        case ["answer", list(answers)]:
+            if all(_types(one) in ([str, int, list], [str, type(None), list]) for one in answers) and all(
+                _types(sent) == [str, int] and sent[1] >= 0 for one in answers for sent in one[2]
+            ):
+                return [(node, wake, [Sent(*sent) for sent in all_sent]) for node, wake, all_sent in answers]
+    raise ControlError("an answer that is none")
 
 
 def pack_final(digests: list[SenderDigest], dropped: dict[str, int], latencies_ms: dict[str, list[float]]) -> bytes:
@@ -110,8 +108,18 @@ def pack_final(digests: list[SenderDigest], dropped: dict[str, int], latencies_m
 
 def unpack_final(words: list[Any]) -> tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]:
     """Digests, dropped and latencies of a `final`; raises ControlError."""
-    try:
-        _, senders, dropped, latencies_ms = words
-        return [SenderDigest(*one) for one in senders], dict(dropped), dict(latencies_ms)
-    except (TypeError, ValueError) as error:
-        raise ControlError(f"a last word that is none: {error}") from None
+    match words:
+        case ["final", list(senders), dict(dropped), dict(latencies_ms)]:
+            fit = (
+                all(_types(one) == [str, int, int, str] for one in senders)
+                and all(_types(item) == [str, int] for item in dropped.items())
+                and all(type(name) is str and {float}.issuperset(_types(ms)) for name, ms in latencies_ms.items())
+            )
+            if fit:
+                return [SenderDigest(*one) for one in senders], dropped, latencies_ms
+    raise ControlError("a last word that is none")
+
+
+def _types(values: Any) -> list[type]:
+    """Of the members of a list or tuple; of anything else what no pattern of types is like."""
+    return [type(one) for one in values] if isinstance(values, list | tuple) else [type(None)]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import BRIEF, LONG, Flight, events, flight, has_ended, messages, until
+from flights import BRIEF, LONG, Flight, events, flight, has_ended, until
 from rerun.chunk import RrdReader
 
 from comms.codec import decode
@@ -24,6 +24,7 @@ from comms.topics import topic_of
 from secondlook import cli, mission, processes
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import HUB, RECORDER
+from secondlook.mission_files import read_messages
 from secondlook.node_spec import NodeSpec
 from secondlook.processes import GRACE_S, Processes, RunFailedError
 from secondlook.scenario import load_scenario
@@ -37,7 +38,7 @@ INTERRUPTED = r"interrupted at \d+ s of the mission"
 
 def assert_readable(folder: Path) -> None:
     """What a run that was cut off has written can be read."""
-    kept = messages(folder)
+    kept = read_messages(folder / "messages.mpk")
     assert len(kept) > 50
     for key, payload in kept:
         found = topic_of(key)
@@ -75,7 +76,7 @@ def assert_failed(flying: Flight, code: int, out: str, err: str, said: str) -> N
     assert summary["ending"] == ("interrupted" if said == INTERRUPTED else "failed")
     assert summary["digest"] is None
     assert 0 < summary["time"]["mission_s"] < 1700
-    assert sum(summary["messages"].values()) == len(messages(flying.folder))
+    assert sum(summary["messages"].values()) == len(read_messages(flying.folder / "messages.mpk"))
 
 
 @pytest.mark.parametrize("host", HOSTS)
@@ -132,7 +133,7 @@ def test_when_the_launcher_is_killed_its_children_end_by_themselves(tmp_path: Pa
         flying.process.kill()
         assert flying.finish(SOON_S) == (-signal.SIGKILL, "", "")
         assert_gone(flying, children)
-    for key, payload in messages(flying.folder):  # up to the cut
+    for key, payload in read_messages(flying.folder / "messages.mpk"):  # up to the cut
         found = topic_of(key)
         assert found is not None
         decode(payload, found[0].message)
@@ -155,12 +156,6 @@ class Saboteur:
 
     def close(self) -> None:
         self.closed += 1
-
-
-@pytest.fixture
-def faulty(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Lets children find the faulty nodes."""
-    monkeypatch.setenv("PYTHONPATH", str(BRIEF.parent))
 
 
 @pytest.fixture
@@ -188,7 +183,6 @@ def run_fleet(
     return str(caught.value)
 
 
-@pytest.mark.usefixtures("faulty")
 @pytest.mark.parametrize(
     ("host", "sentence"),
     [
@@ -215,7 +209,6 @@ def say_nothing(pids: dict[str, int]) -> None:
     """No sabotage."""
 
 
-@pytest.mark.usefixtures("faulty")
 @pytest.mark.parametrize(
     ("node", "factory", "config", "sentence"),
     [
@@ -240,7 +233,6 @@ def test_a_node_that_fails_in_its_process_is_named_with_its_reason(
     assert re.fullmatch(sentence, said)
 
 
-@pytest.mark.usefixtures("faulty")
 def test_an_observer_that_fails_is_named_with_its_reason(tmp_path: Path, fleet: Fleet) -> None:
     def fail(pids: dict[str, int]) -> None:
         raise OSError("no space left on device")
@@ -249,7 +241,6 @@ def test_an_observer_that_fails_is_named_with_its_reason(tmp_path: Path, fleet: 
     assert re.fullmatch(r"observer has failed at \d+\.\d{3} s: OSError: no space left on device", said)
 
 
-@pytest.mark.usefixtures("faulty")
 @pytest.mark.parametrize("bus", ["zenoh", "local"])
 def test_a_failed_mission_has_exit_code_1_and_its_traceback_in_a_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], bus: str

@@ -15,12 +15,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import BRIEF, events, flight, messages
+from flights import BRIEF, events, flight
 
 from comms.codec import decode
 from comms.topics import topic_of
 from secondlook.mission import RunOptions, run_mission
-from secondlook.mission_files import NOT_FOR_PEOPLE
+from secondlook.mission_files import NOT_FOR_PEOPLE, read_messages
 from secondlook.scenario import load_scenario, scenario_hash
 from tests.viz.recordings import verify
 
@@ -74,7 +74,7 @@ def test_all_files_of_a_run_are_there_and_no_other(landed: Landed) -> None:
 
 def test_every_message_is_kept_and_can_be_read(landed: Landed) -> None:
     kept = Counter[str]()
-    for key, payload in messages(landed.folder):
+    for key, payload in read_messages(landed.folder / "messages.mpk"):
         found = topic_of(key)
         assert found is not None
         decode(payload, found[0].message)
@@ -84,7 +84,11 @@ def test_every_message_is_kept_and_can_be_read(landed: Landed) -> None:
 
 def test_events_are_those_messages_that_are_for_people_in_their_order(landed: Landed) -> None:
     hidden = {topic.name for topic in NOT_FOR_PEOPLE}
-    for_people = [key for key, _ in messages(landed.folder) if (topic_of(key) or ("", ""))[0] not in NOT_FOR_PEOPLE]
+    for_people = [
+        key
+        for key, _ in read_messages(landed.folder / "messages.mpk")
+        if (topic_of(key) or ("", ""))[0] not in NOT_FOR_PEOPLE
+    ]
     told = events(landed.folder)
     assert [one["key"] for one in told] == for_people
     assert len(told) == sum(count for name, count in landed.summary["messages"].items() if name not in hidden)

@@ -16,8 +16,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import msgpack
-
 BRIEF = Path(__file__).with_name("brief.yaml")
 # The same mission at a walking pace: it goes on for some seconds of wall time, long enough to be cut off.
 LONG = ("--set", "vehicles.primary.speed_mps=0.5")
@@ -98,14 +96,6 @@ def flight(folder: Path, *arguments: str) -> Iterator[Flight]:
         flying.process.communicate()
         for pid in flying.children().values():
             os.kill(pid, signal.SIGKILL)
-
-
-def messages(folder: Path) -> list[tuple[str, bytes]]:
-    """Key and payload of each whole message in messages.mpk; the last one may be cut off."""
-    with (folder / "messages.mpk").open("rb") as file:
-        unpacker = msgpack.Unpacker(file)
-        assert next(unpacker) == ["secondlook-messages", 1]
-        return [(key, payload) for key, payload in unpacker]
 
 
 def events(folder: Path) -> list[dict[str, Any]]:
