@@ -15,11 +15,17 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test lock clean
+.PHONY: run test pictures lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
 	@$(BIN)/secondlook run $(ARGS)
+
+# The pictures in the README and the docs, from the program itself.
+pictures: .venv/.run-ready
+	@rm -rf runs/pictures
+	@$(BIN)/secondlook run tellaro --out runs/pictures
+	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png
 
 test: .venv/.test-ready
 	$(BIN)/ruff check

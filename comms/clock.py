@@ -52,7 +52,8 @@ class Round:
 
 
 class LockstepClock:
-    """The clock of one run.
+    """The clock of one run. After its last round `over_ms` tells when the mission was over, None if it was not, and
+    `timed_out` whether the time limit has ended it.
 
     Ask for `next_round`, carry out its grants, report each node with `answer`, and so on until there is none.
     `routing` names the nodes; those that only listen are never waited for, but counted (`watched`, `watched_bytes`).
@@ -63,6 +64,7 @@ class LockstepClock:
         self.rounds = 0
         self.messages: Counter[str] = Counter()
         self.over_ms: int | None = None
+        self.timed_out = False
         self._routing = routing
         self._time_limit_ms = time_limit_ms
         self._started = False
@@ -104,7 +106,13 @@ class LockstepClock:
                 self.watched_bytes[watcher] += one.size
 
     def answer(self, node_id: str, wake_ms: int | None, sent: Sequence[Sent]) -> None:
-        """Takes a granted node's answer: the wake-up it wants next (in the future) and what it has published."""
+        """Takes a granted node's answer: the wake-up it wants next (in the future) and what it has published.
+
+        Raises ValueError for a node that was not granted anything or has answered, for a wake-up that is not in the
+        future, and for a key that the node may not write.
+        """
+        if node_id not in self._waiting:
+            raise ValueError(f"{node_id} has answered at {self.now_ms} ms without being asked")
         self._waiting.remove(node_id)
         if wake_ms is not None and wake_ms <= self.now_ms:
             raise ValueError(f"{node_id} asks at {self.now_ms} ms to be woken at {wake_ms} ms, which is not later")
@@ -123,7 +131,10 @@ class LockstepClock:
         next_ms = min((wake for wake in self._wakes.values() if wake is not None), default=None)
         if self._due_times and (next_ms is None or self._due_times[0] < next_ms):
             next_ms = self._due_times[0]
-        if next_ms is None or next_ms > self._last_ms():
+        if next_ms is None:
+            return None
+        if next_ms > self._last_ms():
+            self.timed_out = self.over_ms is None
             return None
         self._count_round(next_ms)
         self.now_ms = next_ms
@@ -139,13 +150,6 @@ class LockstepClock:
                 self._grown[node_id].clear()
                 self._waiting.add(node_id)
         return Round(next_ms, start, tuple(grants))
-
-    @property
-    def timed_out(self) -> bool:
-        """Whether the run has ended because of its time limit."""
-        return self.over_ms is None and any(
-            wake is not None and wake > self._time_limit_ms for wake in self._wakes.values()
-        )
 
     def _last_ms(self) -> int:
         return self._time_limit_ms if self.over_ms is None else self.over_ms + WRAP_UP_MS

@@ -8,10 +8,12 @@ from typing import Any
 import msgpack
 
 from comms.messages import Message
-from comms.wire import IDENTIFIER, WireError, record_of
+from comms.wire import IDENTIFIER, LARGEST_MS, WireError, record_of
 
 SCHEMA_VERSION = 1
 HEADER_FIELDS = 6
+LARGEST_INCARNATION = 2**16 - 1
+LARGEST_SEQUENCE = 2**32 - 1
 CLOCK = "clock"  # the clock's id as a sender
 
 
@@ -35,6 +37,7 @@ class Header:
 
 def encode(header: Header, message: Message) -> bytes:
     """The payload of a message; raises WireError where a field does not fit."""
+    _check(header.sender, header.incarnation, header.sequence, header.sent_ms)
     body = record_of(type(message)).encode(message)
     payload: bytes = msgpack.packb(
         [SCHEMA_VERSION, header.sender, header.incarnation, header.sequence, header.sent_ms, body]
@@ -51,10 +54,19 @@ def decode(payload: bytes, message_type: type[Message]) -> tuple[Header, Message
     if type(parts) is not list or len(parts) != HEADER_FIELDS:
         raise WireError(f"not a list of {HEADER_FIELDS} parts")
     version, sender, incarnation, sequence, sent_ms, body = parts
-    if version != SCHEMA_VERSION:
-        raise WireError(f"schema version {version!r}, this is version {SCHEMA_VERSION}")
+    if type(version) is not int or version != SCHEMA_VERSION:
+        raise WireError(f"of another schema version than {SCHEMA_VERSION}")
+    _check(sender, incarnation, sequence, sent_ms)
+    return Header(sender, incarnation, sequence, sent_ms), record_of(message_type).decode(body)
+
+
+def _check(sender: Any, incarnation: Any, sequence: Any, sent_ms: Any) -> None:
     if type(sender) is not str or not IDENTIFIER.fullmatch(sender):
         raise WireError("the sender is not an identifier")
-    if not all(type(number) is int and number >= 0 for number in (incarnation, sequence, sent_ms)):
-        raise WireError("incarnation, sequence and send time are whole numbers from 0")
-    return Header(sender, incarnation, sequence, sent_ms), record_of(message_type).decode(body)
+    for name, number, largest in (
+        ("incarnation", incarnation, LARGEST_INCARNATION),
+        ("sequence", sequence, LARGEST_SEQUENCE),
+        ("send time", sent_ms, LARGEST_MS),
+    ):
+        if type(number) is not int or not 0 <= number <= largest:
+            raise WireError(f"the {name} is not a whole number from 0 to {largest}")

@@ -1,7 +1,7 @@
 """What clock and processes say to each other in lockstep, beside the topics: keys and packed words.
 
-A process is a host: it holds some of the nodes, or one listener. Hub to host: `welcome`, `grant`, `mark`, `finish`.
-Host to hub: `hello`, `ready`, `answer`, `ack`, `final`, `failed`.
+A process is a host: it holds some of the nodes, or one listener. Hub to host: `welcome`, `grant`, `mark`, `finish`,
+`goodbye`. Host to hub: `hello`, `ready`, `answer`, `ack`, `final`, `failed`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,10 @@ import msgpack
 from comms.clock import Grant, Sent
 from comms.runner import SenderDigest
 from comms.topics import KEY_ROOT
+
+
+class ControlError(Exception):
+    """Words that make no sense; the text says which."""
 
 
 @dataclass(frozen=True)
@@ -59,8 +63,13 @@ def pack(*words: Any) -> bytes:
 
 
 def unpack(payload: bytes) -> list[Any]:
-    """Name and words of a control message."""
-    words: list[Any] = msgpack.unpackb(payload)
+    """Name and words of a control message; raises ControlError where it is none."""
+    try:
+        words = msgpack.unpackb(payload)
+    except (ValueError, TypeError, msgpack.UnpackException, RecursionError):
+        words = None
+    if type(words) is not list or not words or type(words[0]) is not str:
+        raise ControlError(f"{payload[:20]!r}")
     return words
 
 
@@ -81,8 +90,16 @@ def pack_answers(answers: list[tuple[str, int | None, list[Sent]]]) -> bytes:
 
 
 def unpack_answers(words: list[Any]) -> list[tuple[str, int | None, list[Sent]]]:
-    """The answers of an `answer`."""
-    return [(node, wake, [Sent(*one) for one in sent]) for node, wake, sent in words[1]]
+    """The answers of an `answer`; raises ControlError."""
+    try:
+        answers = [(node, wake, [Sent(*one) for one in sent]) for node, wake, sent in words[1]]
+    except (TypeError, ValueError, IndexError) as error:
+        raise ControlError(f"an answer that is none: {error}") from None
+    for node, wake, sent in answers:
+        fits = type(node) is str and (wake is None or type(wake) is int)
+        if not fits or any(type(one.key) is not str or type(one.size) is not int or one.size < 0 for one in sent):
+            raise ControlError("an answer with a part of the wrong type")
+    return answers
 
 
 def pack_final(digests: list[SenderDigest], dropped: dict[str, int], latencies_ms: dict[str, list[float]]) -> bytes:
@@ -92,6 +109,9 @@ def pack_final(digests: list[SenderDigest], dropped: dict[str, int], latencies_m
 
 
 def unpack_final(words: list[Any]) -> tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]:
-    """Digests, dropped and latencies of a `final`."""
-    _, senders, dropped, latencies_ms = words
-    return [SenderDigest(*one) for one in senders], dropped, latencies_ms
+    """Digests, dropped and latencies of a `final`; raises ControlError."""
+    try:
+        _, senders, dropped, latencies_ms = words
+        return [SenderDigest(*one) for one in senders], dict(dropped), dict(latencies_ms)
+    except (TypeError, ValueError) as error:
+        raise ControlError(f"a last word that is none: {error}") from None

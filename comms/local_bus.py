@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from comms.clock import LockstepClock, Sent
 from comms.codec import CLOCK
+from comms.kept_listener import KeptListener, close_all
 from comms.messages import Message, RunInfo
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending
@@ -26,11 +27,11 @@ def run_local(
     `nodes` and `listeners` are keyed by node id and complete for the roster of `routing`. Raises NodeError and
     RunawayError.
     """
+    kept = {name: KeptListener(name, listener) for name, listener in listeners.items()}
     try:
-        return _Local(routing, nodes, listeners, time_limit_ms).run(run_info)
+        return _Local(routing, nodes, kept, time_limit_ms).run(run_info)
     finally:
-        for listener in listeners.values():
-            listener.close()
+        close_all(kept.values())
 
 
 class _Local:

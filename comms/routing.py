@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from comms.messages import Role
 from comms.topics import TOPICS, Reach, Topic, topic_of
+from comms.wire import IDENTIFIER
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,15 +35,18 @@ class Route:
 
 
 class Routing:
-    """Answers for a fixed roster; keys are below the run id. Raises ValueError for two nodes with one id, or two that
-    may write one topic of one vehicle."""
+    """Answers for a fixed roster; keys are below the run id. Raises ValueError for an id that is no identifier, for two
+    nodes with one id, and for two that may write one topic of one vehicle."""
 
     def __init__(self, roster: tuple[RosterNode, ...]) -> None:
         self.roster = roster
         self.nodes = {node.node_id: node for node in roster}
+        for name in (*self.nodes, *(vehicle for node in roster for vehicle in node.vehicles)):
+            if not IDENTIFIER.fullmatch(name):  # a `*` or `/` would let a node write and read what is not its own
+                raise ValueError(f"{name!r} is not an id: at most 40 of a-z, 0-9, _ and -")
         if len(self.nodes) != len(roster):
             raise ValueError("two nodes have the same id")
-        self._routes: dict[str, Route | None] = {}
+        self._routes: dict[str, Route] = {}
         for topic in TOPICS:
             for vehicle in {v for node in roster for v in node.vehicles} if topic.has_vehicle else {""}:
                 writers = self._who(topic, topic.writers, vehicle)
@@ -55,7 +59,8 @@ class Routing:
             return self._routes[key]
         except KeyError:
             found = self._find(key)
-            self._routes[key] = found
+            if found is not None:  # keys that lead nowhere are not kept: anyone may think of any number of them
+                self._routes[key] = found
             return found
 
     def subscriptions(self, node_id: str) -> tuple[str, ...]:

@@ -20,6 +20,13 @@ class NodeError(Exception):
     """A node has broken the rules of the house or raised; the text is one sentence that names it."""
 
 
+def failure_of(node_id: str, error: Exception, *, at_ms: int | None = None) -> NodeError:
+    """What is said of a node that has raised; where it did goes to the log."""
+    log.error("%s has failed", node_id, exc_info=error)
+    when = "" if at_ms is None else f" at {at_ms / 1000:.3f} s"
+    return NodeError(" ".join(f"{node_id} has failed{when}: {type(error).__name__}: {error}".split()))
+
+
 @dataclass(frozen=True, slots=True)
 class Outgoing:
     """A message on its way: key below the run id, route, the message and its payload."""
@@ -148,10 +155,7 @@ class NodeRunner:
         except NodeError:
             raise
         except Exception as error:
-            log.exception("%s has failed", self.node_id)
-            raise NodeError(
-                f"{self.node_id} has failed at {now_ms / 1000:.3f} s: {type(error).__name__}: {error}"
-            ) from error
+            raise failure_of(self.node_id, error, at_ms=now_ms) from error
         if self._wake_ms is not None and self._wake_ms <= now_ms:
             raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self._wake_ms} ms, which is not later")
         return self._wake_ms, [self.stamp(one.key, one.message, now_ms) for one in published]

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import enum
 import math
+import operator
 import re
+import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
@@ -17,10 +19,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 IDENTIFIER = re.compile(r"[a-z0-9_-]{1,40}")
+LARGEST_MS = 2**53  # of any time; a float still holds it exactly
 
 
 class WireError(ValueError):
     """A value that does not fit its field; the text says what and what is allowed."""
+
+
+# What a value of the wrong type or size raises in a conversion; WireError is a ValueError.
+MISFITS = (ValueError, TypeError, ArithmeticError, AttributeError)
+
+# Says in few words what has arrived, however long or deeply nested it is.
+_BRIEFLY = reprlib.Repr()
+_BRIEFLY.maxlevel = 2
+_BRIEFLY.maxlist = _BRIEFLY.maxdict = 4
+_BRIEFLY.maxstring = _BRIEFLY.maxother = 60
 
 
 class Kind(Protocol):
@@ -49,7 +62,9 @@ class Scaled:
 
     def decode(self, wire: Any) -> float:
         if type(wire) is not int or not self.low <= wire / self.steps_per_unit <= self.high:
-            raise WireError(f"{wire!r} is not a whole number within {self.low} to {self.high} {self.unit}")
+            raise WireError(
+                f"{_BRIEFLY.repr(wire)} is not a whole number of steps in {self.low} to {self.high} {self.unit}"
+            )
         return wire / self.steps_per_unit
 
 
@@ -61,13 +76,14 @@ class Whole:
     high: int
 
     def encode(self, value: int) -> int:
-        if not self.low <= value <= self.high:
-            raise WireError(f"{value} is outside {self.low} to {self.high}")
-        return int(value)
+        number = operator.index(value)  # refuses 2.5, which int() would cut off
+        if not self.low <= number <= self.high:
+            raise WireError(f"{number} is outside {self.low} to {self.high}")
+        return number
 
     def decode(self, wire: Any) -> int:
         if type(wire) is not int or not self.low <= wire <= self.high:
-            raise WireError(f"{wire!r} is not a whole number from {self.low} to {self.high}")
+            raise WireError(f"{_BRIEFLY.repr(wire)} is not a whole number from {self.low} to {self.high}")
         return wire
 
 
@@ -76,17 +92,19 @@ class Flag:
     """True or false."""
 
     def encode(self, value: bool) -> bool:
+        if not isinstance(value, bool | np.bool_):
+            raise WireError(f"{_BRIEFLY.repr(value)} is not true or false")
         return bool(value)
 
     def decode(self, wire: Any) -> bool:
         if type(wire) is not bool:
-            raise WireError(f"{wire!r} is not true or false")
+            raise WireError(f"{_BRIEFLY.repr(wire)} is not true or false")
         return wire
 
 
 @dataclass(frozen=True)
 class Words:
-    """Text of at most `longest` characters; `pattern` narrows it."""
+    """Text of at most `longest` bytes in UTF-8; `pattern` narrows it."""
 
     longest: int
     pattern: re.Pattern[str] | None = None
@@ -95,11 +113,16 @@ class Words:
         return self.decode(value)
 
     def decode(self, wire: Any) -> str:
-        if type(wire) is not str or len(wire) > self.longest:
-            raise WireError(f"{str(wire)[:60]!r} is not text of at most {self.longest} characters")
-        if self.pattern is not None and not self.pattern.fullmatch(wire):
-            raise WireError(f"{wire!r} does not match {self.pattern.pattern}")
-        return wire
+        try:
+            fits = type(wire) is str and len(wire.encode()) <= self.longest
+        except UnicodeEncodeError:  # half a surrogate pair
+            fits = False
+        if not fits:
+            raise WireError(f"{_BRIEFLY.repr(wire)} is not text of at most {self.longest} bytes")
+        text: str = wire
+        if self.pattern is not None and not self.pattern.fullmatch(text):
+            raise WireError(f"{_BRIEFLY.repr(text)} does not match {self.pattern.pattern}")
+        return text
 
 
 @dataclass(frozen=True)
@@ -109,11 +132,11 @@ class Choice:
     members: tuple[enum.Enum, ...]
 
     def encode(self, value: enum.Enum) -> int:
-        return self.members.index(value)
+        return self.members.index(value)  # ValueError, as any misfit, where it is no member
 
     def decode(self, wire: Any) -> enum.Enum:
         if type(wire) is not int or not 0 <= wire < len(self.members):
-            raise WireError(f"{wire!r} is not one of 0 to {len(self.members) - 1}")
+            raise WireError(f"{_BRIEFLY.repr(wire)} is not one of 0 to {len(self.members) - 1}")
         return self.members[wire]
 
 
@@ -138,6 +161,8 @@ class Packed:
             if array.size and not (float(array.min()) >= 0.0 and float(array.max()) <= self.high):  # refuses NaN too
                 raise WireError(f"an array's values are outside 0 to {self.high}")
             array = np.rint(array * self.steps_per_unit)
+        elif not np.can_cast(array.dtype, self.dtype):
+            raise WireError(f"an array of {array.dtype} does not go into {np.dtype(self.dtype)} without loss")
         return [*array.shape, np.ascontiguousarray(array, dtype=self.dtype).tobytes()]
 
     def decode(self, wire: Any) -> NDArray[Any]:
@@ -145,7 +170,7 @@ class Packed:
             raise WireError(f"not an array of {self.dimensions} axes")
         shape = wire[:-1]
         if not all(type(n) is int and 0 <= n <= self.most for n in shape) or math.prod(shape) > self.most:
-            raise WireError(f"{shape} is not a shape of at most {self.most} elements")
+            raise WireError(f"{_BRIEFLY.repr(shape)} is not a shape of at most {self.most} elements")
         if math.prod(shape) * np.dtype(self.dtype).itemsize != len(wire[-1]):
             raise WireError(f"{len(wire[-1])} bytes do not fill the shape {shape}")
         array = np.frombuffer(wire[-1], dtype=self.dtype).reshape(shape)
@@ -154,6 +179,7 @@ class Packed:
         values = array / self.steps_per_unit
         if values.size and float(values.max()) > self.high:
             raise WireError(f"an array's values are above {self.high}")
+        values.setflags(write=False)  # one message may have several readers
         return values
 
 
@@ -174,11 +200,13 @@ class Mask:
             raise WireError("not a mask")
         rows, columns, packed = wire
         if not all(type(n) is int and 0 <= n <= self.most for n in (rows, columns)) or rows * columns > self.most:
-            raise WireError(f"{(rows, columns)} is not a shape of at most {self.most} cells")
+            raise WireError(f"{_BRIEFLY.repr((rows, columns))} is not a shape of at most {self.most} cells")
         if len(packed) != (rows * columns + 7) // 8:
             raise WireError(f"{len(packed)} bytes do not fill the shape {(rows, columns)}")
         bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=rows * columns)
-        return bits.astype(np.bool_).reshape(rows, columns)
+        mask = bits.astype(np.bool_).reshape(rows, columns)
+        mask.setflags(write=False)
+        return mask
 
 
 @dataclass(frozen=True)
@@ -214,7 +242,7 @@ class Record:
     def encode(self, value: Any) -> list[Any]:
         try:
             return [encode(getattr(value, name)) for name, encode, _ in self.fields]
-        except WireError:
+        except MISFITS:
             return self._name_the_field(lambda name, encode, _: encode(getattr(value, name)))
 
     def decode(self, wire: Any) -> Any:
@@ -222,7 +250,7 @@ class Record:
             raise WireError(f"{self.cls.__name__} needs a list of {len(self.fields)} fields")
         try:
             return self.cls(*[decode(one) for (_, _, decode), one in zip(self.fields, wire, strict=True)])
-        except WireError:
+        except MISFITS:
             values = iter(wire)
             return self._name_the_field(lambda _name, _encode, decode: decode(next(values)))
 
@@ -231,7 +259,7 @@ class Record:
         for name, encode, decode in self.fields:
             try:
                 convert(name, encode, decode)
-            except WireError as error:
+            except MISFITS as error:
                 raise WireError(f"{self.cls.__name__}.{name}: {error}") from None
         raise AssertionError("a conversion that failed once passed the second time")
 
@@ -275,7 +303,7 @@ Radians = Annotated[float, Scaled("rad", 1_000_000, -7.0, 7.0)]
 MetresPerSecond = Annotated[float, Scaled("m/s", 1000, 0.0, 100.0)]
 Probability = Annotated[float, Scaled("(probability)", 10_000, 0.0, 1.0)]
 SquareMetres = Annotated[float, Scaled("m2", 10, 0.0, 1e9)]
-Milliseconds = Annotated[int, Whole(0, 2**53)]
+Milliseconds = Annotated[int, Whole(0, LARGEST_MS)]
 Count = Annotated[int, Whole(0, 2**31 - 1)]
 YesNo = Annotated[bool, Flag()]
 Identifier = Annotated[str, Words(40, IDENTIFIER)]

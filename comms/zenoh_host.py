@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import time
 from collections import Counter
 from collections.abc import Mapping
+from typing import Any
 
 import zenoh
 
 from comms.clock import Grant, Sent
 from comms.control import RunKeys, pack, pack_answers, pack_final, unpack, unpack_grants
 from comms.group import NodeGroup
+from comms.kept_listener import KeptListener, close_all
 from comms.latency import STRIP_TO_TASK, StripLatency
 from comms.messages import Role
 from comms.node import Listener, Node, Received
@@ -20,6 +23,7 @@ from comms.runner import Intake, NodeError, Outgoing
 from comms.zenoh_session import put, subscribe
 
 HELLO_EVERY_S = 0.2
+GOODBYE_WITHIN_S = 5.0
 _Mail = tuple[str, bytes]
 
 
@@ -67,7 +71,18 @@ class _Line:
                 self.say(pack("ready"))
                 return
 
-    def get(self) -> tuple[list[object] | None, _Mail | None]:
+    def part(self, words: bytes) -> None:
+        """A last word; returns when the hub has heard it, or is gone. The session may be closed then: the news of its
+        end cannot overtake the word."""
+        self.say(words)
+        deadline_s = time.monotonic() + GOODBYE_WITHIN_S
+        with contextlib.suppress(queue.Empty):
+            while True:
+                item = self.queue.get(timeout=max(0.0, deadline_s - time.monotonic()))
+                if item is None or (item[0] == self._words_key and unpack(item[1])[0] == "goodbye"):
+                    return
+
+    def get(self) -> tuple[list[Any] | None, _Mail | None]:
         """The next item: the clock's words, or mail (key below the run id, payload)."""
         item = self.queue.get()
         if item is None:
@@ -99,7 +114,7 @@ def serve_nodes(session: zenoh.Session, keys: RunKeys, host: str, nodes: Mapping
         elif words is not None and words[0] == "grant":
             granted = unpack_grants(words)
         elif words is not None and words[0] == "finish":
-            line.say(pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds}))
+            line.part(pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds}))
             return
         if granted is not None and group.has_all(granted[2]):
             now_ms, start, grants = granted
@@ -122,13 +137,14 @@ class ListenerHost:
     """Holds one listener: gives it the messages in order as the clock's marks come, and acknowledges each mark.
 
     `run` returns when the run is finished, or when `interrupt` is called from another thread; either way the listener
-    has then had all that arrived in order, and is closed.
+    has then had all that arrived in order, and is closed. Where the listener fails it is closed too, the hub is told,
+    and NodeError raised.
     """
 
     def __init__(
         self, session: zenoh.Session, keys: RunKeys, host: str, node_id: str, listener: Listener, routing: Routing
     ) -> None:
-        self._listener = listener
+        self._listener = KeptListener(node_id, listener)
         self._routing = routing
         self._intake = Intake(routing)
         self._arrived: Counter[str] = Counter()
@@ -141,29 +157,38 @@ class ListenerHost:
 
     def run(self) -> None:
         """Listens to the end of the run."""
-        mark: list[object] | None = None
         try:
-            self._line.shake_hands()
-            while True:
-                words, mail = self._line.get()
-                if mail is not None:
-                    self._receive(*mail)
-                elif words is not None and words[0] in ("mark", "finish"):
-                    mark = words
-                if mark is None or not self._has_all(mark):
-                    continue
-                self._release(up_to_ms=mark[2])  # type: ignore[arg-type]
-                if mark[0] == "finish":
-                    break
-                self._line.say(pack("ack", mark[1]))
-                mark = None
-        except Interrupted:
-            # Without a mark nobody knows whether earlier messages are still missing: what there is, in order.
-            self._release(up_to_ms=None)
-            self._listener.close()
-            return
-        self._listener.close()
-        self._line.say(pack_final([], dict(self._intake.dropped), {}))
+            try:
+                self._listen()
+                finished = True
+            except Interrupted:
+                # Without a mark nobody knows whether earlier messages are still missing: what there is, in order.
+                self._release(up_to_ms=None)
+                finished = False
+            finally:
+                close_all([self._listener])
+        except NodeError as error:
+            self._line.say(pack("failed", str(error)))
+            raise
+        if finished:
+            self._line.part(pack_final([], dict(self._intake.dropped), {}))
+
+    def _listen(self) -> None:
+        mark: list[Any] | None = None
+        self._line.shake_hands()
+        while True:
+            words, mail = self._line.get()
+            if mail is not None:
+                self._receive(*mail)
+            elif words is not None and words[0] in ("mark", "finish"):
+                mark = words
+            if mark is None or not self._has_all(mark[3]):
+                continue
+            self._release(up_to_ms=mark[2])
+            if mark[0] == "finish":
+                return
+            self._line.say(pack("ack", mark[1]))
+            mark = None
 
     def _receive(self, key: str, payload: bytes) -> None:
         route = self._routing.route(key)
@@ -173,9 +198,7 @@ class ListenerHost:
         if received is not None:
             self._held.append(received)
 
-    def _has_all(self, mark: list[object]) -> bool:
-        expected = mark[3]
-        assert isinstance(expected, dict)
+    def _has_all(self, expected: dict[str, int]) -> bool:
         return all(self._arrived[sender] >= count for sender, count in expected.items())
 
     def _release(self, *, up_to_ms: int | None) -> None:

@@ -5,33 +5,49 @@ from __future__ import annotations
 import queue
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import zenoh
 
 from comms.clock import Grant, LockstepClock, Round, Sent
 from comms.codec import CLOCK
-from comms.control import HostPlan, RunKeys, pack, pack_grants, unpack, unpack_answers, unpack_final
+from comms.control import (
+    ControlError,
+    HostPlan,
+    RunKeys,
+    pack,
+    pack_grants,
+    unpack,
+    unpack_answers,
+    unpack_final,
+)
 from comms.group import NodeGroup
 from comms.latency import STRIP_TO_TASK, StripLatency
 from comms.local_bus import ending_of
 from comms.messages import Role, RunInfo
 from comms.node import Node
+from comms.pacing import MOST_BEHIND_BYTES, Pacing
 from comms.result import BusResult
 from comms.routing import Routing
 from comms.runner import Outgoing, SenderDigest, Stamp, fleet_digest
 from comms.topics import RUN
-from comms.zenoh_session import put, subscribe
+from comms.zenoh_session import PATIENCE_S, put, subscribe
 
-MARK_EVERY_MS = 10_000  # simulated time between two marks for the listeners
-MARK_EVERY_BYTES = 256 * 1024
-MOST_BEHIND_BYTES = 4 << 20
-PATIENCE_S = 60.0  # wall time without a word from a process that has to answer
+SIGN_OF_LIFE_EVERY_S = 0.5
 
 
 class FleetError(Exception):
-    """A process of the fleet has failed, died or fallen silent; the text is one sentence that names it."""
+    """A process of the fleet has failed or fallen silent; the text is one sentence that names it."""
+
+
+class HostLostError(FleetError):
+    """The connection to a process is gone: it has died, or for too long given no sign of life."""
+
+    def __init__(self, host: str, at_ms: int) -> None:
+        super().__init__(f"{host} was lost at {at_ms / 1000:.3f} s of the mission")
+        self.host = host
+        self.at_ms = at_ms
 
 
 class Hub:
@@ -39,6 +55,9 @@ class Hub:
 
     `hosts`: the other processes. `nodes`: the nodes of this process. `run` waits for all, runs the fleet to its end and
     returns the result; raises FleetError, NodeError, RunawayError.
+
+    `patience_s`: wall time without a word from a process that has to answer. `most_behind_bytes`: see `Pacing`.
+    `alive`: called with the simulated time every half second of wall time and sooner.
     """
 
     def __init__(
@@ -49,10 +68,17 @@ class Hub:
         hosts: tuple[HostPlan, ...],
         nodes: Mapping[str, Node],
         time_limit_ms: int,
+        *,
+        patience_s: float = PATIENCE_S,
+        most_behind_bytes: int = MOST_BEHIND_BYTES,
+        alive: Callable[[int], None] = lambda now_ms: None,
     ) -> None:
         self._session = session
         self._keys = keys
         self._routing = routing
+        self._patience_s = patience_s
+        self._alive = alive
+        self._alive_at_s = time.monotonic()
         self._clock = LockstepClock(routing, time_limit_ms)
         self._group = NodeGroup(nodes, routing)
         self._latency = StripLatency()
@@ -60,16 +86,12 @@ class Hub:
         listening = {node.node_id for node in routing.roster if node.listens_only}
         self._host_of = {node: plan.host for plan in hosts for node in plan.nodes}
         self._hosts = {plan.host for plan in hosts}
-        self._watchers = {node: host for node, host in self._host_of.items() if node in listening}
+        self._listeners = {node: host for node, host in self._host_of.items() if node in listening}
+        self._pacing = Pacing(self._clock, self._listeners, most_behind_bytes)
         self._queue: queue.SimpleQueue[tuple[str, str, bytes]] = queue.SimpleQueue()
         self._ready: set[str] = set()
-        self._finals: dict[str, list[Any]] = {}
-        self._answers: dict[str, list[tuple[str, int | None, list[Sent]]]] = {}
-        self._mark = 0
-        self._mark_ms = 0
-        self._marked_bytes = dict.fromkeys(self._watchers, 0)
-        self._acked_bytes = dict.fromkeys(self._watchers, 0)
-        self._bytes_at_mark: dict[str, dict[int, int]] = {node: {} for node in self._watchers}
+        self._asked: dict[str, set[str]] = {}
+        self._finals: dict[str, tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]] = {}
         expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
         self._subscribers = subscribe(session, expressions, self._on_mail)
         self._subscribers += subscribe(session, [keys.from_host("*")], self._on_words)
@@ -79,14 +101,18 @@ class Hub:
 
     def run(self, run_info: RunInfo) -> BusResult:
         """See the class."""
-        self._wait("start", lambda: self._ready >= self._hosts)
+        self._wait(lambda: self._ready >= self._hosts, lambda: _no("start", self._hosts - self._ready))
         stamp = Stamp(CLOCK, self._routing)
         announced = stamp(RUN.key(), run_info, 0)
         self._clock.publish(CLOCK, [Sent(announced.key, len(announced.payload))])
         self._publish([announced])
         while (turn := self._clock.next_round()) is not None:
+            self._show_life()
+            while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
+                self._handle(*self._queue.get())
             self._carry_out(turn)
-            self._pace_listeners()
+            if self._pacing.next_mark():
+                self._mark_listeners()
         return self._finish()
 
     def _carry_out(self, turn: Round) -> None:
@@ -98,63 +124,45 @@ class Hub:
             else:
                 away.setdefault(self._host_of[grant.node_id], []).append(grant)
         for host, grants in away.items():
-            put(self._session, self._keys.to_host(host), pack_grants(turn.now_ms, start=turn.start, grants=grants))
-        self._answers.clear()
+            self._asked[host] = {grant.node_id for grant in grants}
+            self._say(host, pack_grants(turn.now_ms, start=turn.start, grants=grants))
         if here:
-            self._wait("mail", lambda: self._group.has_all(here))
+            self._wait(lambda: self._group.has_all(here), lambda: f"mail is missing: {self._group.missing(here)}")
             for grant in here:
                 wake_ms, outgoing = self._group.act(grant, turn.now_ms, start=turn.start)
                 if grant.node_id in self._coordinators:
                     self._latency.sending(outgoing, time.perf_counter())
                 self._publish(outgoing)
                 self._clock.answer(grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing])
-        if away:
-            self._wait("answer", lambda: len(self._answers) == len(away), away)
-            for answers in self._answers.values():
-                for node_id, wake_ms, sent in answers:
-                    self._clock.answer(node_id, wake_ms, sent)
+        self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
 
     def _publish(self, outgoing: list[Outgoing]) -> None:
         for one in outgoing:
             put(self._session, self._keys.topic(one.key), one.payload)
 
-    def _pace_listeners(self) -> None:
-        clock = self._clock
-        waiting_bytes = max(
-            (clock.watched_bytes[node] - self._marked_bytes[node] for node in self._watchers), default=0
-        )
-        if clock.now_ms - self._mark_ms < MARK_EVERY_MS and waiting_bytes < MARK_EVERY_BYTES:
-            return
-        self._mark += 1
-        self._mark_ms = clock.now_ms
-        for node, host in self._watchers.items():
-            self._marked_bytes[node] = clock.watched_bytes[node]
-            self._bytes_at_mark[node][self._mark] = clock.watched_bytes[node]
-            put(
-                self._session,
-                self._keys.to_host(host),
-                pack("mark", self._mark, clock.now_ms, dict(clock.watched[node])),
-            )
-        self._wait("acknowledgement", lambda: not self._behind(), {self._watchers[node]: [] for node in self._behind()})
+    def _say(self, host: str, words: bytes) -> None:
+        put(self._session, self._keys.to_host(host), words)
 
-    def _behind(self) -> list[str]:
-        return [
-            node
-            for node in self._watchers
-            if self._clock.watched_bytes[node] - self._acked_bytes[node] > MOST_BEHIND_BYTES
-        ]
+    def _mark_listeners(self) -> None:
+        for node, host in self._listeners.items():
+            self._say(host, pack("mark", self._pacing.mark, self._clock.now_ms, dict(self._clock.watched[node])))
+        self._wait(
+            lambda: not self._pacing.behind(),
+            lambda: _no("acknowledgement", {self._listeners[node] for node in self._pacing.behind()}),
+        )
 
     def _finish(self) -> BusResult:
         for host in self._hosts:
-            nodes = [node for node, its_host in self._watchers.items() if its_host == host]
+            nodes = [node for node, its_host in self._listeners.items() if its_host == host]
             counts = dict(self._clock.watched[nodes[0]]) if nodes else {}
-            put(self._session, self._keys.to_host(host), pack("finish", self._mark, self._clock.now_ms, counts))
-        self._wait("last word", lambda: self._finals.keys() >= self._hosts)
+            self._say(host, pack("finish", self._pacing.mark, self._clock.now_ms, counts))
+        self._wait(
+            lambda: self._finals.keys() >= self._hosts, lambda: _no("last word", self._hosts - self._finals.keys())
+        )
         digests: list[SenderDigest] = self._group.digests()
         dropped = Counter(self._group.intake.dropped)
         latencies = list(self._latency.milliseconds)
-        for words in self._finals.values():
-            its_digests, its_dropped, its_latencies = unpack_final(words)
+        for its_digests, its_dropped, its_latencies in self._finals.values():
             digests.extend(its_digests)
             dropped.update(its_dropped)
             latencies.extend(its_latencies.get(STRIP_TO_TASK, ()))
@@ -169,23 +177,28 @@ class Hub:
             latencies_ms={STRIP_TO_TASK: latencies},
         )
 
-    def _wait(self, what: str, done: Any, hosts: Mapping[str, object] | None = None) -> None:
-        """Handles what arrives until `done()`; FleetError after 60 s without anything arriving."""
+    def _wait(self, done: Callable[[], bool], missing: Callable[[], str]) -> None:
+        """Handles what arrives until `done()`; FleetError when nothing arrives for too long."""
+        heard_at_s = time.monotonic()
         while not done():
             try:
-                kind, key, payload = self._queue.get(timeout=PATIENCE_S)
+                kind, key, payload = self._queue.get(timeout=min(SIGN_OF_LIFE_EVERY_S, self._patience_s))
             except queue.Empty:
-                raise FleetError(f"nothing heard for {PATIENCE_S:.0f} s: {self._silent(what, hosts)}") from None
-            self._handle(kind, key, payload)
+                if time.monotonic() - heard_at_s >= self._patience_s:
+                    at_s = self._clock.now_ms / 1000
+                    raise FleetError(
+                        f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission: {missing()}"
+                    ) from None
+            else:
+                heard_at_s = time.monotonic()
+                self._handle(kind, key, payload)
+            self._show_life()
 
-    def _silent(self, what: str, hosts: Mapping[str, object] | None) -> str:
-        if what == "start":
-            silent = self._hosts - self._ready
-        elif what == "last word":
-            silent = self._hosts - self._finals.keys()
-        else:
-            silent = set(hosts or ()) - self._answers.keys()
-        return f"no {what} from {', '.join(sorted(silent)) or 'the network'} at {self._clock.now_ms / 1000:.3f} s"
+    def _show_life(self) -> None:
+        now_s = time.monotonic()
+        if now_s - self._alive_at_s >= SIGN_OF_LIFE_EVERY_S:
+            self._alive_at_s = now_s
+            self._alive(self._clock.now_ms)
 
     def _handle(self, kind: str, key: str, payload: bytes) -> None:
         if kind == "mail":
@@ -194,26 +207,38 @@ class Hub:
                 self._latency.arrived(received, time.perf_counter())
             return
         host = key.rsplit("/", 1)[1]
-        if kind == "gone":
-            if host in self._hosts and host not in self._finals:
-                raise FleetError(f"{host} has died at {self._clock.now_ms / 1000:.3f} s of the mission")
+        if host not in self._hosts:
             return
-        words = unpack(payload)
-        match words[0]:
-            case "hello":
-                put(self._session, self._keys.to_host(host), pack("welcome"))
-            case "ready":
+        if kind == "gone":
+            if host not in self._finals:
+                raise HostLostError(host, self._clock.now_ms)
+            return
+        try:
+            self._take_words(host, unpack(payload))
+        except (ControlError, ValueError) as error:
+            raise FleetError(f"{host} has said what makes no sense to the clock: {error}") from error
+
+    def _take_words(self, host: str, words: list[Any]) -> None:
+        match words:
+            case ["hello"]:
+                self._say(host, pack("welcome"))
+            case ["ready"]:
                 self._ready.add(host)
-            case "answer":
-                self._answers[host] = unpack_answers(words)
-            case "ack":
-                for node, its_host in self._watchers.items():
-                    if its_host == host:
-                        self._acked_bytes[node] = self._bytes_at_mark[node].pop(words[1])
-            case "final":
-                self._finals[host] = words
-            case "failed":
-                raise FleetError(words[1])
+            case ["answer", *_]:
+                answers = unpack_answers(words)
+                if {node_id for node_id, _, _ in answers} != self._asked.pop(host, None):
+                    raise ControlError("an answer for nodes that were not asked")
+                for node_id, wake_ms, sent in answers:
+                    self._clock.answer(node_id, wake_ms, sent)
+            case ["ack", int(mark)]:
+                self._pacing.acknowledge(next((n for n, its in self._listeners.items() if its == host), host), mark)
+            case ["final", *_]:
+                self._finals[host] = unpack_final(words)
+                self._say(host, pack("goodbye"))
+            case ["failed", str(sentence)]:
+                raise FleetError(sentence)
+            case _:
+                raise ControlError(f"{words[0][:20]!r}")
 
     def _on_mail(self, key: str, payload: bytes) -> None:
         self._queue.put(("mail", key, payload))
@@ -222,5 +247,9 @@ class Hub:
         self._queue.put(("words", key, payload))
 
     def _on_token(self, sample: zenoh.Sample) -> None:
-        if sample.kind is zenoh.SampleKind.DELETE:
+        if sample.kind == zenoh.SampleKind.DELETE:  # not `is`: each look at it makes a new one
             self._queue.put(("gone", str(sample.key_expr), b""))
+
+
+def _no(what: str, hosts: Any) -> str:
+    return f"no {what} from {', '.join(sorted(hosts))}"

@@ -11,7 +11,8 @@ from typing import Any
 
 import zenoh
 
-CONNECT_TIMEOUT_MS = 10_000
+CONNECT_TIMEOUT_S = 10.0
+PATIENCE_S = 60.0
 LARGEST_MESSAGE_BYTES = 4 << 20
 
 
@@ -19,16 +20,18 @@ class ConnectionFailedError(Exception):
     """A session that could not be opened; the text is one sentence."""
 
 
-def open_hub(users: Mapping[str, str], access_control: dict[str, Any] | None) -> tuple[zenoh.Session, str]:
+def open_hub(
+    users: Mapping[str, str], access_control: dict[str, Any] | None, *, patience_s: float = PATIENCE_S
+) -> tuple[zenoh.Session, str]:
     """A session that routes for all others, and the endpoint it listens on.
 
-    `users`: a password for each user name that may connect. Only loopback is listened on.
+    `users`: a password for each user name that may connect. Only loopback is listened on. `patience_s`: see `_config`.
     """
     with tempfile.TemporaryDirectory(prefix="secondlook-") as folder:
         passwords = Path(folder) / "users"
         with open(os.open(passwords, os.O_WRONLY | os.O_CREAT, 0o600), "w") as file:
             file.writelines(f"{name}:{password}\n" for name, password in users.items())
-        config = _config("router", listen=["tcp/127.0.0.1:0"])
+        config = _config("router", patience_s, listen=["tcp/127.0.0.1:0"])
         _set(config, "scouting/delay", 0)
         _set(config, "adminspace", {"enabled": True, "permissions": {"read": True, "write": False}})
         _set(config, "transport/auth/usrpwd/dictionary_file", str(passwords))
@@ -43,10 +46,18 @@ def open_hub(users: Mapping[str, str], access_control: dict[str, Any] | None) ->
     raise ConnectionFailedError("the hub does not say which port it listens on")
 
 
-def open_client(endpoint: str, user: str, password: str) -> zenoh.Session:
-    """A session that speaks through the hub at `endpoint`; raises ConnectionFailedError where there is none."""
-    config = _config("client", connect=[endpoint])
-    _set(config, "connect/timeout_ms", CONNECT_TIMEOUT_MS)
+def open_client(
+    endpoint: str,
+    user: str,
+    password: str,
+    *,
+    connect_timeout_s: float = CONNECT_TIMEOUT_S,
+    patience_s: float = PATIENCE_S,
+) -> zenoh.Session:
+    """A session that speaks through the hub at `endpoint`; raises ConnectionFailedError where there is none, or none
+    that lets `user` in with `password`. `patience_s`: see `_config`."""
+    config = _config("client", patience_s, connect=[endpoint])
+    _set(config, "connect/timeout_ms", round(connect_timeout_s * 1000))
     _set(config, "transport/auth/usrpwd/user", user)
     _set(config, "transport/auth/usrpwd/password", password)
     try:
@@ -83,7 +94,9 @@ def subscribe(
     return [session.declare_subscriber(one, zenoh.handlers.Callback(forward, indirect=False)) for one in needed]
 
 
-def _config(mode: str, *, listen: Iterable[str] = (), connect: Iterable[str] = ()) -> zenoh.Config:
+def _config(mode: str, patience_s: float, *, listen: Iterable[str] = (), connect: Iterable[str] = ()) -> zenoh.Config:
+    """`patience_s`: wall time after which the other side gives up a session from which nothing comes, not even a sign
+    of life, and for which a put waits for one that takes nothing. An end of the process is noticed at once."""
     config = zenoh.Config()
     _set(config, "mode", mode)
     _set(config, "scouting/multicast/enabled", False)
@@ -91,6 +104,9 @@ def _config(mode: str, *, listen: Iterable[str] = (), connect: Iterable[str] = (
     _set(config, "connect/endpoints", list(connect))
     _set(config, "transport/shared_memory/enabled", False)  # a killed process would leave segments behind
     _set(config, "transport/link/rx/max_message_size", LARGEST_MESSAGE_BYTES)
+    _set(config, "transport/link/tx/lease", round(patience_s * 1000))
+    block_us = round(patience_s * 1e6)
+    _set(config, "transport/link/tx/queue/congestion_control/block/wait_before_close", block_us)
     return config
 
 

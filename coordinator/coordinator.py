@@ -36,7 +36,7 @@ from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
 from coordinator.vehicles import KnownVehicle
 from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
-from planner.hotspots import beside
+from planner.groups import neighbours
 from planner.types import BoolArray, FloatArray, Strip
 
 log = logging.getLogger("secondlook.coordinator")
@@ -293,7 +293,7 @@ class Coordinator:
         told_open = self.map.told_by(self._primaries)
         for hotspot in self._hotspots.values():
             if hotspot.growing:
-                told_open |= beside(hotspot.cells)
+                told_open |= hotspot.cells | neighbours(hotspot.cells)
         return self._inside & told_open & ~self.map.settled_by(self._primaries)
 
     @property

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from planner.risk import LevelArray, residual_risk
+from planner.tiles import tile_shape
 from planner.types import BoolArray, FloatArray, GridSpec
 
 
@@ -49,13 +50,13 @@ class FleetMap:
     ) -> bool:
         """Takes one tile; returns whether it was news.
 
-        `version`: (incarnation, version). A tile that does not lie on the grid, or whose arrays differ in shape, raises
-        ValueError.
+        `version`: (incarnation, version). What is not one of the grid's tiles, whole and in its place, raises
+        ValueError and changes nothing: pieces that overlap would make the map depend on the order in which they come.
         """
-        rows, columns = sum_levels.shape
-        fits = first_row + rows <= self.grid.rows and first_column + columns <= self.grid.columns
-        if not fits or largest_levels.shape != sum_levels.shape or settled.shape != sum_levels.shape:
-            raise ValueError(f"a tile of {rows} x {columns} cells at {first_row}, {first_column} is not on the grid")
+        rows, columns = shape = tile_shape(self.grid, first_row, first_column)
+        if not sum_levels.shape == largest_levels.shape == settled.shape == shape:
+            told = f"{sum_levels.shape}, {largest_levels.shape} and {settled.shape}"
+            raise ValueError(f"the tile at {first_row}, {first_column} has {shape} cells, not {told}")
         layer = self.layers.get(vehicle)
         if layer is None:
             layer = self.layers[vehicle] = VehicleLayer(

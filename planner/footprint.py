@@ -9,8 +9,9 @@ import numpy as np
 
 from planner.types import FloatArray, GridSpec, Point, SweepFrame
 
-# Positions travel in centimetres, headings in microradians: a cell centre this close to a bin's edge counts as on it.
 EDGE_TOLERANCE_M = 1e-3
+"""A cell centre this close before a bin's edge counts as on it: positions travel in centimetres, headings in
+microradians."""
 
 
 @dataclass(frozen=True)
@@ -33,34 +34,38 @@ class LookGeometry:
 def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> tuple[slice, slice, FloatArray]:
     """The window of the grid that a look may touch, and the P_d that each of its cells gets, 0 where it is not seen.
 
-    `p_detect`: shape (2, along_bins, range_bins), port first. A cell is seen if its centre is (paper, section V); a
-    centre right under the track belongs to starboard. Consecutive looks of one track never see a cell twice.
+    `p_detect`: shape (2, along_bins, range_bins), port first. A cell is seen if its centre is (paper, section V). A
+    centre on the edge between two bins belongs to the one that begins there, which of two range bins is the outer; one
+    right under the track belongs to starboard. Of consecutive looks of one track exactly one sees a cell.
     """
     track = SweepFrame(*geometry.origin, geometry.heading_rad)
-    length_m = geometry.along_bins * geometry.along_bin_m
+    # Rounded, so that one look's end is the next one's begin to the last bit, however each was computed.
+    begin_m = round(geometry.first_along_m, 6)
+    end_m = round(geometry.first_along_m + geometry.along_bins * geometry.along_bin_m, 6)
     reach_m = (geometry.range_bins - 0.5) * geometry.range_bin_m
-    along_ends = np.array([geometry.first_along_m, geometry.first_along_m + length_m])
-    corners = track.to_mission(np.array([-reach_m, reach_m, -reach_m, reach_m]), np.repeat(along_ends, 2))
+    corners = track.to_mission(np.array([-reach_m, reach_m, -reach_m, reach_m]), np.repeat([begin_m, end_m], 2))
     across, along = grid.frame.to_sweep(*corners)
-    columns = _window(across / grid.cell_m, grid.columns)
-    rows = _window(along / grid.cell_m - 0.5, grid.rows)
+    columns = _window(across, grid.across_m)
+    rows = _window(along, grid.along_m)
     turn_rad = geometry.heading_rad - grid.frame.heading_rad
     origin_across, origin_along = grid.frame.to_sweep(*geometry.origin)
     du = (grid.across_m[columns] - origin_across)[np.newaxis, :]
     dv = (grid.along_m[rows] - origin_along)[:, np.newaxis]
     sin, cos = math.sin(turn_rad), math.cos(turn_rad)
     lateral_m = du * cos - dv * sin
-    along_m = du * sin + dv * cos - geometry.first_along_m
-    along_bin = np.floor((along_m + EDGE_TOLERANCE_M) / geometry.along_bin_m).astype(np.intp)
-    range_bin = np.rint(np.abs(lateral_m) / geometry.range_bin_m).astype(np.intp)
+    along_m = du * sin + dv * cos + EDGE_TOLERANCE_M
+    along_bin = np.floor((along_m - begin_m) / geometry.along_bin_m).astype(np.intp)
+    range_bin = np.floor((np.abs(lateral_m) + EDGE_TOLERANCE_M) / geometry.range_bin_m + 0.5).astype(np.intp)
     side = (lateral_m >= -EDGE_TOLERANCE_M).astype(np.intp)
-    seen = (along_bin >= 0) & (along_bin < geometry.along_bins) & (range_bin < geometry.range_bins)
+    seen = (along_m >= begin_m) & (along_m < end_m) & (range_bin < geometry.range_bins)
     np.clip(along_bin, 0, geometry.along_bins - 1, out=along_bin)
     np.minimum(range_bin, geometry.range_bins - 1, out=range_bin)
     return rows, columns, np.where(seen, p_detect[side, along_bin, range_bin], 0.0)
 
 
-def _window(cells: FloatArray, count: int) -> slice:
-    first = min(max(math.floor(float(cells.min()) - 0.5), 0), count)
-    last = min(max(math.ceil(float(cells.max()) + 0.5) + 1, first), count)
-    return slice(first, last)
+def _window(corners_m: FloatArray, centres_m: FloatArray) -> slice:
+    """The cells along one axis of the grid with their centres between a look's corners, all in the sweep frame."""
+    margin_m = 2 * EDGE_TOLERANCE_M  # one that a bin may begin early, one for rounding
+    ends_m = float(corners_m.min()) - margin_m, float(corners_m.max()) + margin_m
+    first, behind_last = np.searchsorted(centres_m, ends_m).tolist()
+    return slice(first, behind_last)

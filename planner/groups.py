@@ -7,50 +7,77 @@ from numpy.typing import NDArray
 
 from planner.types import BoolArray
 
+IndexArray = NDArray[np.intp]
+
+
+def neighbours(cells: BoolArray) -> BoolArray:
+    """The cells that share a side with one of the given, which may be among them."""
+    found = np.zeros_like(cells)
+    found[1:] |= cells[:-1]
+    found[:-1] |= cells[1:]
+    found[:, 1:] |= cells[:, :-1]
+    found[:, :-1] |= cells[:, 1:]
+    return found
+
 
 def label_groups(cells: BoolArray, block: int) -> tuple[NDArray[np.int32], int]:
-    """Numbers the groups of cells that touch along an edge; returns the number of each cell (0 elsewhere) and how many.
+    """Numbers the groups of cells that touch by their sides.
 
-    Groups end at the borders of blocks of `block` x `block` cells, counted from the array's corner. The numbers follow
-    the first cell of each group, column by column within a block. Works on runs of cells along the first axis: the
-    labelling of a general image library costs more to import than all of a mission's calls together.
+    Works on runs, cells of a row that follow each other within a block. The labelling of a general image library costs
+    more to import than all of a mission's calls together.
+
+    Args:
+        cells: shape (rows, columns).
+        block: groups end at the borders of blocks of so many rows and columns, counted from the array's corner; >= 1.
+
+    Returns:
+        The number of each cell's group, 0 elsewhere, same shape; and how many groups there are. Numbers count from 1 in
+        the order of the groups' first cells, row by row.
+
+    Raises:
+        ValueError: `block` is below 1.
     """
+    if block < 1:
+        raise ValueError(f"a block has at least one row and column, not {block}")
+    # A run is told by the places of its first and last cell in the flattened array.
+    goes_on = cells[:, :-1] & cells[:, 1:]
+    goes_on[:, block - 1 :: block] = False
+    begins, ends = cells.copy(), cells.copy()
+    begins[:, 1:] ^= goes_on
+    ends[:, :-1] ^= goes_on
+    first, last = np.flatnonzero(begins), np.flatnonzero(ends)
+
+    leader = _connected(first.size, *_neighbours(first, last, cells.shape[1], block))
+    number = np.cumsum(leader == np.arange(leader.size), dtype=np.int32)
     labels = np.zeros(cells.shape, dtype=np.int32)
-    count = 0
-    rows, columns = cells.shape
-    for row in range(0, rows, block):
-        for column in range(0, columns, block):
-            window = (slice(row, row + block), slice(column, column + block))
-            if cells[window].any():
-                count += _label_block(cells[window], labels[window], count)
-    return labels, count
+    labels[cells] = np.repeat(number[leader], last - first + 1)
+    return labels, int(number[-1]) if number.size else 0
 
 
-def _label_block(cells: BoolArray, labels: NDArray[np.int32], offset: int) -> int:
-    padded = np.zeros((cells.shape[0] + 2, cells.shape[1]), dtype=np.int8)
-    padded[1:-1] = cells
-    steps = np.diff(padded, axis=0).T  # per column: +1 where a run begins, -1 behind its end
-    columns, begins = (places.tolist() for places in np.nonzero(steps == 1))
-    ends = np.nonzero(steps == -1)[1].tolist()
-    parent = list(range(len(begins)))
+def _neighbours(first: IndexArray, last: IndexArray, columns: int, block: int) -> tuple[IndexArray, IndexArray]:
+    """The pairs of runs, one below the other in one block, that have a column in common.
 
-    def root(run: int) -> int:
-        while parent[run] != run:
-            parent[run] = parent[parent[run]]
-            run = parent[run]
-        return run
+    Args:
+        first: the place of each run's first cell, ascending.
+        last: that of its last.
+        columns: of the array.
+        block: rows of a block.
+    """
+    lowest = np.searchsorted(last, first - columns)
+    counts = np.searchsorted(first, last - columns, side="right") - lowest
+    counts[first // columns % block == 0] = 0
+    above = np.repeat(np.arange(first.size), counts)
+    below = np.arange(above.size) + np.repeat(lowest + counts - np.cumsum(counts), counts)
+    return above, below
 
-    other = 0
-    for run, column in enumerate(columns):
-        while columns[other] < column - 1 or (columns[other] == column - 1 and ends[other] <= begins[run]):
-            other += 1
-        neighbour = other
-        while columns[neighbour] == column - 1 and begins[neighbour] < ends[run]:
-            one, two = root(neighbour), root(run)
-            parent[max(one, two)] = min(one, two)
-            neighbour += 1
-    numbers: dict[int, int] = {}
-    for run, column in enumerate(columns):
-        number = numbers.setdefault(root(run), offset + len(numbers) + 1)
-        labels[begins[run] : ends[run], column] = number
-    return len(numbers)
+
+def _connected(count: int, one: IndexArray, other: IndexArray) -> IndexArray:
+    """For each of so many runs the first run that the pairs, one run and the other, connect it with."""
+    leader = np.arange(count)
+    while True:
+        leads_one, leads_other = leader[one], leader[other]
+        if np.array_equal(leads_one, leads_other):
+            return leader
+        # Of two leaders the later follows the earlier; then everyone follows the leader's leader.
+        np.minimum.at(leader, np.maximum(leads_one, leads_other), np.minimum(leads_one, leads_other))
+        leader = leader[leader]

@@ -1,30 +1,33 @@
-"""Hotspots: areas whose cells are settled and badly seen, each under an id that stays its own.
-
-Hot cells that touch make one hotspot, cut at the borders of 500 m blocks so that none grows without bound.
-"""
+"""Hotspots: patches of cells that are settled and badly seen, each under a number that it keeps for life."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
-from planner.groups import label_groups
+from planner.groups import label_groups, neighbours
+from planner.outline import outline
 from planner.types import BoolArray, FloatArray, GridSpec, Point
 
-BLOCK_M = 500.0
-SMALLEST_M2 = 400.0
-MOST_CORNERS = 40
+NumberArray = NDArray[np.int32]
+IndexArray = NDArray[np.intp]
 
-IdArray = NDArray[np.int32]
+MOST_VERTICES = 40
+"""An outline has no more."""
 
 
 @dataclass(frozen=True)
-class HotspotArea:
-    """A hotspot: its outline (mission frame, covering its cells' centres, at most 40 corners), the mean residual risk
-    over its cells, how many they are, and whether it touches cells that are not settled yet."""
+class Hotspot:
+    """A patch of badly seen cells.
+
+    `outline`: its vertices, mission frame, not repeated at the end, at most 40; covers all of the patch's cells, holes
+    and small notches included. `mean_risk`: mean residual risk of its cells, to 1e-4. `growing`: whether it touches a
+    cell that is not settled, so that it may still become larger.
+    """
 
     number: int
     outline: tuple[Point, ...]
@@ -33,135 +36,166 @@ class HotspotArea:
     growing: bool
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HotspotMap:
-    """The hotspots that stand: the id of each hot cell (0 elsewhere), those that still grow, and the next free id."""
+    """The hotspots at one time.
 
-    ids: IdArray
-    growing: frozenset[int]
-    next_id: int
+    `numbers`: which hotspot each cell belongs to, shape `grid.shape`, 0 for none; `hotspots`: by number;
+    `next_number`: the number that the next new one gets, above all that were ever given.
+    """
 
-    @staticmethod
-    def empty(grid: GridSpec) -> HotspotMap:
-        """No hotspots yet; ids count from 1."""
-        return HotspotMap(np.zeros(grid.shape, dtype=np.int32), frozenset(), 1)
+    numbers: NumberArray
+    hotspots: Mapping[int, Hotspot] = field(default_factory=lambda: MappingProxyType({}))
+    next_number: int = 1
+
+    @classmethod
+    def empty(cls, grid: GridSpec) -> HotspotMap:
+        """The map before the first hotspot."""
+        return cls(np.zeros(grid.shape, dtype=np.int32))
 
 
-@dataclass(frozen=True)
-class HotspotChange:
-    """What is new: the hotspots that stand now, those among them that are new or changed, and ids that are gone, each
-    with the id that took its cells over (0 for none)."""
+@dataclass(frozen=True, eq=False)
+class HotspotUpdate:
+    """What became of the hotspots.
+
+    `changed`: those that are new or differ from before, by number; `withdrawn`: the numbers that are no more, each
+    with the number of the hotspot that now holds most of its cells, or None where none does.
+    """
 
     map: HotspotMap
-    changed: tuple[HotspotArea, ...]
-    withdrawn: dict[int, int]
+    changed: tuple[Hotspot, ...]
+    withdrawn: Mapping[int, int | None]
 
 
-def find_hotspots(
-    grid: GridSpec, hot: BoolArray, open_cells: BoolArray, risk: FloatArray, before: HotspotMap
-) -> HotspotChange:
-    """Groups hot cells and matches them with the hotspots of before.
+def update_hotspots(
+    grid: GridSpec,
+    hot: BoolArray,
+    unsettled: BoolArray,
+    risk: FloatArray,
+    previous: HotspotMap,
+    *,
+    block_m: float = 500.0,
+    least_area_m2: float = 400.0,
+) -> HotspotUpdate:
+    """The hotspots in a map, carried on from those before.
 
-    `hot`: settled and badly seen. `open_cells`: inside the area and not settled. Arrays have grid shape. A group keeps
-    the id that most of its cells had; the larger group wins an id that two claim; ids are not used again.
+    A hotspot is a patch of hot cells that touch by their sides. Patches are cut at the borders of blocks, so that one
+    hotspot stays small enough for one revisit. A patch keeps the number that most of its cells had (of equals the
+    lowest); where two claim one number the patch of more cells has it (of equals the first along the rows), and the
+    other keeps the number that most of its other cells had, where nobody else keeps that, or gets a new one. A number
+    is never given twice.
+
+    Args:
+        grid: the cells.
+        hot: the cells that are settled, inside and at or above the threshold of risk, shape `grid.shape`.
+        unsettled: the cells inside that are not settled, same shape.
+        risk: residual risk, same shape.
+        previous: what the last update gave, or `HotspotMap.empty`.
+        block_m: side of the square blocks, counted in whole cells from the grid's first, > 0.
+        least_area_m2: smaller patches are left out.
+
+    Raises:
+        ValueError: an array has another shape than the grid, or `block_m` is not finite and above 0.
     """
-    previous, next_id = before.ids, before.next_id
-    groups, count = label_groups(hot, block=max(1, int(BLOCK_M / grid.cell_m)))
-    flat_groups, flat_previous = groups.ravel(), previous.ravel()
-    sizes = np.bincount(flat_groups, minlength=count + 1)
-    id_of_group = np.zeros(count + 1, dtype=np.int32)
-    claimed: set[int] = set()
-    both = (flat_groups > 0) & (flat_previous > 0)
-    votes: dict[int, list[tuple[int, int]]] = {}
-    if both.any():
-        pairs, counts = np.unique(np.stack([flat_groups[both], flat_previous[both]]), axis=1, return_counts=True)
-        for group, old, shared in zip(pairs[0].tolist(), pairs[1].tolist(), counts.tolist(), strict=True):
-            votes.setdefault(group, []).append((shared, old))
-    large_enough = [group for group in range(1, count + 1) if sizes[group] * grid.cell_area_m2 >= SMALLEST_M2]
-    for group in sorted(large_enough, key=lambda group: (-int(sizes[group]), group)):
-        for _, old in sorted(votes.get(group, []), key=lambda vote: (-vote[0], vote[1])):
-            if old not in claimed:
-                id_of_group[group] = old
-                claimed.add(old)
-                break
-    for group in large_enough:
-        if id_of_group[group] == 0:
-            id_of_group[group] = next_id
-            next_id += 1
-    ids = id_of_group[groups]
-    touches_open = beside(open_cells)
-    growing: set[int] = set()
-    changed: list[HotspotArea] = []
-    for number, window in _windows(ids):
-        cells = ids[window] == number
-        grows = bool((cells & touches_open[window]).any())
-        if grows:
-            growing.add(number)
-        old = previous == number
-        same_cells = np.count_nonzero(old) == np.count_nonzero(cells) and np.array_equal(cells, old[window])
-        if not same_cells or grows != (number in before.growing):
-            mean_risk = float(risk[window][cells].mean())
-            outline = _outline(grid, cells, window)
-            changed.append(HotspotArea(number, outline, mean_risk, int(np.count_nonzero(cells)), grows))
-    gone = set(np.unique(previous).tolist()) - set(np.unique(ids).tolist()) - {0}
-    withdrawn = {old_id: _heir(ids[previous == old_id]) for old_id in sorted(gone)}
-    return HotspotChange(HotspotMap(ids, frozenset(growing), next_id), tuple(changed), withdrawn)
+    if not hot.shape == unsettled.shape == risk.shape == previous.numbers.shape == grid.shape:
+        raise ValueError(f"hotspots need arrays of the grid's shape, {grid.shape}")
+    if not 0 < block_m < np.inf:
+        raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
+    labels, count = label_groups(hot, max(1, int(block_m / grid.cell_m)))
+    occupied = np.flatnonzero(hot)
+    labels_there = labels.ravel()[occupied]
+    sizes = np.bincount(labels_there, minlength=count + 1)
+    large_enough = (sizes > 0) & (sizes * grid.cell_area_m2 >= least_area_m2)
+    kept = np.flatnonzero(large_enough).tolist()
 
+    in_kept = large_enough[labels_there]
+    number_of = _carried_on(labels_there[in_kept], previous.numbers.ravel()[occupied[in_kept]], sizes)
+    next_number = previous.next_number
+    for label in kept:
+        if label not in number_of:
+            number_of[label] = next_number
+            next_number += 1
+    lookup = np.zeros(count + 1, dtype=np.int32)
+    lookup[kept] = [number_of[label] for label in kept]
+    numbers = lookup[labels]
 
-def beside(cells: BoolArray) -> BoolArray:
-    """The cells and their four neighbours."""
-    beside = cells.copy()
-    beside[1:] |= cells[:-1]
-    beside[:-1] |= cells[1:]
-    beside[:, 1:] |= cells[:, :-1]
-    beside[:, :-1] |= cells[:, 1:]
-    return beside
+    moved = np.flatnonzero(numbers != previous.numbers)
+    reshaped = {*np.unique(numbers.ravel()[moved]).tolist(), *np.unique(previous.numbers.ravel()[moved]).tolist()}
+    risk_sums = np.bincount(labels_there, weights=risk.ravel()[occupied], minlength=count + 1)
+    growing = np.bincount(labels_there[neighbours(unsettled).ravel()[occupied]], minlength=count + 1)
 
-
-def _windows(ids: IdArray) -> list[tuple[int, tuple[slice, slice]]]:
-    """For each id, ascending, the smallest window with all its cells."""
-    rows, columns = np.nonzero(ids)
-    numbers, inverse = np.unique(ids[rows, columns], return_inverse=True)
-    low = np.full((2, numbers.size), np.iinfo(np.int64).max)
-    high = np.full((2, numbers.size), -1)
-    for axis, places in enumerate((rows, columns)):
-        np.minimum.at(low[axis], inverse, places)
-        np.maximum.at(high[axis], inverse, places)
-    return [
-        (int(number), (slice(int(top), int(bottom) + 1), slice(int(left), int(right) + 1)))
-        for number, (top, left), (bottom, right) in zip(numbers, low.T, high.T, strict=True)
-    ]
-
-
-def _outline(grid: GridSpec, cells: BoolArray, window: tuple[slice, slice]) -> tuple[Point, ...]:
-    padded = np.zeros((cells.shape[0] + 2, cells.shape[1]), dtype=np.int8)
-    padded[1:-1] = cells
-    steps = np.diff(padded, axis=0).T  # per column: +1 where a run of rows begins, -1 behind its end
-    columns, begins = np.nonzero(steps == 1)
-    _, ends = np.nonzero(steps == -1)
-    first_row, first_column = window[0].start, window[1].start
-    boxes = shapely.box(
-        (columns + first_column - 0.5) * grid.cell_m,
-        (begins + first_row) * grid.cell_m,
-        (columns + first_column + 0.5) * grid.cell_m,
-        (ends + first_row) * grid.cell_m,
+    hotspots, changed = {}, []
+    for label in kept:
+        number = number_of[label]
+        before = previous.hotspots.get(number)
+        now = Hotspot(
+            number=number,
+            outline=(
+                before.outline
+                if before is not None and number not in reshaped
+                else _outline(grid, occupied[labels_there == label])
+            ),
+            mean_risk=round(float(risk_sums[label] / sizes[label]), 4),
+            cells=int(sizes[label]),
+            growing=bool(growing[label]),
+        )
+        hotspots[number] = now
+        if now != before:
+            changed.append(now)
+    return HotspotUpdate(
+        HotspotMap(numbers, MappingProxyType(hotspots), next_number),
+        tuple(sorted(changed, key=lambda hotspot: hotspot.number)),
+        {number: _heir(numbers[previous.numbers == number]) for number in previous.hotspots if number not in hotspots},
     )
-    whole = shapely.union_all(boxes)
-    assert isinstance(whole, shapely.Polygon)
-    outer = shapely.Polygon(whole.exterior)
-    simple = outer
-    tolerance_m = grid.cell_m
-    while len(simple.exterior.coords) - 1 > MOST_CORNERS:
-        # Widened by what simplifying may cut off, so that the outline goes on covering its cells.
-        widened = outer.buffer(tolerance_m, join_style="mitre").simplify(tolerance_m)
-        assert isinstance(widened, shapely.Polygon)
-        simple = shapely.Polygon(widened.exterior)
-        tolerance_m *= 1.5
-    across, along = np.asarray(simple.exterior.coords[:-1]).T
-    x_m, y_m = grid.frame.to_mission(across, along)
+
+
+def _carried_on(labels: NumberArray, previous_numbers: NumberArray, sizes: IndexArray) -> dict[int, int]:
+    """Which patches carry on which numbers.
+
+    Args:
+        labels: the label of each cell in a patch.
+        previous_numbers: the number that cell had, same shape.
+        sizes: cells of each label.
+    """
+    had_one = previous_numbers > 0
+    pairs, shared = np.unique(
+        labels[had_one].astype(np.int64) << 32 | previous_numbers[had_one].astype(np.int64), return_counts=True
+    )
+    wanted: dict[int, list[int]] = {}
+    # Ascending by number where shares are equal, because the pairs are.
+    for pair in pairs[np.argsort(-shared, kind="stable")].tolist():
+        wanted.setdefault(pair >> 32, []).append(pair & 0xFFFFFFFF)
+    number_of: dict[int, int] = {}
+    taken: set[int] = set()
+    largest_first = sorted(wanted, key=lambda label: (-sizes[label], label))
+    # Nobody takes another number before everybody had a chance at the one wanted most.
+    for most in (1, None):
+        for label in largest_first:
+            if label not in number_of:
+                for number in wanted[label][:most]:
+                    if number not in taken:
+                        number_of[label] = number
+                        taken.add(number)
+                        break
+    return number_of
+
+
+def _outline(grid: GridSpec, patch: IndexArray) -> tuple[Point, ...]:
+    """A patch's outline in the mission frame; `patch`: its cells' places in the flattened grid."""
+    rows, columns = np.divmod(patch, grid.columns)
+    first_row, first_column = int(rows.min()), int(columns.min())
+    cells = np.zeros((int(rows.max()) - first_row + 1, int(columns.max()) - first_column + 1), dtype=np.bool_)
+    cells[rows - first_row, columns - first_column] = True
+    vertices = outline(cells, MOST_VERTICES)
+    # A column is centred at a whole multiple of the cell's side; a row begins at one.
+    across_m = (vertices[:, 0] + first_column - 0.5) * grid.cell_m
+    along_m = (vertices[:, 1] + first_row) * grid.cell_m
+    x_m, y_m = grid.frame.to_mission(across_m, along_m)
     return tuple(zip(x_m.tolist(), y_m.tolist(), strict=True))
 
 
-def _heir(ids: IdArray) -> int:
-    taken = ids[ids > 0]
-    return int(np.bincount(taken).argmax()) if taken.size else 0
+def _heir(numbers: NumberArray) -> int | None:
+    """The number that most of some cells have, of equals the lowest; None where none has any."""
+    counts = np.bincount(numbers, minlength=1)
+    counts[0] = 0
+    return int(np.argmax(counts)) if counts.any() else None

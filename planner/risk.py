@@ -16,7 +16,6 @@ from planner.types import BoolArray, FloatArray, GridSpec
 NATS_PER_LEVEL = 0.02
 MOST_LEVELS = 255
 HIGHEST_P_DETECT = 0.999
-WORST_SHARE = 0.30
 
 LevelArray = NDArray[np.uint8]
 
@@ -27,6 +26,8 @@ class RiskLayer:
     def __init__(self, grid: GridSpec) -> None:
         self.sum_nats: FloatArray = np.zeros(grid.shape)
         self.largest_nats: FloatArray = np.zeros(grid.shape)
+        self._sum_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
+        self._largest_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
 
     def add_look(self, rows: slice, columns: slice, p_detect: FloatArray) -> None:
         """Adds a look's P_d per cell of a window, 0 where a cell was not seen.
@@ -38,14 +39,16 @@ class RiskLayer:
         nats = -np.log1p(-p_detect)
         self.sum_nats[rows, columns] += nats
         np.maximum(self.largest_nats[rows, columns], nats, out=self.largest_nats[rows, columns])
+        self._sum_levels[rows, columns] = to_levels(self.sum_nats[rows, columns])
+        self._largest_levels[rows, columns] = to_levels(self.largest_nats[rows, columns])
 
     def sum_levels(self) -> LevelArray:
         """The sums in levels; they saturate at 255, a residual risk of 0.006."""
-        return to_levels(self.sum_nats)
+        return self._sum_levels.copy()
 
     def largest_levels(self) -> LevelArray:
         """The largest single looks in levels; they saturate at 255 (one look of P_d 0.994)."""
-        return to_levels(self.largest_nats)
+        return self._largest_levels.copy()
 
 
 def to_levels(nats: FloatArray) -> LevelArray:
@@ -57,8 +60,11 @@ def to_levels(nats: FloatArray) -> LevelArray:
 def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.integer], rho: float = 0.0) -> FloatArray:
     """RR = exp(-(largest + (1 - rho) (sum - largest))) per cell.
 
-    `rho` in [0, 1]: how far looks at one cell tell the same story; 0 is the paper's product over looks (equation 2).
+    `rho`: how far looks at one cell tell the same story; 0 is the paper's product over looks (equation 2), with 1 only
+    the best counts. Raises ValueError where it is not in [0, 1].
     """
+    if not 0.0 <= rho <= 1.0:
+        raise ValueError(f"rho must lie in [0, 1], not {rho}")
     if rho == 0.0:
         return _exp(-NATS_PER_LEVEL * sum_levels.astype(np.float64))
     largest = largest_levels.astype(np.float64)
@@ -81,13 +87,19 @@ class RiskStatistics:
 
 
 def risk_statistics(risk: FloatArray, seen: BoolArray, inside: BoolArray) -> RiskStatistics:
-    """Statistics over the cells inside the area; `seen`: cells with at least one look. All arrays of grid shape."""
+    """Statistics over the cells inside the area.
+
+    All arrays have grid shape. `seen`: cells with at least one level, which is to say with at least one look. The worst
+    30 % are counted to the nearest cell, and at least one. Raises ValueError where no cell is inside.
+    """
     values = risk[inside]
-    worst = max(1, round(WORST_SHARE * values.size))
+    if not values.size:
+        raise ValueError("no cell lies inside the area")
+    worst = max(1, (3 * values.size + 5) // 10)
     ranked = np.partition(values, values.size - worst)
     return RiskStatistics(
         cells=int(values.size),
         mean=float(values.mean()),
         worst30_mean=float(ranked[values.size - worst :].mean()),
-        uncovered_share=float(1.0 - np.count_nonzero(seen[inside]) / values.size),
+        uncovered_share=float(np.count_nonzero(~seen[inside]) / values.size),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from planner.dubins import Pose, shortest_path
 from planner.types import Strip, SweepFrame, Track
@@ -11,11 +12,15 @@ LENGTH_TOLERANCE_M = 1e-6
 
 
 def legs_over_strip(strip: Strip, swath_m: float) -> list[Track]:
-    """The fewest parallel legs along a strip that cover its width with a swath of `swath_m` > 0, evenly spread.
+    """The fewest parallel legs along a strip that cover its width with a swath of `swath_m`, evenly spread.
 
     Numbered from 1; `across_m` is the offset from the strip's left edge. Directions alternate, the first leg runs the
-    strip's way.
+    strip's way. Raises ValueError where the swath, or the strip's length or width, is not finite and above 0.
     """
+    if not all(math.isfinite(extent_m) and extent_m > 0 for extent_m in (swath_m, strip.length_m, strip.width_m)):
+        raise ValueError(
+            f"a sweep needs lengths above 0: swath {swath_m} m, strip {strip.length_m} m by {strip.width_m} m"
+        )
     count = max(1, math.ceil((strip.width_m - LENGTH_TOLERANCE_M) / swath_m))
     frame = SweepFrame(*strip.start, strip.heading_rad)
     legs = []
@@ -30,12 +35,22 @@ def legs_over_strip(strip: Strip, swath_m: float) -> list[Track]:
 def cheapest_entry(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> tuple[list[Track], float]:
     """The legs in the order and direction that is shortest from `pose`, and the whole distance in metres.
 
-    The legs are kept in sequence, from the first or from the last, and in their directions or all turned round; each
-    is entered and left straight for `run_in_m`.
+    The legs are kept in sequence, from the first or from the last, and in their directions or all turned round; of ways
+    equally long the first in this sentence is taken. They are numbered from 1 in the order of flying. Each is entered
+    straight for `run_in_m` >= 0, and left so where another follows. Raises ValueError where there are no legs, or the
+    run-in or the turn radius is not finite or out of its range.
     """
-    turned = [Track(leg.number, leg.across_m, leg.end, leg.start) for leg in legs]
-    ways = [legs, legs[::-1], turned, turned[::-1]]
-    return min(((way, _distance_m(way, pose, turn_radius_m, run_in_m)) for way in ways), key=lambda found: found[1])
+    if not legs:
+        raise ValueError("a sweep has at least one leg")
+    if not (math.isfinite(run_in_m) and run_in_m >= 0):
+        raise ValueError(f"the run-in must be finite and 0 or more, not {run_in_m} m")
+    turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
+    best, best_m = legs, math.inf
+    for way in (legs, legs[::-1], turned, turned[::-1]):
+        distance_m = _distance_m(way, pose, turn_radius_m, run_in_m)
+        if distance_m < best_m - LENGTH_TOLERANCE_M:
+            best, best_m = way, distance_m
+    return [replace(leg, number=number) for number, leg in enumerate(best, start=1)], best_m
 
 
 def _distance_m(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> float:

@@ -18,6 +18,9 @@ class Tile:
     first_column: int
     window: tuple[slice, slice]
 
+    def __hash__(self) -> int:
+        return hash((self.first_row, self.first_column))
+
 
 def tiles(grid: GridSpec) -> tuple[Tile, ...]:
     """All tiles of a grid, row by row; those at the far edges may be smaller."""
@@ -34,3 +37,27 @@ def tiles(grid: GridSpec) -> tuple[Tile, ...]:
         for row in range(0, grid.rows, TILE_CELLS)
         for column in range(0, grid.columns, TILE_CELLS)
     )
+
+
+def tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, columns: slice) -> list[Tile]:
+    """The tiles, out of all of the grid's, that share a cell with a window."""
+    if rows.start >= rows.stop or columns.start >= columns.stop:
+        return []
+    a_row = -(-grid.columns // TILE_CELLS)
+    return [
+        all_tiles[row * a_row + column]
+        for row in range(rows.start // TILE_CELLS, (rows.stop - 1) // TILE_CELLS + 1)
+        for column in range(columns.start // TILE_CELLS, (columns.stop - 1) // TILE_CELLS + 1)
+    ]
+
+
+def tile_shape(grid: GridSpec, first_row: int, first_column: int) -> tuple[int, int]:
+    """How many rows and columns the tile has that begins at a cell.
+
+    Raises:
+        ValueError: no tile of the grid begins there.
+    """
+    on_grid = 0 <= first_row < grid.rows and 0 <= first_column < grid.columns
+    if not on_grid or first_row % TILE_CELLS or first_column % TILE_CELLS:
+        raise ValueError(f"no tile of a grid of {grid.rows} x {grid.columns} begins at {first_row}, {first_column}")
+    return min(TILE_CELLS, grid.rows - first_row), min(TILE_CELLS, grid.columns - first_column)

@@ -2,7 +2,8 @@
 
 Standard input: the length and the pickle of a `ChildOrder`, then, but for the hub, one line with the hub's endpoint; it
 stays open as long as the launcher lives, and the child ends when it closes. The file descriptor named in
-SECONDLOOK_STATUS_FD: one JSON object a line for the launcher.
+SECONDLOOK_STATUS_FD: one JSON object a line for the launcher. The arguments say run and host, for whoever looks at the
+list of processes.
 """
 
 from __future__ import annotations
@@ -23,11 +24,13 @@ from comms.control import RunKeys
 from comms.routing import Routing
 from comms.runner import NodeError
 from comms.zenoh_host import ListenerHost, serve_nodes
-from comms.zenoh_hub import FleetError, Hub
+from comms.zenoh_hub import FleetError, HostLostError, Hub
 from comms.zenoh_session import ConnectionFailedError, open_client, open_hub
 from secondlook.child_order import STATUS_FD, ChildOrder, read_order
+from secondlook.node_spec import make_nodes
 
-ORPHANED = 3  # exit code when the launcher is gone
+FAILED = 1  # exit codes: after a sentence for the launcher, and when the launcher is gone
+ORPHANED = 3
 
 
 def main() -> int:
@@ -47,9 +50,12 @@ def main() -> int:
             _be_listener(order)
         else:
             _be_host(order)
+    except HostLostError as error:
+        tell(lost=error.host, at_ms=error.at_ms)
+        return FAILED
     except (NodeError, FleetError, RunawayError, ConnectionFailedError) as error:
         tell(failed=str(error))
-        return 1
+        return FAILED
     return 0
 
 
@@ -60,44 +66,58 @@ def _read_endpoint(pipe: IO[bytes]) -> str:
     return line.decode().strip()
 
 
-def _when_launcher_goes(act: Callable[[], None]) -> None:
-    def wait() -> None:
+class _LauncherWatch:
+    """Acts when the launcher's pipe closes: ends the process at once, unless `act` is set to something milder."""
+
+    def __init__(self) -> None:
+        self.act: Callable[[], None] = lambda: os._exit(ORPHANED)
+        threading.Thread(target=self._wait, daemon=True).start()
+
+    def _wait(self) -> None:
         # Not through sys.stdin: a thread blocked inside its buffer would break the interpreter's shutdown.
         while os.read(sys.stdin.fileno(), 1):
             pass
-        act()
-
-    threading.Thread(target=wait, daemon=True).start()
+        self.act()
 
 
 def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
     assert order.run_info is not None
-    _when_launcher_goes(lambda: os._exit(ORPHANED))
+    _LauncherWatch()
+    nodes = make_nodes(order.specs)
     routing, keys = Routing(order.roster), RunKeys(order.run)
-    session, endpoint = open_hub(order.passwords, access_rules(routing, order.hosts, keys))
+    rules = access_rules(routing, order.hosts, keys)
+    session, endpoint = open_hub(order.passwords, rules, patience_s=order.patience_s)
     with session:
-        tell(endpoint=endpoint)
-        nodes = {node_id: spec.make() for node_id, spec in order.specs.items()}
-        hub = Hub(session, keys, routing, order.hosts, nodes, order.time_limit_ms)
+        hub = Hub(
+            session,
+            keys,
+            routing,
+            order.hosts,
+            nodes,
+            order.time_limit_ms,
+            patience_s=order.patience_s,
+            alive=lambda now_ms: tell(alive_ms=now_ms),
+        )
+        tell(endpoint=endpoint)  # now that the hub hears whoever connects
         result = hub.run(order.run_info)
         tell(result={**asdict(result), "ending": result.ending.value})
 
 
 def _be_host(order: ChildOrder) -> None:
-    nodes = {node_id: spec.make() for node_id, spec in order.specs.items()}
+    nodes = make_nodes(order.specs)
     endpoint = _read_endpoint(sys.stdin.buffer)
-    _when_launcher_goes(lambda: os._exit(ORPHANED))
-    with open_client(endpoint, order.host, order.password) as session:
+    _LauncherWatch()
+    with open_client(endpoint, order.host, order.password, patience_s=order.patience_s) as session:
         serve_nodes(session, RunKeys(order.run), order.host, nodes, Routing(order.roster))
 
 
 def _be_listener(order: ChildOrder) -> None:
-    (node_id, spec), *_ = order.specs.items()
-    listener = spec.make()
+    ((node_id, listener),) = make_nodes(order.specs).items()
     endpoint = _read_endpoint(sys.stdin.buffer)
-    with open_client(endpoint, order.host, order.password) as session:
+    watch = _LauncherWatch()
+    with open_client(endpoint, order.host, order.password, patience_s=order.patience_s) as session:
         host = ListenerHost(session, RunKeys(order.run), order.host, node_id, listener, Routing(order.roster))
-        _when_launcher_goes(host.interrupt)
+        watch.act = host.interrupt
         host.run()
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+import sys
 from dataclasses import dataclass, field
 from typing import IO
 
@@ -16,13 +17,15 @@ STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor 
 
 @dataclass(frozen=True)
 class ChildOrder:
-    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock."""
+    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock.
+    `patience_s`: wall time after which someone silent is given up."""
 
     run: str
     host: str
     password: str
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
+    patience_s: float
     is_hub: bool = False
     is_listener: bool = False
     hosts: tuple[HostPlan, ...] = ()
@@ -32,8 +35,8 @@ class ChildOrder:
 
 
 def write_order(pipe: IO[bytes], order: ChildOrder) -> None:
-    """Sends an order to a child's standard input."""
-    pickled = pickle.dumps(order)
+    """Sends an order to a child's standard input, with the launcher's import path: a user's own parts may lie there."""
+    pickled = pickle.dumps((sys.path, pickle.dumps(order)))
     pipe.write(len(pickled).to_bytes(8, "big") + pickled)
     pipe.flush()
 
@@ -41,6 +44,9 @@ def write_order(pipe: IO[bytes], order: ChildOrder) -> None:
 def read_order(pipe: IO[bytes]) -> ChildOrder:
     """Waits for the launcher's order."""
     size = int.from_bytes(pipe.read(8), "big")
-    order = pickle.loads(pipe.read(size))
+    path, pickled = pickle.loads(pipe.read(size))
+    # Behind our own path, so that nothing there can stand in a room's way.
+    sys.path.extend(entry for entry in path if entry not in sys.path)
+    order = pickle.loads(pickled)
     assert isinstance(order, ChildOrder)
     return order

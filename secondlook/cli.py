@@ -10,6 +10,7 @@ import typer
 
 from secondlook.commands.check import check
 from secondlook.commands.plan import plan
+from secondlook.commands.replay import replay
 from secondlook.commands.run import run
 from secondlook.commands.scenarios import scenarios
 from secondlook.errors import UserError
@@ -42,7 +43,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan):
+for command in (run, scenarios, check, plan, replay):
     app.command()(command)
 
 

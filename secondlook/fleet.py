@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 from comms.codec import SCHEMA_VERSION
 from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from comms.routing import RosterNode
-from coordinator.allocation import Allocator, GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from planner.area import SurveyArea
-from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
 from secondlook.errors import UserError
 from secondlook.node_spec import NodeSpec
+from secondlook.parts import ALLOCATOR, SONAR, SPACING, PartError, PartKind
 from secondlook.scenario import (
     PatchySeabed,
     RevisitVehicle,
@@ -23,8 +23,6 @@ from secondlook.scenario import (
 )
 from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
 from vehicle_agent.config import RevisitConfig, SurveyConfig
-
-ALLOCATORS: dict[str, Allocator] = {"greedy": GreedyAllocator(), "none": NoAllocator()}
 
 
 @dataclass(frozen=True)
@@ -81,7 +79,9 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
     specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))}
     for name, vehicle in scenario.vehicles.items():
         specs[name] = _agent_spec(name, vehicle)
-    specs["coordinator"] = NodeSpec("coordinator.coordinator:Coordinator", _coordinator_config(scenario))
+    specs["coordinator"] = NodeSpec(
+        scenario.coordinator.node or "coordinator.coordinator:Coordinator", _coordinator_config(scenario)
+    )
     return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000))
 
 
@@ -115,15 +115,10 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
             run_in_m=vehicle.run_in_m,
             endurance_ms=endurance_ms,
         )
-        return NodeSpec("vehicle_agent.revisit:RevisitAgent", config)
-    spacing: SpacingPlanner = (
-        AdaptiveSpacing(vehicle.nadir_gap_m, vehicle.range_m)
-        if vehicle.spacing == "adaptive"
-        else FixedSpacing(vehicle.nadir_gap_m, vehicle.range_m)
-    )
+        return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", config)
     survey = SurveyConfig(
         vehicle=name,
-        spacing=spacing,
+        spacing=_made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.range_m),
         nadir_gap_m=vehicle.nadir_gap_m,
         range_m=vehicle.range_m,
         threshold=vehicle.threshold,
@@ -131,7 +126,16 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         run_in_m=vehicle.run_in_m,
         endurance_ms=endurance_ms,
     )
-    return NodeSpec("vehicle_agent.survey:SurveyAgent", survey)
+    return NodeSpec(vehicle.agent or "vehicle_agent.survey:SurveyAgent", survey)
+
+
+def _made(kind: PartKind, text: str, **arguments: object) -> Any:
+    try:
+        return kind.maker(text)(**arguments)
+    except PartError as error:
+        raise UserError(f"{text}: {error}") from error
+    except Exception as error:
+        raise UserError(f"{text} cannot be made: {type(error).__name__}: {error}") from error
 
 
 def _world_config(scenario: Scenario) -> WorldConfig:
@@ -166,13 +170,14 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
             look_m=sensor.look_m,
             noise_cell=sensor.noise_cell,
             noise_track=sensor.noise_track,
+            sonar=None if sensor.sonar is None else SONAR.maker(sensor.sonar),
         ),
     )
 
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
     return CoordinatorConfig(
-        allocator=ALLOCATORS[scenario.coordinator.allocator],
+        allocator=_made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor,
         lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
         min_strip_m=scenario.coordinator.min_strip_m,

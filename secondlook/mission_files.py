@@ -15,6 +15,7 @@ import numpy as np
 from comms.codec import SCHEMA_VERSION
 from comms.node import Received
 from comms.topics import COVERAGE, LOOK, NAV
+from secondlook.errors import UserError
 
 FILE_FORMAT = "secondlook-messages"
 NOT_FOR_PEOPLE = (LOOK, COVERAGE, NAV)  # looks and tiles are arrays, positions are better drawn
@@ -55,6 +56,32 @@ class MissionFiles:
         self._events.close()
         if self._messages is not None:
             self._messages.close()
+
+
+def read_messages(path: Path) -> list[tuple[str, bytes]]:
+    """Key (below the run id) and payload of every message in a messages.mpk, in the order of sending.
+
+    A file that was cut off in the middle of a message is read up to there. Raises UserError, in one sentence, for what
+    is not such a file or is one of another version.
+    """
+    found: list[tuple[str, bytes]] = []
+    try:
+        with path.open("rb") as file:
+            stream = msgpack.Unpacker(file)
+            head = next(stream, None)
+            if type(head) is not list or len(head) != 2 or head[0] != FILE_FORMAT:
+                raise UserError(f"{path}: is not a file of messages")
+            if head[1] != SCHEMA_VERSION:
+                raise UserError(f"{path}: holds messages of schema version {head[1]}; must be version {SCHEMA_VERSION}")
+            for entry in stream:
+                if type(entry) is not list or [type(one) for one in entry] != [str, bytes]:
+                    raise UserError(f"{path}: message {len(found) + 1} is not a key and a payload")
+                found.append((entry[0], entry[1]))
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}; must be the messages.mpk of a recorded run") from error
+    except (ValueError, msgpack.UnpackException) as error:
+        raise UserError(f"{path}: cannot be read behind message {len(found)}: {error}") from error
+    return found
 
 
 def _plain(value: Any) -> Any:

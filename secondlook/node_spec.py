@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
+
+from comms.runner import failure_of
 
 
 @dataclass(frozen=True)
@@ -18,3 +21,14 @@ class NodeSpec:
         """The node itself; its module is imported only here."""
         module, name = self.factory.split(":")
         return getattr(import_module(module), name)(self.config)
+
+
+def make_nodes(specs: Mapping[str, NodeSpec]) -> dict[str, Any]:
+    """The nodes by their ids; raises NodeError for one that cannot be made."""
+    nodes = {}
+    for node_id, spec in specs.items():
+        try:
+            nodes[node_id] = spec.make()
+        except Exception as error:
+            raise failure_of(node_id, error) from error
+    return nodes

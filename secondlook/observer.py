@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -19,11 +20,12 @@ Progress = Callable[[Metrics], None]
 class Observer:
     """A listener that writes messages.mpk, events.jsonl and at the end risk.npz into `folder`.
 
-    `progress` is told the figures every 10 simulated seconds.
+    `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds.
     """
 
     def __init__(self, folder: Path, *, with_messages: bool, progress: Progress | None = None) -> None:
         self.metrics = Metrics()
+        self.messages: Counter[str] = Counter()
         self._folder = folder
         self._files = MissionFiles(folder, with_messages=with_messages)
         self._progress = progress
@@ -31,6 +33,7 @@ class Observer:
 
     def on_message(self, received: Received) -> None:
         """Takes one message."""
+        self.messages[received.topic.name] += 1
         self._files.write(received)
         self.metrics.take(received)
         if self._progress is not None and self.metrics.now_ms >= self._progress_due_ms:

@@ -23,7 +23,7 @@ class Body:
         self._looks = Looks(
             config,
             offset_m=self._vehicle.offset_m,
-            sonar=CurveSonar(curve, seabed),
+            sonar=(config.sensor.sonar or CurveSonar)(curve=curve, seabed=seabed),
             targets=targets,
             recogniser=Recogniser(curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
             seed=world.seed,

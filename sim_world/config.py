@@ -7,6 +7,7 @@ ValueError with the field's name.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from comms.wire import IDENTIFIER
 from planner.types import DetectionCurve, Point
+from sim_world.sonar_model import SonarModel
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
@@ -56,7 +58,8 @@ class SensorConfig:
     `curve`: true P_d over lateral range on a seabed that weakens nothing. A look covers `look_m` of track, a whole
     number of bins `along_bin_m`; its range bins are centred at whole multiples of `range_bin_m`. `noise_cell` and
     `noise_track`: standard deviations, on the logit scale, of the error of the P_d that the vehicle estimates, drawn
-    once a cell and once a track, 0 to 2.
+    once a cell and once a track, 0 to 2. `sonar` makes the true model, called with the
+    keywords `curve` and `seabed`; None stands for `sim_world.sonar.CurveSonar`.
     """
 
     curve: DetectionCurve
@@ -65,6 +68,7 @@ class SensorConfig:
     look_m: float = 20.0
     noise_cell: float = 0.23
     noise_track: float = 0.05
+    sonar: Callable[..., SonarModel] | None = None
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect

@@ -10,7 +10,7 @@ from planner.types import FloatArray
 from sim_world.config import VehicleConfig
 from sim_world.estimate import PDetectEstimate
 from sim_world.recogniser import Recogniser
-from sim_world.sonar import SonarModel
+from sim_world.sonar_model import SonarModel
 from sim_world.swath import SIDES, Swath
 from sim_world.targets import Targets
 from sim_world.vehicle import Stretch

@@ -9,7 +9,7 @@ from comms.node import Publication
 from comms.topics import COVERAGE
 from planner.footprint import LookGeometry, look_on_grid
 from planner.risk import RiskLayer
-from planner.tiles import tiles
+from planner.tiles import Tile, tiles, tiles_within
 from planner.types import BoolArray, GridSpec
 
 
@@ -23,6 +23,7 @@ class CoverageLayer:
         self._vehicle = vehicle
         self._version = 0
         self._tiles = tiles(grid)
+        self._touched: set[Tile] = set()
         self._published_sum = np.zeros(grid.shape, dtype=np.uint8)
         self._published_largest = np.zeros(grid.shape, dtype=np.uint8)
         self._published_settled = np.zeros(grid.shape, dtype=np.bool_)
@@ -39,32 +40,39 @@ class CoverageLayer:
             along_bins=along_bins,
             range_bins=range_bins,
         )
-        self.layer.add_look(*look_on_grid(self.grid, geometry, look.p_detect))
+        rows, columns, p_detect = look_on_grid(self.grid, geometry, look.p_detect)
+        self.layer.add_look(rows, columns, p_detect)
+        self._touched.update(tiles_within(self.grid, self._tiles, rows, columns))
 
     def changed_tiles(self) -> list[Publication]:
         """The tiles that differ from what was last published."""
         sums, largest = self.layer.sum_levels(), self.layer.largest_levels()
-        changed = (
-            (sums != self._published_sum)
-            | (largest != self._published_largest)
-            | (self.settled != self._published_settled)
-        )
-        if not changed.any():
-            return []
+        resettled = self.settled != self._published_settled
+        some_resettled = bool(resettled.any())
         published = []
         for tile in self._tiles:
-            if not changed[tile.window].any():
+            window = tile.window
+            changed = (some_resettled and resettled[window].any()) or (
+                tile in self._touched
+                and (
+                    (sums[window] != self._published_sum[window]).any()
+                    or (largest[window] != self._published_largest[window]).any()
+                )
+            )
+            if not changed:
                 continue
             self._version += 1
             message = CoverageTile(
                 version=self._version,
                 first_row=tile.first_row,
                 first_column=tile.first_column,
-                sum_levels=sums[tile.window],
-                largest_levels=largest[tile.window],
-                settled=self.settled[tile.window],
+                sum_levels=sums[window],
+                largest_levels=largest[window],
+                settled=self.settled[window],
             )
             published.append(Publication(COVERAGE.key(vehicle=self._vehicle, tile=tile.name), message))
-        self._published_sum, self._published_largest = sums, largest
-        self._published_settled = self.settled.copy()
+            self._published_sum[window] = sums[window]
+            self._published_largest[window] = largest[window]
+            self._published_settled[window] = self.settled[window]
+        self._touched.clear()
         return published

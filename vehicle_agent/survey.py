@@ -23,7 +23,7 @@ from comms.messages import (
 from comms.topics import CURVE, HOTSPOT, PLAN
 from planner.area import SurveyArea
 from planner.curve import RangeTally, effective_range_m
-from planner.hotspots import HotspotMap, find_hotspots
+from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
@@ -258,16 +258,22 @@ class SurveyAgent(Agent):
         layer = self.coverage.layer
         risk = residual_risk(layer.sum_levels(), layer.largest_levels(), self._rho)
         hot = self.coverage.settled & (risk >= self.config.hotspot_risk)
-        open_cells = self._inside & ~self.coverage.settled
-        change = find_hotspots(self.coverage.grid, hot, open_cells, risk, self._hotspots)
-        self._hotspots = change.map
-        for area in change.changed:
-            outline = tuple(Vertex(x_m, y_m) for x_m, y_m in area.outline)
+        unsettled = self._inside & ~self.coverage.settled
+        update = update_hotspots(self.coverage.grid, hot, unsettled, risk, self._hotspots)
+        self._hotspots = update.map
+        for hotspot in update.changed:
+            outline = tuple(Vertex(x_m, y_m) for x_m, y_m in hotspot.outline)
             self._publish_hotspot(
-                area.number, HotspotState.ACTIVE, outline, area.mean_risk, area.cells, area.growing, merged_into=0
+                hotspot.number,
+                HotspotState.ACTIVE,
+                outline,
+                hotspot.mean_risk,
+                hotspot.cells,
+                hotspot.growing,
+                merged_into=0,
             )
-        for number, heir in change.withdrawn.items():
-            self._publish_hotspot(number, HotspotState.WITHDRAWN, (), 0.0, 0, growing=False, merged_into=heir)
+        for number, heir in update.withdrawn.items():
+            self._publish_hotspot(number, HotspotState.WITHDRAWN, (), 0.0, 0, growing=False, merged_into=heir or 0)
 
     def _publish_hotspot(
         self,

@@ -1,1 +1,1 @@
-"""Rerun recorder, blueprint and report."""
+"""Rerun recorder, blueprint and pictures of recordings."""

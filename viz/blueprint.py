@@ -23,7 +23,7 @@ def mission_blueprint(extent: Extent, vehicles: Sequence[str]) -> rrb.Blueprint:
     if wide:
         layout: rrb.Container = rrb.Vertical(
             area,
-            rrb.Horizontal(_metrics_view(), _curve_view(), _activity_view(), log, column_shares=[4, 3, 4, 5]),
+            rrb.Horizontal(_metrics_view(), _curve_view(), _activity_view(), log, column_shares=[4, 3, 4, 6]),
             row_shares=[5, 4],
         )
     else:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
+import rerun.blueprint as rrb
 
 from planner.types import FloatArray
+from viz.live_feed import LiveFeed, new_stream
 from viz.paths import TIMELINE
 
 Build = Callable[[FloatArray], Iterable[rr.ComponentColumn]]
@@ -28,41 +30,54 @@ class Column:
         self._times_ms.append(time_ms)
         self._rows.append(numbers)
 
-    def send(self, stream: rr.RecordingStream) -> None:
+    def send(self, streams: Iterable[rr.RecordingStream]) -> None:
         """Sends what is held."""
         if self._times_ms:
             times = np.array(self._times_ms, dtype="timedelta64[ms]")
             rows = np.array(self._rows, dtype=np.float64)
-            stream.send_columns(self.path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(rows))
+            for stream in streams:
+                stream.send_columns(self.path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(rows))
             self._times_ms, self._rows = [], []
 
 
 class Canvas:
-    """One recording, written to a file. Its only timeline is the simulated time.
+    """One recording, written to a file, and shown live where there is a `live_pipe` (see LiveFeed).
+
+    Its only timeline is the simulated time.
 
     `piece_ms`: how much simulated time the columns hold back at most; so much is lost if the process is killed.
     """
 
-    def __init__(self, path: Path, recording_id: str, piece_ms: int) -> None:
-        self.stream = rr.RecordingStream("secondlook", recording_id=recording_id, send_properties=False)
-        # The wall clock has no place in a recording of simulated time.
-        self.stream.set_log_time_enabled(False)
-        self.stream.set_log_tick_enabled(False)
-        self.stream.save(path)
+    def __init__(self, path: Path, recording_id: str, piece_ms: int, live_pipe: Path | None) -> None:
+        self._file = new_stream(recording_id)
+        self._file.save(path)
+        self._live = LiveFeed(live_pipe, recording_id) if live_pipe else None
+        # Two streams of one id: in one stream, a viewer that stalls would hold up the file too.
+        self._streams = (self._file, self._live.stream) if self._live else (self._file,)
         # A name from the start: without any entry the file would not get the footer that completes it.
-        self.stream.send_recording_name(recording_id)
+        for stream in self._streams:
+            stream.send_recording_name(recording_id)
         self._piece_ms = piece_ms
         self._piece_from_ms = 0
         self._columns: list[Column] = []
 
+    def present(self, name: str, blueprint: rrb.Blueprint, mission: rr.AnyValues) -> None:
+        """Says what the recording is called, how it is laid out and what mission it is of."""
+        for stream in self._streams:
+            stream.send_recording_name(name)
+            stream.send_property("mission", mission)
+            stream.send_blueprint(blueprint)
+
     def put(self, time_ms: int, path: str, *parts: rr.AsComponents) -> None:
         """Logs one entry at a simulated time."""
-        self.stream.set_time(TIMELINE, duration=np.timedelta64(time_ms, "ms"))
-        self.stream.log(path, parts[0], *parts[1:])
+        for stream in self._streams:
+            stream.set_time(TIMELINE, duration=np.timedelta64(time_ms, "ms"))
+            stream.log(path, parts[0], *parts[1:])
 
     def put_static(self, path: str, *parts: rr.AsComponents) -> None:
         """Logs what holds at all times."""
-        self.stream.log(path, parts[0], *parts[1:], static=True)
+        for stream in self._streams:
+            stream.log(path, parts[0], *parts[1:], static=True)
 
     def column(self, path: str, build: Build) -> Column:
         """A column that is sent in pieces; `build` makes its components from an array of shape (rows, numbers)."""
@@ -79,9 +94,11 @@ class Canvas:
     def close(self) -> None:
         """Sends what is held and completes the file."""
         self._send()
-        self.stream.flush()
-        self.stream.disconnect()
+        self._file.flush()
+        self._file.disconnect()
+        if self._live is not None:
+            self._live.close()
 
     def _send(self) -> None:
         for column in self._columns:
-            column.send(self.stream)
+            column.send(self._streams)

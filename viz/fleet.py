@@ -86,7 +86,7 @@ class Fleet:
             received.header.sent_ms,
             f"{paths.CONTACTS}/{received.vehicle}",
             rr.Points3D(
-                [[contact.x_m, contact.y_m, POINT_Z_M]], colors=[palette.CONTACT], radii=rr.Radius.ui_points(3.0)
+                [[contact.x_m, contact.y_m, POINT_Z_M]], colors=[palette.CONTACT], radii=rr.Radius.ui_points(2.0)
             ),
         )
 

@@ -13,7 +13,7 @@ UNSEEN: Colour = (38, 44, 54)
 BACKGROUND: Colour = (13, 16, 21)
 PLANNED: Colour = (140, 170, 205)
 TEXT: Colour = (225, 228, 233)
-HOTSPOT: Colour = (255, 64, 64)
+HOTSPOT: Colour = (10, 10, 14)  # dark: a hotspot is bright, until a second look has made it dark too
 CONTACT: Colour = (255, 255, 255)
 WITHIN_R_EFF: Colour = (74, 176, 140)
 BEYOND_R_EFF: Colour = (98, 104, 114)
@@ -30,14 +30,14 @@ STRIP: dict[StripState, Colour] = {
     StripState.OFFERED: (255, 180, 220),
     StripState.ACCEPTED: (255, 180, 220),
     StripState.UNDER_WAY: (255, 110, 199),
-    StripState.DONE: (215, 220, 228),
+    StripState.DONE: (128, 134, 145),
     StripState.FAILED: (190, 90, 255),
 }
 TASK: dict[TaskState, Colour] = {
     TaskState.ACCEPTED: (255, 180, 220),
     TaskState.REFUSED: (150, 155, 165),
     TaskState.UNDER_WAY: (255, 110, 199),
-    TaskState.DONE: (215, 220, 228),
+    TaskState.DONE: (128, 134, 145),
     TaskState.FAILED: (190, 90, 255),
     TaskState.GIVEN_BACK: (150, 155, 165),
 }

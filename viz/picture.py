@@ -18,10 +18,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import rerun_cli  # type: ignore[import-untyped]
 from rerun.experimental import ViewerClient
 
 from viz.paths import TIMELINE
+from viz.viewer_program import BIND, LISTENING, PROGRAM, quiet_environment
 
 DRIVER_FOLDERS = tuple(
     Path(root) / "vulkan" / "icd.d" for root in ("/usr/share", "/usr/local/share", "/etc", "/usr/local/etc")
@@ -30,7 +30,6 @@ DRIVER_VARIABLES = ("VK_DRIVER_FILES", "VK_ICD_FILENAMES")
 DRIVER_HINT = "On Debian and Ubuntu the package mesa-vulkan-drivers has one that needs no graphics card."
 NO_DRIVER_USED = re.compile("graphics adapter|render context")
 SOFTWARE_DRIVER = "lvp_icd*.json"
-LISTENING = re.compile(r"Listening for gRPC connections on (127\.0\.0\.1:\d+)")
 READY_WITHIN_S = 60.0
 POLL_S = 0.1
 STEADY_S = 4.5  # longer than the notes last that the viewer shows in a corner
@@ -64,9 +63,7 @@ def headless_viewer(recording: Path, size: tuple[int, int] = (1600, 900)) -> Ite
         raise PictureError(f"There is no recording {recording}.")
     with tempfile.TemporaryDirectory(prefix="secondlook-viewer-") as folder:
         home, log = Path(folder), Path(folder) / "viewer.log"
-        # The wheel's command is a wrapper that leaves the viewer behind when it is killed: start the viewer itself.
-        binary = Path(rerun_cli.__file__).with_name("rerun")
-        command = [str(binary), "--headless", "--hide-welcome-screen", "--bind", "127.0.0.1", "--port", "0"]
+        command = [PROGRAM, "--headless", "--hide-welcome-screen", *BIND]
         command += ["--window-size", f"{size[0]}x{size[1]}", "--memory-limit", "1GiB", str(recording.resolve())]
         with log.open("wb") as output:
             process = subprocess.Popen(command, stdout=output, stderr=output, env=_environment(home), cwd=home)
@@ -112,12 +109,9 @@ def _has_opened(client: ViewerClient) -> bool:
 
 
 def _environment(home: Path) -> dict[str, str]:
-    environment = dict(os.environ)
-    # CI is the viewer's switch for usage statistics that needs no file in anyone's home.
-    environment |= {"HOME": str(home), "XDG_CONFIG_HOME": str(home), "XDG_DATA_HOME": str(home), "CI": "1"}
-    environment |= {"XDG_CACHE_HOME": str(home), "XDG_RUNTIME_DIR": str(home), "NO_COLOR": "1"}
-    # The viewer would ask a host outside for a newer version of itself: a proxy that is not there keeps it from that.
-    environment |= dict.fromkeys(("HTTPS_PROXY", "https_proxy"), "http://127.0.0.1:1")
+    environment = quiet_environment()
+    folders = ("HOME", "XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_CACHE_HOME", "XDG_RUNTIME_DIR")
+    environment |= dict.fromkeys(folders, str(home))
     if not any(os.environ.get(variable) for variable in DRIVER_VARIABLES):
         software = [str(driver) for folder in DRIVER_FOLDERS for driver in folder.glob(SOFTWARE_DRIVER)]
         if software:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rerun as rr
@@ -30,29 +29,25 @@ from viz.blueprint import mission_blueprint
 from viz.canvas import Canvas
 from viz.curves import Curves
 from viz.fleet import Fleet
+from viz.recorder_config import RecorderConfig
 from viz.risk_map import RiskMap
 from viz.second_looks import SecondLooks
 from viz.shapes import extent_of
-from viz.story import Story
+from viz.story import Line, Story
 from viz.truth import Truth
 
 
 class Recorder:
-    """Writes `path` (comms.node.Listener). The file is complete after `close`; what was written before a process is
-    killed stays readable.
-
-    `recording_id`: recordings of one id open as one; the name of the file's folder, the run's, if not given.
-    `draw_every_s`: the risk map is drawn at most once in so much simulated time. `piece_s`: positions and statistics
-    are held back for so much simulated time and written together.
+    """Writes `config.path` (comms.node.Listener). The file is complete after `close`; what was written before a process
+    is killed stays readable.
 
     Everything drawn comes from the messages; what comes before the run's first message is kept until that is there.
     """
 
-    def __init__(
-        self, path: Path, recording_id: str | None = None, *, draw_every_s: float = 10.0, piece_s: float = 60.0
-    ) -> None:
-        self._canvas = Canvas(path, recording_id or path.absolute().parent.name, round(piece_s * 1000))
-        self._draw_every_ms = round(draw_every_s * 1000)
+    def __init__(self, config: RecorderConfig) -> None:
+        recording_id = config.recording_id or config.path.absolute().parent.name
+        self._canvas = Canvas(config.path, recording_id, round(config.piece_s * 1000), config.live_pipe)
+        self._draw_every_ms = round(config.draw_every_s * 1000)
         self._mission: _Mission | None = None
         self._early: list[Received] = []
 
@@ -83,9 +78,8 @@ class _Mission:
         self._canvas = canvas
         extent = extent_of(run)
         vehicles = tuple(vehicle.vehicle for vehicle in run.vehicles)
-        canvas.stream.send_recording_name(run.scenario)
-        canvas.stream.send_property("mission", rr.AnyValues(scenario=run.scenario, seed=run.seed))
-        canvas.stream.send_blueprint(mission_blueprint(extent, vehicles))
+        told = rr.AnyValues(scenario=run.scenario, seed=run.seed)
+        canvas.present(run.scenario, mission_blueprint(extent, vehicles), told)
         self._map = RiskMap(canvas, run, extent, draw_every_ms)
         self._story = Story()
         fleet, second_looks, curves, truth = (
@@ -116,14 +110,16 @@ class _Mission:
         draw = self._draw.get(type(received.message))
         if draw is not None:
             draw(received, received.message)
-        line = self._story.tell(received)
-        if line is not None:
-            level, colour = (
-                (rr.TextLogLevel.WARN, palette.WARNING) if line.warns else (rr.TextLogLevel.INFO, palette.TEXT)
-            )
-            sender = received.header.sender
-            words = rr.TextLog(f"{sender}: {line.text}", level=level, color=colour)
-            self._canvas.put(time_ms, f"{paths.LOG}/{sender}", words)
+        self._put_lines(self._story.tell(received))
 
     def finish(self) -> None:
         self._map.finish()
+        self._put_lines(self._story.rest())
+
+    def _put_lines(self, lines: Iterable[Line]) -> None:
+        for line in lines:
+            level, colour = (
+                (rr.TextLogLevel.WARN, palette.WARNING) if line.warns else (rr.TextLogLevel.INFO, palette.TEXT)
+            )
+            words = rr.TextLog(f"{line.sender}: {line.text}", level=level, color=colour)
+            self._canvas.put(line.time_ms, f"{paths.LOG}/{line.sender}", words)

@@ -8,7 +8,7 @@ from comms.messages import Hotspot, HotspotState, StripState, StripStatus
 from comms.node import Received
 from viz import palette, paths
 from viz.canvas import Canvas
-from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, ring, southern_end, strip_ring
+from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, label_place, ring, strip_ring
 from viz.story import number_of
 
 
@@ -28,34 +28,41 @@ class SecondLooks:
         self._canvas.put(
             received.header.sent_ms,
             path,
-            rr.LineStrips3D([outline], colors=[palette.HOTSPOT], radii=rr.Radius.ui_points(1.0)),
+            rr.LineStrips3D([outline], colors=[palette.HOTSPOT], radii=rr.Radius.ui_points(0.7)),
         )
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
-        """Draws the strip in the colour of its state, with its id and what it may remove."""
+        """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
         number = number_of(received)
         path = f"{paths.STRIPS}/{number}"
         if strip.state is StripState.WITHDRAWN:
             self._canvas.put(received.header.sent_ms, path, rr.Clear(recursive=True))
             return
         outline = strip_ring(strip, STRIP_Z_M)
-        words = f"strip {number} {strip.state.value.replace('_', ' ')}"
-        if strip.state is not StripState.DONE:
-            words += f", {strip.removable_m2:.0f} m²"
+        done = strip.state is StripState.DONE
         self._canvas.put(
             received.header.sent_ms,
             path,
-            rr.LineStrips3D([outline], colors=[palette.STRIP[strip.state]], radii=rr.Radius.ui_points(1.5)),
+            rr.LineStrips3D(
+                [outline], colors=[palette.STRIP[strip.state]], radii=rr.Radius.ui_points(0.8 if done else 1.5)
+            ),
         )
         # Words in the colour of the state would not be legible on every part of the map.
         self._canvas.put(
             received.header.sent_ms,
             f"{path}/label",
             rr.Points3D(
-                [southern_end(outline)],
-                labels=words,
+                [label_place(strip, number, STRIP_Z_M)],
+                labels=_words(strip, number),
                 show_labels=True,
-                colors=[palette.TEXT],
+                colors=[palette.STRIP[StripState.DONE] if done else palette.TEXT],
                 radii=rr.Radius.ui_points(0.1),
             ),
         )
+
+
+def _words(strip: StripStatus, number: int) -> str:
+    if strip.state is StripState.DONE:
+        return str(number)
+    state = "" if strip.state is StripState.OPEN else f" {strip.state.value.replace('_', ' ')}"
+    return f"strip {number}{state}: {strip.removable_m2:.0f} m²"

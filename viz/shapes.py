@@ -16,6 +16,8 @@ UNSEEN_Z_M, OUTLINE_Z_M, PLAN_Z_M, HOTSPOT_Z_M, STRIP_Z_M, FLOWN_Z_M, POINT_Z_M,
     0.2 * step for step in range(1, 9)
 )
 
+GOLDEN_SHARE = (math.sqrt(5.0) - 1.0) / 2.0  # its multiples, whole parts left out, keep apart from each other
+
 
 @dataclass(frozen=True)
 class Extent:
@@ -69,11 +71,15 @@ def strip_ring(strip: StripStatus, z_m: float) -> FloatArray:
     return np.column_stack([corners, np.full(5, z_m)])
 
 
-def southern_end(outline: FloatArray) -> FloatArray:
-    """The middle of the most southern side of a closed outline, shape (3,): a label hangs below it."""
-    middles: FloatArray = (outline[:-1] + outline[1:]) / 2
-    southern: FloatArray = middles[middles[:, 1].argmin()]
-    return southern
+def label_place(strip: StripStatus, number: int, z_m: float) -> tuple[float, float, float]:
+    """Where a strip's label hangs on its centre line: at another share of its length for each number, because strips
+    often lie side by side and the labels are wider than they."""
+    along_m = strip.length_m * (0.1 + 0.8 * (number * GOLDEN_SHARE % 1.0))
+    return (
+        strip.start_x_m + along_m * math.sin(strip.heading_rad),
+        strip.start_y_m + along_m * math.cos(strip.heading_rad),
+        z_m,
+    )
 
 
 def glyph(size_m: float) -> tuple[FloatArray, list[tuple[int, int, int]]]:

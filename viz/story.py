@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from comms.messages import (
     Curve,
@@ -24,13 +24,26 @@ from comms.messages import (
 )
 from comms.node import Received
 
+MOST_NAMED = 3
+
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One line of the log; `warns` where something did not go as planned."""
+    """One line of the log: when and by whom, in what words; `warns` where something did not go as planned."""
 
+    time_ms: int
+    sender: str
     text: str
     warns: bool = False
+
+
+@dataclass
+class _HotspotNews:
+    """What one vehicle said of its hotspots at one time: often many at once, and worth one line together."""
+
+    time_ms: int
+    new: list[str] = field(default_factory=list)
+    withdrawn: list[str] = field(default_factory=list)
 
 
 class Story:
@@ -38,29 +51,45 @@ class Story:
 
     def __init__(self) -> None:
         self._told: dict[Hashable, object] = {}
+        self._hotspots: dict[str, _HotspotNews] = {}
 
-    def tell(self, received: Received) -> Line | None:
-        """The line for a message; None where it has nothing new to say to a person."""
+    def tell(self, received: Received) -> list[Line]:
+        """The lines that are ready now that this message has come; none where it has nothing new for a person."""
+        header = received.header
+        lines = self.rest(before_ms=header.sent_ms)
+        told = self._words(received)
+        if told is not None:
+            text, warns = told
+            lines.append(Line(header.sent_ms, header.sender, text, warns))
+        return lines
+
+    def rest(self, *, before_ms: int | None = None) -> list[Line]:
+        """The lines still held back: all, or those of another time than this."""
+        due = [sender for sender, news in self._hotspots.items() if news.time_ms != before_ms]
+        return [_hotspots(sender, self._hotspots.pop(sender)) for sender in due]
+
+    def _words(self, received: Received) -> tuple[str, bool] | None:
+        """What a message says, and whether it warns."""
         match received.message:
             case RunInfo() as run:
-                return _run(run)
+                return _run(run), False
             case Plan() as plan:
-                return Line(f"plan {plan.revision}: {plan.note}" if plan.note else f"plan {plan.revision}")
+                return f"plan {plan.revision}: {plan.note or _plan(plan)}", False
             case Curve() as curve:
                 return _curve(curve)
             case Hotspot() as hotspot:
-                return self._hotspot(received, hotspot)
+                self._note_hotspot(received, hotspot)
             case StripStatus() as strip:
                 return self._strip(received, strip)
             case Task() as task:
                 what = "take" if task.action is TaskAction.TAKE else "give back"
-                return Line(f"{received.vehicle}, {what} strip {task.strip}")
+                return f"{received.vehicle}, {what} strip {task.strip}", False
             case TaskStatus() as status:
                 return self._task(received, status)
             case ManeuverStatus(state=ManeuverState.REFUSED) as status:
-                return Line(f"manoeuvre {status.number} refused{_because(status.reason)}", warns=True)
+                return f"manoeuvre {status.number} refused{_because(status.reason)}", True
             case MissionOver() as over:
-                return Line(f"the mission is over{_because(over.reason)}")
+                return f"the mission is over{_because(over.reason)}", False
         return None
 
     def _is_news(self, subject: Hashable, state: object) -> bool:
@@ -68,30 +97,28 @@ class Story:
         self._told[subject] = state
         return news
 
-    def _hotspot(self, received: Received, hotspot: Hotspot) -> Line | None:
+    def _note_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         if not self._is_news(received.key, hotspot.state):
-            return None
+            return
+        news = self._hotspots.setdefault(received.header.sender, _HotspotNews(received.header.sent_ms))
         number = number_of(received)
         if hotspot.state is HotspotState.ACTIVE:
-            return Line(
-                f"hotspot {number}: {hotspot.cells} cells badly seen, mean residual risk {hotspot.mean_risk:.2f}"
-            )
-        merged = f", merged into {hotspot.merged_into}" if hotspot.merged_into else ""
-        return Line(f"hotspot {number} withdrawn{merged}")
+            news.new.append(f"{number} ({hotspot.cells} cells, risk {hotspot.mean_risk:.2f})")
+        else:
+            news.withdrawn.append(str(number))
 
-    def _strip(self, received: Received, strip: StripStatus) -> Line | None:
+    def _strip(self, received: Received, strip: StripStatus) -> tuple[str, bool] | None:
         if not self._is_news(received.key, strip.state):
             return None
         number = number_of(received)
         if strip.state is StripState.OPEN:
             size = f"{strip.length_m:.0f} m x {strip.width_m:.0f} m"
-            return Line(f"strip {number} open: {size}, {strip.removable_m2:.0f} m² of risk to remove")
+            return f"strip {number} open: {size}, {strip.removable_m2:.0f} m² of risk to remove", False
         if strip.state in (StripState.WITHDRAWN, StripState.FAILED):
-            failed = strip.state is StripState.FAILED
-            return Line(f"strip {number} {strip.state.value}{_because(strip.reason)}", warns=failed)
+            return f"strip {number} {strip.state.value}{_because(strip.reason)}", strip.state is StripState.FAILED
         return None  # the vehicle's own answers tell the rest
 
-    def _task(self, received: Received, status: TaskStatus) -> Line | None:
+    def _task(self, received: Received, status: TaskStatus) -> tuple[str, bool] | None:
         if not self._is_news((received.vehicle, status.strip), status.state):
             return None
         what = {
@@ -103,7 +130,7 @@ class Story:
             TaskState.GIVEN_BACK: "given back",
         }[status.state]
         warns = status.state in (TaskState.REFUSED, TaskState.FAILED)
-        return Line(f"strip {status.strip} {what}{_because(status.reason)}", warns=warns)
+        return f"strip {status.strip} {what}{_because(status.reason)}", warns
 
 
 def number_of(received: Received) -> int:
@@ -111,12 +138,12 @@ def number_of(received: Received) -> int:
     return int(received.key.rpartition("/")[2])
 
 
-def _run(run: RunInfo) -> Line:
+def _run(run: RunInfo) -> str:
     surveyors = [vehicle.vehicle for vehicle in run.vehicles if vehicle.role is Role.SURVEY]
     helpers = [vehicle.vehicle for vehicle in run.vehicles if vehicle.role is Role.REVISIT]
     by = f" by {', '.join(surveyors)}" if surveyors else ""
     second = f", second looks by {', '.join(helpers)}" if helpers else ""
-    return Line(f"mission {run.scenario}, seed {run.seed}: a survey of {_area_km2(run):.2f} km²{by}{second}")
+    return f"mission {run.scenario}, seed {run.seed}: a survey of {_area_km2(run):.2f} km²{by}{second}"
 
 
 def _area_km2(run: RunInfo) -> float:
@@ -124,10 +151,28 @@ def _area_km2(run: RunInfo) -> float:
     return abs(sum(a.x_m * b.y_m - b.x_m * a.y_m for a, b in corners)) / 2e6
 
 
-def _curve(curve: Curve) -> Line:
+def _plan(plan: Plan) -> str:
+    ahead = sum(not track.flown for track in plan.tracks)
+    spaced = f", spaced for {plan.r_adpt_m[-1]} m" if plan.r_adpt_m and ahead else ""
+    return f"{ahead} of {len(plan.tracks)} tracks still to fly{spaced}"
+
+
+def _curve(curve: Curve) -> tuple[str, bool]:
     if curve.r_eff_m == 0:
-        return Line(f"track {curve.track}: no range is admissible", warns=True)
-    return Line(f"track {curve.track}: r_eff {curve.r_eff_m} m, best P_d {curve.p_detect.max(initial=0.0):.2f}")
+        return f"track {curve.track}: no range is admissible", True
+    return f"track {curve.track}: r_eff {curve.r_eff_m} m, best P_d {curve.p_detect.max(initial=0.0):.2f}", False
+
+
+def _hotspots(sender: str, news: _HotspotNews) -> Line:
+    told = [
+        f"{what} {', '.join(names[:MOST_NAMED])}{f' and {left} more' if left > 0 else ''}"
+        for what, names, left in (
+            ("new", news.new, len(news.new) - MOST_NAMED),
+            ("withdrawn", news.withdrawn, len(news.withdrawn) - MOST_NAMED),
+        )
+        if names
+    ]
+    return Line(news.time_ms, sender, f"hotspots: {'; '.join(told)}")
 
 
 def _because(reason: str) -> str:

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from secondlook.errors import UserError
+from secondlook.live_view import live_view
 from secondlook.mission import RunOptions, run_mission
 from secondlook.processes import RunFailedError
 from secondlook.run_display import closing_table, progress_display
@@ -39,26 +40,33 @@ def run(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
     no_record: Annotated[bool, typer.Option("--no-record", help="Without recording and messages.mpk.")] = False,
+    live: Annotated[bool, typer.Option("--live", help="Show the mission in Rerun while it runs.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="With --live: in a browser, not in a window.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
 ) -> None:
     """Fly a mission, and write what happened."""
+    if web and not live:
+        raise UserError("--web: says how to show a mission --live; must go with --live")
+    if live and no_record:
+        raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
     mission = load_scenario(scenario, set_ or (), seed)
-    folder = _folder(out, mission.name)
-    with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
-        options = RunOptions(folder, bus.value, processes, record=not no_record, progress=progress)
-        try:
-            summary = run_mission(mission, options)
-        except RunFailedError as error:
-            failure = str(error)
+    with live_view(lambda: _folder(out, mission.name), live=live, web=web) as (folder, pipe):
+        with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
+            options = RunOptions(folder, bus.value, processes, record=not no_record, progress=progress, live_pipe=pipe)
+            try:
+                summary = run_mission(mission, options)
+            except RunFailedError as error:
+                failure = str(error)
+            else:
+                failure = ""
+        if failure:
+            sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
+        elif as_json:
+            typer.echo(json.dumps(summary, indent=2))
         else:
-            failure = ""
+            closing_table(summary, folder)
     if failure:
-        sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
         raise typer.Exit(MISSION_FAILED)
-    if as_json:
-        typer.echo(json.dumps(summary, indent=2))
-    else:
-        closing_table(summary, folder)
 
 
 def _folder(out: Path | None, name: str) -> Path:

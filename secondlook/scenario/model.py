@@ -8,9 +8,10 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
+from secondlook.parts import ALLOCATOR, NODE
 from secondlook.scenario.area import Area
 from secondlook.scenario.dialect import dump
-from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, refused
+from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId
 
 
@@ -61,12 +62,14 @@ class Targets(Mapping):
 class Coordinator(Mapping):
     """How strips are cut and given out.
 
+    `allocator`: ours by name, or `package.module:Class` of your own; `node`: the same for the whole coordinator.
     `lost_after_s`: age of a vehicle's last state from which it counts as lost. `min_strip_m`, `max_strip_m`: length
     of a strip. `worth_risk`: mean residual risk over a helper's swath from which a further metre of strip is worth
     flying.
     """
 
-    allocator: Literal["greedy", "none"] = "greedy"
+    allocator: Annotated[str, part(ALLOCATOR)] = "greedy"
+    node: Annotated[str, part(NODE)] | None = None
     lost_after_s: Duration = 30.0
     min_strip_m: Length = 30.0
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0

@@ -9,8 +9,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from planner.types import DetectionCurve
+from secondlook.parts import CURVE, SONAR, PartError
 from secondlook.scenario import bundled
-from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, refused
+from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, part, refused
 
 
 class Curve(Mapping):
@@ -39,20 +40,35 @@ def _take_bundled(value: object) -> object:
     if not isinstance(value, str):
         return value
     names = bundled.curve_names()
-    if value not in names:
-        raise refused(f"must be a bundled curve ({', '.join(names)}), or a mapping with range_m and p_detect")
-    return bundled.curve(value)
+    if value in names:
+        return bundled.curve(value)
+    if ":" not in value:
+        raise refused(
+            f"must be a bundled curve ({', '.join(names)}), a mapping with range_m and p_detect, "
+            "or package.module:Class of what makes one"
+        )
+    try:
+        made = CURVE.maker(value)()
+    except PartError as error:
+        raise refused(str(error)) from error
+    except Exception as error:
+        raise refused(f"must make a DetectionCurve; {type(error).__name__}: {error}") from error
+    if not isinstance(made, DetectionCurve):
+        raise refused(f"must make a DetectionCurve; it makes a {type(made).__name__}")
+    return {"range_m": np.asarray(made.range_m).tolist(), "p_detect": np.asarray(made.p_detect).tolist()}
 
 
 class Sensor(Mapping):
     """A side-looking sonar.
 
-    What it detects is either a `curve`, bundled or inline, or, flat, `p_detect` up to `range_m`. `noise_cell`,
-    `noise_track`: standard deviation of P_d per cell and per track, in logits. `look_m`: length of track in one look;
-    `along_bin_m`, `range_bin_m`: the bins of a look.
+    What it detects is either a `curve`, bundled, inline or made by `package.module:Class`, or, flat, `p_detect` up to
+    `range_m`; `sonar`: `package.module:Class` of a true model of your own, given that curve and the seabed.
+    `noise_cell`, `noise_track`: standard deviation of P_d per cell and per track, in logits. `look_m`: length of track
+    in one look; `along_bin_m`, `range_bin_m`: the bins of a look.
     """
 
     curve: Annotated[Curve | None, BeforeValidator(_take_bundled)] = None
+    sonar: Annotated[str, part(SONAR)] | None = None
     p_detect: PDetect | None = None
     range_m: Length | None = None
     noise_cell: Noise = 0.23

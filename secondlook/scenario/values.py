@@ -8,8 +8,10 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
+
+from secondlook.parts import PartError, PartKind
 
 TOLERANCE = 1e-6
 """By how much numbers may differ that must fit each other."""
@@ -31,6 +33,19 @@ Noise = Annotated[float, Field(ge=0, le=5)]
 def refused(allowed: str) -> PydanticCustomError:
     """The error to raise for a value, in the words that follow `... is not allowed; `."""
     return PydanticCustomError("refused", "{allowed}", {"allowed": allowed})
+
+
+def part(kind: PartKind) -> AfterValidator:
+    """Accepts the names of our parts of a kind, and `package.module:Class` of a user's own that can be used."""
+
+    def check(text: str) -> str:
+        try:
+            kind.maker(text)
+        except PartError as error:
+            raise refused(str(error)) from error
+        return text
+
+    return AfterValidator(check)
 
 
 def check_pair(value: object) -> object:

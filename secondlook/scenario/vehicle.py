@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
+from secondlook.parts import NODE, SPACING
 from secondlook.scenario.sensor import Sensor
 from secondlook.scenario.values import (
     TOLERANCE,
@@ -17,6 +18,7 @@ from secondlook.scenario.values import (
     Mapping,
     OpenShare,
     Speed,
+    part,
     refused,
 )
 
@@ -46,7 +48,7 @@ class VehicleBase(Mapping):
 
     `body`: what moves it, for now always the simulated world. `endurance_s`: how long its battery lasts.
     `run_in_m`: straight run before and after each track. `nadir_gap_m`: what it does not see beside its track, per
-    side.
+    side. `agent`: `package.module:Class` of a node of your own in its back seat.
     """
 
     role: str
@@ -59,6 +61,7 @@ class VehicleBase(Mapping):
     run_in_m: LengthOrZero
     nadir_gap_m: LengthOrZero
     sensor: Sensor
+    agent: Annotated[str, part(NODE)] | None = None
 
     @field_validator("sensor")
     @classmethod
@@ -80,7 +83,7 @@ class SurveyVehicle(VehicleBase):
     altitude_m: Length = 15.0
     run_in_m: LengthOrZero = 20.0
     range_m: Length
-    spacing: Literal["adaptive", "fixed"] = "adaptive"
+    spacing: Annotated[str, part(SPACING)] = "adaptive"
     threshold: OpenShare = 0.05
     hotspot_risk: OpenShare = 0.55
 

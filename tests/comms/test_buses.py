@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from fleets import BUSES, Bus, Notes, Scripted, nav, say_nav, say_over, say_state, says
+from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, says
 
 from comms import clock
 from comms.clock import RunawayError
@@ -101,22 +101,10 @@ def test_a_fleet_that_goes_on_for_ever_ends_at_its_time_limit(bus: Bus) -> None:
     assert world.log[-1] == ("wake", 10_000)
 
 
-def _fleet_that_talks() -> dict[str, Scripted]:
-    def tick(now_ms: int) -> Step:
-        return says(say_nav("alpha", now_ms), say_nav("beta", -now_ms), wake_ms=now_ms + 700)
-
-    return {
-        "world": Scripted(starts=tick, wakes=tick),
-        "alpha": Scripted(hears=lambda received, now_ms: says(say_state("alpha", now_ms))),
-        "beta": Scripted(hears=lambda received, now_ms: says(say_state("beta", 1), say_state("beta", 2))),
-        "coordinator": Scripted(starts=lambda now_ms: Step(wake_ms=20_000), wakes=lambda now_ms: says(say_over())),
-    }
-
-
 def test_all_buses_give_one_digest_and_tell_every_node_the_same() -> None:
     told = []
     for run_on in BUSES.values():
-        nodes, notes = _fleet_that_talks(), Notes()
+        nodes, notes = fleet_that_talks(), Notes()
         result = run_on(nodes, notes)
         heard = [(one.key, one.header, one.payload) for one in notes.heard]
         told.append((result.digest, result.messages, {name: node.log for name, node in nodes.items()}, heard))
@@ -126,8 +114,8 @@ def test_all_buses_give_one_digest_and_tell_every_node_the_same() -> None:
 
 
 def test_the_digest_tells_one_changed_message() -> None:
-    nodes = _fleet_that_talks()
-    before = BUSES["local"](_fleet_that_talks(), Notes()).digest
+    nodes = fleet_that_talks()
+    before = BUSES["local"](fleet_that_talks(), Notes()).digest
     nodes["alpha"].hears = lambda received, now_ms: says(say_state("alpha", now_ms + (now_ms == 7001)))
     assert BUSES["local"](nodes, Notes()).digest != before
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -82,6 +83,34 @@ def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
     code, out, err = secondlook("scenarios")
     assert (code, err) == (0, "")
     assert [line.split()[0] for line in out.splitlines()] == ["patchy", "tellaro"]
+
+
+def test_live_without_a_display_is_told_before_anything_flies(
+    secondlook: SecondLook, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    expected = "--live: there is no display for the viewer's window; add --web to watch in a browser\n"
+    assert secondlook("run", "--live", "--out", str(tmp_path / "run")) == (2, "", expected)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--web"], "--web: says how to show a mission --live; must go with --live\n"),
+        (
+            ["--live", "--no-record"],
+            "--no-record: is not allowed with --live, which shows what the recorder draws\n",
+        ),
+    ],
+)
+def test_options_that_do_not_go_together_are_told(
+    secondlook: SecondLook, tmp_path: Path, arguments: list[str], expected: str
+) -> None:
+    assert secondlook("run", "--out", str(tmp_path / "run"), *arguments) == (2, "", expected)
+    assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.parametrize("arguments", [["fly"], ["check"], ["plan", "--width", "wide"], ["check", "tellaro", "--fast"]])

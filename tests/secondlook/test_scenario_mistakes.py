@@ -105,7 +105,10 @@ MISTAKES = {
     "spacing of its own": (
         "range_m: 145",
         "range_m: 145\n    spacing: wide",
-        ['bad.yaml:13: vehicles.primary.spacing: "wide" is not allowed; must be adaptive or fixed'],
+        [
+            'bad.yaml:13: vehicles.primary.spacing: "wide" is not allowed; '
+            "must be adaptive, fixed or package.module:Class of a spacing planner"
+        ],
     ),
     "unknown role": (
         "role: revisit",
@@ -227,7 +230,8 @@ MISTAKES = {
         "curve: mussel",
         [
             'bad.yaml:13: vehicles.primary.sensor.curve: "mussel" is not allowed; '
-            "must be a bundled curve (muscle), or a mapping with range_m and p_detect"
+            "must be a bundled curve (muscle), a mapping with range_m and p_detect, "
+            "or package.module:Class of what makes one"
         ],
     ),
     "curve that does not ascend": (

@@ -19,7 +19,7 @@ def test_the_mean_over_both_draws_is_the_truth(truth: float) -> None:
     assert np.mean(means) == pytest.approx(truth, abs=1e-3)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(truth=st.floats(0.02, 0.98), noise_cell=st.floats(0.0, 1.5))
 def test_the_mean_is_the_truth_for_any_noise(truth: float, noise_cell: float) -> None:
     noise = PDetectEstimate(noise_cell, 0.0)

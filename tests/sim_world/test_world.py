@@ -435,7 +435,7 @@ def as_sent(published: Published, keep: Callable[[str], bool] = lambda _: True) 
     return [(at_ms, one.key, encode(header, one.message)) for at_ms, one in published if keep(one.key)]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(orders(anything))
 def test_whatever_it_is_told_it_says_only_what_it_may_and_what_fits(told: list[tuple[int, str, Maneuver]]) -> None:
     routing = Routing((RosterNode("world", Role.WORLD, ("a", "b")),))
@@ -447,13 +447,13 @@ def test_whatever_it_is_told_it_says_only_what_it_may_and_what_fits(told: list[t
         assert len(payload) <= route.topic.max_bytes
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(orders(metres))
 def test_one_seed_gives_one_mission(told: list[tuple[int, str, Maneuver]]) -> None:
     assert as_sent(sail(NOISY, told).published) == as_sent(sail(NOISY, told).published)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(orders(metres))
 def test_a_vehicle_does_not_depend_on_the_others(told: list[tuple[int, str, Maneuver]]) -> None:
     alone = replace(NOISY, vehicles=(NOISY.vehicles[0],))
@@ -461,7 +461,7 @@ def test_a_vehicle_does_not_depend_on_the_others(told: list[tuple[int, str, Mane
     assert both == single
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.integers(0, 100_000))
 def test_what_a_look_sees_does_not_depend_on_when(wait_ms: int) -> None:
     now, later = (sail(NOISY, [(after_ms, "a", NORTH_400)]).looks() for after_ms in (0, wait_ms))

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from any_message import any_message
 from hypothesis import strategies as st
+from likely_message import likely_message
 from one_node import OneNode
 
 from comms.messages import Look, Maneuver, ManeuverStatus
@@ -34,7 +34,7 @@ def letters(topics: Sequence[tuple[Topic, Sequence[str]]], most: int) -> st.Sear
             lambda vehicle, number, **rest: Letter(topic.key(vehicle=vehicle, number=number, tile="0-0"), **rest),
             st.sampled_from(list(vehicles)),
             st.integers(1, 3),
-            message=any_message(topic.message),
+            message=likely_message(topic.message),
             after_ms=st.sampled_from([*[0, 1, 2, 3] * 8, *[700] * 4, 4_000, 11_000, 31_000]),
             sequence=st.sampled_from([*[None] * 8, 0, 7]),
             incarnation=st.sampled_from([*[0] * 20, 1]),

@@ -1,195 +1,118 @@
-"""Hypothesis strategies for messages that fit the wire: from the likely to the extreme, whatever their sense."""
+"""Messages of every type made from the kinds their fields are annotated with: any that is valid, and the largest."""
 
 from __future__ import annotations
 
-from dataclasses import fields
-from functools import cache
+import enum
+from dataclasses import fields, is_dataclass
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import numpy as np
 from hypothesis import strategies as st
 
-from comms.messages import (
-    AgentState,
-    CoverageTile,
-    Hotspot,
-    HotspotState,
-    Look,
-    LookContact,
-    ManeuverState,
-    ManeuverStatus,
-    Message,
-    Mode,
-    Task,
-    TaskAction,
-    TaskState,
-    TaskStatus,
-    Vertex,
+from comms.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, Header
+from comms.messages import Message
+from comms.wire import (
+    IDENTIFIER,
+    LARGEST_MS,
+    AtMost,
+    Flag,
+    Mask,
+    Packed,
+    Scaled,
+    Whole,
+    Words,
 )
-from comms.wire import AtMost, Choice, Flag, Kind, Many, Mask, Packed, Record, Scaled, Whole, Words, record_of
 
-_NAMES = ["primary", "helper", "second"]
-_LIKELY_M = [0.0, 5.0, 50.0, 97.5, 122.5, 300.0, -40.0]
-_SIDES = st.integers(0, 6)
+MESSAGE_TYPES: tuple[type[Any], ...] = get_args(Message)
+MOST_DRAWN = 6  # entries of a tuple and elements along an axis: enough to differ, and quick to draw
 
-
-@cache
-def any_message(cls: type[Message]) -> st.SearchStrategy[Any]:
-    """Messages of one type. Those that lead on make sense more often than chance would have it."""
-    sensible = {
-        Look: _looks,
-        CoverageTile: _tiles,
-        Hotspot: _hotspots,
-        AgentState: _states,
-        TaskStatus: _task_statuses,
-        Task: _tasks,
-        ManeuverStatus: _maneuver_statuses,
-    }.get(cls)
-    anything = _of_record(cls)
-    return anything if sensible is None else st.one_of(anything, sensible(), sensible())
+headers = st.builds(
+    Header,
+    st.from_regex(IDENTIFIER, fullmatch=True),
+    st.integers(0, LARGEST_INCARNATION),
+    st.integers(0, LARGEST_SEQUENCE),
+    st.integers(0, LARGEST_MS),
+)
 
 
-def _of_record(cls: type[Any]) -> st.SearchStrategy[Any]:
-    hints = get_type_hints(cls, include_extras=True)
-    return st.builds(cls, **{field.name: _of_hint(hints[field.name]) for field in fields(cls)})
+def any_message(message_type: type[Any]) -> st.SearchStrategy[Any]:
+    """Valid messages of a type, each field anywhere in its range."""
+    hints = get_type_hints(message_type, include_extras=True)
+    return st.builds(message_type, **{one.name: _any(hints[one.name]) for one in fields(message_type)})
 
 
-def _of_hint(hint: Any) -> st.SearchStrategy[Any]:
-    if get_origin(hint) is Annotated:
-        base, *notes = get_args(hint)
-        most = next((note.count for note in notes if isinstance(note, AtMost)), None)
-        if most is not None:
-            return st.lists(_of_hint(get_args(base)[0]), max_size=min(most, 5)).map(tuple)
-        return _of_kind(notes[0])
-    if isinstance(hint, type) and issubclass(hint, bool):
-        return st.booleans()
-    try:
-        return st.sampled_from(tuple(hint))  # an enumeration
-    except TypeError:
-        record_of(hint)
-        return _of_record(hint)
+def largest_message(message_type: type[Any], *, tile_cells: int) -> Any:
+    """A message of a type that takes the most bytes its fields allow; a coverage tile has `tile_cells` a side."""
+    hints = get_type_hints(message_type, include_extras=True)
+    return message_type(**{one.name: _largest(hints[one.name], tile_cells) for one in fields(message_type)})
 
 
-def _of_kind(kind: Kind) -> st.SearchStrategy[Any]:
-    match kind:
-        case Scaled():
-            likely = st.sampled_from([one for one in _LIKELY_M if kind.low <= one <= kind.high])
-            near = st.floats(max(kind.low, -500), min(kind.high, 500))
-            return st.one_of(likely, near, st.sampled_from([kind.low, kind.high]))
-        case Whole():
-            return st.one_of(st.integers(0, 6), st.integers(0, 6), st.sampled_from([kind.low, kind.high, 10_000]))
+def kind_of(hint: Any) -> Any:
+    """The wire kind a field is annotated with; None for an enumeration, a record or a tuple of a bounded length."""
+    if get_origin(hint) is not Annotated:
+        return None
+    return next((note for note in get_args(hint)[1:] if not isinstance(note, AtMost)), None)
+
+
+def _bounded_tuple(hint: Any) -> tuple[Any, int]:
+    base, bound = get_args(hint)
+    return get_args(base)[0], bound.count
+
+
+def _any(hint: Any) -> st.SearchStrategy[Any]:
+    match kind_of(hint):
+        case Scaled(low=low, high=high):
+            return st.floats(low, high)
+        case Whole(low=low, high=high):
+            return st.integers(low, high)
         case Flag():
             return st.booleans()
-        case Words(pattern=None):
-            return st.text(max_size=10)
-        case Words():
-            return st.sampled_from([name for name in ["", *_NAMES, "0" * 64] if _fits(kind, name)])
-        case Packed():
-            values = st.sampled_from([0.0, 0.05, 0.3, kind.high] if kind.steps_per_unit else [0, 1, 18, 255])
-            return st.builds(np.full, st.tuples(*[_SIDES] * kind.dimensions), values)
+        case Words(longest=longest, pattern=None):
+            return st.text(max_size=longest).filter(lambda text: len(text.encode()) <= longest)
+        case Words(longest=longest, pattern=pattern):
+            assert pattern is not None
+            return st.from_regex(pattern, fullmatch=True).filter(lambda text: len(text) <= longest)
+        case Packed() as packed:
+            return _arrays(packed.dimensions, packed.dtype, packed.steps_per_unit, packed.high)
         case Mask():
-            return st.builds(np.full, st.tuples(_SIDES, _SIDES), st.booleans())
-    assert not isinstance(kind, Choice | Many | Record)
-    raise TypeError(f"no strategy for {kind}")
+            return _arrays(2, "?", None, 0.0)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return st.sampled_from(hint)
+    if is_dataclass(hint):
+        return any_message(hint)  # type: ignore[arg-type]
+    entry, most = _bounded_tuple(hint)
+    return st.lists(_any(entry), max_size=min(most, MOST_DRAWN)).map(tuple)
 
 
-def _fits(kind: Words, text: str) -> bool:
-    return len(text) <= kind.longest and kind.pattern is not None and bool(kind.pattern.fullmatch(text))
+@st.composite
+def _arrays(draw: st.DrawFn, dimensions: int, dtype: str, steps_per_unit: int | None, high: float) -> Any:
+    shape = draw(st.lists(st.integers(0, MOST_DRAWN), min_size=dimensions, max_size=dimensions))
+    generator = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    if steps_per_unit is None:
+        top = 2 if dtype == "?" else np.iinfo(dtype).max + 1
+        return generator.integers(0, top, shape).astype(dtype)
+    return generator.choice([0.0, high, *generator.uniform(0.0, high, 4)], shape)
 
 
-def _looks() -> st.SearchStrategy[Look]:
-    profiles = st.builds(
-        lambda p_detect, far: np.where(np.arange(151) <= far, p_detect, 0.0),
-        st.sampled_from([0.0, 0.1, 0.3, 0.7, 0.999]),
-        st.sampled_from([1, 20, 60, 100, 130, 150]),
-    )
-    contacts = st.builds(LookContact, st.floats(0, 50), st.floats(-100, 100), st.floats(0, 1))
-    return st.builds(
-        lambda profile, bins, **rest: Look(p_detect=np.broadcast_to(profile, (2, bins, 151)), **rest),
-        profiles,
-        st.integers(1, 10),
-        number=st.integers(0, 9),
-        maneuver=st.sampled_from([0, 0, 1, 3]),
-        origin_x_m=st.sampled_from([0.0, 50.0, 120.0, 400.0]),
-        origin_y_m=st.sampled_from([0.0, 200.0]),
-        heading_rad=st.sampled_from([0.0, 3.141593, 1.0]),
-        first_along_m=st.sampled_from([0.0, 50.0, 100.0]),
-        along_bin_m=st.sampled_from([5.0, 20.0]),
-        range_bin_m=st.sampled_from([1.0, 2.0]),
-        altitude_m=st.just(15.0),
-        position_sigma_m=st.just(0.0),
-        valid=st.sampled_from([True, True, True, False]),
-        contacts=st.lists(contacts, max_size=2).map(tuple),
-    )
-
-
-def _tiles() -> st.SearchStrategy[CoverageTile]:
-    return st.builds(
-        lambda version, row, column, level, settled: CoverageTile(
-            version,
-            row * 20,
-            column * 20,
-            np.full((20, 20), level, dtype=np.uint8),
-            np.full((20, 20), level, dtype=np.uint8),
-            np.full((20, 20), settled),
-        ),
-        st.integers(0, 9),
-        st.integers(0, 2),
-        st.integers(0, 2),
-        st.sampled_from([0, 5, 60, 255]),
-        st.booleans(),
-    )
-
-
-def _hotspots() -> st.SearchStrategy[Hotspot]:
-    return st.builds(
-        lambda revision, state, x_m, y_m, length_m, risk, growing: Hotspot(
-            revision,
-            state,
-            (Vertex(x_m, y_m), Vertex(x_m + 60, y_m), Vertex(x_m + 60, y_m + length_m), Vertex(x_m, y_m + length_m)),
-            risk,
-            100,
-            growing,
-            0,
-        ),
-        st.integers(0, 9),
-        st.sampled_from([HotspotState.ACTIVE, HotspotState.ACTIVE, HotspotState.WITHDRAWN]),
-        st.sampled_from([-20.0, 7.5, 102.5, 180.0]),
-        st.sampled_from([0.0, 50.0]),
-        st.sampled_from([20.0, 100.0, 200.0]),
-        st.sampled_from([0.3, 0.8, 1.0]),
-        st.sampled_from([False, False, True]),
-    )
-
-
-def _states() -> st.SearchStrategy[AgentState]:
-    modes = st.sampled_from([Mode.IDLE, Mode.IDLE, Mode.TRANSIT, Mode.REVISIT, Mode.SURVEY])
-    return st.builds(
-        lambda mode, works_on, x_m: AgentState(mode, works_on, 1.0, 0, x_m, 0.0, 0.0),
-        modes,
-        st.sampled_from([0, 1, 1, 2]),
-        st.sampled_from([0.0, 120.0]),
-    )
-
-
-def _task_statuses() -> st.SearchStrategy[TaskStatus]:
-    strips = st.sampled_from([1, 1, 1, 2, 3])
-    states = st.sampled_from([*TaskState, TaskState.ACCEPTED, TaskState.UNDER_WAY, TaskState.DONE])
-    return st.builds(lambda strip, state: TaskStatus(strip, state, 0.0, 0, ""), strips, states)
-
-
-def _tasks() -> st.SearchStrategy[Task]:
-    actions = st.sampled_from([TaskAction.TAKE, TaskAction.TAKE, TaskAction.GIVE_BACK])
-    return st.builds(
-        lambda action, strip, length_m: Task(action, strip, 50.0, 20.0, 0.0, length_m, 50.0),
-        actions,
-        st.integers(1, 3),
-        st.sampled_from([60.0, 120.0]),
-    )
-
-
-def _maneuver_statuses() -> st.SearchStrategy[ManeuverStatus]:
-    states = st.sampled_from([*ManeuverState, ManeuverState.DONE, ManeuverState.DONE])
-    return st.builds(
-        lambda number, state: ManeuverStatus(number, state, 500_000, ""), st.sampled_from([0, 0, 0, 1, 3]), states
-    )
+def _largest(hint: Any, tile_cells: int) -> Any:
+    match kind_of(hint):
+        case Scaled(low=low, high=high):
+            return max(low, high, key=abs)
+        case Whole(high=high):
+            return high
+        case Flag():
+            return True
+        case Words(longest=longest):
+            return "a" * longest
+        case Packed(dimensions=2, dtype=dtype):
+            return np.full((tile_cells, tile_cells), np.iinfo(dtype).max, dtype)
+        case Packed() as packed:
+            return np.full((1,) * (packed.dimensions - 1) + (packed.most,), packed.high)
+        case Mask():
+            return np.full((tile_cells, tile_cells), True)
+    if isinstance(hint, type) and issubclass(hint, enum.Enum):
+        return list(hint)[-1]
+    if is_dataclass(hint):
+        return largest_message(hint, tile_cells=tile_cells)  # type: ignore[arg-type]
+    entry, most = _bounded_tuple(hint)
+    return (_largest(entry, tile_cells),) * most

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from comms.access import access_rules
-from comms.control import HostPlan, RunKeys
+from comms.control import HostPlan, RunKeys, pack
 from comms.local_bus import run_local
 from comms.messages import AgentState, ClockMode, Grid, MissionOver, Mode, Nav, Role, RunInfo
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.result import BusResult
 from comms.routing import RosterNode, Routing
+from comms.runner import NodeError
 from comms.topics import MISSION_OVER, NAV, STATE
 from comms.zenoh_host import ListenerHost, serve_nodes
-from comms.zenoh_hub import Hub
-from comms.zenoh_session import open_client, open_hub
+from comms.zenoh_hub import FleetError, Hub
+from comms.zenoh_session import open_client, open_hub, put
 
 RUN_INFO = RunInfo(
     schema=1,
@@ -125,15 +128,84 @@ def on_local(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: in
 
 def on_zenoh(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
     """Runs the toy fleet over Zenoh on loopback: the world at the hub, each other node behind a session of its own."""
-    return _over_zenoh(nodes, listener, [["alpha"], ["beta"], ["coordinator"]], time_limit_ms)
+    return over_zenoh(nodes, listener, time_limit_ms=time_limit_ms)
 
 
 def on_zenoh_grouped(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
     """The same with coordinator and one agent behind one session."""
-    return _over_zenoh(nodes, listener, [["alpha"], ["beta", "coordinator"]], time_limit_ms)
+    plans = (
+        HostPlan("alpha", ("alpha",)),
+        HostPlan("both", ("beta", "coordinator")),
+        HostPlan("observer", ("observer",)),
+    )
+    return over_zenoh(nodes, listener, plans=plans, time_limit_ms=time_limit_ms)
 
 
 BUSES: dict[str, Bus] = {"local": on_local, "zenoh": on_zenoh, "zenoh-grouped": on_zenoh_grouped}
+EACH_ALONE = tuple(HostPlan(name, (name,)) for name in ("alpha", "beta", "coordinator", "observer"))
+KEYS = RunKeys("toy")
+
+
+def password(host: str) -> str:
+    """With which a host of the toy fleet connects."""
+    return f"secret-{host}"
+
+
+def over_zenoh(
+    nodes: Mapping[str, Node],
+    listener: Listener,
+    *,
+    plans: tuple[HostPlan, ...] = EACH_ALONE,
+    absent: tuple[str, ...] = (),
+    before: Callable[[str], None] = lambda endpoint: None,
+    on_failure: Callable[[], None] = lambda: None,
+    rules: bool = True,
+    time_limit_ms: int = 60_000,
+    **hub_options: Any,
+) -> BusResult:
+    """Runs the toy fleet over Zenoh, its hosts started in the order of `plans`, those `absent` left out.
+
+    Without `rules` everyone who has a password may write and read everything.
+    `before` is told the hub's endpoint before any host is started. `hub_options` go to `Hub`. When the hub fails,
+    `on_failure` is called, and what is left of the fleet sent home, before its error goes on.
+    """
+    filled = _filled(nodes)
+    routing = Routing(ROSTER)
+    users = {plan.host: password(plan.host) for plan in plans}
+    hub_session, endpoint = open_hub(users, access_rules(routing, plans, KEYS) if rules else None)
+
+    def serve(plan: HostPlan) -> None:
+        with (
+            contextlib.suppress(NodeError, SystemExit),  # the hub is told of the one and notices the other
+            open_client(endpoint, plan.host, password(plan.host)) as session,
+        ):
+            if plan.host == "observer":
+                ListenerHost(session, KEYS, plan.host, "observer", listener, routing).run()
+            else:
+                serve_nodes(session, KEYS, plan.host, {name: filled[name] for name in plan.nodes}, routing)
+
+    threads = [
+        threading.Thread(target=serve, args=(plan,), name=plan.host, daemon=True)
+        for plan in plans
+        if plan.host not in absent
+    ]
+    with hub_session:
+        before(endpoint)
+        hub = Hub(hub_session, KEYS, routing, plans, {"world": filled["world"]}, time_limit_ms, **hub_options)
+        for thread in threads:
+            thread.start()
+        try:
+            return hub.run(RUN_INFO)
+        except FleetError:
+            on_failure()
+            for plan in plans:
+                put(hub_session, KEYS.to_host(plan.host), pack("finish", 0, 0, {}))
+                put(hub_session, KEYS.to_host(plan.host), pack("goodbye"))
+            raise
+        finally:
+            for thread in threads:
+                thread.join(timeout=20)
+                assert not thread.is_alive(), f"{thread.name} has not ended"
 
 
 def _filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
@@ -141,30 +213,15 @@ def _filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
     return {node_id: nodes.get(node_id, Scripted()) for node_id in acting}
 
 
-def _over_zenoh(
-    nodes: Mapping[str, Node], listener: Listener, groups: list[list[str]], time_limit_ms: int
-) -> BusResult:
-    filled = _filled(nodes)
-    routing = Routing(ROSTER)
-    keys = RunKeys("toy")
-    plans = tuple(HostPlan("-".join(group), tuple(group)) for group in [*groups, ["observer"]])
-    passwords = {plan.host: f"secret-{plan.host}" for plan in plans}
-    hub_session, endpoint = open_hub(passwords, access_rules(routing, plans, keys))
+def fleet_that_talks(until_ms: int = 20_000) -> dict[str, Scripted]:
+    """A fleet in which everyone says something again and again, until the coordinator ends it."""
 
-    def serve(plan: HostPlan) -> None:
-        with open_client(endpoint, plan.host, passwords[plan.host]) as session:
-            if plan.host == "observer":
-                ListenerHost(session, keys, plan.host, "observer", listener, routing).run()
-            else:
-                serve_nodes(session, keys, plan.host, {name: filled[name] for name in plan.nodes}, routing)
+    def tick(now_ms: int) -> Step:
+        return says(say_nav("alpha", now_ms), say_nav("beta", -now_ms), wake_ms=now_ms + 700)
 
-    with hub_session:
-        hub = Hub(hub_session, keys, routing, plans, {"world": filled["world"]}, time_limit_ms)
-        threads = [threading.Thread(target=serve, args=(plan,), daemon=True) for plan in plans]
-        for thread in threads:
-            thread.start()
-        result = hub.run(RUN_INFO)
-        for thread in threads:
-            thread.join(timeout=20)
-            assert not thread.is_alive()
-    return result
+    return {
+        "world": Scripted(starts=tick, wakes=tick),
+        "alpha": Scripted(hears=lambda received, now_ms: says(say_state("alpha", now_ms))),
+        "beta": Scripted(hears=lambda received, now_ms: says(say_state("beta", 1), say_state("beta", 2))),
+        "coordinator": Scripted(starts=lambda now_ms: Step(wake_ms=until_ms), wakes=lambda now_ms: says(say_over())),
+    }

@@ -193,7 +193,7 @@ class TestSpacingAtItsLimits:
         assert agent.last(Plan).r_adpt_m[1] == second
         assert agent.last(AgentState).mode is Mode.FINISHED
 
-    @settings(max_examples=25, deadline=None)
+    @settings(max_examples=25)
     @given(
         width_m=st.integers(50, 900),
         nadir_gap_m=st.sampled_from([10.0, 40.0]),

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 import socket
 import struct
 from pathlib import Path
@@ -9,18 +8,7 @@ from urllib.parse import urlsplit
 import pytest
 
 from viz import picture
-from viz.picture import PictureError, headless_viewer, main, reports, show, what_is_missing
-
-
-@pytest.fixture
-def drawable(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Skips where nothing can be drawn; fails instead where all tests are required to run."""
-    missing = what_is_missing()
-    if missing is not None:
-        if os.environ.get("SECONDLOOK_REQUIRE_ALL") == "1":
-            pytest.fail(missing)
-        pytest.skip(missing)
-    monkeypatch.setattr(picture, "STEADY_S", 0.2)
+from viz.picture import PictureError, headless_viewer, main, reports, show
 
 
 def listens(url: str) -> bool:

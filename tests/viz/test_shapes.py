@@ -5,10 +5,12 @@ import math
 import numpy as np
 import pytest
 import rerun.blueprint as rrb
+from hypothesis import given
+from hypothesis import strategies as st
 
 from comms.messages import ClockMode, Grid, RunInfo, StripState, StripStatus, Vertex
 from viz.blueprint import FIELD_OF_VIEW_RAD, MARGIN, mission_blueprint
-from viz.shapes import Extent, body_quaternions, extent_of, ring, southern_end, strip_ring, swath
+from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring, swath
 
 
 def strip(heading_rad: float) -> StripStatus:
@@ -22,9 +24,17 @@ def test_a_strip_runs_along_its_heading() -> None:
     np.testing.assert_allclose(strip_ring(strip(math.pi / 2), 0.0), np.array(east), atol=1e-9)
 
 
-def test_a_label_hangs_below_the_southern_side() -> None:
-    assert southern_end(strip_ring(strip(0.0), 0.0)) == pytest.approx([10, 20, 0])
-    assert southern_end(strip_ring(strip(math.pi), 0.0)) == pytest.approx([10, -80, 0])
+@given(st.integers(1, 200), st.floats(0, 6.28))
+def test_labels_hang_on_the_centre_line_apart_from_their_neighbours(number: int, heading_rad: float) -> None:
+    along = []
+    for neighbour in (number, number + 1, number + 2):
+        x_m, y_m, z_m = label_place(strip(heading_rad), neighbour, 1.5)
+        ahead_m = (x_m - 10) * math.sin(heading_rad) + (y_m - 20) * math.cos(heading_rad)
+        assert math.hypot(x_m - 10, y_m - 20) == pytest.approx(ahead_m)
+        assert 10 <= ahead_m <= 90
+        assert z_m == 1.5
+        along.append(ahead_m)
+    assert min(abs(along[0] - along[1]), abs(along[0] - along[2]), abs(along[1] - along[2])) > 15
 
 
 def test_a_ring_is_closed() -> None:

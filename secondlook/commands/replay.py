@@ -1,0 +1,51 @@
+"""`secondlook replay`: does a node say the same again?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from comms.routing import Routing
+from comms.runner import NodeError
+from secondlook.errors import UserError
+from secondlook.fleet import build_fleet
+from secondlook.mission_files import read_messages
+from secondlook.replay import replay_node
+from secondlook.scenario import load_scenario
+
+DIFFERS = 1
+
+
+def replay(
+    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    node: Annotated[str, typer.Option(help="Whom to replay: a vehicle's id, coordinator or world.")] = "coordinator",
+) -> None:
+    """Feed one node of a recorded mission what it heard, and compare what it says with the recording."""
+    scenario_file = run / "scenario.yaml"
+    recording = read_messages(run / "messages.mpk")
+    fleet = build_fleet(load_scenario(str(scenario_file)), record=False)
+    if node not in fleet.specs:
+        raise UserError(f"--node {node}: not a node of this mission; must be one of {', '.join(fleet.specs)}")
+    try:
+        result = replay_node(
+            node,
+            fleet.specs[node].make(),
+            Routing(fleet.roster),
+            recording,
+            whole=(run / "summary.json").exists(),
+        )
+    except NodeError as error:
+        typer.echo(f"{error}", err=True)
+        raise typer.Exit(DIFFERS) from error
+    if result.difference is None:
+        typer.echo(f"{node}: all {result.agreed} messages are said again, byte for byte")
+        return
+    difference = result.difference
+    typer.echo(
+        f"{node}: {difference.after} messages agree, then at {difference.t_s:.3f} s\n"
+        f"  recorded: {difference.recorded}\n"
+        f"  replayed: {difference.replayed}"
+    )
+    raise typer.Exit(DIFFERS)

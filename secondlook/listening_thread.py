@@ -1,0 +1,71 @@
+"""A listener in a thread of the launcher's own process."""
+
+from __future__ import annotations
+
+import threading
+
+from comms.control import RunKeys
+from comms.node import Listener
+from comms.routing import Routing
+from comms.zenoh_host import ListenerHost
+from comms.zenoh_session import open_client
+
+
+class ListeningThread:
+    """Listens at the hub, under a node's id as host and user name, from `start` to the run's end or to `stop`.
+
+    Whatever happens, the listener is closed by then. `error` is what went wrong.
+    """
+
+    def __init__(
+        self, node_id: str, listener: Listener, keys: RunKeys, routing: Routing, password: str, patience_s: float
+    ) -> None:
+        self.error: Exception | None = None
+        self._node_id = node_id
+        self._listener = listener
+        self._keys = keys
+        self._routing = routing
+        self._password = password
+        self._patience_s = patience_s
+        self._host: ListenerHost | None = None
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._listen, name=node_id, daemon=True)
+        self._endpoint = ""
+
+    def start(self, endpoint: str) -> None:
+        """Connects and begins to listen."""
+        self._endpoint = endpoint
+        self._thread.start()
+
+    def join(self, timeout_s: float) -> None:
+        """Waits for its end after the run's."""
+        self._thread.join(timeout_s)
+
+    def interrupt(self) -> None:
+        """Lets it end early, if it has not ended yet."""
+        self._stopping.set()
+        if self._host is not None:
+            self._host.interrupt()
+
+    def stop(self, timeout_s: float) -> None:
+        """Interrupts it and waits for its end."""
+        self.interrupt()
+        if self._thread.is_alive():
+            self._thread.join(timeout_s)
+        if self._host is None:  # it never came to listen
+            try:
+                self._listener.close()
+            except Exception as error:
+                self.error = self.error or error
+
+    def _listen(self) -> None:
+        try:
+            with open_client(self._endpoint, self._node_id, self._password, patience_s=self._patience_s) as session:
+                self._host = ListenerHost(
+                    session, self._keys, self._node_id, self._node_id, self._listener, self._routing
+                )
+                if self._stopping.is_set():
+                    self._host.interrupt()
+                self._host.run()
+        except Exception as error:
+            self.error = error

@@ -1,0 +1,114 @@
+"""The parts that a scenario may choose: ours by name, a user's own as `package.module:Class`."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from coordinator.allocation import GreedyAllocator, NoAllocator
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
+
+_OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
+
+
+class PartError(Exception):
+    """A part that cannot be used; the text says what must be, and why this is not."""
+
+
+@dataclass(frozen=True)
+class PartKind:
+    """A kind of part.
+
+    `ours`: what makes each of our own, by name. `arguments`: what a maker is called with, by keyword. `methods`: what a
+    part must be able to do, each with the names of its arguments; checked on classes before anything is made.
+    """
+
+    what: str
+    arguments: tuple[str, ...] = ()
+    methods: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    ours: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
+
+    def maker(self, text: str) -> Callable[..., Any]:
+        """What makes the part that `text` names: one of ours, or a class or function of the user's.
+
+        Raises PartError.
+        """
+        if text in self.ours:
+            return self.ours[text]
+        match = _OWN.fullmatch(text)
+        if match is None:
+            raise PartError(f"must be {self._names()}")
+        found = _import(match.group(1), match.group(2))
+        if not callable(found):
+            raise PartError(f"must be {self._names()}; that is a {type(found).__name__}")
+        self._check_call(found, self.arguments, f"{text} must take ({', '.join(self.arguments)})")
+        if inspect.isclass(found):
+            for method, arguments in self.methods.items():
+                must = f"{self.what} must have {method}({', '.join(arguments)})"
+                if not callable(getattr(found, method, None)):
+                    raise PartError(f"{must}; {text} has no {method}")
+                self._check_call(getattr(found, method), ("self", *arguments), must, by_place=True)
+        maker: Callable[..., Any] = found
+        return maker
+
+    def _names(self) -> str:
+        names = " or ".join([*self.ours, f"package.module:Class of {self.what}"])
+        return names.replace(" or ", ", ", len(self.ours) - 1)
+
+    def _check_call(
+        self, called: Callable[..., Any], arguments: tuple[str, ...], must: str, *, by_place: bool = False
+    ) -> None:
+        try:
+            signature = inspect.signature(called)
+        except (TypeError, ValueError):  # some builtins have none; what they do with a call will show
+            return
+        try:
+            if by_place:
+                signature.bind(*arguments)
+            else:
+                signature.bind(**dict.fromkeys(arguments))
+        except TypeError as error:
+            raise PartError(f"{must}; {error}") from error
+
+
+def _import(module: str, name: str) -> Any:
+    here = str(Path.cwd())
+    if here not in sys.path and "" not in sys.path:
+        # At the end: a user's own modules are found from where the command is called, and are in nothing's way.
+        sys.path.append(here)
+    try:
+        return getattr(import_module(module), name)
+    except AttributeError:
+        raise PartError(f"must be importable; {module} has no {name}") from None
+    except Exception as error:
+        raise PartError(f"must be importable; {type(error).__name__}: {error}") from error
+
+
+ALLOCATOR = PartKind(
+    "an allocator",
+    methods={"assign": ("strips", "helpers")},
+    ours={"greedy": GreedyAllocator, "none": NoAllocator},
+)
+SPACING = PartKind(
+    "a spacing planner",
+    arguments=("nadir_gap_m", "told_range_m"),
+    methods={"decide": ("width_m", "covered_m", "r_eff_m")},
+    ours={"adaptive": AdaptiveSpacing, "fixed": FixedSpacing},
+)
+SONAR = PartKind(
+    "a sonar model",
+    arguments=("curve", "seabed"),
+    methods={"p_detect": ("range_m", "look_bearing_rad", "altitude_m", "position_m", "time_s")},
+)
+CURVE = PartKind("a detection curve's maker")
+NODE = PartKind(
+    "a node",
+    arguments=("config",),
+    methods={"start": ("now_ms",), "on_message": ("received", "now_ms"), "on_wake": ("now_ms",)},
+)

@@ -1,0 +1,102 @@
+"""Replays one node of a recorded mission: given what it heard, at the times it heard it, it must say the same again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from comms.clock import WRAP_UP_MS
+from comms.node import Node, Received
+from comms.routing import Routing
+from comms.runner import Intake, NodeRunner, Outgoing
+from comms.topics import MISSION_OVER
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Where the replay parts from the recording: the count of messages that agreed, the time, and in words what is
+    said there in either."""
+
+    after: int
+    t_s: float
+    recorded: str
+    replayed: str
+
+
+@dataclass(frozen=True)
+class ReplayResult:
+    """How many messages agreed, and the first that does not; None if all do."""
+
+    agreed: int
+    difference: Difference | None
+
+
+def replay_node(
+    node_id: str, node: Node, routing: Routing, recording: Sequence[tuple[str, bytes]], *, whole: bool
+) -> ReplayResult:
+    """Feeds a node its mail and wake-ups and compares what it publishes with what the recording has from it.
+
+    `recording`: key and payload of every message. `whole`: the mission was recorded to its end; of one that was cut off
+    only what the recording still holds is compared. Raises NodeError where the node fails.
+    """
+    intake = Intake(routing)
+    messages = [received for key, payload in recording if (received := intake.open(key, payload)) is not None]
+    expected = [one for one in messages if one.header.sender == node_id]
+    runner = NodeRunner(node_id, node, routing)
+    last_ms = 0
+    due_times: set[int] = set()
+    for one in messages:
+        last_ms = max(last_ms, one.header.sent_ms)
+        route = routing.route(one.key)
+        if route is not None and node_id in route.readers:
+            runner.deliver(one)
+            due_times.add(one.header.sent_ms + one.topic.delay_ms)
+    overs = [one.header.sent_ms for one in messages if one.topic is MISSION_OVER]
+    end_ms = overs[0] + WRAP_UP_MS if overs else last_ms
+    agreed = 0
+    now_ms: int | None = 0
+    times = sorted(due_times, reverse=True)
+    while now_ms is not None and now_ms <= end_ms:
+        wake_ms, outgoing = runner.act(now_ms, start=now_ms == 0)
+        for said in outgoing:
+            if agreed == len(expected):
+                if not whole and now_ms >= last_ms:
+                    return ReplayResult(agreed, None)
+                return ReplayResult(agreed, _difference(agreed, now_ms, None, said))
+            if (said.key, said.payload) != (expected[agreed].key, expected[agreed].payload):
+                return ReplayResult(agreed, _difference(agreed, now_ms, expected[agreed], said))
+            agreed += 1
+        while times and times[-1] <= now_ms:
+            times.pop()
+        now_ms = min((time for time in (wake_ms, times[-1] if times else None) if time is not None), default=None)
+    if agreed < len(expected):
+        return ReplayResult(agreed, _difference(agreed, expected[agreed].header.sent_ms, expected[agreed], None))
+    return ReplayResult(agreed, None)
+
+
+def _difference(agreed: int, now_ms: int, recorded: Received | None, replayed: Outgoing | None) -> Difference:
+    before = "nothing" if recorded is None else f"{recorded.key} at {recorded.header.sent_ms / 1000:.3f} s"
+    after = "nothing" if replayed is None else f"{replayed.key} at {now_ms / 1000:.3f} s"
+    if recorded is not None and replayed is not None and recorded.key == replayed.key:
+        # The payload is what was compared; the replayed message is not quantised, so only clear differences are named.
+        for field in fields(recorded.message):
+            old, new = getattr(recorded.message, field.name), getattr(replayed.message, field.name)
+            if not _alike(old, new):
+                before += f", {field.name} {_short(old)}"
+                after += f", {field.name} {_short(new)}"
+    return Difference(agreed, now_ms / 1000, before, after)
+
+
+def _alike(old: object, new: object) -> bool:
+    if isinstance(old, np.ndarray) and isinstance(new, np.ndarray):
+        return old.shape == new.shape and bool(np.allclose(old, new, atol=1e-2))
+    if isinstance(old, float) and isinstance(new, (int, float)):
+        return abs(old - new) <= 1e-2
+    return old == new
+
+
+def _short(value: object) -> str:
+    words = repr(value)
+    return words if len(words) <= 80 else words[:77] + "..."

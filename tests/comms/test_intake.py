@@ -1,0 +1,64 @@
+"""What does not fit is counted, said once and dropped; what fits comes through."""
+
+from __future__ import annotations
+
+import logging
+
+import pytest
+from fleets import ROSTER, nav, state
+
+from comms.codec import Header, encode
+from comms.node import Received
+from comms.routing import Routing
+from comms.runner import Intake
+from comms.topics import NAV, STATE
+
+GOOD = encode(Header("world", 0, 0, 1000), nav(2.0))
+
+
+@pytest.fixture
+def intake() -> Intake:
+    return Intake(Routing(ROSTER))
+
+
+def test_a_message_that_fits_is_opened(intake: Intake) -> None:
+    expected = Received("veh/alpha/nav", NAV, "alpha", Header("world", 0, 0, 1000), nav(2.0), GOOD)
+    assert intake.open("veh/alpha/nav", GOOD) == expected
+    assert not intake.dropped
+
+
+@pytest.mark.parametrize(
+    ("key", "payload", "reason", "said"),
+    [
+        ("veh/alpha/nav", b"\xc1", "malformed", "from world: malformed: veh/alpha/nav: not MessagePack"),
+        ("veh/alpha/nav", encode(Header("world", 0, 0, 0), state()), "malformed", "Nav needs a list of 6 fields"),
+        ("veh/alpha/nav", b"\x00" * (NAV.max_bytes + 1), "too long", "too long: veh/alpha/nav: 201 bytes"),
+        ("veh/alpha/nav", encode(Header("beta", 0, 0, 0), nav()), "wrong sender", "says it is from beta"),
+        ("agent/beta/state", encode(Header("alpha", 0, 0, 0), state()), "wrong sender", "from beta: wrong sender"),
+        ("veh/delta/nav", GOOD, "unknown key", "from nobody: unknown key: veh/delta/nav"),
+        ("agent/alpha/coverage/*", GOOD, "unknown key", "unknown key: agent/alpha/coverage/*"),
+    ],
+)
+def test_what_does_not_fit_is_counted_and_said_once(
+    intake: Intake, caplog: pytest.LogCaptureFixture, key: str, payload: bytes, reason: str, said: str
+) -> None:
+    for _ in range(3):
+        assert intake.open(key, payload) is None
+    assert intake.dropped == {reason: 3}
+    assert len(caplog.records) == 1
+    assert caplog.records[0].levelno == logging.WARNING
+    assert said in caplog.messages[0]
+    assert intake.open("veh/alpha/nav", GOOD) is not None
+
+
+def test_each_sender_and_each_reason_is_said_for_itself(intake: Intake, caplog: pytest.LogCaptureFixture) -> None:
+    for key in ("veh/alpha/nav", "agent/alpha/state", "agent/beta/state", "agent/beta/maneuver"):
+        intake.open(key, b"\xc1")
+    intake.open("agent/beta/state", b"\x00" * (STATE.max_bytes + 1))
+    assert intake.dropped == {"malformed": 4, "too long": 1}
+    assert [message.split(": ")[:2] for message in caplog.messages] == [
+        ["dropped a message from world", "malformed"],
+        ["dropped a message from alpha", "malformed"],
+        ["dropped a message from beta", "malformed"],
+        ["dropped a message from beta", "too long"],
+    ]

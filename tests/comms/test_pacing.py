@@ -1,0 +1,85 @@
+"""Marks and acknowledgements of those that only listen, worked out by hand."""
+
+from __future__ import annotations
+
+import pytest
+from fleets import ROSTER
+
+from comms.clock import LockstepClock, Sent
+from comms.pacing import Pacing
+from comms.routing import Routing
+
+
+@pytest.fixture
+def clock() -> LockstepClock:
+    clock = LockstepClock(Routing(ROSTER), 60_000)
+    clock.next_round()
+    for node_id in ("alpha", "beta", "coordinator"):
+        clock.answer(node_id, None, [])
+    return clock
+
+
+def say(clock: LockstepClock, size: int, *, later_ms: int) -> None:
+    """The world says so many bytes now, and the clock goes on."""
+    clock.answer("world", clock.now_ms + later_ms, [Sent("world/truth/targets", size)])
+    clock.next_round()
+
+
+def test_there_is_a_mark_every_sixteenth_of_the_bound(clock: LockstepClock) -> None:
+    pacing = Pacing(clock, ["observer"], 1600)
+    say(clock, 99, later_ms=10)
+    assert not pacing.next_mark()
+    say(clock, 1, later_ms=10)
+    assert pacing.next_mark()
+    assert pacing.mark == 1
+    assert not pacing.next_mark()
+    say(clock, 100, later_ms=10)
+    assert pacing.next_mark()
+    assert pacing.mark == 2
+
+
+def test_there_is_a_mark_every_ten_seconds(clock: LockstepClock) -> None:
+    pacing = Pacing(clock, ["observer"], 1600)
+    say(clock, 1, later_ms=9999)
+    assert not pacing.next_mark()
+    say(clock, 1, later_ms=1)
+    assert pacing.next_mark()
+    say(clock, 1, later_ms=9999)
+    assert not pacing.next_mark()
+
+
+def test_a_listener_is_behind_from_the_bound_until_it_has_acknowledged_enough(clock: LockstepClock) -> None:
+    pacing = Pacing(clock, ["observer"], 1600)
+    for _ in range(15):
+        say(clock, 100, later_ms=10)
+        assert pacing.next_mark()
+        assert pacing.behind() == []
+    say(clock, 100, later_ms=10)
+    assert pacing.behind() == ["observer"]
+    pacing.acknowledge("observer", 1)
+    assert pacing.behind() == []
+    say(clock, 150, later_ms=10)
+    assert pacing.behind() == ["observer"]
+    pacing.acknowledge("observer", 15)
+    assert pacing.behind() == []
+
+
+def test_without_listeners_nobody_is_behind(clock: LockstepClock) -> None:
+    pacing = Pacing(clock, [], 1600)
+    say(clock, 5000, later_ms=10)
+    assert not pacing.next_mark()
+    assert pacing.behind() == []
+
+
+@pytest.mark.parametrize(("node_id", "mark"), [("observer", 0), ("observer", 2), ("alpha", 1), ("observer", "1")])
+def test_an_acknowledgement_of_a_mark_that_was_not_sent_is_refused(
+    clock: LockstepClock, node_id: str, mark: int
+) -> None:
+    pacing = Pacing(clock, ["observer"], 1600)
+    say(clock, 100, later_ms=10)
+    assert pacing.next_mark()
+    with pytest.raises(ValueError, match=f"^{node_id} has acknowledged a mark that it was not sent"):
+        pacing.acknowledge(node_id, mark)
+    pacing.acknowledge("observer", 1)
+    with pytest.raises(ValueError, match=r": 1$"):
+        pacing.acknowledge("observer", 1)

@@ -1,0 +1,238 @@
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.fleet_map import FleetMap
+from planner.risk import LevelArray
+from planner.types import BoolArray, GridSpec, SweepFrame
+
+GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=23, rows=22)
+# Its four tiles: (first row, first column, rows, columns).
+PLACES = ((0, 0, 20, 20), (0, 20, 20, 3), (20, 0, 2, 20), (20, 20, 2, 3))
+
+
+@dataclass(frozen=True, eq=False)
+class TileNews:
+    vehicle: str
+    version: tuple[int, int]
+    place: tuple[int, int, int, int]
+    sum_levels: LevelArray
+    largest_levels: LevelArray
+    settled: BoolArray
+
+    def give(self, fleet: FleetMap) -> bool:
+        row, column, _, _ = self.place
+        arrays = (self.sum_levels, self.largest_levels, self.settled)
+        return fleet.take(self.vehicle, self.version, row, column, *arrays)
+
+
+def tile(
+    vehicle: str, version: tuple[int, int], place: tuple[int, int, int, int], levels: int, largest: int | None = None
+) -> TileNews:
+    shape = place[2:]
+    return TileNews(
+        vehicle,
+        version,
+        place,
+        np.full(shape, levels, dtype=np.uint8),
+        np.full(shape, levels if largest is None else largest, dtype=np.uint8),
+        np.full(shape, levels > 0),
+    )
+
+
+@st.composite
+def published(draw: st.DrawFn) -> list[TileNews]:
+    """What a fleet has published: every (vehicle, place, version) once, with contents of its own."""
+    which = draw(
+        st.sets(
+            st.tuples(
+                st.sampled_from(["alpha", "beta", "gamma"]),
+                st.tuples(st.integers(0, 1), st.integers(1, 3)),
+                st.sampled_from(PLACES),
+            ),
+            max_size=12,
+        )
+    )
+    generator = np.random.Generator(np.random.PCG64(draw(st.integers(0, 2**32 - 1))))
+    told = []
+    for vehicle, version, place in sorted(which):
+        sums = generator.integers(0, 256, place[2:], dtype=np.uint8)
+        largest = (sums * generator.uniform(0, 1, place[2:])).astype(np.uint8)
+        told.append(TileNews(vehicle, version, place, sums, largest, generator.integers(0, 2, place[2:]).astype(bool)))
+    return told
+
+
+def newest(told: list[TileNews]) -> list[TileNews]:
+    best: dict[tuple[str, tuple[int, int, int, int]], TileNews] = {}
+    for news in sorted(told, key=lambda news: news.version):
+        best[news.vehicle, news.place] = news
+    return list(best.values())
+
+
+def joined(told: list[TileNews], rho: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+    """The map from scratch, cell by cell as the formula says it."""
+    sums, largest = np.zeros(GRID.shape), np.zeros(GRID.shape)
+    for news in newest(told):
+        row, column, rows, columns = news.place
+        window = np.s_[row : row + rows, column : column + columns]
+        sums[window] += news.sum_levels
+        largest[window] = np.maximum(largest[window], news.largest_levels)
+    return np.exp(-0.02 * (largest + (1 - rho) * (sums - largest)))
+
+
+@given(st.data(), published(), st.sampled_from([0.0, 0.3, 1.0]))
+def test_any_order_with_losses_and_repeats_ends_in_one_map(
+    data: st.DataObject, told: list[TileNews], rho: float
+) -> None:
+    # Anything may be lost, come again, and late.
+    arriving = data.draw(st.lists(st.sampled_from(told), max_size=20)) if told else []
+    fleet, other = FleetMap(GRID, rho), FleetMap(GRID, rho)
+    for news in arriving:
+        news.give(fleet)
+    for news in data.draw(st.permutations(arriving)):
+        news.give(other)
+    np.testing.assert_allclose(fleet.risk, joined(arriving, rho), rtol=1e-12)
+    np.testing.assert_array_equal(fleet.risk, other.risk)
+    np.testing.assert_array_equal(fleet.seen(), other.seen())
+    np.testing.assert_array_equal(fleet.settled_by(["alpha", "gamma"]), other.settled_by(["alpha", "gamma"]))
+
+
+@given(st.data(), published())
+def test_two_listeners_who_tell_each_other_what_they_heard_agree(data: st.DataObject, told: list[TileNews]) -> None:
+    heard = [data.draw(st.lists(st.sampled_from(told))) if told else [] for _ in range(2)]
+    one, other, both = FleetMap(GRID), FleetMap(GRID), FleetMap(GRID)
+    for news in heard[0] + newest(heard[1]):
+        news.give(one)
+    for news in heard[1] + newest(heard[0]):
+        news.give(other)
+    for news in newest(heard[0] + heard[1]):
+        news.give(both)
+    np.testing.assert_array_equal(one.risk, both.risk)
+    np.testing.assert_array_equal(other.risk, both.risk)
+
+
+@given(published(), st.sampled_from([0.0, 0.3, 1.0]))
+def test_what_is_seen_is_what_has_a_risk_below_1(told: list[TileNews], rho: float) -> None:
+    fleet = FleetMap(GRID, rho)
+    for news in told:
+        # A layer's largest look has a level where the sum has.
+        replace(news, largest_levels=np.maximum(news.largest_levels, np.minimum(news.sum_levels, 1))).give(fleet)
+    np.testing.assert_array_equal(fleet.seen(), fleet.risk < 1)
+    risk, seen = fleet.risk_of({"alpha", "beta", "gamma"})
+    np.testing.assert_array_equal(risk, fleet.risk)
+    np.testing.assert_array_equal(seen, fleet.seen())
+
+
+@given(published())
+def test_what_is_known_already_is_no_news(told: list[TileNews]) -> None:
+    fleet = FleetMap(GRID)
+    taken = [news.give(fleet) for news in sorted(told, key=lambda news: news.version)]
+    assert all(taken)
+    assert fleet.changes == len(told)
+    before = fleet.risk.copy()
+    assert not any(news.give(fleet) for news in told)
+    assert fleet.changes == len(told)
+    np.testing.assert_array_equal(fleet.risk, before)
+
+
+def test_sums_add_and_maxima_take_the_maximum() -> None:
+    fleet = FleetMap(GRID, rho=0.5)
+    tile("alpha", (0, 1), PLACES[0], 50, largest=40).give(fleet)
+    tile("beta", (0, 1), PLACES[0], 30).give(fleet)
+    # Sum 80, largest 40: exp(-0.02 (40 + 0.5 * 40)).
+    assert fleet.risk[0, 0] == pytest.approx(math.exp(-1.2))
+    assert fleet.risk[0, 20] == 1.0
+
+
+def test_a_restarted_vehicle_starts_its_layer_anew() -> None:
+    fleet = FleetMap(GRID)
+    tile("alpha", (0, 9), PLACES[0], 50).give(fleet)
+    assert tile("alpha", (1, 0), PLACES[0], 10).give(fleet)
+    assert fleet.risk[0, 0] == pytest.approx(math.exp(-0.2))
+    assert not tile("alpha", (0, 10), PLACES[0], 99).give(fleet)
+
+
+def test_layers_can_be_told_apart() -> None:
+    fleet = FleetMap(GRID)
+    tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
+    tile("beta", (0, 1), PLACES[1], 30).give(fleet)
+    risk, seen = fleet.risk_of({"alpha"})
+    assert (risk[0, 0], risk[0, 20]) == (pytest.approx(math.exp(-1.0)), 1.0)
+    assert (seen[0, 0], seen[0, 20]) == (True, False)
+    assert np.count_nonzero(fleet.seen()) == 400 + 60
+
+
+def test_settled_is_what_one_of_them_says() -> None:
+    fleet = FleetMap(GRID)
+    tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
+    tile("beta", (0, 1), PLACES[1], 30).give(fleet)
+    tile("gamma", (0, 1), PLACES[2], 30).give(fleet)
+    assert np.count_nonzero(fleet.settled_by(["alpha"])) == 400
+    assert np.count_nonzero(fleet.settled_by(["alpha", "beta", "silent"])) == 400 + 60
+    assert not fleet.settled_by([]).any()
+
+
+@pytest.mark.parametrize(
+    "place",
+    [
+        (20, 0, 20, 20),
+        (0, 20, 20, 20),
+        (40, 0, 2, 20),
+        (-20, 0, 20, 20),
+        (0, -20, 20, 20),
+        (-1, -1, 20, 20),
+        (2, 0, 20, 20),
+        (0, 3, 20, 20),
+        (0, 0, 19, 20),
+        (0, 0, 20, 19),
+        (0, 0, 22, 23),
+        (0, 0, 0, 0),
+        (2**31 - 1, 0, 20, 20),
+        (0, 2**80, 20, 20),
+    ],
+)
+def test_what_is_no_tile_of_the_grid_is_refused(place: tuple[int, int, int, int]) -> None:
+    check_refused(tile("alpha", (5, 1), place, 50))
+    check_refused(tile("stranger", (0, 1), place, 50))
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        {"sum_levels": np.zeros((20, 19), dtype=np.uint8)},
+        {"largest_levels": np.zeros((19, 20), dtype=np.uint8)},
+        {"settled": np.zeros((1, 20), dtype=np.bool_)},
+        {"settled": np.zeros(20, dtype=np.bool_)},
+        {"sum_levels": np.zeros((20, 20, 1), dtype=np.uint8)},
+        {"sum_levels": np.uint8(3)},
+    ],
+)
+def test_arrays_of_another_shape_are_refused(spoilt: dict[str, Any]) -> None:
+    check_refused(replace(tile("alpha", (5, 1), PLACES[0], 50), **spoilt))
+
+
+def check_refused(misfit: TileNews) -> None:
+    """It raises and changes nothing."""
+    fleet, twin = FleetMap(GRID), FleetMap(GRID)
+    for one in (fleet, twin):
+        tile("alpha", (0, 1), PLACES[0], 50).give(one)
+        tile("beta", (0, 2), PLACES[3], 20).give(one)
+    with pytest.raises(ValueError, match="tile"):
+        misfit.give(fleet)
+    assert fleet.changes == 2
+    assert set(fleet.layers) == {"alpha", "beta"}
+    np.testing.assert_array_equal(fleet.risk, twin.risk)
+    # Nor did it use up a version.
+    assert tile("alpha", (0, 2), PLACES[0], 60).give(fleet)
+    for vehicle, layer in twin.layers.items():
+        if vehicle != "alpha":
+            np.testing.assert_array_equal(fleet.layers[vehicle].sum_levels, layer.sum_levels)
+            np.testing.assert_array_equal(fleet.layers[vehicle].settled, layer.settled)
+            assert fleet.layers[vehicle].versions == layer.versions

@@ -1,0 +1,296 @@
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.hotspots import Hotspot, HotspotMap, HotspotUpdate, update_hotspots
+from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
+
+GRID = GridSpec(SweepFrame(100, 200, 0), 5, columns=12, rows=6)
+NONE = np.zeros(GRID.shape, dtype=bool)
+RISK = np.full(GRID.shape, 0.9)
+
+
+def cells_of(picture: str) -> BoolArray:
+    """Cells drawn with their first row at the bottom, the rest of the grid left out."""
+    cells = NONE.copy()
+    for row, line in enumerate(reversed(picture.split())):
+        for column, mark in enumerate(line):
+            cells[row, column] = mark == "#"
+    return cells
+
+
+def update(
+    picture: str, previous: HotspotMap | None = None, unsettled: BoolArray = NONE, risk: FloatArray = RISK
+) -> HotspotUpdate:
+    """Four cells are enough."""
+    before = previous or HotspotMap.empty(GRID)
+    return update_hotspots(GRID, cells_of(picture), unsettled, risk, before, least_area_m2=100)
+
+
+class TestFinding:
+    def test_patches_touch_by_their_sides(self) -> None:
+        found = update("##..## ##..## ..##.. ..##..")
+        assert [(hotspot.number, hotspot.cells) for hotspot in found.changed] == [(1, 4), (2, 4), (3, 4)]
+        assert found.map.numbers[:4, :6].tolist() == [
+            [0, 0, 1, 1, 0, 0],
+            [0, 0, 1, 1, 0, 0],
+            [2, 2, 0, 0, 3, 3],
+            [2, 2, 0, 0, 3, 3],
+        ]
+        assert found.map.next_number == 4
+        assert found.withdrawn == {}
+
+    def test_patches_of_few_cells_are_left_out(self) -> None:
+        found = update("###.##..#### ........#...")
+        assert [hotspot.cells for hotspot in found.changed] == [5]
+        assert np.count_nonzero(found.map.numbers) == 5
+
+    @pytest.mark.parametrize(
+        ("cell_m", "enough"), [(5, 16), (2.5, 64), (3, 45), (0.1, 40_000), (0.9, 494), (20, 1), (30, 1)]
+    )
+    def test_400_square_metres_are_enough(self, cell_m: float, enough: int) -> None:
+        grid = GridSpec(SweepFrame(0, 0, 0), cell_m, columns=200, rows=200)
+        for cells in {enough - 1, enough} - {0}:
+            hot = np.zeros(grid.shape, dtype=bool)
+            hot.ravel()[:cells] = True
+            found = update_hotspots(grid, hot, ~hot, np.ones(grid.shape), HotspotMap.empty(grid))
+            assert [hotspot.cells for hotspot in found.changed] == [cells] * (cells == enough)
+
+    @pytest.mark.parametrize(("cell_m", "cells"), [(5, 100), (0.5, 1000), (3, 166), (600, 1)])
+    def test_blocks_are_of_500_m_or_the_whole_cells_that_fit(self, cell_m: float, cells: int) -> None:
+        grid = GridSpec(SweepFrame(0, 0, 0), cell_m, columns=cells + 1, rows=1)
+        hot = np.ones(grid.shape, dtype=bool)
+        found = update_hotspots(grid, hot, ~hot, np.ones(grid.shape), HotspotMap.empty(grid), least_area_m2=0)
+        assert [hotspot.cells for hotspot in found.changed] == [cells, 1]
+
+    def test_patches_are_cut_at_blocks_in_both_axes(self) -> None:
+        # Blocks of 15 m: columns centred at 0, 5, 10 | 15, 20, 25 m; rows at 2.5, 7.5, 12.5 | 17.5, ... m.
+        hot = np.zeros(GRID.shape, dtype=bool)
+        hot[:, :6] = True
+        found = update_hotspots(GRID, hot, NONE, RISK, HotspotMap.empty(GRID), block_m=15, least_area_m2=0)
+        assert found.map.numbers[:, :6].tolist() == [[1] * 3 + [2] * 3] * 3 + [[3] * 3 + [4] * 3] * 3
+        assert [hotspot.cells for hotspot in found.changed] == [9] * 4
+
+    def test_mean_risk_is_that_of_the_patch(self) -> None:
+        risk = np.zeros(GRID.shape)
+        risk[0, :4] = [0.9, 0.8, 0.7, 0.65437]
+        found = update("####", risk=risk)
+        assert found.changed[0].mean_risk == 0.7636
+
+    @pytest.mark.parametrize(
+        ("open_cell", "growing"), [((0, 2), True), ((2, 0), True), ((1, 2), True), ((2, 2), False), ((0, 5), False)]
+    )
+    def test_grows_while_it_touches_an_unsettled_cell_by_its_side(
+        self, open_cell: tuple[int, int], growing: bool
+    ) -> None:
+        unsettled = NONE.copy()
+        unsettled[open_cell] = True
+        assert update("## ##", unsettled=unsettled).changed[0].growing == growing
+
+    def test_outlines_lie_in_the_mission_frame(self) -> None:
+        grid = GridSpec(SweepFrame(100, 200, math.pi / 2), 5, columns=4, rows=6)
+        hot = np.zeros(grid.shape, dtype=bool)
+        hot[1:3, 2:4] = True
+        found = update_hotspots(grid, hot, ~hot, np.ones(grid.shape), HotspotMap.empty(grid), least_area_m2=100)
+        # Along is east, across is south: 5 to 15 m along, 7.5 to 17.5 m across.
+        expected = shapely.box(105, 200 - 17.5, 115, 200 - 7.5)
+        assert shapely.Polygon(found.changed[0].outline).symmetric_difference(expected).area < 1e-6
+
+
+class TestNumbers:
+    def test_nothing_new_changes_nothing(self) -> None:
+        first = update("##..## ##..##")
+        again = update("##..## ##..##", first.map)
+        assert again.changed == ()
+        assert again.withdrawn == {}
+        assert again.map.hotspots == first.map.hotspots
+        assert again.map.next_number == first.map.next_number
+
+    def test_a_patch_that_grows_keeps_its_number(self) -> None:
+        first = update("##..## ##..##")
+        then = update("##..##### ##..#####", first.map)
+        assert [(hotspot.number, hotspot.cells) for hotspot in then.changed] == [(2, 10)]
+
+    def test_a_patch_that_shrinks_gets_a_new_outline(self) -> None:
+        first = update("##### #####")
+        then = update("####. ####.", first.map)
+        assert [(hotspot.number, hotspot.cells) for hotspot in then.changed] == [(1, 8)]
+        assert shapely.Polygon(then.changed[0].outline).area == pytest.approx(8 * GRID.cell_area_m2)
+
+    def test_of_two_patches_that_merge_the_larger_lives_on(self) -> None:
+        first = update("##..### ##..###")
+        merged = update("####### #######", first.map)
+        assert [hotspot.number for hotspot in merged.changed] == [2]
+        assert merged.withdrawn == {1: 2}
+
+    def test_of_a_patch_that_falls_apart_the_larger_part_keeps_the_number(self) -> None:
+        first = update("####### #######")
+        apart = update("##.#### ##.####", first.map)
+        assert [(hotspot.number, hotspot.cells) for hotspot in apart.changed] == [(1, 8), (2, 4)]
+        assert apart.withdrawn == {}
+        assert apart.map.numbers[0, :7].tolist() == [2, 2, 0, 1, 1, 1, 1]
+
+    def test_the_larger_patch_wins_even_with_the_smaller_share_of_the_old_one(self) -> None:
+        first = update("####### #######")
+        # On the left 8 of the old cells; on the right 4 of them and 10 new ones.
+        then = update("####.####### ####.#######", first.map)
+        assert then.map.numbers[0, 0] == 2
+        assert then.map.numbers[0, 6] == 1
+
+    def test_a_part_that_swallows_another_patch_keeps_the_number_of_that(self) -> None:
+        first = update("#####....... #########.## #########.##")
+        # Left 15 of the old cells of 1, right 6 of them and all 4 of 2.
+        then = update("#####....... #####.###### #####.######", first.map)
+        assert then.map.numbers[0].tolist() == [1] * 5 + [0] + [2] * 6
+        assert then.withdrawn == {}
+
+    def test_no_number_is_second_choice_of_one_and_first_of_another(self) -> None:
+        first = update("#######.#### #######.#### #######.####")
+        # The one in the middle has 6 cells of 1 and 3 of 2, the smaller one on the right 6 of 2.
+        then = update("####........ ####.####.## ####.####.## ####.####.##", first.map)
+        assert then.map.numbers[0].tolist() == [1] * 4 + [0] + [3] * 4 + [0] + [2] * 2
+        assert then.withdrawn == {}
+
+    def test_a_patch_that_is_gone_is_withdrawn_and_its_number_not_given_again(self) -> None:
+        first = update("##..## ##..##")
+        gone = update("##.... ##....", first.map)
+        assert gone.changed == ()
+        assert gone.withdrawn == {2: None}
+        back = update("##..## ##..##", gone.map)
+        assert [hotspot.number for hotspot in back.changed] == [3]
+
+    def test_a_patch_that_shrinks_below_the_least_size_is_withdrawn(self) -> None:
+        first = update("#### ####")
+        assert update("###. ....", first.map).withdrawn == {1: None}
+
+    def test_a_change_of_risk_or_growth_alone_is_reported(self) -> None:
+        first = update("## ##")
+        unsettled = NONE.copy()
+        unsettled[0, 2] = True
+        growing = update("## ##", first.map, unsettled)
+        assert [hotspot.growing for hotspot in growing.changed] == [True]
+        assert growing.changed[0].outline is first.changed[0].outline
+        less = update("## ##", growing.map, unsettled, RISK - 0.1)
+        assert [hotspot.mean_risk for hotspot in less.changed] == [0.8]
+        barely = update("## ##", less.map, unsettled, RISK - 0.10001)
+        assert barely.changed == ()
+
+    def test_a_patch_that_moves_without_changing_size_is_reported(self) -> None:
+        first = update("###.. ###..")
+        then = update(".###. .###.", first.map)
+        assert [(hotspot.number, hotspot.cells) for hotspot in then.changed] == [(1, 6)]
+        assert then.changed[0].outline != first.changed[0].outline
+
+
+def patches_of(grid: GridSpec, hot: BoolArray, block_m: float, min_cells: int) -> set[frozenset[tuple[int, int]]]:
+    """The definition: cells joined one by one."""
+
+    def block(cell: tuple[int, int]) -> tuple[int, int]:
+        return math.floor(grid.along_m[cell[0]] / block_m), math.floor(grid.across_m[cell[1]] / block_m)
+
+    left = set(zip(*(axis.tolist() for axis in np.nonzero(hot)), strict=True))
+    patches = set()
+    while left:
+        patch, ahead = set(), [left.pop()]
+        while ahead:
+            row, column = ahead.pop()
+            patch.add((row, column))
+            for beside in ((row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)):
+                if beside in left and block(beside) == block((row, column)):
+                    left.remove(beside)
+                    ahead.append(beside)
+        if len(patch) >= min_cells:
+            patches.add(frozenset(patch))
+    return patches
+
+
+def cells_numbered(numbers: np.ndarray, number: int) -> frozenset[tuple[int, int]]:
+    return frozenset(zip(*(axis.tolist() for axis in np.nonzero(numbers == number)), strict=True))
+
+
+class TestProperties:
+    GRID = GridSpec(SweepFrame(-30, 70, 0.6), 5, columns=33, rows=21)
+
+    @settings(max_examples=40)
+    @given(st.integers(0, 1_000_000), st.sampled_from([0.3, 0.5, 0.6]), st.sampled_from([0.02, 0.2]))
+    def test_over_a_survey_that_goes_on(self, seed: int, share: float, change: float) -> None:
+        rng = np.random.default_rng(seed)
+        hot = rng.random(self.GRID.shape) < share
+        seen_last: dict[int, Hotspot] = {}
+        before = HotspotMap.empty(self.GRID)
+        for _ in range(5):
+            risk: FloatArray = rng.random(self.GRID.shape)
+            unsettled = ~hot & (rng.random(self.GRID.shape) < 0.05)
+            now = update_hotspots(self.GRID, hot, unsettled, risk, before, block_m=60, least_area_m2=75)
+            self.check_patches(now.map, hot, unsettled, risk)
+            self.check_numbers(now, before)
+            # Who follows the reports alone knows the same hotspots.
+            seen_last.update({hotspot.number: hotspot for hotspot in now.changed})
+            for number in now.withdrawn:
+                del seen_last[number]
+            assert seen_last == now.map.hotspots
+            assert all(before.hotspots.get(hotspot.number) != hotspot for hotspot in now.changed)
+            before = now.map
+            hot = hot ^ (rng.random(self.GRID.shape) < change)
+
+    def check_patches(self, found: HotspotMap, hot: BoolArray, unsettled: BoolArray, risk: FloatArray) -> None:
+        patches = {number: cells_numbered(found.numbers, number) for number in found.hotspots}
+        assert set(patches.values()) == patches_of(self.GRID, hot, 60, 3)
+        assert sum(map(len, patches.values())) == np.count_nonzero(found.numbers)
+        for number, cells in patches.items():
+            hotspot = found.hotspots[number]
+            assert (hotspot.number, hotspot.cells) == (number, len(cells))
+            assert hotspot.mean_risk == pytest.approx(np.mean([risk[cell] for cell in cells]), abs=0.6e-4)
+            beside = {(r + dr, c + dc) for r, c in cells for dr, dc in ((0, 1), (0, -1), (1, 0), (-1, 0))}
+            assert hotspot.growing == any(
+                unsettled[r, c] for r, c in beside if 0 <= r < self.GRID.rows and 0 <= c < self.GRID.columns
+            )
+            rows, columns = np.array(sorted(cells)).T
+            centres = shapely.points(*self.GRID.frame.to_mission(self.GRID.across_m[columns], self.GRID.along_m[rows]))
+            polygon = shapely.Polygon(hotspot.outline)
+            assert polygon.is_valid
+            assert len(hotspot.outline) <= 40
+            assert np.all(shapely.contains(polygon, centres))
+
+    def check_numbers(self, now: HotspotUpdate, before: HotspotMap) -> None:
+        assert now.map.next_number > max(now.map.hotspots, default=0)
+        size = {number: hotspot.cells for number, hotspot in now.map.hotspots.items()}
+        wants: dict[int, list[int]] = {}
+        for number in now.map.hotspots:
+            assert number in before.hotspots or number >= before.next_number
+            had = Counter(before.numbers[now.map.numbers == number].tolist())
+            del had[0]
+            wants[number] = sorted(had, key=lambda n: (-had[n], n))
+        for number, wanted in wants.items():
+            # Each has the number it wants most of those that nobody else has.
+            assert all(better in now.map.hotspots for better in wanted[: [*wanted, number].index(number)])
+            assert number in wanted or number >= before.next_number
+            if wanted and wanted[0] != number:
+                # Another one has it, which wanted it as much and is no smaller.
+                assert wants[wanted[0]][0] == wanted[0]
+                assert size[wanted[0]] >= size[number]
+        for number, heir in now.withdrawn.items():
+            assert number in before.hotspots
+            assert number not in now.map.hotspots
+            has = Counter(now.map.numbers[before.numbers == number].tolist())
+            del has[0]
+            assert heir == (min(has, key=lambda n: (-has[n], n)) if has else None)
+        assert set(before.hotspots) <= set(now.map.hotspots) | set(now.withdrawn)
+
+
+class TestRefusals:
+    def test_of_arrays_of_another_shape(self) -> None:
+        with pytest.raises(ValueError, match=r"the grid's shape, \(6, 12\)"):
+            update_hotspots(GRID, NONE[1:], NONE, RISK, HotspotMap.empty(GRID))
+
+    @pytest.mark.parametrize("block_m", [0, -5, math.nan, math.inf])
+    def test_of_blocks_without_extent(self, block_m: float) -> None:
+        with pytest.raises(ValueError, match="block"):
+            update_hotspots(GRID, NONE, NONE, RISK, HotspotMap.empty(GRID), block_m=block_m)

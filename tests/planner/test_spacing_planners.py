@@ -1,0 +1,137 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.spacing import track_count
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner, lowest_range_m
+
+WIDTH_M = 1212
+NADIR_GAP_M = 40
+R_EFF_M = 130
+
+
+def fly(planner: SpacingPlanner, width_m: float, r_eff_m: int) -> tuple[list[float], list[int]]:
+    """Flies pair after pair as long as the planner replans; returns the offsets flown and the ranges decided."""
+    flown: list[float] = []
+    ranges: list[int] = []
+    covered_m, known_m = 0.0, None
+    while covered_m < width_m - 1e-6:
+        decision = planner.decide(width_m, covered_m, known_m)
+        ranges.append(decision.range_m)
+        if not decision.replans:
+            return flown + list(decision.offsets_m), ranges
+        flown += decision.offsets_m[:2]
+        known_m = r_eff_m
+        covered_m = max(flown) + min(decision.range_m, planner.counted_range_m(known_m))
+    return flown, ranges
+
+
+class TestThePapersFigures:
+    """Section V: an area 1212 m wide, a nadir gap of 40 m, an effective range of 130 m."""
+
+    def test_experiment_1(self) -> None:
+        planner = AdaptiveSpacing(NADIR_GAP_M, 145)
+        first = planner.decide(WIDTH_M, 0, None)
+        assert (first.range_m, len(first.offsets_m), first.replans, first.note) == (138, 7, True, "")
+        assert first.offsets_m[:2] == (138, 236)
+        covered_m = 236 + min(138, planner.counted_range_m(R_EFF_M))
+        assert covered_m == 366
+        then = planner.decide(WIDTH_M, covered_m, R_EFF_M)
+        assert then == SpacingDecision(120, (486, 566, 806, 886, 1012, 1092), replans=True)
+
+    @pytest.mark.parametrize(("told_m", "ranges_m"), [(145, [138, 120, 120, 120]), (120, [120] * 4), (130, [120] * 4)])
+    def test_each_adaptive_mission_flies_eight_tracks(self, told_m: float, ranges_m: list[int]) -> None:
+        offsets, ranges = fly(AdaptiveSpacing(NADIR_GAP_M, told_m), WIDTH_M, R_EFF_M)
+        assert len(offsets) == 8
+        assert ranges == ranges_m
+
+    @pytest.mark.parametrize(("told_m", "tracks"), [(145, 7), (120, 8), (130, 8)])
+    def test_the_control_missions(self, told_m: float, tracks: int) -> None:
+        offsets, ranges = fly(FixedSpacing(NADIR_GAP_M, told_m), WIDTH_M, R_EFF_M)
+        assert len(offsets) == tracks
+        assert ranges == [told_m]
+
+
+class TestAdaptiveSpacing:
+    @pytest.mark.parametrize("r_eff_m", [119, 80, 1, 0])
+    def test_below_three_nadir_gaps_plans_with_those_and_says_so(self, r_eff_m: int) -> None:
+        planner = AdaptiveSpacing(NADIR_GAP_M, 145)
+        decision = planner.decide(WIDTH_M, 366, r_eff_m)
+        assert decision.range_m == 120
+        assert decision.note == f"r_eff {r_eff_m} m is below 3 r_min: planning with 120 m, gaps remain"
+        assert planner.counted_range_m(r_eff_m) == 120
+
+    @pytest.mark.parametrize("r_eff_m", [None, 120, 130])
+    def test_has_nothing_to_say_otherwise(self, r_eff_m: int | None) -> None:
+        assert AdaptiveSpacing(NADIR_GAP_M, 145).decide(WIDTH_M, 366, r_eff_m).note == ""
+
+    def test_r_eff_may_be_more_than_what_was_told(self) -> None:
+        # One pair of 124 m covers the 332 m that are left; of 120 m it would not.
+        planner = AdaptiveSpacing(NADIR_GAP_M, 120)
+        assert planner.decide(332, 0, None) == SpacingDecision(120, (120, 200, 212), replans=True)
+        assert planner.decide(332, 0, 150) == SpacingDecision(124, (124, 208), replans=True)
+
+    def test_adapts_to_what_is_left_of_the_width(self) -> None:
+        decision = AdaptiveSpacing(NADIR_GAP_M, 145).decide(366 + 332, 366, 150)
+        assert decision == SpacingDecision(124, (490, 574), replans=True)
+
+    def test_without_a_nadir_gap_every_range_can_be_planned_with(self) -> None:
+        planner = AdaptiveSpacing(0, 50)
+        assert planner.decide(90, 0, None) == SpacingDecision(30, (30, 60), replans=True)
+        assert planner.decide(90, 0, 10).note == ""
+        assert planner.decide(90, 0, 10).range_m == 10
+
+    def test_a_track_without_a_nadir_gap_that_saw_nothing_tells_no_range(self) -> None:
+        planner = AdaptiveSpacing(0, 50)
+        decision = planner.decide(90, 0, 0)
+        assert (decision.range_m, decision.offsets_m) == (30, (30, 60))
+        assert decision.note == "r_eff 0 m is nothing to plan with: planning with 50 m, gaps remain"
+
+    @given(
+        width_m=st.floats(1, 5000),
+        nadir_gap_m=st.integers(0, 60),
+        told_m=st.integers(1, 300),
+        r_eff_m=st.integers(0, 300),
+    )
+    def test_the_survey_ends_and_reaches_the_far_side(
+        self, width_m: float, nadir_gap_m: int, told_m: int, r_eff_m: int
+    ) -> None:
+        planner = AdaptiveSpacing(nadir_gap_m, max(told_m, lowest_range_m(nadir_gap_m)))
+        offsets, ranges = fly(planner, width_m, r_eff_m)
+        assert all(lowest_range_m(nadir_gap_m) <= range_m for range_m in ranges)
+        assert all(range_m <= planner.counted_range_m(r_eff_m) for range_m in ranges[1:])
+        assert ranges[0] <= planner.told_range_m
+        # No pair covers less than one of the least range.
+        least_m = 3 * lowest_range_m(nadir_gap_m) - nadir_gap_m
+        assert len(offsets) <= 2 * (math.ceil(width_m / least_m) + 1)
+        assert max(offsets) + planner.counted_range_m(r_eff_m) >= width_m - 1e-6
+
+
+class TestFixedSpacing:
+    @given(
+        width_m=st.floats(1, 5000), told_m=st.floats(120, 300), covered_m=st.floats(0, 500), r_eff_m=st.integers(0, 300)
+    )
+    def test_never_replans_whatever_was_measured(
+        self, width_m: float, told_m: float, covered_m: float, r_eff_m: int
+    ) -> None:
+        planner = FixedSpacing(NADIR_GAP_M, told_m)
+        decision = planner.decide(width_m, covered_m, r_eff_m)
+        assert decision == planner.decide(width_m, covered_m, None)
+        assert not decision.replans
+        assert decision.range_m == planner.counted_range_m(r_eff_m) == math.floor(told_m + 1e-6)
+        assert len(decision.offsets_m) == track_count(width_m - covered_m, NADIR_GAP_M, decision.range_m)
+
+    def test_counts_a_range_in_whole_metres(self) -> None:
+        assert FixedSpacing(NADIR_GAP_M, 145.9).decide(WIDTH_M, 0, None).range_m == 145
+        assert FixedSpacing(NADIR_GAP_M, 145 - 1e-9).decide(WIDTH_M, 0, None).range_m == 145
+
+
+@pytest.mark.parametrize(
+    ("nadir_gap_m", "lowest_m"), [(40, 120), (0, 1), (0.2, 1), (0.5, 2), (10.1, 31), (40 + 1e-9, 120)]
+)
+def test_the_lowest_range_is_three_nadir_gaps_in_whole_metres(nadir_gap_m: float, lowest_m: int) -> None:
+    assert lowest_range_m(nadir_gap_m) == lowest_m

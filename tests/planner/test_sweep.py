@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.dubins import Pose, shortest_path
+from planner.sweep import cheapest_entry, legs_over_strip
+from planner.types import Strip, Track
+
+NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
+
+strips = st.builds(
+    Strip,
+    number=st.just(1),
+    start=st.tuples(st.integers(-500, 500), st.integers(-500, 500)),
+    heading_rad=st.integers(-40, 40).map(lambda n: n / 10),
+    length_m=st.integers(20, 400).map(float),
+    width_m=st.integers(5, 200).map(float),
+)
+poses = st.builds(Pose, st.integers(-800, 800), st.integers(-800, 800), st.integers(-40, 40).map(lambda n: n / 10))
+
+
+class TestLegsOverStrip:
+    def test_by_hand_to_the_north(self) -> None:
+        legs = legs_over_strip(Strip(7, (100, 50), NORTH, 200, 60), 25)
+        assert [(leg.number, leg.across_m) for leg in legs] == [(1, 10), (2, 30), (3, 50)]
+        assert np.array([leg.start for leg in legs]) == pytest.approx(np.array([(80, 50), (100, 250), (120, 50)]))
+        assert np.array([leg.end for leg in legs]) == pytest.approx(np.array([(80, 250), (100, 50), (120, 250)]))
+
+    def test_by_hand_to_the_east(self) -> None:
+        legs = legs_over_strip(Strip(7, (0, 0), EAST, 100, 40), 20)
+        # Port is north.
+        assert np.array([leg.start for leg in legs]) == pytest.approx(np.array([(0, 10), (100, -10)]))
+        assert np.array([leg.end for leg in legs]) == pytest.approx(np.array([(100, 10), (0, -10)]))
+
+    @pytest.mark.parametrize(
+        ("width_m", "count"), [(1, 1), (20, 1), (20 + 1e-9, 1), (20.1, 2), (60, 3), (60 - 1e-9, 3), (61, 4)]
+    )
+    def test_no_more_than_needed(self, width_m: float, count: int) -> None:
+        assert len(legs_over_strip(Strip(1, (0, 0), 1.0, 50, width_m), 20)) == count
+
+    @given(strips, st.floats(5, 100))
+    def test_cover_the_strip(self, strip: Strip, swath_m: float) -> None:
+        legs = legs_over_strip(strip, swath_m)
+        seen = shapely.union_all(
+            [shapely.LineString([leg.start, leg.end]).buffer(swath_m / 2 + 1e-6, cap_style="flat") for leg in legs]
+        )
+        centre_line = shapely.LineString([strip.start, strip.end])
+        area = centre_line.buffer(strip.width_m / 2, cap_style="flat")
+        assert area.difference(seen).area < 1e-2
+        assert len(legs) == 1 or (len(legs) - 1) * swath_m < strip.width_m
+
+    @given(strips, st.floats(5, 100))
+    def test_lie_evenly_and_alternate(self, strip: Strip, swath_m: float) -> None:
+        legs = legs_over_strip(strip, swath_m)
+        assert all(leg.length_m == pytest.approx(strip.length_m) for leg in legs)
+        edge_m = strip.width_m / len(legs) / 2
+        assert [leg.across_m for leg in legs] == pytest.approx([edge_m * (2 * k + 1) for k in range(len(legs))])
+        for first, second in itertools.pairwise(legs):
+            assert math.dist(first.end, second.start) == pytest.approx(2 * edge_m)
+
+    @pytest.mark.parametrize(
+        ("length_m", "width_m", "swath_m"),
+        [(0, 10, 10), (10, -1, 10), (10, 10, 0), (10, 10, math.nan), (math.inf, 1, 1)],
+    )
+    def test_refuse_what_has_no_extent(self, length_m: float, width_m: float, swath_m: float) -> None:
+        with pytest.raises(ValueError, match="lengths above 0"):
+            legs_over_strip(Strip(1, (0, 0), 0, length_m, width_m), swath_m)
+
+
+class TestCheapestEntry:
+    # Legs at 10, 30 and 50 m east, 100 m long; the first runs north.
+    LEGS = legs_over_strip(Strip(1, (30, 0), NORTH, 100, 60), 20)
+
+    @pytest.mark.parametrize(
+        ("pose", "first"),
+        [
+            (Pose(10, -50, NORTH), ((10, 0), (10, 100))),
+            (Pose(50, -50, NORTH), ((50, 0), (50, 100))),
+            (Pose(10, 150, SOUTH), ((10, 100), (10, 0))),
+            (Pose(50, 150, SOUTH), ((50, 100), (50, 0))),
+        ],
+    )
+    def test_begins_at_the_nearest_end(self, pose: Pose, first: tuple[tuple[float, float], ...]) -> None:
+        ordered, distance_m = cheapest_entry(self.LEGS, pose, 10, 0)
+        assert ordered[0].start == pytest.approx(first[0], abs=1e-9)
+        assert ordered[0].end == pytest.approx(first[1], abs=1e-9)
+        # 50 m there, three legs and two half circles of 10 m radius.
+        assert distance_m == pytest.approx(50 + 300 + 2 * 10 * math.pi)
+        assert [leg.number for leg in ordered] == [1, 2, 3]
+        assert [leg.across_m for leg in ordered] == ([10, 30, 50] if first[0][0] == 10 else [50, 30, 10])
+
+    def test_goes_straight_before_and_after_legs(self) -> None:
+        ordered, distance_m = cheapest_entry(self.LEGS, Pose(10, -50, NORTH), 10, 30)
+        # The run-in is part of the way there; between two legs it is flown on both sides.
+        assert distance_m == pytest.approx(50 + 300 + 2 * 10 * math.pi + 4 * 30)
+        assert ordered[0].length_m == pytest.approx(100)
+        _, too_near_m = cheapest_entry(self.LEGS[:1], Pose(10, -20, NORTH), 10, 30)
+        _, near_enough_m = cheapest_entry(self.LEGS[:1], Pose(10, -30, NORTH), 10, 30)
+        assert near_enough_m == pytest.approx(130)
+        assert too_near_m > 150
+
+    @pytest.mark.parametrize("heading_rad", [0.3 * k for k in range(21)])
+    def test_of_equal_ways_takes_the_first(self, heading_rad: float) -> None:
+        # Where rounding makes one of them shorter, now this and now that.
+        x_m, y_m = 123.4, -567.8
+        legs = legs_over_strip(Strip(1, (x_m, y_m), heading_rad, 100, 60), 20)
+        behind = Pose(x_m - 100 * math.sin(heading_rad), y_m - 100 * math.cos(heading_rad), heading_rad)
+        ordered, _ = cheapest_entry(legs, behind, 10, 0)
+        assert [leg.across_m for leg in ordered] == [10, 30, 50]
+
+    @given(strips, poses, st.floats(2, 40), st.sampled_from([0.0, 15.0]))
+    def test_is_the_shortest_of_the_four_ways(
+        self, strip: Strip, pose: Pose, turn_radius_m: float, run_in_m: float
+    ) -> None:
+        legs = legs_over_strip(strip, 30)
+        turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
+
+        def flown_m(way: list[Track]) -> float:
+            total_m, at = -run_in_m, pose  # after the last leg there is none
+            for leg in way:
+                run_in = run_in_m * math.sin(leg.heading_rad), run_in_m * math.cos(leg.heading_rad)
+                enter = Pose(leg.start[0] - run_in[0], leg.start[1] - run_in[1], leg.heading_rad)
+                total_m += shortest_path(at, enter, turn_radius_m).length_m + leg.length_m + 2 * run_in_m
+                at = Pose(leg.end[0] + run_in[0], leg.end[1] + run_in[1], leg.heading_rad)
+            return total_m
+
+        ordered, distance_m = cheapest_entry(legs, pose, turn_radius_m, run_in_m)
+        assert distance_m == pytest.approx(min(map(flown_m, (legs, legs[::-1], turned, turned[::-1]))))
+        assert distance_m == pytest.approx(flown_m(ordered))
+        assert {frozenset((leg.start, leg.end)) for leg in ordered} == {frozenset((leg.start, leg.end)) for leg in legs}
+        # Each leg begins where the one before ends, one spacing beside it.
+        for first, second in itertools.pairwise(ordered):
+            assert math.dist(first.end, second.start) == pytest.approx(strip.width_m / len(legs))
+
+    def test_refuses_no_legs_and_lengths_out_of_range(self) -> None:
+        with pytest.raises(ValueError, match="at least one leg"):
+            cheapest_entry([], Pose(0, 0, 0), 10, 0)
+        for run_in_m in (-1, math.nan, math.inf):
+            with pytest.raises(ValueError, match="run-in"):
+                cheapest_entry(self.LEGS, Pose(0, 0, 0), 10, run_in_m)
+        with pytest.raises(ValueError, match="turn radius"):
+            cheapest_entry(self.LEGS, Pose(0, 0, 0), 0, 0)

@@ -1,0 +1,68 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.tiles import TILE_CELLS, tile_shape, tiles, tiles_within
+from planner.types import GridSpec, SweepFrame
+
+
+def grid_of(rows: int, columns: int) -> GridSpec:
+    return GridSpec(SweepFrame(0, 0, 0), 5, columns, rows)
+
+
+grids = st.builds(grid_of, st.integers(1, 70), st.integers(1, 70))
+
+
+@given(grids)
+def test_tiles_hold_each_cell_once(grid: GridSpec) -> None:
+    count = np.zeros(grid.shape, dtype=int)
+    for tile in tiles(grid):
+        count[tile.window] += 1
+        assert count[tile.window].shape == tile_shape(grid, tile.first_row, tile.first_column)
+        assert count[tile.window].size <= TILE_CELLS**2
+        rows, columns = tile.window
+        assert (rows.start, columns.start) == (tile.first_row, tile.first_column)
+        assert rows.stop <= grid.rows
+        assert columns.stop <= grid.columns
+    assert (count == 1).all()
+
+
+@given(grids)
+def test_tiles_have_names_of_their_own(grid: GridSpec) -> None:
+    names = [tile.name for tile in tiles(grid)]
+    assert len(set(names)) == len(names)
+    assert len(set(tiles(grid))) == len(names)
+
+
+def test_the_tiles_of_the_papers_grid() -> None:
+    every = tiles(grid_of(80, 243))
+    assert len(every) == 4 * 13
+    assert [tile.name for tile in every[:3]] == ["0-0", "0-1", "0-2"]
+    last = every[-1]
+    assert (last.name, last.first_row, last.first_column) == ("3-12", 60, 240)
+    assert last.window == (slice(60, 80), slice(240, 243))
+
+
+@st.composite
+def windows(draw: st.DrawFn, count: int) -> slice:
+    """Of so many cells; often from a tile's border, or to one."""
+    place = st.integers(0, count) | st.integers(0, count // TILE_CELLS).map(lambda tile: tile * TILE_CELLS)
+    return slice(*sorted((draw(place), draw(place))))
+
+
+@given(grids, st.data())
+def test_tiles_within_a_window_are_those_that_share_a_cell(grid: GridSpec, data: st.DataObject) -> None:
+    window = data.draw(windows(grid.rows)), data.draw(windows(grid.columns))
+    marked = np.zeros(grid.shape, dtype=bool)
+    marked[window] = True
+    every = tiles(grid)
+    assert tiles_within(grid, every, *window) == [tile for tile in every if marked[tile.window].any()]
+
+
+@pytest.mark.parametrize("place", [(-20, 0), (0, -20), (80, 0), (0, 260), (10, 0), (0, 241), (10**12, 0), (0, 2**70)])
+def test_no_tile_begins_elsewhere(place: tuple[int, int]) -> None:
+    with pytest.raises(ValueError, match="no tile"):
+        tile_shape(grid_of(80, 243), *place)

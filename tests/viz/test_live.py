@@ -1,0 +1,257 @@
+"""A live view shows the mission, and whatever becomes of it, recording is neither held up nor harmed."""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil  # type: ignore[import-untyped]
+import pytest
+import rerun as rr
+from rerun.experimental import ViewerClient
+
+from comms.node import Received
+from tests.viz.recordings import entities, rows, verify
+from viz import live_server, viewer_program
+from viz.live_feed import LiveFeed
+from viz.live_server import LiveServer, LiveViewError
+from viz.recorder import Recorder
+from viz.recorder_config import RecorderConfig
+
+RUN = "tellaro-run"
+PATIENCE_S = 30.0
+
+
+def wait_until(holds: Callable[[], Any]) -> None:
+    """Fails where it does not come to hold; how long it takes is not judged."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not holds():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
+def is_gone(pid: int) -> bool:
+    return not psutil.pid_exists(pid) or psutil.Process(pid).status() == psutil.STATUS_ZOMBIE
+
+
+@contextmanager
+def watched(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[LiveServer, int]]:
+    """A live server with a viewer that has no window, and that viewer's process; neither is left."""
+    monkeypatch.setattr(live_server, "WINDOW", ("--headless", "--window-size", "800x500"))
+    with LiveServer(RUN, web=False) as server:
+        server.open_window()
+        assert server.window is not None
+        (viewer,) = psutil.Process(server.window.pid).children()
+        try:
+            yield server, viewer.pid
+        finally:
+            if viewer.is_running():
+                viewer.kill()
+            server.window.wait()
+    # The server goes with its window.
+    wait_until(lambda: server.server.poll() is not None)
+
+
+def client_of(server: LiveServer) -> ViewerClient:
+    listening = viewer_program.LISTENING.search(server.window_log.read_text())
+    assert listening
+    return ViewerClient.connect(f"rerun+http://{listening[1]}/proxy")
+
+
+def shown_until_ms(client: ViewerClient) -> int:
+    """The last simulated time that the viewer has of the run."""
+    ends = [
+        timeline.end or 0
+        for recording in client.get_state().recordings
+        for timeline in recording.timelines
+        if timeline.name == "sim_time"
+    ]
+    return max(ends, default=0) // 1_000_000
+
+
+def record_all(pipe: Path, folder: Path, messages: list[Received], in_the_middle: Callable[[], None]) -> Path:
+    """Records with a live view to which something happens half way."""
+    path = folder / RUN / "mission.rrd"
+    path.parent.mkdir()
+    recorder = Recorder(RecorderConfig(path, live_pipe=pipe))
+    half = len(messages) // 2
+    for received in messages[:half]:
+        recorder.on_message(received)
+    in_the_middle()
+    for received in messages[half:]:
+        recorder.on_message(received)
+    recorder.close()
+    return path
+
+
+def assert_complete(path: Path, expected: Path) -> None:
+    """The file is whole, and says what one says that was recorded with nobody watching."""
+    assert verify(path).returncode == 0
+    assert entities(path) == entities(expected)
+    for entity, component in (("/area/risk", "GridMap:data"), ("/metrics/mean_risk", "Scalars:scalars")):
+        assert len(rows(path, entity, component)) == len(rows(expected, entity, component))
+
+
+@pytest.mark.usefixtures("drawable")
+def test_a_viewer_shows_what_is_recorded_so_far(
+    messages: list[Received], recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    half_ms = messages[len(messages) // 2].header.sent_ms
+    with watched(monkeypatch) as (server, _):
+        client = client_of(server)
+        # Positions are held back for a minute.
+        path = record_all(
+            server.pipe, tmp_path, messages, lambda: wait_until(lambda: shown_until_ms(client) >= half_ms - 61_000)
+        )
+        wait_until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
+        wait_until(lambda: len(client.get_state().views) == 5)
+        state = client.get_state()
+    assert [one.store_id for one in state.recordings] == [f"Recording:secondlook:{RUN}"]
+    assert [report for view in state.views for report in view.reports] == []
+    assert_complete(path, recording)
+
+
+@pytest.mark.usefixtures("drawable")
+@pytest.mark.parametrize("harm", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_viewer_that_stalls_or_dies_holds_nothing_up(
+    messages: list[Received], recording: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, harm: signal.Signals
+) -> None:
+    with watched(monkeypatch) as (server, viewer):
+        path = record_all(server.pipe, tmp_path, messages, lambda: os.kill(viewer, harm))
+        assert is_gone(viewer) or psutil.Process(viewer).status() == psutil.STATUS_STOPPED
+    assert_complete(path, recording)
+
+
+@pytest.mark.parametrize("harm", [signal.SIGSTOP, signal.SIGKILL])
+def test_a_server_that_stalls_or_dies_holds_nothing_up(
+    messages: list[Received], recording: Path, tmp_path: Path, harm: signal.Signals, caplog: pytest.LogCaptureFixture
+) -> None:
+    with LiveServer(RUN, web=False) as server:
+        path = record_all(server.pipe, tmp_path, messages, lambda: os.kill(server.server.pid, harm))
+        assert is_gone(server.server.pid) == (harm == signal.SIGKILL)
+    assert_complete(path, recording)
+    assert len(caplog.messages) == 1
+    assert caplog.messages[0].startswith("the live view ")
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_nobody_at_the_other_end_harms_nothing(
+    messages: list[Received], recording: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture, there: bool
+) -> None:
+    pipe = tmp_path / "pipe"
+    if there:
+        os.mkfifo(pipe)
+    assert_complete(record_all(pipe, tmp_path, messages, lambda: None), recording)
+    assert [message.split(":")[0] for message in caplog.messages] == [
+        "the mission is not shown live, the recording goes on"
+    ]
+
+
+def test_what_a_stalled_reader_does_not_take_is_bounded_and_counted(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    feed = LiveFeed(pipe, RUN, held_bytes=200_000)
+    noise = np.random.default_rng(1).integers(256, size=100_000, dtype=np.uint8)  # cannot be compressed
+
+    def drops(wanted: int) -> bool:
+        # At least 100 kB a piece: the pipe takes less than one.
+        feed.stream.log("noise", rr.Tensor(noise))
+        return feed.dropped >= wanted
+
+    wait_until(lambda: drops(2))
+    feed.close()
+    assert feed.dropped >= 2
+    os.close(reader)
+    told = [message.split(":")[0].split(" pieces")[0] for message in caplog.messages]
+    assert told[0] == "the live view is too far behind"
+    assert len(told) == 2
+    assert told[1].startswith("the live view lacks ")
+
+
+@pytest.mark.usefixtures("drawable")
+def test_the_pipe_stays_open_as_long_as_the_window(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Otherwise the server that it leaves behind would keep a core busy."""
+    monkeypatch.setattr(live_server, "WINDOW", ("--headless",))
+    with LiveServer(RUN, web=False) as server:
+        server.open_window()
+        reader = os.open(server.pipe, os.O_RDONLY | os.O_NONBLOCK)
+    ends = select.poll()
+    ends.register(reader, select.POLLHUP)
+    open_afterwards, serves_afterwards = ends.poll(0) == [], server.server.poll() is None
+    assert server.window is not None
+    for viewer in psutil.Process(server.window.pid).children():
+        viewer.kill()
+    server.window.wait()
+    wait_until(lambda: server.server.poll() is not None)
+    closed_at_last = ends.poll(0) == [(reader, select.POLLHUP)]
+    os.close(reader)
+    assert (open_afterwards, serves_afterwards, closed_at_last) == (True, True, True)
+
+
+@pytest.mark.usefixtures("drawable")
+def test_a_viewer_that_comes_late_gets_everything(
+    messages: list[Received], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_server, "WINDOW", ("--headless",))
+    with LiveServer(RUN, web=False) as server:
+        record_all(server.pipe, tmp_path, messages, lambda: None)
+        server.open_window()
+        client = client_of(server)
+        wait_until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
+        assert server.window is not None
+        os.killpg(server.window.pid, signal.SIGKILL)
+        server.window.wait()
+        server.window = None  # so that the server ends here
+    assert server.server.poll() is not None
+
+
+def test_the_page_is_served_on_this_machine_alone() -> None:
+    with LiveServer(RUN, web=True) as server:
+        with urllib.request.urlopen(server.page, timeout=PATIENCE_S) as answer:
+            assert answer.status == 200
+            assert b"<html" in answer.read()
+        listening = [
+            one.laddr.ip
+            for one in psutil.Process(server.server.pid).net_connections("inet")
+            if one.status == psutil.CONN_LISTEN
+        ]
+        assert listening == ["127.0.0.1"] * 2
+    assert server.server.poll() is not None
+    assert not server.pipe.parent.exists()
+
+
+def test_the_server_does_not_outlive_a_killed_command() -> None:
+    program = f"""
+from viz.live_server import LiveServer
+with LiveServer({RUN!r}, web=True) as server:
+    print(server.server.pid, server.pipe.parent, flush=True)
+    server.wait()
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as command:
+        assert command.stdout is not None
+        pid, folder = command.stdout.readline().split()
+        assert not is_gone(int(pid))
+        command.kill()
+    wait_until(lambda: is_gone(int(pid)) and not Path(folder).exists())
+
+
+def test_a_window_that_cannot_open_is_told_and_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_server, "WINDOW", ("--no-such-option",))
+    refused = pytest.raises(LiveViewError, match=r"^--live: the viewer does not start: ")
+    with LiveServer(RUN, web=False) as server, refused:
+        server.open_window()
+    assert server.server.poll() is not None
+    assert not server.pipe.parent.exists()

@@ -1,0 +1,23 @@
+"""What the recorder is told; apart from it, so that whoever starts it need not import rerun."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class RecorderConfig:
+    """`path`: the file to write.
+
+    `recording_id`: recordings of one id open as one; the name of the file's folder, the run's, if not given.
+    `live_pipe`: the named pipe of a LiveServer, to show the mission while it runs; None: the file alone.
+    `draw_every_s`: the risk map is drawn at most once in so much simulated time. `piece_s`: positions and statistics
+    are held back for so much simulated time and written together.
+    """
+
+    path: Path
+    recording_id: str | None = None
+    live_pipe: Path | None = None
+    draw_every_s: float = 10.0
+    piece_s: float = 60.0
