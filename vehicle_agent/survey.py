@@ -25,7 +25,7 @@ from planner.area import SurveyArea
 from planner.curve import RangeTally, effective_range_m
 from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
-from planner.risk import residual_risk
+from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
 from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision, lowest_range_m
 from planner.types import FloatArray, Track
@@ -135,7 +135,8 @@ class SurveyAgent(Agent):
             curve = self._tally.curve()
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
             every = math.ceil(curve.p_detect.size / MOST_CURVE_POINTS)
-            message = Curve(track.number, self._range_bin_m * every, curve.p_detect[::every], r_eff_m)
+            p_detect = np.minimum(curve.p_detect[::every], HIGHEST_P_DETECT)  # a mean of such may be above by rounding
+            message = Curve(track.number, self._range_bin_m * every, p_detect, r_eff_m)
             self.publish(CURVE.key(vehicle=self.vehicle), message)
         self.r_eff_m.append(r_eff_m)
         self._after_track(now_ms)

@@ -352,6 +352,11 @@ class TestTracksThatGoWrong:
         curve = agent.last(Curve)
         assert (curve.range_bin_m, curve.r_eff_m, curve.p_detect[130]) == (2, 261, 0.3)
 
+    def test_a_curve_of_the_highest_p_detect_fits_the_wire(self) -> None:
+        agent = on_its_way()
+        fly(agent, PRIMARY, command(agent), flat(0.999, 0, 100), looks=5)  # their mean is 0.9990000000000001
+        assert agent.last(Curve).p_detect[50] == 0.999
+
     def test_a_curve_of_very_many_bins_is_published_coarser(self) -> None:
         agent = on_its_way()
         maneuver = command(agent)

@@ -1,0 +1,88 @@
+"""Whatever valid messages the coordinator gets, it never raises, and no strip is with two vehicles."""
+
+from __future__ import annotations
+
+from any_mail import Letter, deliver, letters
+from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from one_node import OneNode
+
+from comms.messages import (
+    AgentState,
+    Hotspot,
+    HotspotState,
+    MissionOver,
+    Mode,
+    Role,
+    StripState,
+    StripStatus,
+    Task,
+    TaskAction,
+    Vertex,
+)
+from comms.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TASK_STATUS
+from coordinator.allocation import GreedyAllocator, NoAllocator
+from coordinator.config import CoordinatorConfig
+from coordinator.coordinator import Coordinator
+from coordinator.ledger import ENDED, WITH_A_VEHICLE
+
+HELPERS = [HELPER, SECOND_HELPER]
+ALL = [PRIMARY, *HELPERS]
+MAIL = [
+    (HOTSPOT, [PRIMARY]),
+    (HOTSPOT, [PRIMARY]),
+    (STATE, HELPERS),
+    (STATE, ALL),
+    (TASK_STATUS, HELPERS),
+    (TASK_STATUS, HELPERS),
+    (TASK_STATUS, HELPERS),
+    (COVERAGE, ALL),
+    (COVERAGE, HELPERS),
+    *((topic, [PRIMARY]) for topic in (PLAN, CURVE, CONTACT)),
+]
+THREE = (*FLEET, vehicle(SECOND_HELPER, Role.REVISIT))
+RUNS = [
+    run_info(300, 200, vehicles=THREE),
+    run_info(200, 300, cell_m=7, heading_rad=2.0, vehicles=THREE),
+    run_info(300, 200, vehicles=FLEET[:1]),
+    run_info(300, 200, vehicles=FLEET[1:]),
+]
+
+
+OUTLINE = tuple(Vertex(x_m, y_m) for x_m, y_m in ((97.5, 30), (147.5, 30), (147.5, 170), (97.5, 170)))
+BEGINNING = [
+    *(Letter(f"agent/{name}/state", AgentState(Mode.IDLE, 0, 1, 0, 120, 0, 0), 1, None, 0) for name in ALL),
+    Letter(f"agent/{PRIMARY}/hotspot/1", Hotspot(0, HotspotState.ACTIVE, OUTLINE, 1, 280, False, 0), 1, None, 0),
+]
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    allocator=st.sampled_from([GreedyAllocator(), GreedyAllocator(), GreedyAllocator(), NoAllocator()]),
+    run=st.sampled_from([RUNS[0], RUNS[0], RUNS[0], *RUNS]),
+    sensible=st.sampled_from([True, True, True, False]),
+    mail=letters(MAIL, 30),
+)
+def test_the_coordinator(
+    allocator: GreedyAllocator | NoAllocator, run: object, sensible: bool, mail: list[Letter]
+) -> None:
+    node = OneNode(Coordinator(CoordinatorConfig(allocator, 1.05, 30_000, 30, 150, 0.3)), Role.COORDINATOR)
+    deliver(node, [Letter("run", run, 1, None, 0), *(BEGINNING if sensible else []), *mail])
+    strips: dict[int, StripStatus] = {}
+    for one in node.said:
+        message = one.message
+        if isinstance(message, Task) and message.action is TaskAction.TAKE:
+            assert strips[message.strip].state is StripState.OPEN
+            name = one.key.split("/")[2]
+            assert not any(strip.vehicle == name for strip in strips.values() if strip.state in WITH_A_VEHICLE)
+        elif isinstance(message, StripStatus):
+            before = strips.get(one.number)
+            assert message.revision == (1 if before is None else before.revision + 1)
+            assert before is None or before.state not in ENDED
+            assert message.vehicle or message.state not in WITH_A_VEHICLE
+            strips[one.number] = message
+    assert sorted(strips) == list(range(1, len(strips) + 1))
+    assert len(node.all(MissionOver)) <= 1
+    if node.all(MissionOver):
+        assert isinstance(node.said[-1].message, MissionOver)

@@ -1,0 +1,65 @@
+"""Random mail for one node: any valid message it may read, in any order, late, repeated, at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from hypothesis import strategies as st
+from likely_message import likely_message
+from one_node import OneNode
+
+from comms.messages import Look, Maneuver, ManeuverStatus
+from comms.topics import Topic
+
+
+@dataclass(frozen=True)
+class Letter:
+    """A message under its key, heard so many milliseconds after the one before; `sequence` None numbers it on."""
+
+    key: str
+    message: Any
+    after_ms: int
+    sequence: int | None
+    incarnation: int
+
+
+def letters(topics: Sequence[tuple[Topic, Sequence[str]]], most: int) -> st.SearchStrategy[list[Letter]]:
+    """Mail of these topics, each from or for one of its vehicles."""
+
+    def of_topic(entry: tuple[Topic, Sequence[str]]) -> st.SearchStrategy[Letter]:
+        topic, vehicles = entry
+        return st.builds(
+            lambda vehicle, number, **rest: Letter(topic.key(vehicle=vehicle, number=number, tile="0-0"), **rest),
+            st.sampled_from(list(vehicles)),
+            st.integers(1, 3),
+            message=likely_message(topic.message),
+            after_ms=st.sampled_from([*[0, 1, 2, 3] * 8, *[700] * 4, 4_000, 11_000, 31_000]),
+            sequence=st.sampled_from([*[None] * 8, 0, 7]),
+            incarnation=st.sampled_from([*[0] * 20, 1]),
+        )
+
+    return st.lists(st.one_of([of_topic(entry) for entry in topics]), min_size=most // 2, max_size=most)
+
+
+def deliver(node: OneNode, mail: Sequence[Letter]) -> None:
+    """Gives the node its mail; `OneNode` holds what it says and when it wants to be woken to the rules.
+
+    Looks and statuses of manoeuvre 0 are made to be of the one that the node has commanded last.
+    """
+    for letter in mail:
+        commanded = node.all(Maneuver)
+        message = letter.message
+        if isinstance(message, Look) and message.maneuver == 0 and commanded:
+            message = replace(message, maneuver=commanded[-1].number)
+        elif isinstance(message, ManeuverStatus) and message.number == 0 and commanded:
+            message = replace(message, number=commanded[-1].number)
+        node.hear(
+            letter.key,
+            message,
+            at_ms=node.now_ms + letter.after_ms if letter.after_ms else None,
+            sequence=letter.sequence,
+            incarnation=letter.incarnation,
+        )
+    node.wait(100)

@@ -1,0 +1,73 @@
+"""Whole missions on the local bus, each flown once for all tests that look at it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, TypeVar
+
+from comms.local_bus import run_local
+from comms.node import Received
+from comms.result import BusResult
+from comms.routing import Routing
+from secondlook.fleet import build_fleet
+from secondlook.metrics import Metrics
+from secondlook.scenario import Scenario, load_scenario
+
+M = TypeVar("M")
+
+
+@dataclass
+class Watcher:
+    """Listens to all that is said."""
+
+    heard: list[Received] = field(default_factory=list)
+    metrics: Metrics = field(default_factory=Metrics)
+
+    def on_message(self, received: Received) -> None:
+        self.heard.append(received)
+        self.metrics.take(received)
+
+    def close(self) -> None:
+        self.metrics.close()
+
+
+@dataclass(frozen=True)
+class Flown:
+    """A mission that was flown: what the bus reports, all that was said, the nodes as they are in the end."""
+
+    result: BusResult
+    heard: list[Received]
+    metrics: Metrics
+    nodes: dict[str, Any]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The mission's figures."""
+        return self.metrics.summary()
+
+    def all(self, kind: type[M]) -> list[tuple[Received, M]]:
+        """All messages of a type in the order of their sending."""
+        return [(one, one.message) for one in self.heard if isinstance(one.message, kind)]
+
+
+def fly_scenario(scenario: Scenario) -> Flown:
+    """Flies a mission."""
+    fleet = build_fleet(scenario, record=False)
+    nodes = {node_id: spec.make() for node_id, spec in fleet.specs.items()}
+    watcher = Watcher()
+    result = run_local(Routing(fleet.roster), nodes, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
+    return Flown(result, watcher.heard, watcher.metrics, nodes)
+
+
+@cache
+def flown(name: str, seed: int, *overrides: str) -> Flown:
+    """The bundled mission with this seed and these overrides."""
+    return fly_scenario(load_scenario(name, overrides, seed))
+
+
+@cache
+def flown_alone(*overrides: str) -> Flown:
+    """The trial's mission without a helper."""
+    scenario = load_scenario("tellaro", ("targets.count=0", *overrides), 1)
+    return fly_scenario(scenario.model_copy(update={"vehicles": dict(scenario.survey_vehicles)}))
