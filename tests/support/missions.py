@@ -13,6 +13,7 @@ from comms.routing import Routing
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics
 from secondlook.scenario import Scenario, load_scenario
+from secondlook.scenario.vehicle import Start, Vehicle
 
 M = TypeVar("M")
 
@@ -61,13 +62,13 @@ def fly_scenario(scenario: Scenario) -> Flown:
 
 
 @cache
-def flown(name: str, seed: int, *overrides: str) -> Flown:
-    """The bundled mission with this seed and these overrides."""
-    return fly_scenario(load_scenario(name, overrides, seed))
-
-
-@cache
-def flown_alone(*overrides: str) -> Flown:
-    """The trial's mission without a helper."""
-    scenario = load_scenario("tellaro", ("targets.count=0", *overrides), 1)
-    return fly_scenario(scenario.model_copy(update={"vehicles": dict(scenario.survey_vehicles)}))
+def flown(name: str, seed: int, *overrides: str, helpers: int = 1) -> Flown:
+    """The bundled mission with this seed, these overrides and none, one or two helpers."""
+    scenario = load_scenario(name, overrides, seed)
+    fleet: dict[str, Vehicle] = {**scenario.survey_vehicles}
+    if helpers >= 1:
+        fleet |= scenario.revisit_vehicles
+    if helpers >= 2:
+        helper = scenario.revisit_vehicles["helper"]
+        fleet["second"] = helper.model_copy(update={"start": Start(x_m=1250, y_m=440, heading_deg=180)})
+    return fly_scenario(scenario.model_copy(update={"vehicles": fleet}))
