@@ -185,3 +185,13 @@ def test_json_is_the_summary_alone(tmp_path: Path) -> None:
     assert (flown.code, flown.err) == (0, "")
     assert json.loads(flown.out) == flown.summary
     assert {path.name for path in flown.folder.iterdir()} == FILES
+
+
+@pytest.mark.parametrize("bus", ["zenoh", "local"])
+def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path, bus: str) -> None:
+    flown = fly(tmp_path / "out", "--bus", bus, "--no-record", "--set", "mission.time_limit_s=20")
+    said = "the mission is not over at its time limit, mission.time_limit_s: 20"
+    assert (flown.code, flown.out, flown.left) == (1, "", {})
+    assert flown.err == f"{said}; what was recorded is in {flown.folder}\n"
+    assert (flown.summary["ending"], flown.summary["failure"]) == ("time_limit", said)
+    assert len(flown.summary["digest"]) == 64

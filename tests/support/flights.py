@@ -61,7 +61,12 @@ class Flight:
             text=True,
             env={**os.environ, MARKER: self._mark, "COLUMNS": "120"},
             cwd=folder.parent,
+            start_new_session=True,  # a process group of its own, for Ctrl-C
         )
+
+    def press_ctrl_c(self) -> None:
+        """What a terminal does: SIGINT to the whole process group."""
+        os.killpg(self.process.pid, signal.SIGINT)
 
     def children(self) -> dict[str, int]:
         """The process ids of the run's children by host, whoever their parent is by now."""
