@@ -76,7 +76,7 @@ class Whole:
     high: int
 
     def encode(self, value: int) -> int:
-        number = operator.index(value)  # refuses 2.5, which int() would cut off
+        number = int(operator.index(value))  # index refuses 2.5, which int alone would cut off
         if not self.low <= number <= self.high:
             raise WireError(f"{number} is outside {self.low} to {self.high}")
         return number

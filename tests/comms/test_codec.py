@@ -265,6 +265,13 @@ def test_what_does_not_fit_its_field_is_not_sent(message: Any, field: str, wrong
         encode(HEADER, replace(message, **{field: wrong}))
 
 
+@pytest.mark.parametrize("count", [7, np.int64(7), np.uint8(7), True])
+def test_a_count_travels_as_a_plain_whole_number(count: int) -> None:
+    got = decode(encode(HEADER, replace(CURVE, r_eff_m=count)), Curve)[1]
+    assert isinstance(got, Curve)
+    assert (got.r_eff_m, type(got.r_eff_m)) == (int(count), int)
+
+
 def test_a_message_is_not_shared_by_its_arrays() -> None:
     tile = decode(encode(HEADER, TILE), CoverageTile)[1]
     curve = decode(encode(HEADER, CURVE), Curve)[1]
