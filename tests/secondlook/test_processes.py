@@ -95,7 +95,10 @@ def test_a_killed_process_ends_the_run_with_a_sentence_that_names_it(tmp_path: P
 def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path, number: signal.Signals) -> None:
     with flight(tmp_path / "out", *LONG) as flying:
         children = take_off(flying)
-        flying.process.send_signal(number)
+        if number == signal.SIGINT:
+            flying.press_ctrl_c()
+        else:
+            flying.process.send_signal(number)
         printed = flying.finish(SOON_S)
         assert_gone(flying, children)
     assert_failed(flying, *printed, said=INTERRUPTED)
@@ -107,7 +110,7 @@ def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path, numbe
 def test_a_run_on_the_local_bus_is_interrupted_alike(tmp_path: Path) -> None:
     with flight(tmp_path / "out", *LONG, "--bus", "local", "--set", "vehicles.primary.speed_mps=0.1") as flying:
         assert until(flying.is_under_way)
-        flying.process.send_signal(signal.SIGINT)
+        flying.press_ctrl_c()
         printed = flying.finish(SOON_S)
     assert_failed(flying, *printed, said=INTERRUPTED)
     assert_readable(flying.folder)
@@ -117,10 +120,10 @@ def test_a_second_interrupt_waits_for_nobody(tmp_path: Path) -> None:
     with flight(tmp_path / "out", *LONG) as flying:
         children = take_off(flying)
         os.kill(children["recorder"], signal.SIGSTOP)
-        flying.process.send_signal(signal.SIGINT)
+        flying.press_ctrl_c()
         assert has_ended(children["world"], SOON_S)
         began_s = time.monotonic()
-        flying.process.send_signal(signal.SIGINT)
+        flying.press_ctrl_c()
         printed = flying.finish(SOON_S)
         assert time.monotonic() - began_s < GRACE_S
         assert_gone(flying, children)
