@@ -235,11 +235,16 @@ class Coordinator:
     def _take_at_work(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
         """A vehicle says that it is at a strip.
 
-        Where the strip is not with it, because it was taken for lost, it gets the strip back if nobody else has it and
-        it lies where it lay. Else the vehicle is to give it back, so that no two are at one strip.
+        Where the strip is not with it, because it was taken for lost, it gets the strip back, as it was, if nobody else
+        has it. Else the vehicle is to give it back, so that no two are at one strip.
         """
         name = vehicle.entry.vehicle
-        if record.state is StripState.OPEN and vehicle.offered.get(record.strip.number) == record.strip:
+        offered = vehicle.offered.get(record.strip.number)
+        if record.state is StripState.OPEN and offered is not None:
+            if record.strip != offered[0]:
+                self.ledger.revise(record, *offered, record.removable_m2)
+                self._publish_strip(record)
+                self._to_cut = True
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
         if record.vehicle == name and record.state in WITH_A_VEHICLE:
             if under_way:
@@ -354,7 +359,7 @@ class Coordinator:
             record = self.ledger.get(number)
             assert record is not None
             self._say(TaskAction.TAKE, record.strip, vehicle)
-            self.vehicles[vehicle].offered[number] = record.strip
+            self.vehicles[vehicle].offered[number] = (record.strip, record.window)
             self._move(record, StripState.OFFERED, now_ms, f"offered to {vehicle}", vehicle)
 
     def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:

@@ -21,8 +21,8 @@ class KnownVehicle:
     """One vehicle of the fleet.
 
     `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was given up; for a primary.
-    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: the strips that it
-    was offered, as they were then.
+    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: by number the strips
+    that it was offered, as they were then, and the windows they were cut from.
     """
 
     entry: RosterVehicle
@@ -32,7 +32,7 @@ class KnownVehicle:
     finished_ms: int | None = None
     refused: set[int] = field(default_factory=set)
     failed_at: list[Window] = field(default_factory=list)
-    offered: dict[int, Strip] = field(default_factory=dict)
+    offered: dict[int, tuple[Strip, Window]] = field(default_factory=dict)
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
 

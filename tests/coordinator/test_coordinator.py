@@ -445,7 +445,17 @@ class TestSilence:
         assert (told.states(), told.strips()[1].vehicle) == ({1: UNDER_WAY}, HELPER)
         assert len(told.tasks()) == 1
 
-    def test_if_another_has_it_or_it_was_moved_it_is_to_give_it_back(self) -> None:
+    def test_a_strip_that_was_moved_meanwhile_is_again_where_it_was(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.keep_alive([PRIMARY], 40)
+        told.hotspot((97.5, 50, 147.5, 250), revision=2)
+        told.settle()
+        assert (told.states(), told.strips()[1].length_m) == ({1: OPEN}, 200)
+        told.status(HELPER, 1, TaskState.UNDER_WAY)
+        told.settle()
+        assert (told.states(), told.strips()[1].length_m) == ({1: UNDER_WAY}, 300)
+
+    def test_if_another_has_it_or_it_was_withdrawn_it_is_to_give_it_back(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
         told.state(SECOND_HELPER, Mode.IDLE, at_ms=20_000)
         told.keep_alive([PRIMARY], 20)
@@ -459,11 +469,11 @@ class TestSilence:
 
         told = with_a_helper(TaskState.UNDER_WAY)
         told.keep_alive([PRIMARY], 40)
-        told.hotspot((97.5, 50, 147.5, 250), revision=2)
+        told.hotspot(None, revision=2)
         told.settle()
         told.status(HELPER, 1, TaskState.UNDER_WAY)
         assert told.tasks()[-1] == (HELPER, TaskAction.GIVE_BACK, 1)
-        assert told.states() == {1: OPEN}
+        assert told.states() == {1: WITHDRAWN}
 
     def test_done_by_a_helper_taken_for_lost_is_seen_on_the_map(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)
