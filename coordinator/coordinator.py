@@ -44,6 +44,7 @@ log = logging.getLogger("secondlook.coordinator")
 SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newly cut strip is an open one revised
 WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is published again
 ANSWER_WITHIN_MS = 10_000
+GIVEN_UP_AFTER = 10  # times as long as for a lost vehicle must a primary be silent before the mission ends without it
 CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen for the map to agree that it is done
 
@@ -190,6 +191,19 @@ class Coordinator:
             record = self.ledger.get(state.works_on)
             if record is not None and vehicle.tells_news_of(state.works_on, header):
                 self._take_at_work(record, vehicle, now_ms, under_way=state.mode is Mode.REVISIT)
+        elif was_idle and vehicle.is_idle:
+            self._take_idle(vehicle, header, now_ms)
+
+    def _take_idle(self, vehicle: KnownVehicle, header: Header, now_ms: int) -> None:
+        """A vehicle says once more that it has no work: its last word on a strip that it still has here was lost."""
+        name = vehicle.entry.vehicle
+        for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
+            if record.vehicle == name and vehicle.tells_news_of(record.strip.number, header):
+                if self._seen_share(record, name) >= COVERED_SHARE:
+                    self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)
+                else:
+                    self._move(record, StripState.OPEN, now_ms, f"{name} has no work, its word on it was lost")
+                self._to_cut = True
 
     def _take_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:
         record = self.ledger.get(status.strip)
@@ -221,11 +235,16 @@ class Coordinator:
     def _take_at_work(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
         """A vehicle says that it is at a strip.
 
-        Where the strip is not with it, because it was taken for lost, it gets the strip back if nobody else has it and
-        it lies where it lay. Else the vehicle is to give it back, so that no two are at one strip.
+        Where the strip is not with it, because it was taken for lost, it gets the strip back, as it was, if nobody else
+        has it. Else the vehicle is to give it back, so that no two are at one strip.
         """
         name = vehicle.entry.vehicle
-        if record.state is StripState.OPEN and vehicle.offered.get(record.strip.number) == record.strip:
+        offered = vehicle.offered.get(record.strip.number)
+        if record.state is StripState.OPEN and offered is not None:
+            if record.strip != offered[0]:
+                self.ledger.revise(record, *offered, record.removable_m2)
+                self._publish_strip(record)
+                self._to_cut = True
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
         if record.vehicle == name and record.state in WITH_A_VEHICLE:
             if under_way:
@@ -237,12 +256,8 @@ class Coordinator:
 
     def _take_done(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int) -> None:
         """The map decides whether a strip is done, not the word; what is left is cut anew."""
-        assert self.map is not None
         name = vehicle.entry.vehicle
-        layer = self.map.layers.get(name)
-        cells = self._inside[record.window.cells]
-        seen = layer.sum_levels[record.window.cells] > 0 if layer is not None else np.zeros_like(cells)
-        share = float(seen[cells].mean()) if cells.any() else 1.0
+        share = self._seen_share(record, name)
         if share >= COVERED_SHARE:
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         else:
@@ -250,15 +265,25 @@ class Coordinator:
             self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
         self._to_cut = True
 
+    def _seen_share(self, record: StripRecord, vehicle: str) -> float:
+        assert self.map is not None
+        layer = self.map.layers.get(vehicle)
+        cells = self._inside[record.window.cells]
+        seen = layer.sum_levels[record.window.cells] > 0 if layer is not None else np.zeros_like(cells)
+        return float(seen[cells].mean()) if cells.any() else 1.0
+
     def _find_lost(self, now_ms: int) -> None:
         for name, vehicle in self.vehicles.items():
             if vehicle.lost or now_ms - vehicle.heard_ms < self.config.lost_after_ms:
                 continue
-            vehicle.lose(now_ms)
+            vehicle.lost = True
             for record in self.ledger.in_state(*WITH_A_VEHICLE):
                 if record.vehicle == name:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
                     self._to_cut = True
+        for vehicle in self._primaries.values():
+            if vehicle.finished_ms is None and now_ms - vehicle.heard_ms >= self._given_up_after_ms:
+                vehicle.finished_ms = now_ms
         for record in self.ledger.in_state(StripState.OFFERED):
             if now_ms - record.since_ms >= ANSWER_WITHIN_MS:
                 self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
@@ -297,8 +322,12 @@ class Coordinator:
         return self._inside & told_open & ~self.map.settled_by(self._primaries)
 
     @property
-    def _primaries(self) -> list[str]:
-        return [name for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY]
+    def _primaries(self) -> dict[str, KnownVehicle]:
+        return {name: one for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY}
+
+    @property
+    def _given_up_after_ms(self) -> int:
+        return GIVEN_UP_AFTER * self.config.lost_after_ms
 
     def _risk_to_serve(self) -> FloatArray:
         """Residual risk where there are hotspots: the joined map's where tiles have come, else the hotspot's mean."""
@@ -330,7 +359,7 @@ class Coordinator:
             record = self.ledger.get(number)
             assert record is not None
             self._say(TaskAction.TAKE, record.strip, vehicle)
-            self.vehicles[vehicle].offered[number] = record.strip
+            self.vehicles[vehicle].offered[number] = (record.strip, record.window)
             self._move(record, StripState.OFFERED, now_ms, f"offered to {vehicle}", vehicle)
 
     def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:
@@ -360,7 +389,7 @@ class Coordinator:
         )
 
     def _find_end(self, now_ms: int) -> None:
-        ends = [one.finished_ms for one in self.vehicles.values() if one.entry.role is Role.SURVEY]
+        ends = [one.finished_ms for one in self._primaries.values()]
         if any(end is None for end in ends):
             return
         left = len(self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE))
@@ -374,7 +403,7 @@ class Coordinator:
         self._outbox.append(Publication(MISSION_OVER.key(), MissionOver(reason)))
 
     def _deadline_ms(self) -> int:
-        ends = [one.finished_ms or 0 for one in self.vehicles.values() if one.entry.role is Role.SURVEY]
+        ends = [one.finished_ms or 0 for one in self._primaries.values()]
         return math.ceil(max(ends, default=0) * self.config.deadline_factor)
 
     def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
@@ -411,6 +440,8 @@ class Coordinator:
         times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
         if self._cut_by_ms is not None:
             times.append(self._cut_by_ms)
-        if all(one.finished_ms is not None for one in self.vehicles.values() if one.entry.role is Role.SURVEY):
+        surveying = [one for one in self._primaries.values() if one.finished_ms is None]
+        times += [one.heard_ms + self._given_up_after_ms for one in surveying]
+        if not surveying:
             times.append(self._deadline_ms())
         return min((max(time_ms, now_ms + 1) for time_ms in times), default=None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from comms.codec import Header
-from comms.messages import AgentState, Mode, Role, RosterVehicle
+from comms.messages import AgentState, Mode, RosterVehicle
 from coordinator.ledger import StripRecord
 from coordinator.strips import SAME_PLACE, Window
 from planner.types import Strip
@@ -20,9 +20,9 @@ _NONE_YET: Order = (-1, -1)
 class KnownVehicle:
     """One vehicle of the fleet.
 
-    `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was lost; for a primary.
-    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: the strips that it
-    was offered, as they were then.
+    `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was given up; for a primary.
+    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: by number the strips
+    that it was offered, as they were then, and the windows they were cut from.
     """
 
     entry: RosterVehicle
@@ -32,7 +32,7 @@ class KnownVehicle:
     finished_ms: int | None = None
     refused: set[int] = field(default_factory=set)
     failed_at: list[Window] = field(default_factory=list)
-    offered: dict[int, Strip] = field(default_factory=dict)
+    offered: dict[int, tuple[Strip, Window]] = field(default_factory=dict)
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
 
@@ -54,18 +54,12 @@ class KnownVehicle:
         self._state_order = order
         self.state = state
         self.heard_ms = header.sent_ms
-        if self.lost:
-            self.lost = False
+        self.lost = False
+        if state.mode is not Mode.FINISHED:
             self.finished_ms = None
-        if state.mode is Mode.FINISHED and self.finished_ms is None:
+        elif self.finished_ms is None:
             self.finished_ms = now_ms
         return True
-
-    def lose(self, now_ms: int) -> None:
-        """Nothing has been heard of it for too long: the mission no longer waits for it."""
-        self.lost = True
-        if self.entry.role is Role.SURVEY and self.finished_ms is None:
-            self.finished_ms = now_ms
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; takes note of it."""

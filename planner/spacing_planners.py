@@ -28,9 +28,6 @@ class SpacingDecision:
 class SpacingPlanner(Protocol):
     """Lays tracks over a width; asked at the start and, where its decision says so, after each pair."""
 
-    def counted_range_m(self, r_eff_m: int | None) -> float:
-        """How far from a track what it covers is counted. `r_eff_m`: as for `decide`."""
-
     def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
         """Tracks for [covered_m, width_m]. `r_eff_m`: the effective range after the last track flown (0: nothing
         admissible), None before the first pair is flown."""
@@ -46,21 +43,10 @@ class AdaptiveSpacing:
     nadir_gap_m: float
     told_range_m: float
 
-    def counted_range_m(self, r_eff_m: int | None) -> float:
-        """r_eff; where it is less than planning can use, what planning uses instead.
-
-        What a track misses nearer than that stays a gap. If it were planned for again, a survey with such a sensor
-        would fly its last tracks for ever.
-        """
-        lowest_m = lowest_range_m(self.nadir_gap_m)
-        if r_eff_m is None or (r_eff_m == 0 and self.nadir_gap_m == 0.0):
-            # Without a nadir gap no range is too short to plan with, and one that nothing was seen at tells of none.
-            return max(self.told_range_m, lowest_m)
-        return max(r_eff_m, lowest_m)
-
     def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
         """See `SpacingPlanner`."""
-        lowest_m, highest_m = lowest_range_m(self.nadir_gap_m), self.counted_range_m(r_eff_m)
+        lowest_m = lowest_range_m(self.nadir_gap_m)
+        highest_m = counted_range_m(r_eff_m, self.nadir_gap_m, self.told_range_m)
         note = ""
         if r_eff_m is not None and r_eff_m < highest_m:
             # Paired tracks cannot close the nadir gap at such a range (equation 1): the gaps become hotspots.
@@ -78,13 +64,9 @@ class FixedSpacing:
     nadir_gap_m: float
     told_range_m: float
 
-    def counted_range_m(self, r_eff_m: int | None) -> float:
-        """The range told, in whole metres; what was measured changes nothing."""
-        return max(math.floor(self.told_range_m + LENGTH_TOLERANCE_M), lowest_range_m(self.nadir_gap_m))
-
     def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
         """See `SpacingPlanner`; what was measured changes nothing."""
-        range_m = int(self.counted_range_m(r_eff_m))
+        range_m = max(math.floor(self.told_range_m + LENGTH_TOLERANCE_M), lowest_range_m(self.nadir_gap_m))
         offsets = track_offsets(width_m, self.nadir_gap_m, range_m, covered_m=covered_m)
         return SpacingDecision(range_m, tuple(offsets), replans=False)
 
@@ -92,3 +74,17 @@ class FixedSpacing:
 def lowest_range_m(nadir_gap_m: float) -> int:
     """The least whole metre that can space pairs: they cover each other's nadir gap from 3 r_min on (equation 1)."""
     return max(1, math.ceil(3 * nadir_gap_m - LENGTH_TOLERANCE_M))
+
+
+def counted_range_m(r_eff_m: int | None, nadir_gap_m: float, told_range_m: float) -> float:
+    """How far from a track what it covers is counted: r_eff; where that is less than planning can use, what planning
+    uses instead. `r_eff_m`: as for `SpacingPlanner.decide`.
+
+    What a track misses nearer than that stays a gap. If it were planned for again, a survey with such a sensor would
+    fly its last tracks for ever.
+    """
+    lowest_m = lowest_range_m(nadir_gap_m)
+    if r_eff_m is None or (r_eff_m == 0 and nadir_gap_m == 0.0):
+        # Without a nadir gap no range is too short to plan with, and one that nothing was seen at tells of none.
+        return max(told_range_m, lowest_m)
+    return max(r_eff_m, lowest_m)

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from comms.codec import SCHEMA_VERSION
+import numpy as np
+import shapely
+
+from comms.codec import CLOCK, SCHEMA_VERSION, Header, encode
 from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from comms.routing import RosterNode
 from coordinator.config import CoordinatorConfig
 from planner.area import SurveyArea
+from planner.types import Point
 from secondlook.errors import UserError
 from secondlook.node_spec import NodeSpec
 from secondlook.parts import ALLOCATOR, SONAR, SPACING, PartError, PartKind
@@ -56,7 +61,7 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
         scenario_sha256=scenario_hash(scenario),
         seed=scenario.seed,
         mode=ClockMode.LOCKSTEP,
-        area=tuple(Vertex(x_m, y_m) for x_m, y_m in scenario.area.polygon_m),
+        area=_outline(scenario.area.polygon_m),
         grid=Grid(
             grid.frame.origin_x_m,
             grid.frame.origin_y_m,
@@ -68,6 +73,7 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
         rho=scenario.mission.rho,
         vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
     )
+    encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
     roster = [
         RosterNode("clock", Role.CLOCK),
         RosterNode("world", Role.WORLD, tuple(scenario.vehicles)),
@@ -85,6 +91,16 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
     return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000))
 
 
+def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
+    """The area's corners as they travel, in whole centimetres; without those that rounding has turned into dents."""
+    corners = [(round(x_m, 2), round(y_m, 2)) for x_m, y_m in polygon_m]
+    hull = shapely.MultiPoint(corners).convex_hull
+    if not isinstance(hull, shapely.Polygon):
+        raise ValueError("an area that has none in whole centimetres cannot be surveyed")
+    convex = set(hull.exterior.coords)
+    return tuple(Vertex(*corner) for corner in dict.fromkeys(corners) if corner in convex)
+
+
 def _role(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
     return Role.SURVEY if isinstance(vehicle, SurveyVehicle) else Role.REVISIT
 
@@ -99,13 +115,17 @@ def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> Roste
         run_in_m=vehicle.run_in_m,
         nadir_gap_m=vehicle.nadir_gap_m,
         swath_m=vehicle.sensor.reach_m,
-        p_detect=float(curve.p_detect.max()),
-        endurance_ms=round(vehicle.endurance_s * 1000),
+        p_detect=float(np.trapezoid(curve.p_detect, curve.range_m)) / vehicle.sensor.reach_m,
+        endurance_ms=_endurance_ms(vehicle),
     )
 
 
+def _endurance_ms(vehicle: SurveyVehicle | RevisitVehicle) -> int:
+    return max(1, round(vehicle.endurance_s * 1000))
+
+
 def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
-    endurance_ms = round(vehicle.endurance_s * 1000)
+    endurance_ms = _endurance_ms(vehicle)
     if isinstance(vehicle, RevisitVehicle):
         config = RevisitConfig(
             vehicle=name,

@@ -27,7 +27,7 @@ from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
-from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision, lowest_range_m
+from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision, counted_range_m, lowest_range_m
 from planner.types import FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import SurveyConfig
@@ -70,7 +70,10 @@ class SurveyAgent(Agent):
         self._rho = run.rho
         self._hotspots = HotspotMap.empty(spec)
         self._decide(r_eff_m=None)
-        self._begin_track(now_ms)
+        if self.ahead:
+            self._begin_track(now_ms)
+        else:
+            self._finish()
 
     def on_look(self, look: Look, now_ms: int) -> None:
         """Notes how far the sonar sees; of a look at the present track also its P_d and how far the track is looked."""
@@ -247,7 +250,7 @@ class SurveyAgent(Agent):
 
     def _edge_m(self, tracks: list[Track], r_eff_m: int) -> float:
         """The edge up to which these tracks cover the area."""
-        counted_m = self.config.spacing.counted_range_m(r_eff_m)
+        counted_m = counted_range_m(r_eff_m, self.config.nadir_gap_m, self.config.range_m)
         return max(track.across_m for track in tracks) + min(self.decision.range_m, counted_m)
 
     def _find_hotspots(self, now_ms: int) -> None:

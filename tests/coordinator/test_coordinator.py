@@ -445,7 +445,17 @@ class TestSilence:
         assert (told.states(), told.strips()[1].vehicle) == ({1: UNDER_WAY}, HELPER)
         assert len(told.tasks()) == 1
 
-    def test_if_another_has_it_or_it_was_moved_it_is_to_give_it_back(self) -> None:
+    def test_a_strip_that_was_moved_meanwhile_is_again_where_it_was(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.keep_alive([PRIMARY], 40)
+        told.hotspot((97.5, 50, 147.5, 250), revision=2)
+        told.settle()
+        assert (told.states(), told.strips()[1].length_m) == ({1: OPEN}, 200)
+        told.status(HELPER, 1, TaskState.UNDER_WAY)
+        told.settle()
+        assert (told.states(), told.strips()[1].length_m) == ({1: UNDER_WAY}, 300)
+
+    def test_if_another_has_it_or_it_was_withdrawn_it_is_to_give_it_back(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
         told.state(SECOND_HELPER, Mode.IDLE, at_ms=20_000)
         told.keep_alive([PRIMARY], 20)
@@ -459,11 +469,11 @@ class TestSilence:
 
         told = with_a_helper(TaskState.UNDER_WAY)
         told.keep_alive([PRIMARY], 40)
-        told.hotspot((97.5, 50, 147.5, 250), revision=2)
+        told.hotspot(None, revision=2)
         told.settle()
         told.status(HELPER, 1, TaskState.UNDER_WAY)
         assert told.tasks()[-1] == (HELPER, TaskAction.GIVE_BACK, 1)
-        assert told.states() == {1: OPEN}
+        assert told.states() == {1: WITHDRAWN}
 
     def test_done_by_a_helper_taken_for_lost_is_seen_on_the_map(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)
@@ -474,6 +484,27 @@ class TestSilence:
         told.settle()
         assert told.states() == {1: WITHDRAWN}
         assert len(told.tasks()) == 1
+
+    @pytest.mark.parametrize(("p_detect", "left"), [(0.7, {1: DONE}), (0.0, {1: OFFERED})])
+    def test_a_last_word_that_is_lost_is_told_by_the_next_states(
+        self, p_detect: float, left: dict[int, StripState]
+    ) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.layer(HELPER, looked(p_detect))
+        told.state(HELPER, Mode.IDLE)
+        told.settle()
+        assert told.states() == {1: UNDER_WAY}  # the word may be on its way
+        told.keep_alive([PRIMARY, HELPER], 10)
+        told.settle()
+        assert told.states() == left
+
+    def test_a_word_that_comes_late_counts_and_an_idle_state_before_it_does_not(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.layer(HELPER, looked())
+        told.state(HELPER, Mode.IDLE)
+        told.status(HELPER, 1, TaskState.DONE)
+        told.keep_alive([PRIMARY, HELPER], 30)
+        assert told.states() == {1: DONE}
 
 
 class TestTheEnd:
@@ -536,26 +567,34 @@ class TestTheEnd:
         told.settle()
         assert len(told.node.all(MissionOver)) == 1
 
-    def test_a_lost_primary_is_not_waited_for(self) -> None:
+    def test_a_primary_that_is_silent_for_five_minutes_is_given_up(self) -> None:
         told = coordinator(idle=())
         told.hotspot()
-        told.node.wait_until(31_499)
+        told.node.wait_until(314_999)
         assert told.node.all(MissionOver) == []
-        told.node.wait_until(31_501)
-        assert len(told.node.all(MissionOver)) == 1  # 1.05 times 30 s
+        told.node.wait_until(315_001)
+        assert len(told.node.all(MissionOver)) == 1  # 1.05 times 300 s
         assert told.states() == {1: OPEN}
 
-    def test_a_lost_primary_that_is_back_is(self) -> None:
+    def test_with_nothing_left_to_do_it_is_over_when_the_primary_is_given_up(self) -> None:
+        told = coordinator()
+        told.node.wait_until(299_999)
+        assert told.node.all(MissionOver) == []
+        told.node.wait_until(300_001)
+        assert len(told.node.all(MissionOver)) == 1
+
+    @pytest.mark.parametrize("silent_s", [40, 305])
+    def test_a_primary_that_is_heard_again_is_waited_for(self, silent_s: int) -> None:
         told = coordinator()
         told.hotspot()
-        told.node.wait_until(30_500)
+        told.node.wait_until(silent_s * 1000)
         told.state(PRIMARY, Mode.SURVEY, 1)
         told.state(HELPER, Mode.IDLE)
-        told.keep_alive([PRIMARY, HELPER], 100)
+        told.keep_alive([PRIMARY, HELPER], 500 - silent_s)
         assert told.node.all(MissionOver) == []
         told.state(PRIMARY, Mode.FINISHED)
-        told.keep_alive([PRIMARY, HELPER], 6)
-        assert told.node.all(MissionOver) == []  # 1.05 times 130 s
+        told.keep_alive([PRIMARY, HELPER], 24)
+        assert told.node.all(MissionOver) == []  # 1.05 times 500 s
         told.keep_alive([PRIMARY, HELPER], 2)
         assert len(told.node.all(MissionOver)) == 1
 

@@ -7,14 +7,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.spacing import track_count
-from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner, lowest_range_m
+from planner.spacing_planners import (
+    AdaptiveSpacing,
+    FixedSpacing,
+    SpacingDecision,
+    counted_range_m,
+    lowest_range_m,
+)
 
 WIDTH_M = 1212
 NADIR_GAP_M = 40
 R_EFF_M = 130
 
 
-def fly(planner: SpacingPlanner, width_m: float, r_eff_m: int) -> tuple[list[float], list[int]]:
+def fly(planner: AdaptiveSpacing | FixedSpacing, width_m: float, r_eff_m: int) -> tuple[list[float], list[int]]:
     """Flies pair after pair as long as the planner replans; returns the offsets flown and the ranges decided."""
     flown: list[float] = []
     ranges: list[int] = []
@@ -26,7 +32,9 @@ def fly(planner: SpacingPlanner, width_m: float, r_eff_m: int) -> tuple[list[flo
             return flown + list(decision.offsets_m), ranges
         flown += decision.offsets_m[:2]
         known_m = r_eff_m
-        covered_m = max(flown) + min(decision.range_m, planner.counted_range_m(known_m))
+        covered_m = max(flown) + min(
+            decision.range_m, counted_range_m(known_m, planner.nadir_gap_m, planner.told_range_m)
+        )
     return flown, ranges
 
 
@@ -38,7 +46,7 @@ class TestThePapersFigures:
         first = planner.decide(WIDTH_M, 0, None)
         assert (first.range_m, len(first.offsets_m), first.replans, first.note) == (138, 7, True, "")
         assert first.offsets_m[:2] == (138, 236)
-        covered_m = 236 + min(138, planner.counted_range_m(R_EFF_M))
+        covered_m = 236 + min(138, counted_range_m(R_EFF_M, planner.nadir_gap_m, planner.told_range_m))
         assert covered_m == 366
         then = planner.decide(WIDTH_M, covered_m, R_EFF_M)
         assert then == SpacingDecision(120, (486, 566, 806, 886, 1012, 1092), replans=True)
@@ -63,7 +71,7 @@ class TestAdaptiveSpacing:
         decision = planner.decide(WIDTH_M, 366, r_eff_m)
         assert decision.range_m == 120
         assert decision.note == f"r_eff {r_eff_m} m is below 3 r_min: planning with 120 m, gaps remain"
-        assert planner.counted_range_m(r_eff_m) == 120
+        assert counted_range_m(r_eff_m, planner.nadir_gap_m, planner.told_range_m) == 120
 
     @pytest.mark.parametrize("r_eff_m", [None, 120, 130])
     def test_has_nothing_to_say_otherwise(self, r_eff_m: int | None) -> None:
@@ -103,12 +111,14 @@ class TestAdaptiveSpacing:
         planner = AdaptiveSpacing(nadir_gap_m, max(told_m, lowest_range_m(nadir_gap_m)))
         offsets, ranges = fly(planner, width_m, r_eff_m)
         assert all(lowest_range_m(nadir_gap_m) <= range_m for range_m in ranges)
-        assert all(range_m <= planner.counted_range_m(r_eff_m) for range_m in ranges[1:])
+        assert all(
+            range_m <= counted_range_m(r_eff_m, planner.nadir_gap_m, planner.told_range_m) for range_m in ranges[1:]
+        )
         assert ranges[0] <= planner.told_range_m
         # No pair covers less than one of the least range.
         least_m = 3 * lowest_range_m(nadir_gap_m) - nadir_gap_m
         assert len(offsets) <= 2 * (math.ceil(width_m / least_m) + 1)
-        assert max(offsets) + planner.counted_range_m(r_eff_m) >= width_m - 1e-6
+        assert max(offsets) + counted_range_m(r_eff_m, planner.nadir_gap_m, planner.told_range_m) >= width_m - 1e-6
 
 
 class TestFixedSpacing:
@@ -122,7 +132,7 @@ class TestFixedSpacing:
         decision = planner.decide(width_m, covered_m, r_eff_m)
         assert decision == planner.decide(width_m, covered_m, None)
         assert not decision.replans
-        assert decision.range_m == planner.counted_range_m(r_eff_m) == math.floor(told_m + 1e-6)
+        assert decision.range_m == math.floor(told_m + 1e-6)
         assert len(decision.offsets_m) == track_count(width_m - covered_m, NADIR_GAP_M, decision.range_m)
 
     def test_counts_a_range_in_whole_metres(self) -> None:

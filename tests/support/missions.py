@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, TypeVar
 
 from comms.local_bus import run_local
-from comms.node import Received
+from comms.node import Node, Received, Step
 from comms.result import BusResult
 from comms.routing import Routing
 from secondlook.fleet import build_fleet
@@ -52,12 +53,41 @@ class Flown:
         return [(one, one.message) for one in self.heard if isinstance(one.message, kind)]
 
 
-def fly_scenario(scenario: Scenario) -> Flown:
-    """Flies a mission."""
+Loses = Callable[[Received, int], bool]
+"""Whether a message that crosses water does not reach a node at this time."""
+
+
+class HardOfHearing:
+    """A node that some of what crosses water does not reach."""
+
+    def __init__(self, node: Node, loses: Loses) -> None:
+        self._node = node
+        self._loses = loses
+        self._wake_ms: int | None = None
+
+    def start(self, now_ms: int) -> Step:
+        return self._keep(self._node.start(now_ms))
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        if received.topic.crosses_water and self._loses(received, now_ms):
+            return Step(wake_ms=self._wake_ms)
+        return self._keep(self._node.on_message(received, now_ms))
+
+    def on_wake(self, now_ms: int) -> Step:
+        return self._keep(self._node.on_wake(now_ms))
+
+    def _keep(self, step: Step) -> Step:
+        self._wake_ms = step.wake_ms
+        return step
+
+
+def fly_scenario(scenario: Scenario, loses: Loses | None = None) -> Flown:
+    """Flies a mission; `loses`: over a link that loses messages."""
     fleet = build_fleet(scenario, record=False)
     nodes = {node_id: spec.make() for node_id, spec in fleet.specs.items()}
+    heard_by = nodes if loses is None else {name: HardOfHearing(node, loses) for name, node in nodes.items()}
     watcher = Watcher()
-    result = run_local(Routing(fleet.roster), nodes, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
+    result = run_local(Routing(fleet.roster), heard_by, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
     return Flown(result, watcher.heard, watcher.metrics, nodes)
 
 
