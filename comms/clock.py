@@ -1,8 +1,8 @@
 """The lockstep clock: who may act next, and at which simulated time. Pure; the buses carry its grants and answers.
 
 A message sent at t is due at t + its topic's delay. The clock grants the earlier of the next wake-up and the next
-delivery that is due, to every node that has either then; it goes on when all of them have answered. Nothing happens in
-between, so there is no tick.
+delivery that is due, to every node that has either then; it goes on when all of them have answered. What is due of a
+topic that wakes nobody comes along with the next grant. Nothing happens in between, so there is no tick.
 """
 
 from __future__ import annotations
@@ -92,15 +92,15 @@ class LockstepClock:
             self._topics_in_second[route.topic.name] += 1
             if route.topic is MISSION_OVER and self.over_ms is None:
                 self.over_ms = self.now_ms
-            if route.readers:
+            for reader in route.readers:
+                self._sent_to[reader][sender] += 1
+                self._grown[reader].add(sender)
+            if route.readers and route.topic.wakes:
                 due = self.now_ms + route.topic.delay_ms
                 if due not in self._due:
                     self._due[due] = set()
                     heapq.heappush(self._due_times, due)
                 self._due[due].update(route.readers)
-                for reader in route.readers:
-                    self._sent_to[reader][sender] += 1
-                    self._grown[reader].add(sender)
             for watcher in route.watchers:
                 self.watched[watcher][sender] += 1
                 self.watched_bytes[watcher] += one.size

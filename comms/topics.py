@@ -57,7 +57,8 @@ class Topic:
     """One row of the table.
 
     `pattern`: the key below the run id; `{vehicle}`, `{number}` and `{tile}` stand for one chunk each.
-    `delay_ms`: from sending to delivery in lockstep, >= 1. `max_bytes`: a larger payload is refused.
+    `delay_ms`: from sending to delivery in lockstep, >= 1. `wakes`: whether a message that is due lets its reader act;
+    if not it waits until the reader acts for another reason. `max_bytes`: a larger payload is refused.
     `rate_hz`: the most that one writer is expected to publish on average, over all its keys of the topic.
     """
 
@@ -71,6 +72,7 @@ class Topic:
     keep: Keep
     crosses_water: bool
     delay_ms: int = 1
+    wakes: bool = True
 
     def key(self, *, vehicle: str = "", number: int = 0, tile: str = "") -> str:
         """The key below the run id."""
@@ -102,8 +104,9 @@ _EVERYONE = dict.fromkeys(Role, Reach.ALL)
 
 RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 20_000, 0.01, Keep.LATEST, crosses_water=False)
 NAV = Topic(
-    "nav", "veh/{vehicle}/nav", Nav, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 200, 1.0, Keep.LATEST, crosses_water=False
-)
+    "nav", "veh/{vehicle}/nav", Nav, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 200, 1.0, Keep.LATEST, crosses_water=False,
+    wakes=False,
+)  # fmt: skip
 LOOK = Topic(
     "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | {Role.OBSERVER: Reach.ALL}, 150_000, 0.2,
     Keep.NOTHING, crosses_water=False,

@@ -52,7 +52,8 @@ def replay_node(
         route = routing.route(one.key)
         if route is not None and node_id in route.readers:
             runner.deliver(one)
-            due_times.add(one.header.sent_ms + one.topic.delay_ms)
+            if one.topic.wakes:
+                due_times.add(one.header.sent_ms + one.topic.delay_ms)
     overs = [one.header.sent_ms for one in messages if one.topic is MISSION_OVER]
     end_ms = overs[0] + WRAP_UP_MS if overs else last_ms
     agreed = 0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, says
+from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, say_status, says
 
 from comms import clock
 from comms.clock import RunawayError
@@ -59,6 +59,18 @@ def test_mail_due_at_a_wake_up_comes_before_it(bus: Bus) -> None:
     assert alpha.log[-2:] == [(100, "veh/alpha/nav", "world", 0, 99), ("wake", 100)]
 
 
+def test_mail_that_wakes_nobody_waits_for_its_readers_next_turn(bus: Bus) -> None:
+    world = Scripted(
+        starts=lambda now_ms: Step(wake_ms=10),
+        wakes=lambda now_ms: says(say_nav("alpha"), wake_ms=now_ms + 10 if now_ms < 50 else None),
+    )
+    beta = Scripted(starts=lambda now_ms: Step(wake_ms=30))
+    alpha = Scripted(starts=lambda now_ms: Step(wake_ms=30))
+    bus({"world": world, "alpha": alpha, "beta": beta}, Notes())
+    # What was sent at 30 ms is due at 31 ms, and nothing lets alpha act after that.
+    assert alpha.log[2:] == [(30, "veh/alpha/nav", "world", n, 10 * n + 10) for n in range(2)] + [("wake", 30)]
+
+
 def test_messages_of_one_time_are_ordered_by_sender_and_sequence(bus: Bus) -> None:
     def speak(name: str) -> Scripted:
         return Scripted(
@@ -74,7 +86,7 @@ def test_messages_of_one_time_are_ordered_by_sender_and_sequence(bus: Bus) -> No
 
 
 def test_a_handler_may_publish_and_the_answer_comes_a_delay_later(bus: Bus) -> None:
-    world = Scripted(starts=lambda now_ms: says(say_nav("alpha")))
+    world = Scripted(starts=lambda now_ms: says(say_status("alpha")))
     alpha = Scripted(hears=lambda received, now_ms: says(say_state("alpha")) if received.vehicle else None)
     coordinator = Scripted()
     bus({"world": world, "alpha": alpha, "coordinator": coordinator}, Notes())

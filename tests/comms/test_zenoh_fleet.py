@@ -107,11 +107,11 @@ def test_a_node_that_raises_is_named_with_what_it_raised() -> None:
 
 
 class Failing(Notes):
-    """A listener that fails at its fourth message."""
+    """A listener that fails at its sixth message."""
 
     def on_message(self, received: Received) -> None:
         super().on_message(received)
-        if len(self.heard) == 4:
+        if len(self.heard) == 6:
             raise OSError("no space left")
 
 

@@ -61,7 +61,7 @@ def assert_gone(flying: Flight, children: dict[str, int]) -> None:
 def take_off(flying: Flight) -> dict[str, int]:
     """Waits until the mission is under way and the recorder has written of it; the children's process ids by host."""
     recording = flying.folder / "mission.rrd"
-    assert until(lambda: flying.is_under_way() and recording.stat().st_size > 20_000)
+    assert until(lambda: flying.is_under_way() and recording.stat().st_size > 100_000)
     children = flying.children()
     assert sorted(children) == sorted(HOSTS)
     return children
@@ -75,7 +75,7 @@ def assert_failed(flying: Flight, code: int, out: str, err: str, said: str) -> N
     assert re.fullmatch(said, summary["failure"])
     assert summary["ending"] == ("interrupted" if said == INTERRUPTED else "failed")
     assert summary["digest"] is None
-    assert 0 < summary["time"]["mission_s"] < 1700
+    assert 0 < summary["time"]["mission_s"] < 4000
     assert sum(summary["messages"].values()) == len(read_messages(flying.folder / "messages.mpk"))
 
 
@@ -193,7 +193,7 @@ def run_fleet(
         ("primary", 150, r"primary has fallen silent at .*|nothing heard for 3 s at .*: no answer from primary"),
         ("recorder", 150, r"recorder has fallen silent at .* s of the mission"),
         # Late enough for the hub to have given signs of life in mid-mission.
-        ("world", 1500, r"world has fallen silent, last heard at [1-9]\d*\.\d{3} s of the mission"),
+        ("world", 4000, r"world has fallen silent, last heard at [1-9]\d*\.\d{3} s of the mission"),
     ],
 )
 def test_a_frozen_process_is_given_up_and_named(

@@ -11,12 +11,23 @@ from typing import Any
 from comms.access import access_rules
 from comms.control import HostPlan, RunKeys, pack
 from comms.local_bus import run_local
-from comms.messages import AgentState, ClockMode, Grid, MissionOver, Mode, Nav, Role, RunInfo
+from comms.messages import (
+    AgentState,
+    ClockMode,
+    Grid,
+    ManeuverState,
+    ManeuverStatus,
+    MissionOver,
+    Mode,
+    Nav,
+    Role,
+    RunInfo,
+)
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.result import BusResult
 from comms.routing import RosterNode, Routing
 from comms.runner import NodeError
-from comms.topics import MISSION_OVER, NAV, STATE
+from comms.topics import MANEUVER_STATUS, MISSION_OVER, NAV, STATE
 from comms.zenoh_host import ListenerHost, serve_nodes
 from comms.zenoh_hub import FleetError, Hub
 from comms.zenoh_session import open_client, open_hub, put
@@ -103,8 +114,14 @@ def says(*publications: Publication, wake_ms: int | None = None) -> Step:
 
 
 def say_nav(vehicle: str, x_m: float = 0.0) -> Publication:
-    """A vehicle's position."""
+    """A vehicle's position, which wakes nobody."""
     return Publication(NAV.key(vehicle=vehicle), nav(x_m))
+
+
+def say_status(vehicle: str, number: int = 0) -> Publication:
+    """A vehicle's word on a manoeuvre."""
+    status = ManeuverStatus(number, ManeuverState.ACCEPTED, 0, "")
+    return Publication(MANEUVER_STATUS.key(vehicle=vehicle), status)
 
 
 def say_state(vehicle: str, works_on: int = 0) -> Publication:
@@ -217,7 +234,8 @@ def fleet_that_talks(until_ms: int = 20_000) -> dict[str, Scripted]:
     """A fleet in which everyone says something again and again, until the coordinator ends it."""
 
     def tick(now_ms: int) -> Step:
-        return says(say_nav("alpha", now_ms), say_nav("beta", -now_ms), wake_ms=now_ms + 700)
+        positions = (say_nav("alpha", now_ms), say_nav("beta", -now_ms))
+        return says(*positions, say_status("alpha", now_ms), say_status("beta"), wake_ms=now_ms + 700)
 
     return {
         "world": Scripted(starts=tick, wakes=tick),

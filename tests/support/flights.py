@@ -18,7 +18,7 @@ from typing import Any
 
 BRIEF = Path(__file__).with_name("brief.yaml")
 # The same mission at a walking pace: it goes on for some seconds of wall time, long enough to be cut off.
-LONG = ("--set", "vehicles.primary.speed_mps=0.5")
+LONG = ("--set", "vehicles.primary.speed_mps=0.2")
 MARKER = "SECONDLOOK_TEST_RUN"
 
 
