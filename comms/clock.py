@@ -3,15 +3,18 @@
 A message sent at t is due at t + its topic's delay. The clock grants the earlier of the next wake-up and the next
 delivery that is due, to every node that has either then; it goes on when all of them have answered. What is due of a
 topic that wakes nobody comes along with the next grant. Nothing happens in between, so there is no tick.
+
+Planned events of nodes (`comms.events`) happen between grants: who is absent or frozen is granted nothing.
 """
 
 from __future__ import annotations
 
 import heapq
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from comms.events import JOINER_DELAY_MS, Change, Happening, NodeEvent, absent_at_start, timeline
 from comms.routing import Routing
 from comms.topics import MISSION_OVER
 
@@ -34,21 +37,25 @@ class Sent:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """Leave for one node to act. `expected`: how many messages of each sender must have arrived in all, for the
-    senders whose count has grown since the node's last grant."""
+    """Leave for one node to act, or with `start` to begin.
+
+    `expected`: how many messages of each sender must have arrived since the node is there, for the senders whose count
+    has grown since the node's last grant.
+    """
 
     node_id: str
     wake: bool
     expected: dict[str, int]
+    start: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Round:
-    """Grants for one simulated time; `start` marks the first, in which nodes are started."""
+    """What happens at one simulated time: first `happenings`, then grants; either may be empty."""
 
     now_ms: int
-    start: bool
     grants: tuple[Grant, ...]
+    happenings: tuple[Happening, ...] = ()
 
 
 class LockstepClock:
@@ -57,9 +64,11 @@ class LockstepClock:
 
     Ask for `next_round`, carry out its grants, report each node with `answer`, and so on until there is none.
     `routing` names the nodes; those that only listen are never waited for, but counted (`watched`, `watched_bytes`).
+    `said_to_joiners` counts by sender all that a node with a planned `Join` may read, also while it is absent.
+    Raises ValueError for events that do not fit, see `comms.events.timeline`.
     """
 
-    def __init__(self, routing: Routing, time_limit_ms: int) -> None:
+    def __init__(self, routing: Routing, time_limit_ms: int, events: Iterable[NodeEvent] = ()) -> None:
         self.now_ms = 0
         self.rounds = 0
         self.messages: Counter[str] = Counter()
@@ -67,9 +76,17 @@ class LockstepClock:
         self.timed_out = False
         self._routing = routing
         self._time_limit_ms = time_limit_ms
-        self._started = False
+        self._events = tuple(events)
+        self._happenings = list(reversed(timeline(self._events, routing)))
+        self._absent = absent_at_start(self._events)
+        self._frozen: set[str] = set()
+        self._held: set[str] = set()
+        self.said_to_joiners: dict[str, Counter[str]] = {
+            one.node_id: Counter() for one in self._happenings if one.change is Change.JOIN
+        }
         acting = [node.node_id for node in routing.roster if not node.listens_only and node.role.value != "clock"]
-        self._wakes: dict[str, int | None] = dict.fromkeys(acting, 0)
+        self._wakes: dict[str, int | None] = {node: None if node in self._absent else 0 for node in acting}
+        self._to_start = set(acting) - self._absent
         self._waiting: set[str] = set()
         self._due: dict[int, set[str]] = {}
         self._due_times: list[int] = []
@@ -82,6 +99,10 @@ class LockstepClock:
         self._rounds_in_second = 0
         self._topics_in_second: Counter[str] = Counter()
 
+    def present(self) -> list[str]:
+        """The acting nodes that are there now."""
+        return [node for node in self._wakes if node not in self._absent]
+
     def publish(self, sender: str, sent: Sequence[Sent]) -> None:
         """Takes note of messages published at the present time: by a node that was granted it, or by the clock."""
         for one in sent:
@@ -92,18 +113,23 @@ class LockstepClock:
             self._topics_in_second[route.topic.name] += 1
             if route.topic is MISSION_OVER and self.over_ms is None:
                 self.over_ms = self.now_ms
-            for reader in route.readers:
+            for joiner, counts in self.said_to_joiners.items():
+                counts[sender] += joiner in route.readers
+            readers = [node for node in route.readers if node not in self._absent] if self._absent else route.readers
+            for reader in readers:
                 self._sent_to[reader][sender] += 1
                 self._grown[reader].add(sender)
-            if route.readers and route.topic.wakes:
-                due = self.now_ms + route.topic.delay_ms
-                if due not in self._due:
-                    self._due[due] = set()
-                    heapq.heappush(self._due_times, due)
-                self._due[due].update(route.readers)
+            if readers and route.topic.wakes:
+                self._make_due(readers, self.now_ms + route.topic.delay_ms)
             for watcher in route.watchers:
                 self.watched[watcher][sender] += 1
                 self.watched_bytes[watcher] += one.size
+
+    def _make_due(self, readers: Iterable[str], due_ms: int) -> None:
+        if due_ms not in self._due:
+            self._due[due_ms] = set()
+            heapq.heappush(self._due_times, due_ms)
+        self._due[due_ms].update(readers)
 
     def answer(self, node_id: str, wake_ms: int | None, sent: Sequence[Sent]) -> None:
         """Takes a granted node's answer: the wake-up it wants next (in the future) and what it has published.
@@ -126,30 +152,76 @@ class LockstepClock:
         """
         if self._waiting:
             raise ValueError(f"the round is not over: no answer from {', '.join(sorted(self._waiting))}")
-        start = not self._started
-        self._started = True
-        next_ms = min((wake for wake in self._wakes.values() if wake is not None), default=None)
-        if self._due_times and (next_ms is None or self._due_times[0] < next_ms):
-            next_ms = self._due_times[0]
-        if next_ms is None:
-            return None
-        if next_ms > self._last_ms():
-            self.timed_out = self.over_ms is None
-            return None
-        self._count_round(next_ms)
-        self.now_ms = next_ms
-        receivers: set[str] = set()
-        if self._due_times and self._due_times[0] == next_ms:
-            receivers = self._due.pop(heapq.heappop(self._due_times))
-        grants = []
-        for node_id, wake_ms in self._wakes.items():
-            wake = wake_ms == next_ms
-            if wake or node_id in receivers:
-                counts = self._sent_to[node_id]
-                grants.append(Grant(node_id, wake, {sender: counts[sender] for sender in self._grown[node_id]}))
-                self._grown[node_id].clear()
-                self._waiting.add(node_id)
-        return Round(next_ms, start, tuple(grants))
+        while True:
+            next_ms = self._next_ms()
+            if next_ms is None:
+                return None
+            if next_ms > self._last_ms():
+                self.timed_out = self.over_ms is None
+                return None
+            happenings = self._happen(next_ms)
+            receivers = self._receivers(next_ms)
+            grants = tuple(
+                self._grant(node_id, next_ms) for node_id in self._wakes if self._acts(node_id, receivers, next_ms)
+            )
+            if grants or happenings:  # else all receivers are frozen or gone
+                self._count_round(next_ms)
+                self.now_ms = next_ms
+                return Round(next_ms, grants, happenings)
+
+    def _next_ms(self) -> int | None:
+        """The next time at which anything may happen."""
+        times = [wake for node, wake in self._wakes.items() if wake is not None and node not in self._frozen]
+        if self._due_times:
+            times.append(self._due_times[0])
+        if self._happenings:
+            times.append(self._happenings[-1].at_ms)
+        return min(times, default=None)
+
+    def _happen(self, now_ms: int) -> tuple[Happening, ...]:
+        """Takes note of the events of this time."""
+        found = []
+        while self._happenings and self._happenings[-1].at_ms == now_ms:
+            one = self._happenings.pop()
+            found.append(one)
+            match one.change:
+                case Change.KILL:
+                    self._absent.add(one.node_id)
+                    self._wakes[one.node_id] = None
+                case Change.FREEZE:
+                    self._frozen.add(one.node_id)
+                case Change.THAW:
+                    self._frozen.remove(one.node_id)
+                case Change.JOIN:
+                    self._absent.remove(one.node_id)
+                    self._to_start.add(one.node_id)
+                    self._wakes[one.node_id] = now_ms
+                    self._sent_to[one.node_id].clear()
+                    self._grown[one.node_id].clear()
+                    self._make_due([one.node_id], now_ms + JOINER_DELAY_MS)  # what was kept for it
+        return tuple(found)
+
+    def _receivers(self, now_ms: int) -> set[str]:
+        """Those who have mail that is due; what is due to one who is frozen is held until it is thawed."""
+        receivers = {node for node in self._held if node not in self._frozen}
+        if self._due_times and self._due_times[0] == now_ms:
+            receivers |= self._due.pop(heapq.heappop(self._due_times))
+        receivers -= self._absent
+        self._held = (self._held - receivers - self._absent) | (receivers & self._frozen)
+        return receivers - self._frozen
+
+    def _acts(self, node_id: str, receivers: set[str], now_ms: int) -> bool:
+        wake_ms = self._wakes[node_id]
+        return node_id in receivers or (wake_ms is not None and wake_ms <= now_ms and node_id not in self._frozen)
+
+    def _grant(self, node_id: str, now_ms: int) -> Grant:
+        wake_ms, counts = self._wakes[node_id], self._sent_to[node_id]
+        start = node_id in self._to_start
+        grown = {sender: counts[sender] for sender in self._grown[node_id]}
+        self._to_start.discard(node_id)
+        self._grown[node_id].clear()
+        self._waiting.add(node_id)
+        return Grant(node_id, wake_ms is not None and wake_ms <= now_ms, grown, start)
 
     def _last_ms(self) -> int:
         return self._time_limit_ms if self.over_ms is None else self.over_ms + WRAP_UP_MS

@@ -1,7 +1,7 @@
 """What clock and processes say to each other in lockstep, beside the topics: keys and packed words.
 
-A process is a host: it holds some of the nodes, or one listener. Hub to host: `welcome`, `grant`, `mark`, `finish`,
-`goodbye`. Host to hub: `hello`, `ready`, `answer`, `ack`, `final`, `failed`.
+A process is a host: it holds some of the nodes, or one listener. Hub to host: `welcome`, `kept`, `grant`, `mark`,
+`last_word`, `finish`, `goodbye`. Host to hub: `hello`, `ready`, `answer`, `ack`, `final`, `failed`.
 """
 
 from __future__ import annotations
@@ -50,10 +50,15 @@ class RunKeys:
 
 @dataclass(frozen=True, slots=True)
 class HostPlan:
-    """Which nodes a process holds. Its id is also its user name at the hub."""
+    """Which nodes a process holds. Its id is also its user name at the hub.
+
+    `incarnation`: which of the nodes' starts it is for, from 0. `joins`: it is let in only when its node joins.
+    """
 
     host: str
     nodes: tuple[str, ...]
+    incarnation: int = 0
+    joins: bool = False
 
 
 def pack(*words: Any) -> bytes:
@@ -73,15 +78,15 @@ def unpack(payload: bytes) -> list[Any]:
     return words
 
 
-def pack_grants(now_ms: int, *, start: bool, grants: list[Grant]) -> bytes:
+def pack_grants(now_ms: int, grants: list[Grant]) -> bytes:
     """Leave for a host's nodes to act."""
-    return pack("grant", now_ms, start, [[one.node_id, one.wake, one.expected] for one in grants])
+    return pack("grant", now_ms, [[one.node_id, one.wake, one.expected, one.start] for one in grants])
 
 
-def unpack_grants(words: list[Any]) -> tuple[int, bool, list[Grant]]:
-    """Time, whether it is the start, and the grants of a `grant`."""
-    _, now_ms, start, grants = words
-    return now_ms, start, [Grant(*one) for one in grants]
+def unpack_grants(words: list[Any]) -> tuple[int, list[Grant]]:
+    """Time and grants of a `grant`."""
+    _, now_ms, grants = words
+    return now_ms, [Grant(*one) for one in grants]
 
 
 def pack_answers(answers: list[tuple[str, int | None, list[Sent]]]) -> bytes:

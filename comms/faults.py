@@ -2,7 +2,7 @@
 
 Faults strike where a message is received, after it has been counted and before it is validated. What happens to a
 message depends on the seed, the receiver, the key and the payload alone, never on when or in which order it arrived:
-the same faults strike on every bus.
+the same faults strike on every bus. What the clock says of the run reaches everyone.
 """
 
 from __future__ import annotations
@@ -13,11 +13,9 @@ import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import msgpack
-
-from comms.codec import HEADER_FIELDS
 from comms.messages import Role
-from comms.routing import RosterNode, Route
+from comms.node import Received
+from comms.routing import RosterNode, Routing
 
 
 class FaultKind(enum.Enum):
@@ -84,17 +82,16 @@ class Faults:
     def __bool__(self) -> bool:
         return bool(self._message_faults or self._cut_offs)
 
-    def deliveries(
-        self, receiver: RosterNode, route: Route, writer: RosterNode, key: str, payload: bytes
-    ) -> list[Delivery]:
-        """What becomes of a message at one receiver: its deliveries, none where it is lost.
+    def deliveries(self, reader: str, received: Received, routing: Routing) -> list[Delivery]:
+        """What becomes of a message at one of its readers: its deliveries, none where it is lost.
 
         Faults apply in their order, each to what those before it left.
         """
-        sent_ms = _sent_ms(payload)
-        if sent_ms is None:
+        receiver, writer = routing.nodes[reader], routing.nodes[received.header.sender]
+        key, payload, sent_ms = received.key, received.payload, received.header.sent_ms
+        if writer.role is Role.CLOCK:  # its announcement of the run is part of every start
             return [Delivery(payload)]
-        if route.topic.crosses_water and any(
+        if received.topic.crosses_water and any(
             cut.from_ms <= sent_ms < cut.until_ms and _across(cut.vehicle, receiver, writer) for cut in self._cut_offs
         ):
             return []
@@ -144,11 +141,4 @@ def _across(vehicle: str, receiver: RosterNode, writer: RosterNode) -> bool:
     return (vehicle in receiver.vehicles) != (vehicle in writer.vehicles)
 
 
-def _sent_ms(payload: bytes) -> int | None:
-    try:
-        parts = msgpack.unpackb(payload)
-    except (ValueError, TypeError, msgpack.UnpackException, RecursionError):
-        return None
-    if type(parts) is list and len(parts) == HEADER_FIELDS and type(parts[4]) is int:
-        return parts[4]
-    return None
+NO_FAULTS = Faults(0)

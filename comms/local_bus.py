@@ -2,34 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from comms.clock import LockstepClock, Sent
 from comms.codec import CLOCK
+from comms.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
+from comms.faults import NO_FAULTS, Faults
+from comms.group import NodeGroup
 from comms.kept_listener import KeptListener, close_all
+from comms.kept_messages import KeptMessages
 from comms.messages import Message, RunInfo
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending
 from comms.routing import Routing
-from comms.runner import Intake, NodeRunner, Outgoing, Stamp, fleet_digest
+from comms.runner import Intake, Outgoing, Stamp, fleet_digest
 from comms.topics import RUN
 
 
 def run_local(
     routing: Routing,
-    nodes: Mapping[str, Node],
+    nodes: Mapping[str, Callable[[], Node]],
     listeners: Mapping[str, Listener],
     run_info: RunInfo,
     time_limit_ms: int,
+    *,
+    faults: Faults = NO_FAULTS,
+    events: Iterable[NodeEvent] = (),
 ) -> BusResult:
     """Runs the fleet to its end and closes the listeners, also when a node fails.
 
-    `nodes` and `listeners` are keyed by node id and complete for the roster of `routing`. Raises NodeError and
-    RunawayError.
+    `nodes` holds what makes each node, `listeners` each listener, keyed by node id and complete for the roster of
+    `routing`. Raises NodeError and RunawayError, and ValueError for events that do not fit.
     """
     kept = {name: KeptListener(name, listener) for name, listener in listeners.items()}
     try:
-        return _Local(routing, nodes, kept, time_limit_ms).run(run_info)
+        return _Local(routing, nodes, kept, LockstepClock(routing, time_limit_ms, events), faults).run(run_info)
     finally:
         close_all(kept.values())
 
@@ -38,22 +45,27 @@ class _Local:
     def __init__(
         self,
         routing: Routing,
-        nodes: Mapping[str, Node],
+        makers: Mapping[str, Callable[[], Node]],
         listeners: Mapping[str, Listener],
-        time_limit_ms: int,
+        clock: LockstepClock,
+        faults: Faults,
     ) -> None:
-        self.clock = LockstepClock(routing, time_limit_ms)
-        self.intake = Intake(routing)
-        self.runners = {node_id: NodeRunner(node_id, node, routing) for node_id, node in nodes.items()}
+        self.clock = clock
+        self.makers = makers
+        self.group = NodeGroup({name: makers[name]() for name in clock.present()}, routing, faults)
         self.listeners = listeners
+        self.opened = Intake(routing)
         self.announcer = Stamp(CLOCK, routing)
+        self.kept = {node_id: KeptMessages(node_id, routing) for node_id in clock.said_to_joiners}
 
     def run(self, run_info: RunInfo) -> BusResult:
         self._carry([self._announce(run_info)])
         while (turn := self.clock.next_round()) is not None:
+            for happening in turn.happenings:
+                self._happen(happening)
             sent: list[Outgoing] = []
             for grant in turn.grants:
-                wake_ms, outgoing = self.runners[grant.node_id].act(turn.now_ms, start=turn.start)
+                wake_ms, outgoing = self.group.act(grant, turn.now_ms)
                 self.clock.answer(grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing])
                 sent.extend(outgoing)
             if len(turn.grants) > 1:
@@ -62,10 +74,10 @@ class _Local:
         return BusResult(
             ending=ending_of(self.clock),
             mission_ms=self.clock.now_ms if self.clock.over_ms is None else self.clock.over_ms,
-            digest=fleet_digest([runner.stamp.digest() for runner in self.runners.values()]),
+            digest=fleet_digest(self.group.digests()),
             rounds=self.clock.rounds,
             messages=dict(self.clock.messages),
-            dropped=dict(self.intake.dropped),
+            dropped=dict(self.group.intake.dropped),
         )
 
     def _announce(self, message: Message) -> Outgoing:
@@ -73,18 +85,25 @@ class _Local:
         self.clock.publish(CLOCK, [Sent(outgoing.key, len(outgoing.payload))])
         return outgoing
 
+    def _happen(self, happening: Happening) -> None:
+        node_id = happening.node_id
+        match happening.change:
+            case Change.KILL:
+                self.group.leave(node_id)
+            case Change.JOIN:
+                self.group.join(node_id, self.makers[node_id](), happening.incarnation)
+                self.group.give_kept(node_id, self.kept[node_id].messages(), happening.at_ms + JOINER_DELAY_MS)
+            case Change.FREEZE | Change.THAW:
+                pass  # the clock alone knows
+
     def _carry(self, sent: list[Outgoing]) -> None:
         for one in sent:
-            readers = one.route.readers
+            received = self.group.receive(one.key, one.payload) if one.route.readers else None
+            for kept in self.kept.values():
+                kept.take(one.key, one.payload)
             watchers = [name for name in one.route.watchers if name in self.listeners]
-            if not readers and not watchers:
-                continue
-            received = self.intake.open(one.key, one.payload)
-            for reader in readers:
-                runner = self.runners[reader]
-                runner.arrived[one.route.writer] += 1
-                if received is not None:
-                    runner.deliver(received)
+            if watchers:
+                received = received or self.opened.open(one.key, one.payload)
             if received is not None:
                 for name in watchers:
                     self.listeners[name].on_message(received)

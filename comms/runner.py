@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import hashlib
 import logging
 from collections import Counter
@@ -128,10 +129,19 @@ class NodeRunner:
         self._node = node
         self._wake_ms: int | None = 0
         self._mail: dict[int, list[Received]] = {}
+        self._late_ms: list[int] = []
 
-    def deliver(self, received: Received) -> None:
-        """Puts a message into the mailbox, to be handled when it is due."""
-        self._mail.setdefault(received.header.sent_ms + received.topic.delay_ms, []).append(received)
+    def deliver(self, received: Received, due_ms: int | None = None) -> None:
+        """Puts a message into the mailbox, to be handled when it is due: as its topic says, or at `due_ms`."""
+        if due_ms is None:
+            due_ms = received.header.sent_ms + received.topic.delay_ms
+        self._mail.setdefault(due_ms, []).append(received)
+
+    def deliver_late(self, received: Received, due_ms: int) -> None:
+        """The same for a message that is due later than the clock knows: the runner itself asks to act then."""
+        self.deliver(received, due_ms)
+        if received.topic.wakes:
+            bisect.insort(self._late_ms, due_ms)
 
     def has_all(self, expected: dict[str, int]) -> bool:
         """Whether as many messages of each sender have arrived as the clock expects."""
@@ -140,7 +150,7 @@ class NodeRunner:
     def act(self, now_ms: int, *, start: bool) -> tuple[int | None, list[Outgoing]]:
         """Starts the node, or handles its due mail in order and then its wake-up if that is due.
 
-        Returns the next wake-up and what the node publishes. Raises NodeError.
+        Returns when to act next and what the node publishes. Raises NodeError.
         """
         published: list[Publication] = []
         try:
@@ -158,7 +168,11 @@ class NodeRunner:
             raise failure_of(self.node_id, error, at_ms=now_ms) from error
         if self._wake_ms is not None and self._wake_ms <= now_ms:
             raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self._wake_ms} ms, which is not later")
-        return self._wake_ms, [self.stamp(one.key, one.message, now_ms) for one in published]
+        next_ms = self._wake_ms
+        if self._late_ms:
+            del self._late_ms[: bisect.bisect_right(self._late_ms, now_ms)]
+            next_ms = min((ms for ms in (next_ms, *self._late_ms[:1]) if ms is not None), default=None)
+        return next_ms, [self.stamp(one.key, one.message, now_ms) for one in published]
 
     def _take(self, step: Step, published: list[Publication]) -> None:
         self._wake_ms = step.wake_ms

@@ -12,7 +12,8 @@ from typing import Any
 import zenoh
 
 from comms.clock import Grant, Sent
-from comms.control import RunKeys, pack, pack_answers, pack_final, unpack, unpack_grants
+from comms.control import HostPlan, RunKeys, pack, pack_answers, pack_final, unpack, unpack_grants
+from comms.faults import NO_FAULTS, Faults
 from comms.group import NodeGroup
 from comms.kept_listener import KeptListener, close_all
 from comms.latency import STRIP_TO_TASK, StripLatency
@@ -93,18 +94,25 @@ class _Line:
         return None, (key.removeprefix(self._keys.root), payload)
 
 
-def serve_nodes(session: zenoh.Session, keys: RunKeys, host: str, nodes: Mapping[str, Node], routing: Routing) -> None:
-    """Lets the nodes act as the clock grants, until the run is finished.
+def serve_nodes(
+    session: zenoh.Session,
+    keys: RunKeys,
+    plan: HostPlan,
+    nodes: Mapping[str, Node],
+    routing: Routing,
+    faults: Faults = NO_FAULTS,
+) -> None:
+    """Lets the nodes of a host act as the clock grants, until the run is finished.
 
     A node that fails is reported to the hub, and NodeError raised.
     """
-    group = NodeGroup(nodes, routing)
+    group = NodeGroup(nodes, routing, faults, plan.incarnation)
     expressions = [one for node_id in nodes for one in routing.subscriptions(node_id)]
-    line = _Line(session, keys, host, expressions)
+    line = _Line(session, keys, plan.host, expressions)
     latency = StripLatency()
     coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
     line.shake_hands()
-    granted: tuple[int, bool, list[Grant]] | None = None
+    granted: tuple[int, list[Grant]] | None = None
     while True:
         words, mail = line.get()
         if mail is not None:
@@ -113,16 +121,21 @@ def serve_nodes(session: zenoh.Session, keys: RunKeys, host: str, nodes: Mapping
                 latency.arrived(received, time.perf_counter())
         elif words is not None and words[0] == "grant":
             granted = unpack_grants(words)
-        elif words is not None and words[0] == "finish":
-            line.part(pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds}))
-            return
-        if granted is not None and group.has_all(granted[2]):
-            now_ms, start, grants = granted
+        elif words is not None and words[0] == "kept":
+            group.give_kept(*words[1:])
+        elif words is not None and words[0] in ("last_word", "finish"):
+            final = pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds})
+            if words[0] == "finish":
+                line.part(final)
+                return
+            line.say(final)
+        if granted is not None and group.has_all(granted[1]):
+            now_ms, grants = granted
             granted = None
             answers = []
             for grant in grants:
                 try:
-                    wake_ms, outgoing = group.act(grant, now_ms, start=start)
+                    wake_ms, outgoing = group.act(grant, now_ms)
                 except NodeError as error:
                     line.say(pack("failed", str(error)))
                     raise

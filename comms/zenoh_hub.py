@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 import time
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import zenoh
@@ -22,7 +22,10 @@ from comms.control import (
     unpack_answers,
     unpack_final,
 )
+from comms.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
+from comms.faults import NO_FAULTS, Faults
 from comms.group import NodeGroup
+from comms.kept_messages import KeptMessages
 from comms.latency import STRIP_TO_TASK, StripLatency
 from comms.local_bus import ending_of
 from comms.messages import Role, RunInfo
@@ -56,6 +59,8 @@ class Hub:
     `hosts`: the other processes. `nodes`: the nodes of this process. `run` waits for all, runs the fleet to its end and
     returns the result; raises FleetError, NodeError, RunawayError.
 
+    `faults` strike what the nodes of this process are sent. `events` are planned changes of nodes, each alone in its
+    process; `carry_out` kills, freezes, thaws or lets in the process of a host, and returns when that is done.
     `patience_s`: wall time without a word from a process that has to answer. `most_behind_bytes`: see `Pacing`.
     `alive`: called with the simulated time every half second of wall time and sooner.
     """
@@ -69,6 +74,9 @@ class Hub:
         nodes: Mapping[str, Node],
         time_limit_ms: int,
         *,
+        faults: Faults = NO_FAULTS,
+        events: Iterable[NodeEvent] = (),
+        carry_out: Callable[[Change, str], None] = lambda change, host: None,
         patience_s: float = PATIENCE_S,
         most_behind_bytes: int = MOST_BEHIND_BYTES,
         alive: Callable[[int], None] = lambda now_ms: None,
@@ -79,20 +87,25 @@ class Hub:
         self._patience_s = patience_s
         self._alive = alive
         self._alive_at_s = time.monotonic()
-        self._clock = LockstepClock(routing, time_limit_ms)
-        self._group = NodeGroup(nodes, routing)
+        self._change = carry_out
+        self._clock = LockstepClock(routing, time_limit_ms, events)
+        self._group = NodeGroup(nodes, routing, faults)
+        self._kept = {node_id: KeptMessages(node_id, routing) for node_id in self._clock.said_to_joiners}
         self._latency = StripLatency()
         self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
         listening = {node.node_id for node in routing.roster if node.listens_only}
-        self._host_of = {node: plan.host for plan in hosts for node in plan.nodes}
-        self._hosts = {plan.host for plan in hosts}
+        self._host_of = {node: plan.host for plan in hosts for node in plan.nodes if not plan.joins}
+        self._joining = {(node, plan.incarnation): plan.host for plan in hosts for node in plan.nodes if plan.joins}
+        self._hosts = {plan.host for plan in hosts if not plan.joins}
+        self._killed: set[str] = set()
+        self._frozen: set[str] = set()
         self._listeners = {node: host for node, host in self._host_of.items() if node in listening}
         self._pacing = Pacing(self._clock, self._listeners, most_behind_bytes)
         self._queue: queue.SimpleQueue[tuple[str, str, bytes]] = queue.SimpleQueue()
         self._ready: set[str] = set()
         self._asked: dict[str, set[str]] = {}
         self._finals: dict[str, tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]] = {}
-        expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
+        expressions = [keys.topic(one) for node_id in (*nodes, *self._kept) for one in routing.subscriptions(node_id)]
         self._subscribers = subscribe(session, expressions, self._on_mail)
         self._subscribers += subscribe(session, [keys.from_host("*")], self._on_words)
         self._liveliness = session.liveliness().declare_subscriber(
@@ -110,6 +123,8 @@ class Hub:
             self._show_life()
             while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
                 self._handle(*self._queue.get())
+            for happening in turn.happenings:
+                self._happen(happening)
             self._carry_out(turn)
             if self._pacing.next_mark():
                 self._mark_listeners()
@@ -125,16 +140,45 @@ class Hub:
                 away.setdefault(self._host_of[grant.node_id], []).append(grant)
         for host, grants in away.items():
             self._asked[host] = {grant.node_id for grant in grants}
-            self._say(host, pack_grants(turn.now_ms, start=turn.start, grants=grants))
+            self._say(host, pack_grants(turn.now_ms, grants))
         if here:
             self._wait(lambda: self._group.has_all(here), lambda: f"mail is missing: {self._group.missing(here)}")
             for grant in here:
-                wake_ms, outgoing = self._group.act(grant, turn.now_ms, start=turn.start)
+                wake_ms, outgoing = self._group.act(grant, turn.now_ms)
                 if grant.node_id in self._coordinators:
                     self._latency.sending(outgoing, time.perf_counter())
                 self._publish(outgoing)
                 self._clock.answer(grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing])
         self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
+
+    def _happen(self, happening: Happening) -> None:
+        node_id = happening.node_id
+        match happening.change:
+            case Change.JOIN:
+                self._let_in(node_id, happening.incarnation)
+            case Change.KILL:
+                host = self._host_of[node_id]
+                self._say(host, pack("last_word"))
+                self._wait(lambda: host in self._finals, lambda: _no("last word", {host}))
+                self._killed.add(host)
+                self._change(Change.KILL, host)
+            case Change.FREEZE:
+                self._frozen.add(self._host_of[node_id])
+                self._change(Change.FREEZE, self._host_of[node_id])
+            case Change.THAW:
+                self._frozen.remove(self._host_of[node_id])
+                self._change(Change.THAW, self._host_of[node_id])
+
+    def _let_in(self, node_id: str, incarnation: int) -> None:
+        """Lets a node's process connect and hands it what was kept. As it connects between two rounds, nothing reaches
+        it twice."""
+        host = self._host_of[node_id] = self._joining[node_id, incarnation]
+        self._hosts.add(host)
+        self._change(Change.JOIN, host)
+        self._wait(lambda: host in self._ready, lambda: _no("start", {host}))
+        kept, said = self._kept[node_id], self._clock.said_to_joiners[node_id]
+        self._wait(lambda: kept.has_all(said), lambda: f"mail is missing that was kept for {node_id}")
+        self._say(host, pack("kept", node_id, kept.messages(), self._clock.now_ms + JOINER_DELAY_MS))
 
     def _publish(self, outgoing: list[Outgoing]) -> None:
         for one in outgoing:
@@ -152,7 +196,9 @@ class Hub:
         )
 
     def _finish(self) -> BusResult:
-        for host in self._hosts:
+        for host in self._frozen:
+            self._change(Change.THAW, host)
+        for host in self._hosts - self._killed:
             nodes = [node for node, its_host in self._listeners.items() if its_host == host]
             counts = dict(self._clock.watched[nodes[0]]) if nodes else {}
             self._say(host, pack("finish", self._pacing.mark, self._clock.now_ms, counts))
@@ -202,7 +248,10 @@ class Hub:
 
     def _handle(self, kind: str, key: str, payload: bytes) -> None:
         if kind == "mail":
-            received = self._group.receive(key.removeprefix(self._keys.root), payload)
+            below = key.removeprefix(self._keys.root)
+            for kept in self._kept.values():
+                kept.take(below, payload)
+            received = self._group.receive(below, payload)
             if received is not None and self._group.holds(self._coordinators):
                 self._latency.arrived(received, time.perf_counter())
             return

@@ -1,7 +1,8 @@
 """The program of a child process: it is told by its launcher what to hold, and holds it until the run has ended.
 
-Standard input: the length and the pickle of a `ChildOrder`, then, but for the hub, one line with the hub's endpoint; it
-stays open as long as the launcher lives, and the child ends when it closes. The file descriptor named in
+Standard input: the length and the pickle of a `ChildOrder`, then one line with the hub's endpoint, or for the hub one
+line each time the launcher has changed a process as asked; it stays open as long as the launcher lives, and the child
+ends when it closes. The file descriptor named in
 SECONDLOOK_STATUS_FD: one JSON object a line for the launcher. The arguments say run and host, for whoever looks at the
 list of processes.
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 import json
 import logging
 import os
+import queue
 import signal
 import sys
 import threading
@@ -21,6 +23,7 @@ from typing import IO, Any
 from comms.access import access_rules
 from comms.clock import RunawayError
 from comms.control import RunKeys
+from comms.events import Change
 from comms.routing import Routing
 from comms.runner import NodeError
 from comms.zenoh_host import ListenerHost, serve_nodes
@@ -67,22 +70,32 @@ def _read_endpoint(pipe: IO[bytes]) -> str:
 
 
 class _LauncherWatch:
-    """Acts when the launcher's pipe closes: ends the process at once, unless `act` is set to something milder."""
+    """Acts when the launcher's pipe closes: ends the process at once, unless `act` is set to something milder.
+
+    `lines`: an item for each line that has come through the pipe.
+    """
 
     def __init__(self) -> None:
         self.act: Callable[[], None] = lambda: os._exit(ORPHANED)
+        self.lines: queue.SimpleQueue[None] = queue.SimpleQueue()
         threading.Thread(target=self._wait, daemon=True).start()
 
     def _wait(self) -> None:
         # Not through sys.stdin: a thread blocked inside its buffer would break the interpreter's shutdown.
-        while os.read(sys.stdin.fileno(), 1):
-            pass
+        while byte := os.read(sys.stdin.fileno(), 1):
+            if byte == b"\n":
+                self.lines.put(None)
         self.act()
 
 
 def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
     assert order.run_info is not None
-    _LauncherWatch()
+    watch = _LauncherWatch()
+
+    def carry_out(change: Change, host: str) -> None:
+        tell(change=change.value, host=host)
+        watch.lines.get()
+
     nodes = make_nodes(order.specs)
     routing, keys = Routing(order.roster), RunKeys(order.run)
     rules = access_rules(routing, order.hosts, keys)
@@ -95,6 +108,9 @@ def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
             order.hosts,
             nodes,
             order.time_limit_ms,
+            faults=order.faults,
+            events=order.events,
+            carry_out=carry_out,
             patience_s=order.patience_s,
             alive=lambda now_ms: tell(alive_ms=now_ms),
         )
@@ -108,7 +124,7 @@ def _be_host(order: ChildOrder) -> None:
     endpoint = _read_endpoint(sys.stdin.buffer)
     _LauncherWatch()
     with open_client(endpoint, order.host, order.password, patience_s=order.patience_s) as session:
-        serve_nodes(session, RunKeys(order.run), order.host, nodes, Routing(order.roster))
+        serve_nodes(session, RunKeys(order.run), order.plan, nodes, Routing(order.roster), order.faults)
 
 
 def _be_listener(order: ChildOrder) -> None:

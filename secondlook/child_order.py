@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from comms.control import HostPlan
+from comms.events import NodeEvent
+from comms.faults import NO_FAULTS, Faults
 from comms.messages import RunInfo
 from comms.routing import RosterNode
 from secondlook.node_spec import NodeSpec
@@ -17,21 +19,28 @@ STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor 
 
 @dataclass(frozen=True)
 class ChildOrder:
-    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock.
-    `patience_s`: wall time after which someone silent is given up."""
+    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock and
+    the planned `events`. `patience_s`: wall time after which someone silent is given up."""
 
     run: str
-    host: str
+    plan: HostPlan
     password: str
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
     patience_s: float
+    faults: Faults = NO_FAULTS
     is_hub: bool = False
     is_listener: bool = False
     hosts: tuple[HostPlan, ...] = ()
     passwords: dict[str, str] = field(default_factory=dict)
     run_info: RunInfo | None = None
     time_limit_ms: int = 0
+    events: tuple[NodeEvent, ...] = ()
+
+    @property
+    def host(self) -> str:
+        """The process's name."""
+        return self.plan.host
 
 
 def write_order(pipe: IO[bytes], order: ChildOrder) -> None:

@@ -67,6 +67,19 @@ class ChildProcess:
         lines = self._log.read_text(errors="replace").strip().splitlines() if code else []
         return Fate(code, f"has ended with exit code {code}", lines[-1] if lines else "")
 
+    def kill(self) -> None:
+        """Kills it and waits for its end."""
+        self._process.kill()
+        self._process.wait()
+
+    def freeze(self) -> None:
+        """Stops it until it is thawed."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Lets it go on."""
+        self._process.send_signal(signal.SIGCONT)
+
     def let_go(self) -> None:
         """Closes its standard input: it ends by itself."""
         with contextlib.suppress(OSError):
@@ -82,8 +95,7 @@ class ChildProcess:
 
     def bury(self) -> None:
         """Kills it if it still runs, and takes away its log if that is empty."""
-        self._process.kill()
-        self._process.wait()
+        self.kill()
         self.let_go()
         self.status.close()
         if self._log.exists() and self._log.stat().st_size == 0:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from comms.clock import RunawayError
+from comms.events import NodeEvent, timeline
+from comms.faults import NO_FAULTS, Faults
 from comms.local_bus import run_local
 from comms.result import BusResult, Ending
 from comms.routing import Routing
@@ -16,7 +19,7 @@ from comms.runner import NodeError
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.log_file import log_to_file
-from secondlook.node_spec import NodeSpec, make_nodes
+from secondlook.node_spec import NodeSpec, make_node, make_nodes
 from secondlook.observer import Observer, Progress
 from secondlook.processes import Processes, RunFailedError
 from secondlook.scenario import Scenario
@@ -32,7 +35,8 @@ LOGS = "logs"
 class RunOptions:
     """`folder`: where the files of the run go; it exists. `processes`: see `host_plans.plan_hosts`. `record`: with
     recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
-    shows the mission while it runs, see `viz.live_server.LiveServer`."""
+    shows the mission while it runs, see `viz.live_server.LiveServer`. `faults`, `events`: what goes wrong on purpose;
+    with events each node concerned has a process of its own."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -40,6 +44,8 @@ class RunOptions:
     record: bool = True
     progress: Progress | None = None
     live_pipe: Path | None = None
+    faults: Faults = NO_FAULTS
+    events: tuple[NodeEvent, ...] = ()
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -47,9 +53,11 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
 
     Raises RunFailedError, in one sentence, when a node fails or dies, when the mission is not over by its time limit,
     and when the run is interrupted; what was recorded until then is readable, and summary.json tells how it ended.
+    Raises ValueError, before anything flies, for events that do not fit the fleet.
     """
     began_s = time.perf_counter()
     fleet = build_fleet(scenario, record=options.record)
+    timeline(options.events, Routing(fleet.roster))  # refuses what does not fit
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress)
     run = _Run(fleet, observer, options)
@@ -92,17 +100,33 @@ class _Run:
 
     def on_local(self) -> BusResult:
         fleet = self._fleet
+        options = self._options
         try:
-            nodes, recorder = make_nodes(fleet.specs), make_nodes(self._recorder)
+            recorder = make_nodes(self._recorder)
         except NodeError:
             self._observer.close()
             raise
-        listeners = {OBSERVER: self._observer, **recorder}
-        return run_local(Routing(fleet.roster), nodes, listeners, fleet.run_info, fleet.time_limit_ms)
+        return run_local(
+            Routing(fleet.roster),
+            {node_id: partial(make_node, node_id, spec) for node_id, spec in fleet.specs.items()},
+            {OBSERVER: self._observer, **recorder},
+            fleet.run_info,
+            fleet.time_limit_ms,
+            faults=options.faults,
+            events=options.events,
+        )
 
     def on_zenoh(self) -> BusResult:
-        logs, recorder = self._options.folder / LOGS, self._recorder.get(RECORDER)
-        with Processes(self._fleet, logs, self._observer, recorder, self._options.processes) as processes:
+        options, recorder = self._options, self._recorder.get(RECORDER)
+        with Processes(
+            self._fleet,
+            options.folder / LOGS,
+            self._observer,
+            recorder,
+            options.processes,
+            faults=options.faults,
+            events=options.events,
+        ) as processes:
             self.processes = processes.count
             return processes.run()
 

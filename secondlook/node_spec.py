@@ -23,12 +23,14 @@ class NodeSpec:
         return getattr(import_module(module), name)(self.config)
 
 
+def make_node(node_id: str, spec: NodeSpec) -> Any:
+    """The node itself; raises NodeError where it cannot be made."""
+    try:
+        return spec.make()
+    except Exception as error:
+        raise failure_of(node_id, error) from error
+
+
 def make_nodes(specs: Mapping[str, NodeSpec]) -> dict[str, Any]:
     """The nodes by their ids; raises NodeError for one that cannot be made."""
-    nodes = {}
-    for node_id, spec in specs.items():
-        try:
-            nodes[node_id] = spec.make()
-        except Exception as error:
-            raise failure_of(node_id, error) from error
-    return nodes
+    return {node_id: make_node(node_id, spec) for node_id, spec in specs.items()}

@@ -9,7 +9,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from comms.control import RunKeys
+from comms.control import HostPlan, RunKeys
+from comms.events import Change, NodeEvent, timeline
+from comms.faults import NO_FAULTS, Faults
 from comms.node import Listener
 from comms.result import BusResult, Ending
 from comms.routing import Routing
@@ -36,7 +38,8 @@ class Processes:
 
     `logs`: a folder for what they print; no file is left there of those that print nothing. `recorder`: how to make the
     recorder in its process, None for none. `observer` lives in this process, and is closed on leaving the context at
-    the latest. `processes`: see `plan_hosts`. `patience_s`: wall time after which a process that should say something
+    the latest. `processes`: see `plan_hosts`. `faults` and `events`: see `comms.faults` and `comms.events`; raises
+    ValueError for events that do not fit. `patience_s`: wall time after which a process that should say something
     and does not is given up.
     """
 
@@ -48,12 +51,19 @@ class Processes:
         recorder: NodeSpec | None,
         processes: int | None,
         *,
+        faults: Faults = NO_FAULTS,
+        events: tuple[NodeEvent, ...] = (),
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._fleet = fleet
+        self._faults = faults
+        self._events = events
         self._logs = logs
         self._keys = RunKeys(f"{fleet.run_info.scenario}-{secrets.token_hex(4)}")
-        self._in_hub, self._plans = plan_hosts(fleet, processes)
+        self._in_hub, self._plans = plan_hosts(fleet, processes, timeline(events, Routing(fleet.roster)))
+        self._to_join = {plan.host for plan in self._plans if plan.joins}
+        self._killed: set[str] = set()
+        self._endpoint = ""
         self._passwords = {plan.host: secrets.token_hex(16) for plan in self._plans}
         self._recorder = recorder
         self._patience_s = patience_s
@@ -93,7 +103,7 @@ class Processes:
                 self._take(child, words)
             now_s = time.monotonic()
             for child in self._children.values():
-                fate = child.fate()
+                fate = None if child.host in self._killed else child.fate()
                 if fate is not None:
                     self._verdict.ends(child.host, fate, now_s)
             if self._listening.error is not None:
@@ -110,6 +120,7 @@ class Processes:
         try:
             for child in self._children.values():
                 child.let_go()
+                child.thaw()
             self._listening.interrupt()
             deadline_s = time.monotonic() + GRACE_S
             for child in self._children.values():
@@ -127,7 +138,7 @@ class Processes:
         self._start(
             ChildOrder(
                 run=self._keys.run,
-                host=HUB,
+                plan=HostPlan(HUB, tuple(self._in_hub)),
                 password="",
                 roster=fleet.roster,
                 specs={node_id: fleet.specs[node_id] for node_id in self._in_hub},
@@ -137,6 +148,8 @@ class Processes:
                 passwords=self._passwords,
                 run_info=fleet.run_info,
                 time_limit_ms=fleet.time_limit_ms,
+                faults=self._faults,
+                events=self._events,
             )
         )
         for plan in self._plans:
@@ -146,11 +159,12 @@ class Processes:
             self._start(
                 ChildOrder(
                     run=self._keys.run,
-                    host=plan.host,
+                    plan=plan,
                     password=self._passwords[plan.host],
                     roster=fleet.roster,
                     specs=recorder or {node_id: fleet.specs[node_id] for node_id in plan.nodes},
                     patience_s=self._patience_s,
+                    faults=self._faults,
                     is_listener=recorder is not None,
                 )
             )
@@ -175,10 +189,14 @@ class Processes:
     def _take(self, child: ChildProcess, words: dict[str, Any]) -> None:
         match words:
             case {"endpoint": endpoint}:
+                self._endpoint = endpoint
                 for other in self._children.values():
-                    if other is not child:
+                    if other is not child and other.host not in self._to_join:
                         other.tell(endpoint)
                 self._listening.start(endpoint)
+            case {"change": change, "host": host}:
+                self._change(Change(change), self._children[host])
+                child.tell("done")
             case {"alive_ms": now_ms}:
                 self._hub_alive_ms = now_ms
             case {"failed": sentence}:
@@ -186,11 +204,27 @@ class Processes:
             case {"lost": host, "at_ms": at_ms}:
                 self._verdict.loses(host, at_ms, time.monotonic())
 
+    def _change(self, change: Change, child: ChildProcess) -> None:
+        """What the hub has asked for, as planned."""
+        match change:
+            case Change.KILL:
+                self._killed.add(child.host)
+                child.kill()
+            case Change.FREEZE:
+                child.freeze()
+            case Change.THAW:
+                child.thaw()
+            case Change.JOIN:
+                self._to_join.remove(child.host)
+                child.tell(self._endpoint)
+
     def _end(self, result: dict[str, Any]) -> BusResult:
         deadline_s = time.monotonic() + GRACE_S
         self._listening.join(GRACE_S)
         if self._listening.error is not None:
             raise RunFailedError(str(self._listening.error))
+        for host in self._to_join:  # the mission was over before
+            self._children[host].let_go()
         for child in self._children.values():
             child.wait(deadline_s)  # whoever is late is killed on leaving the context
         return BusResult(**{**result, "ending": Ending(result["ending"])})

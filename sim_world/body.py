@@ -28,6 +28,8 @@ class Body:
             recogniser=Recogniser(curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
             seed=world.seed,
         )
+        self._told: tuple[Maneuver, int] | None = None
+        self._said: ManeuverStatus | None = None
         self._truth_differs = config.position_error_m > 0.0
         self._nav_key = NAV.key(vehicle=config.vehicle)
         self._status_key = MANEUVER_STATUS.key(vehicle=config.vehicle)
@@ -42,9 +44,14 @@ class Body:
             publish.append(Publication(self._truth_pose_key, self._vehicle.truth(now_ms)))
         return publish
 
-    def command(self, maneuver: Maneuver, now_ms: int) -> Publication:
-        """Begins or refuses a manoeuvre."""
-        return Publication(self._status_key, self._vehicle.command(maneuver, now_ms))
+    def command(self, maneuver: Maneuver, incarnation: int, now_ms: int) -> Publication:
+        """Begins or refuses a manoeuvre; of one that is asked for again, by the same incarnation of the agent, it says
+        how far it got."""
+        if (maneuver, incarnation) != self._told:
+            self._told = maneuver, incarnation
+            self._said = self._vehicle.command(maneuver, now_ms)
+        assert self._said is not None
+        return Publication(self._status_key, self._said)
 
     @property
     def next_event_ms(self) -> int | None:
@@ -55,6 +62,8 @@ class Body:
         """What it has to say at that time."""
         event = self._vehicle.take_event()
         if isinstance(event, ManeuverStatus):
+            if self._told is not None and event.number == self._told[0].number:
+                self._said = event
             return [Publication(self._status_key, event)]
         look, truth = self._looks.look(event, time_ms / 1000.0)
         publish = [Publication(self._look_key, look)]

@@ -42,7 +42,7 @@ class World:
         publish = self._due(now_ms)
         body = self._bodies.get(received.vehicle)
         if body is not None and isinstance(received.message, Maneuver):
-            publish.append(body.command(received.message, now_ms))
+            publish.append(body.command(received.message, received.header.incarnation, now_ms))
             publish += self._due(now_ms)  # a manoeuvre may be done, or on its track, at once
         return Step(tuple(publish), self._wake_ms())
 

@@ -10,6 +10,7 @@ from comms.messages import (
     Look,
     Maneuver,
     ManeuverKind,
+    ManeuverState,
     ManeuverStatus,
     MissionOver,
     Mode,
@@ -44,6 +45,10 @@ class Agent:
         self.nav: Nav | None = None
         self.coverage: CoverageLayer | None = None
         self.maneuver: Maneuver | None = None
+        self._word_due_ms: int | None = None  # when the vehicle should have said more of the present manoeuvre
+        self._looks_taken: set[tuple[int, int]] = set()
+        self._started_ms = 0
+        self._now_ms = 0
         self._endurance_ms = endurance_ms
         self._maneuvers = 0
         self._contacts = 0
@@ -54,11 +59,13 @@ class Agent:
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
+        self._started_ms = now_ms
         return Step()
 
     def on_message(self, received: Received, now_ms: int) -> Step:
         """Takes in what the vehicle and the coordinator say."""
         message = received.message
+        self._now_ms = now_ms
         if isinstance(message, Nav):
             self._take_nav(message, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
@@ -67,12 +74,14 @@ class Agent:
             self.on_run(message, now_ms)
         elif self.coverage is not None and not self._over:
             if isinstance(message, Look):
-                self._take_look(message, now_ms)
+                self._take_look(message, received.header.incarnation, now_ms)
             elif isinstance(message, ManeuverStatus):
                 if self.maneuver is not None and message.number == self.maneuver.number:
+                    self._word_due_ms = _next_word_due_ms(message)
                     self.on_maneuver(message, now_ms)
             elif isinstance(message, Task):
-                self.on_task(message, now_ms)
+                if received.header.sent_ms >= self._started_ms:  # else it was for who was here before
+                    self.on_task(message, now_ms)
             elif isinstance(message, MissionOver):
                 self._over = True
                 self._wake_ms = None
@@ -81,8 +90,11 @@ class Agent:
         return self._step()
 
     def on_wake(self, now_ms: int) -> Step:
-        """Reports, every 10 s."""
+        """Reports, every 10 s; asks again of a manoeuvre of which too long nothing was heard."""
+        self._now_ms = now_ms
         self._wake_ms = now_ms + REPORT_EVERY_MS
+        if self._word_due_ms is not None and now_ms >= self._word_due_ms:
+            self._send_maneuver()
         self.report(now_ms)
         return self._step()
 
@@ -148,9 +160,16 @@ class Agent:
     def _command(self, kind: ManeuverKind, start: Point, end: Point, run_in_m: float) -> None:
         self._maneuvers += 1
         self.maneuver = Maneuver(self._maneuvers, kind, *start, *end, run_in_m)
+        self._send_maneuver()
+
+    def _send_maneuver(self) -> None:
+        self._word_due_ms = self._now_ms + REPORT_EVERY_MS
         self.publish(MANEUVER.key(vehicle=self.vehicle), self.maneuver)
 
-    def _take_look(self, look: Look, now_ms: int) -> None:
+    def _take_look(self, look: Look, incarnation: int, now_ms: int) -> None:
+        if (incarnation, look.number) in self._looks_taken:  # a look that comes twice was one look
+            return
+        self._looks_taken.add((incarnation, look.number))
         if not _makes_sense(look):
             if not self._complained:
                 self._complained = True
@@ -169,6 +188,13 @@ class Agent:
         published = tuple(self._outbox)
         self._outbox.clear()
         return Step(published, self._wake_ms)
+
+
+def _next_word_due_ms(status: ManeuverStatus) -> int | None:
+    """When the vehicle has to say more, a report's time granted; None where it has said its last."""
+    if status.state in (ManeuverState.DONE, ManeuverState.REFUSED) or status.ends_ms == 0:
+        return None
+    return status.ends_ms + REPORT_EVERY_MS
 
 
 def _makes_sense(look: Look) -> bool:

@@ -38,12 +38,11 @@ def test_rounds_grants_and_counts_worked_out_by_hand() -> None:
     clock.publish("clock", [RUN])
     # 0 ms: everyone is started; the announcement is on its way to all.
     told = {"clock": 1}
-    assert clock.next_round() == Round(0, True, tuple(Grant(node, True, told) for node in ACTING))
+    assert clock.next_round() == Round(0, tuple(Grant(node, True, told, start=True) for node in ACTING))
     answer_all(clock, world=(7, [NAV, NAV]))
     # 1 ms: the announcement is due at all, two positions at alpha.
     assert clock.next_round() == Round(
         1,
-        False,
         (
             Grant("world", False, {}),
             Grant("alpha", False, {"world": 2}),
@@ -53,13 +52,13 @@ def test_rounds_grants_and_counts_worked_out_by_hand() -> None:
     )
     answer_all(clock, world=(7, []), alpha=(2, [STATE]), coordinator=(7, []))
     # 2 ms: alpha's wake-up, and its state at the coordinator, who keeps its wake-up.
-    assert clock.next_round() == Round(2, False, (Grant("alpha", True, {}), Grant("coordinator", False, {"alpha": 1})))
+    assert clock.next_round() == Round(2, (Grant("alpha", True, {}), Grant("coordinator", False, {"alpha": 1})))
     clock.answer("coordinator", 7, [])
     clock.answer("alpha", 6, [])
-    assert clock.next_round() == Round(6, False, (Grant("alpha", True, {}),))
+    assert clock.next_round() == Round(6, (Grant("alpha", True, {}),))
     clock.answer("alpha", None, [STATE, STATE])
     # 7 ms: what is due and a wake-up come in one grant; counts are totals.
-    assert clock.next_round() == Round(7, False, (Grant("world", True, {}), Grant("coordinator", True, {"alpha": 3})))
+    assert clock.next_round() == Round(7, (Grant("world", True, {}), Grant("coordinator", True, {"alpha": 3})))
     clock.answer("world", None, [])
     clock.answer("coordinator", None, [])
     assert clock.next_round() is None
@@ -79,15 +78,15 @@ def test_a_topic_that_nobody_who_acts_reads_makes_no_round() -> None:
 def test_after_the_end_there_are_100_ms_for_last_words() -> None:
     clock = started()
     answer_all(clock, coordinator=(2000, []), alpha=(2100, []), beta=(2101, []))
-    assert clock.next_round() == Round(2000, False, (Grant("coordinator", True, {}),))
+    assert clock.next_round() == Round(2000, (Grant("coordinator", True, {}),))
     clock.answer("coordinator", None, [OVER])
     assert clock.over_ms == 2000
     hearing = ("world", "alpha", "beta")
-    assert clock.next_round() == Round(2001, False, tuple(Grant(node, False, {"coordinator": 1}) for node in hearing))
+    assert clock.next_round() == Round(2001, tuple(Grant(node, False, {"coordinator": 1}) for node in hearing))
     clock.answer("world", 3000, [])
     clock.answer("alpha", 2100, [STATE])
     clock.answer("beta", 2101, [])
-    assert clock.next_round() == Round(2002, False, (Grant("coordinator", False, {"alpha": 1}),))
+    assert clock.next_round() == Round(2002, (Grant("coordinator", False, {"alpha": 1}),))
     clock.answer("coordinator", None, [OVER])  # a second end changes nothing
     assert clock.over_ms == 2000
     turn = clock.next_round()
@@ -95,7 +94,7 @@ def test_after_the_end_there_are_100_ms_for_last_words() -> None:
     assert turn.now_ms == 2003
     for node in hearing:
         clock.answer(node, 2100 if node == "alpha" else 2101, [])
-    assert clock.next_round() == Round(2100, False, (Grant("alpha", True, {}),))
+    assert clock.next_round() == Round(2100, (Grant("alpha", True, {}),))
     clock.answer("alpha", None, [])
     assert clock.next_round() is None
     assert not clock.timed_out
@@ -122,9 +121,9 @@ def test_what_wakes_nobody_comes_along_with_the_next_grant() -> None:
     clock = started()
     answer_all(clock, world=(5, [NAV]), alpha=(9, []))
     turn = clock.next_round()
-    assert turn == Round(5, False, (Grant("world", True, {}),))
+    assert turn == Round(5, (Grant("world", True, {}),))
     clock.answer("world", None, [NAV])
-    assert clock.next_round() == Round(9, False, (Grant("alpha", True, {"world": 2}),))
+    assert clock.next_round() == Round(9, (Grant("alpha", True, {"world": 2}),))
     clock.answer("alpha", None, [])
     assert clock.next_round() is None
 

@@ -11,6 +11,7 @@ from comms.codec import Header, encode
 from comms.faults import CutOff, Delivery, FaultKind, Faults, MessageFault
 from comms.messages import AgentState, Message, MissionOver, Nav
 from comms.routing import Routing
+from comms.runner import Intake
 
 ROUTING = Routing(ROSTER)
 NAV, STATE = "veh/alpha/nav", "agent/alpha/state"
@@ -29,9 +30,10 @@ def payload_of(key: str, number: int, sent_ms: int) -> bytes:
 def deliver(faults: Faults, key: str, number: int = 0, sent_ms: int = 0, receiver: str = "") -> list[Delivery]:
     """What becomes of a message at its (first) reader."""
     route = ROUTING.route(key)
+    received = Intake(ROUTING).open(key, payload_of(key, number, sent_ms))
     assert route is not None
-    to, sender = ROUTING.nodes[receiver or route.readers[0]], ROUTING.nodes[route.writer]
-    return faults.deliveries(to, route, sender, key, payload_of(key, number, sent_ms))
+    assert received is not None
+    return faults.deliveries(receiver or route.readers[0], received, ROUTING)
 
 
 def test_without_faults_a_message_passes() -> None:

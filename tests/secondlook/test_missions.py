@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from missions import Flown, flown, fly_scenario
+from missions import Flown, bad_water, flown, fly_scenario
 
+from comms.faults import CutOff, Faults
 from comms.messages import (
     AgentState,
     CoverageTile,
@@ -22,9 +23,7 @@ from comms.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.node import Received
 from comms.result import Ending
-from comms.topics import TASK
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
 from secondlook.scenario import load_scenario
 
@@ -179,8 +178,7 @@ HALF_THE_AREA = ("area.polygon_m=[[0, 0], [600, 0], [600, 400], [0, 400]]",)
 class TestABadLink:
     @pytest.mark.parametrize("share", [0.3, 0.7])
     def test_with_many_messages_lost_the_mission_still_comes_to_its_end(self, share: float) -> None:
-        chance = np.random.default_rng(5)
-        mission = fly_scenario(load_scenario("tellaro", HALF_THE_AREA, 1), lambda *_: bool(chance.random() < share))
+        mission = fly_scenario(load_scenario("tellaro", HALF_THE_AREA, 1), bad_water(5, share))
         primary_s, figures = mission.summary["primary_s"], mission.summary["hotspots"]
         assert mission.result.ending is Ending.OVER
         assert primary_s * 1000 <= mission.result.mission_ms <= 1.05 * (primary_s * 1000 + 300_000)
@@ -188,10 +186,8 @@ class TestABadLink:
         assert mission.summary["risk"]["mean"] < mission.summary["risk_primary_alone"]["mean"] - 0.02
 
     def test_a_helper_cut_off_in_mid_strip_goes_on_with_it_when_it_is_heard_again(self) -> None:
-        def loses(received: Received, now_ms: int) -> bool:
-            return 500_000 <= now_ms < 600_000 and (received.vehicle == "helper" or received.topic is TASK)
-
-        mission = fly_scenario(load_scenario("tellaro", HALF_THE_AREA, 1), loses)
+        cut_off = Faults(5, cut_offs=[CutOff("helper", 500_000, 600_000)])
+        mission = fly_scenario(load_scenario("tellaro", HALF_THE_AREA, 1), cut_off)
         assert {task.action for _, task in mission.all(Task)} == {TaskAction.TAKE}
         reasons = [status.reason for _, status in mission.all(StripStatus)]
         assert "helper is lost: nothing heard of it" in reasons

@@ -18,10 +18,19 @@ import pytest
 from flights import BRIEF, events, flight
 
 from comms.codec import decode
+from comms.control import HostPlan
+from comms.result import BusResult
 from comms.topics import topic_of
+from secondlook import processes
+from secondlook.fleet import build_fleet
+from secondlook.host_plans import plan_hosts
 from secondlook.mission import RunOptions, run_mission
 from secondlook.mission_files import NOT_FOR_PEOPLE, read_messages
+from secondlook.node_spec import NodeSpec
+from secondlook.observer import Observer
+from secondlook.processes import Processes
 from secondlook.scenario import load_scenario, scenario_hash
+from secondlook.scenario.bundled import scenario_names
 from tests.viz.recordings import verify
 
 FILES = {"events.jsonl", "messages.mpk", "mission.rrd", "risk.npz", "scenario.yaml", "summary.json"}
@@ -172,6 +181,41 @@ def test_the_digest_is_the_same_on_a_busy_machine(tmp_path: Path, digest: str) -
     with busy_machine():
         flown = fly(tmp_path / "out")
     assert (flown.code, flown.summary["digest"], flown.left) == (0, digest, {})
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_bundled_mission_has_one_digest_on_both_buses(tmp_path: Path, name: str) -> None:
+    digests = set()
+    for bus in ("local", "zenoh"):
+        (tmp_path / bus).mkdir()
+        options = RunOptions(tmp_path / bus, bus=bus, record=False)
+        digests.add(run_mission(load_scenario(name, (), seed=11), options)["digest"])
+    assert len(digests) == 1
+
+
+def run_with(folder: Path, recorder: NodeSpec | None) -> BusResult:
+    """A run of the brief mission with this recorder."""
+    fleet = build_fleet(load_scenario(str(BRIEF)), record=recorder is not None)
+    with Processes(fleet, folder, Observer(folder, with_messages=False), recorder, None) as started:
+        return started.run()
+
+
+def test_the_digest_is_the_same_with_a_recorder_that_cannot_keep_up(tmp_path: Path, digest: str) -> None:
+    # It needs several times the mission's wall time.
+    assert run_with(tmp_path, NodeSpec("faulty_nodes:SlowListener", 3000)).digest == digest
+
+
+@pytest.mark.parametrize("turn", range(3))
+def test_the_digest_is_the_same_in_whatever_order_processes_start(
+    tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch, turn: int
+) -> None:
+    def turned(*arguments: Any) -> tuple[list[str], tuple[HostPlan, ...]]:
+        in_hub, plans = plan_hosts(*arguments)
+        order = [*plans[turn:], *plans[:turn]]
+        return in_hub, tuple(order[::-1])
+
+    monkeypatch.setattr(processes, "plan_hosts", turned)
+    assert run_with(tmp_path, None).digest == digest
 
 
 def test_another_seed_gives_another_digest(tmp_path: Path, digest: str) -> None:

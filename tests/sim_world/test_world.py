@@ -293,7 +293,7 @@ def test_an_order_that_meets_what_is_due_finds_it_said_first() -> None:
     sea = Sea(QUIET).order("a", NORTH_400).until(249_999)
     sea.now_ms = 250_000  # the order is handled before the wake-up of the same time
     said = len(sea.published)
-    sea.order("a", NORTH_400)
+    sea.order("a", replace(NORTH_400, number=NORTH_400.number + 1))
     kinds = [type(one.message) for _, one in sea.published[said:]]
     assert kinds == [Nav, Look, ManeuverStatus, ManeuverStatus]
     assert [one[1] for one in sea.statuses()[-2:]] == [ManeuverState.DONE, ManeuverState.ACCEPTED]
@@ -492,3 +492,22 @@ def test_topics_are_those_of_the_table() -> None:
         "veh/a/nav",
         *(topic.key(vehicle="a") for topic in (LOOK, MANEUVER_STATUS, TRUTH_LOOK, TRUTH_POSE)),
     }
+
+
+def test_an_order_repeated_is_answered_with_how_far_it_got_and_not_begun_again() -> None:
+    sea = Sea(QUIET).order("a", NORTH_400).until(55_000)
+    once = as_sent(Sea(QUIET).order("a", NORTH_400).until(400_000).published)
+    for at_ms in (55_000, 120_000, 399_999):
+        sea.until(at_ms).order("a", NORTH_400)
+    states = [one[1] for one in sea.statuses()]
+    assert states == [
+        ManeuverState.ACCEPTED,
+        ManeuverState.ON_TRACK,
+        ManeuverState.ON_TRACK,
+        ManeuverState.ON_TRACK,
+        ManeuverState.DONE,
+        ManeuverState.DONE,
+    ]
+    repeated = as_sent(sea.until(400_000).published)
+    assert len(repeated) == len(once) + 3
+    assert [one for one in once if one not in repeated] == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 
 from comms.node import Received, Step
@@ -50,6 +51,21 @@ class ListenerThatFails:
         self._left -= 1
         if self._left == 0:
             raise OSError("no space left on device")
+
+    def close(self) -> None:
+        """Has nothing to close."""
+
+
+class SlowListener:
+    """A listener that takes its time over every message: so much work that the fleet has to wait for it."""
+
+    def __init__(self, rounds: int) -> None:
+        self._rounds = rounds
+
+    def on_message(self, received: Received) -> None:
+        """Works for nothing."""
+        for _ in range(self._rounds):
+            hashlib.sha256(received.payload).digest()
 
     def close(self) -> None:
         """Has nothing to close."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from comms.access import access_rules
 from comms.control import HostPlan, RunKeys, pack
+from comms.events import Change, NodeEvent, timeline
+from comms.faults import NO_FAULTS, Faults
 from comms.local_bus import run_local
 from comms.messages import (
     AgentState,
@@ -137,30 +140,60 @@ def say_over() -> Publication:
 Bus = Callable[..., BusResult]
 
 
-def on_local(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
-    """Runs the toy fleet on the local bus; nodes left out do nothing."""
+def on_local(
+    nodes: Mapping[str, Node],
+    listener: Listener,
+    *,
+    time_limit_ms: int = 60_000,
+    faults: Faults = NO_FAULTS,
+    events: tuple[NodeEvent, ...] = (),
+) -> BusResult:
+    """Runs the toy fleet on the local bus; nodes left out do nothing.
+
+    Whoever joins after it was killed is, as on every bus here, the node under its id with a dot and its incarnation.
+    """
     filled = _filled(nodes)
-    return run_local(Routing(ROSTER), filled, {"observer": listener}, RUN_INFO, time_limit_ms)
+    starts = {name: iter([filled[name], nodes.get(f"{name}.1", filled[name])]) for name in filled}
+    makers = {name: partial(next, starts[name]) for name in filled}
+    watchers = {"observer": listener}
+    return run_local(Routing(ROSTER), makers, watchers, RUN_INFO, time_limit_ms, faults=faults, events=events)
 
 
-def on_zenoh(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
+def on_zenoh(
+    nodes: Mapping[str, Node], listener: Listener, *, events: tuple[NodeEvent, ...] = (), **options: Any
+) -> BusResult:
     """Runs the toy fleet over Zenoh on loopback: the world at the hub, each other node behind a session of its own."""
-    return over_zenoh(nodes, listener, time_limit_ms=time_limit_ms)
+    return over_zenoh(nodes, listener, plans=plans_with(events, EACH_ALONE), events=events, **options)
 
 
-def on_zenoh_grouped(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
-    """The same with coordinator and one agent behind one session."""
-    plans = (
+def on_zenoh_grouped(
+    nodes: Mapping[str, Node], listener: Listener, *, events: tuple[NodeEvent, ...] = (), **options: Any
+) -> BusResult:
+    """The same with coordinator and one agent behind one session, but for whom something is to happen to."""
+    plans: tuple[HostPlan, ...] = (
         HostPlan("alpha", ("alpha",)),
         HostPlan("both", ("beta", "coordinator")),
         HostPlan("observer", ("observer",)),
     )
-    return over_zenoh(nodes, listener, plans=plans, time_limit_ms=time_limit_ms)
+    if {event.node_id for event in events} & {"beta", "coordinator"}:
+        plans = EACH_ALONE
+    return over_zenoh(nodes, listener, plans=plans_with(events, plans), events=events, **options)
 
 
 BUSES: dict[str, Bus] = {"local": on_local, "zenoh": on_zenoh, "zenoh-grouped": on_zenoh_grouped}
 EACH_ALONE = tuple(HostPlan(name, (name,)) for name in ("alpha", "beta", "coordinator", "observer"))
 KEYS = RunKeys("toy")
+
+
+def plans_with(events: tuple[NodeEvent, ...], plans: tuple[HostPlan, ...]) -> tuple[HostPlan, ...]:
+    """These plans with those for whoever joins later."""
+    joins = [one for one in timeline(events, Routing(ROSTER)) if one.change is Change.JOIN]
+    late = {one.node_id for one in joins if one.incarnation == 0}
+    later = [
+        HostPlan(f"{one.node_id}.1" if one.incarnation else one.node_id, (one.node_id,), one.incarnation, joins=True)
+        for one in joins
+    ]
+    return (*(plan for plan in plans if late.isdisjoint(plan.nodes)), *later)
 
 
 def password(host: str) -> str:
@@ -178,6 +211,7 @@ def over_zenoh(
     on_failure: Callable[[], None] = lambda: None,
     rules: bool = True,
     time_limit_ms: int = 60_000,
+    faults: Faults = NO_FAULTS,
     **hub_options: Any,
 ) -> BusResult:
     """Runs the toy fleet over Zenoh, its hosts started in the order of `plans`, those `absent` left out.
@@ -199,30 +233,48 @@ def over_zenoh(
             if plan.host == "observer":
                 ListenerHost(session, KEYS, plan.host, "observer", listener, routing).run()
             else:
-                serve_nodes(session, KEYS, plan.host, {name: filled[name] for name in plan.nodes}, routing)
+                its_nodes = {name: nodes.get(plan.host, filled[name]) for name in plan.nodes}
+                serve_nodes(session, KEYS, plan, its_nodes, routing, faults)
 
-    threads = [
-        threading.Thread(target=serve, args=(plan,), name=plan.host, daemon=True)
+    threads = {
+        plan.host: threading.Thread(target=serve, args=(plan,), name=plan.host, daemon=True)
         for plan in plans
         if plan.host not in absent
-    ]
+    }
+    killed: list[str] = []
+
+    def carry_out(change: Change, host: str) -> None:
+        if change is Change.JOIN:
+            threads[host].start()
+        elif change is Change.KILL:
+            killed.append(host)  # a thread cannot be killed; it is sent home in the end
+
+    def send_home(hosts: Iterable[str]) -> None:
+        for host in hosts:
+            put(hub_session, KEYS.to_host(host), pack("finish", 0, 0, {}))
+            put(hub_session, KEYS.to_host(host), pack("goodbye"))
+
     with hub_session:
         before(endpoint)
-        hub = Hub(hub_session, KEYS, routing, plans, {"world": filled["world"]}, time_limit_ms, **hub_options)
-        for thread in threads:
-            thread.start()
+        world = {"world": filled["world"]}
+        options = {"faults": faults, "carry_out": carry_out, **hub_options}
+        hub = Hub(hub_session, KEYS, routing, plans, world, time_limit_ms, **options)
+        for plan in plans:
+            if plan.host in threads and not plan.joins:
+                threads[plan.host].start()
         try:
-            return hub.run(RUN_INFO)
+            result = hub.run(RUN_INFO)
+            send_home(killed)
+            return result
         except FleetError:
             on_failure()
-            for plan in plans:
-                put(hub_session, KEYS.to_host(plan.host), pack("finish", 0, 0, {}))
-                put(hub_session, KEYS.to_host(plan.host), pack("goodbye"))
+            send_home(threads)
             raise
         finally:
-            for thread in threads:
-                thread.join(timeout=20)
-                assert not thread.is_alive(), f"{thread.name} has not ended"
+            for thread in threads.values():
+                if thread.ident is not None:
+                    thread.join(timeout=20)
+                    assert not thread.is_alive(), f"{thread.name} has not ended"
 
 
 def _filled(nodes: Mapping[str, Node]) -> dict[str, Node]:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import re
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeVar
 
+from comms.faults import NO_FAULTS, FaultKind, Faults, MessageFault
 from comms.local_bus import run_local
-from comms.node import Node, Received, Step
+from comms.node import Received
 from comms.result import BusResult
 from comms.routing import Routing
+from comms.topics import TOPICS
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics
 from secondlook.scenario import Scenario, load_scenario
@@ -53,41 +55,21 @@ class Flown:
         return [(one, one.message) for one in self.heard if isinstance(one.message, kind)]
 
 
-Loses = Callable[[Received, int], bool]
-"""Whether a message that crosses water does not reach a node at this time."""
+def bad_water(seed: int, share: float) -> Faults:
+    """Of all that crosses water this share is lost."""
+    keys = [re.sub(r"{\w+}", "*", topic.pattern) for topic in TOPICS if topic.crosses_water]
+    return Faults(seed, [MessageFault(FaultKind.DROP, one, share) for one in keys])
 
 
-class HardOfHearing:
-    """A node that some of what crosses water does not reach."""
-
-    def __init__(self, node: Node, loses: Loses) -> None:
-        self._node = node
-        self._loses = loses
-        self._wake_ms: int | None = None
-
-    def start(self, now_ms: int) -> Step:
-        return self._keep(self._node.start(now_ms))
-
-    def on_message(self, received: Received, now_ms: int) -> Step:
-        if received.topic.crosses_water and self._loses(received, now_ms):
-            return Step(wake_ms=self._wake_ms)
-        return self._keep(self._node.on_message(received, now_ms))
-
-    def on_wake(self, now_ms: int) -> Step:
-        return self._keep(self._node.on_wake(now_ms))
-
-    def _keep(self, step: Step) -> Step:
-        self._wake_ms = step.wake_ms
-        return step
-
-
-def fly_scenario(scenario: Scenario, loses: Loses | None = None) -> Flown:
-    """Flies a mission; `loses`: over a link that loses messages."""
+def fly_scenario(scenario: Scenario, faults: Faults = NO_FAULTS) -> Flown:
+    """Flies a mission."""
     fleet = build_fleet(scenario, record=False)
     nodes = {node_id: spec.make() for node_id, spec in fleet.specs.items()}
-    heard_by = nodes if loses is None else {name: HardOfHearing(node, loses) for name, node in nodes.items()}
+    makers = {node_id: partial(nodes.__getitem__, node_id) for node_id in nodes}
     watcher = Watcher()
-    result = run_local(Routing(fleet.roster), heard_by, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
+    result = run_local(
+        Routing(fleet.roster), makers, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms, faults=faults
+    )
     return Flown(result, watcher.heard, watcher.metrics, nodes)
 
 

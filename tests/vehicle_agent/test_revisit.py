@@ -126,9 +126,18 @@ class TestAWordRepeated:
         agent = revisit()
         first = answer(agent, STRIP)
         assert answer(agent, STRIP) == first
+        tell_status(agent, HELPER, 1, ManeuverState.ACCEPTED)
         tell_status(agent, HELPER, 1, ManeuverState.ON_TRACK, 20_000)
         assert answer(agent, STRIP).state is TaskState.UNDER_WAY
         assert len(agent.all(Maneuver)) == 1
+
+    def test_a_task_from_before_its_start_was_for_who_was_there_before(self) -> None:
+        config = RevisitConfig(HELPER, swath_m=50, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
+        agent = OneNode(RevisitAgent(config), Role.REVISIT, now_ms=5000)
+        agent.hear("run", RUN, at_ms=5001, sent_ms=0)
+        agent.hear(f"veh/{HELPER}/nav", nav(100, 0), sent_ms=4000)
+        assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/1", STRIP, sent_ms=4999)) == []
+        assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/2", STRIP, sent_ms=5000)) != []
 
     def test_a_strip_done_is_not_swept_again(self) -> None:
         agent = revisit()

@@ -34,6 +34,7 @@ from comms.messages import (
     Maneuver,
     ManeuverKind,
     ManeuverState,
+    ManeuverStatus,
     MissionOver,
     Mode,
     Plan,
@@ -293,6 +294,37 @@ class TestTracksThatGoWrong:
         tell_status(agent, PRIMARY, first.number, ManeuverState.DONE)
         assert command(agent) == second != first
         assert len(agent.last(Plan).r_eff_m) == 1
+
+    def test_a_manoeuvre_is_asked_for_again_until_the_vehicle_answers(self) -> None:
+        agent = on_its_way()
+        first = command(agent)
+        assert agent.all(Maneuver, agent.wait(35)) == [first] * 3
+        tell_status(agent, PRIMARY, first.number, ManeuverState.ACCEPTED)  # done in 300 s
+        tell_status(agent, PRIMARY, first.number, ManeuverState.ON_TRACK)
+        assert agent.all(Maneuver, agent.wait(299)) == []
+        assert set(agent.all(Maneuver, agent.wait(30))) == {first}  # the word that it is done was lost
+        tell_status(agent, PRIMARY, first.number, ManeuverState.DONE)
+        assert command(agent) != first
+
+    def test_after_the_last_word_on_a_manoeuvre_nothing_more_is_asked(self) -> None:
+        agent = on_its_way(survey(), run_info(60, 200))
+        fly_all(agent, SEES_TO_130_M)
+        hold = agent.last(Maneuver)
+        assert hold.kind is ManeuverKind.HOLD
+        agent.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(hold.number, ManeuverState.ACCEPTED, 0, ""))
+        assert agent.all(Maneuver, agent.wait(100)) == []
+
+    def test_a_look_that_comes_twice_was_one_look(self) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        for _ in range(2):
+            agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M))
+        layer = agent.node.coverage.layer  # type: ignore[attr-defined]
+        column = round((maneuver.start_x_m + 50) / 10)
+        assert layer.sum_nats[0, column] == pytest.approx(-math.log(0.7))
+        # Of a vehicle that was started anew it is another.
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 4, SEES_TO_130_M), incarnation=1)
+        assert layer.sum_nats[0, column] == pytest.approx(-2 * math.log(0.7))
 
     def test_a_look_of_another_manoeuvre_is_coverage_but_teaches_nothing_about_this_track(self) -> None:
         agent = on_its_way()
