@@ -72,7 +72,8 @@ class Metrics:
     def take(self, received: Received) -> None:
         """Folds one message in. What contradicts the run's announcement is counted in `misfits`."""
         message = received.message
-        self._pass_time(received.header.sent_ms)
+        if received.header.sent_ms > self.now_ms:
+            self._pass_time(received.header.sent_ms)
         vehicle = self.vehicles.get(received.vehicle)
         if isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
@@ -161,7 +162,7 @@ class Metrics:
             if sent_ms <= at_ms:
                 break
             self._note_risk(at_ms)
-        self.now_ms = max(self.now_ms, sent_ms)
+        self.now_ms = sent_ms
 
     def _note_risk(self, at_ms: int) -> None:
         risk = self.risk()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import enum
 import json
 from dataclasses import fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, BinaryIO, Self, TextIO
@@ -32,6 +33,7 @@ class MissionFiles:
         self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
         self._messages: BinaryIO | None = (folder / "messages.mpk").open("wb") if with_messages else None
         self._pack = msgpack.Packer().pack
+        self._json = json.JSONEncoder(separators=(", ", ": "), check_circular=False).encode
         if self._messages is not None:
             self._messages.write(self._pack([FILE_FORMAT, SCHEMA_VERSION]))
 
@@ -49,7 +51,7 @@ class MissionFiles:
             self._messages.write(self._pack([received.key, received.payload]))
         if received.topic not in NOT_FOR_PEOPLE:
             event = {"t_s": received.header.sent_ms / 1000, "key": received.key, **_plain(received.message)}
-            self._events.write(json.dumps(event, separators=(", ", ": ")) + "\n")
+            self._events.write(self._json(event) + "\n")
 
     def close(self) -> None:
         """Ends both files."""
@@ -84,13 +86,21 @@ def read_messages(path: Path) -> list[tuple[str, bytes]]:
     return found
 
 
+@cache
+def _field_names(kind: type[Any]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(kind))
+
+
 def _plain(value: Any) -> Any:
-    if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    kind = type(value)
+    if kind is float or kind is int or kind is str or kind is bool:  # by far the most
+        return value
+    if kind is tuple:
+        return [_plain(one) for one in value]
+    if is_dataclass(kind):
+        return {name: _plain(getattr(value, name)) for name in _field_names(kind)}
     if isinstance(value, enum.Enum):
         return value.value
-    if isinstance(value, tuple):
-        return [_plain(one) for one in value]
     if isinstance(value, np.ndarray):
         return value.tolist()
     return value
