@@ -65,7 +65,8 @@ COMPILE = .venv-lock/bin/uv pip compile --no-config --universal --fork-strategy 
 
 lock: .venv-lock/.uv-$(UV_VERSION)
 	$(COMPILE) pyproject.toml --group build --output-file requirements.lock
-	$(COMPILE) pyproject.toml --group build --group dev --constraint requirements.lock --output-file requirements-dev.lock
+	$(COMPILE) pyproject.toml --all-extras --group build --group dev --constraint requirements.lock \
+		--output-file requirements-dev.lock
 
 .venv-lock/.uv-$(UV_VERSION):
 	@rm -rf .venv-lock
