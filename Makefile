@@ -22,10 +22,12 @@ run: .venv/.run-ready
 	@$(BIN)/secondlook run $(ARGS)
 
 # The pictures in the README and the docs, from the program itself.
-pictures: .venv/.run-ready
+pictures: .venv/.test-ready
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run tellaro --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png
+	@$(BIN)/secondlook paper --out docs/paper
+	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 
 test: .venv/.test-ready
 	$(BIN)/ruff check

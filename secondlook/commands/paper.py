@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
+from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated
@@ -20,6 +21,7 @@ from secondlook.paper.report import as_json as entries_of
 from secondlook.paper.report import differing_decisions, mean_difference, tables
 from secondlook.paper.side_by_side import measure_all
 from secondlook.processes import RunFailedError
+from secondlook.signals import signals_interrupt
 
 FAILED = 1
 
@@ -66,9 +68,12 @@ def _measure(runs: int, *, shown: bool) -> list[list[MeasuredMission]]:
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
         task = progress.add_task("paper", total=len(missions))
         try:
-            measured = measure_all(missions, lambda done: progress.update(task, completed=done))
+            with signals_interrupt():
+                measured = measure_all(missions, lambda done: progress.update(task, completed=done))
         except RunFailedError as error:
             failure = str(error)
+        except BrokenProcessPool:
+            failure = "a process that measured a mission has died"
         except KeyboardInterrupt:
             failure = "interrupted"
         else:

@@ -68,9 +68,9 @@ class MeasuredMission:
         }
 
 
-def measure(published: PublishedMission, seed: int) -> MeasuredMission:
-    """Flies one mission and fits its mixture; its files are not kept. Raises RunFailedError."""
-    with tempfile.TemporaryDirectory(prefix="secondlook-paper-") as folder:
+def measure(published: PublishedMission, seed: int, scratch: Path) -> MeasuredMission:
+    """Flies one mission and fits its mixture; its files lie in `scratch` for so long. Raises RunFailedError."""
+    with tempfile.TemporaryDirectory(dir=scratch) as folder:
         survey = fly(scenario_of(published, seed), Path(folder))
     # Only who measures needs scikit-learn, not who reads the result in another process.
     fit_mixture = import_module("secondlook.paper.fit").fit_mixture

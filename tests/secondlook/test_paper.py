@@ -6,6 +6,7 @@ import importlib.util
 import io
 import json
 from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,7 @@ from secondlook.paper.published import published_missions, published_sonar
 from secondlook.paper.report import as_json, differing_decisions, mean_difference, tables
 from secondlook.paper.side_by_side import measure_all
 from secondlook.paper.survey import Survey
+from secondlook.processes import RunFailedError
 from secondlook.scenario import load_scenario
 
 MISSIONS = {mission.name: mission for mission in published_missions()}
@@ -267,6 +269,24 @@ class TestCommand:
         assert err == (
             "secondlook paper needs scikit-learn, not installed here; the extra secondlook[paper] has all of it\n"
         )
+
+    @pytest.mark.parametrize(
+        ("raised", "told"),
+        [
+            (RunFailedError("primary has failed"), "primary has failed\n"),
+            (KeyboardInterrupt(), "interrupted\n"),
+            (BrokenProcessPool(), "a process that measured a mission has died\n"),
+        ],
+        ids=["failed", "interrupted", "died"],
+    )
+    def test_missions_that_fail_are_told_in_one_sentence(
+        self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
+    ) -> None:
+        def fail(*_: object) -> None:
+            raise raised
+
+        monkeypatch.setattr("secondlook.commands.paper.measure_all", fail)
+        assert command() == (1, "", told)
 
     def test_an_out_that_is_a_file_is_refused(self, command: Command, tmp_path: Path) -> None:
         taken = tmp_path / "taken"
