@@ -22,10 +22,12 @@ run: .venv/.run-ready
 	@$(BIN)/secondlook run $(ARGS)
 
 # The pictures in the README and the docs, from the program itself.
-pictures: .venv/.run-ready
+pictures: .venv/.test-ready
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run tellaro --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png
+	@$(BIN)/secondlook paper --out docs/paper
+	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 
 test: .venv/.test-ready
 	$(BIN)/ruff check
@@ -65,7 +67,8 @@ COMPILE = .venv-lock/bin/uv pip compile --no-config --universal --fork-strategy 
 
 lock: .venv-lock/.uv-$(UV_VERSION)
 	$(COMPILE) pyproject.toml --group build --output-file requirements.lock
-	$(COMPILE) pyproject.toml --group build --group dev --constraint requirements.lock --output-file requirements-dev.lock
+	$(COMPILE) pyproject.toml --all-extras --group build --group dev --constraint requirements.lock \
+		--output-file requirements-dev.lock
 
 .venv-lock/.uv-$(UV_VERSION):
 	@rm -rf .venv-lock

@@ -255,7 +255,8 @@ class Plan:
 
 @dataclass(frozen=True, slots=True)
 class Curve:
-    """P(y) as estimated from one track: P_d at whole multiples of `range_bin_m` from 0; `r_eff_m` is 0 for none."""
+    """P(y) as estimated from one track, 0 being earlier missions: P_d at whole multiples of `range_bin_m` from 0;
+    `r_eff_m` is 0 for none."""
 
     track: Count
     range_bin_m: Metres

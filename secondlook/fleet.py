@@ -138,13 +138,14 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", config)
     survey = SurveyConfig(
         vehicle=name,
-        spacing=_made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.range_m),
+        spacing=_made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
         nadir_gap_m=vehicle.nadir_gap_m,
-        range_m=vehicle.range_m,
+        range_m=vehicle.told_range_m,
         threshold=vehicle.threshold,
         hotspot_risk=vehicle.hotspot_risk,
         run_in_m=vehicle.run_in_m,
         endurance_ms=endurance_ms,
+        prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
     )
     return NodeSpec(vehicle.agent or "vehicle_agent.survey:SurveyAgent", survey)
 

@@ -26,7 +26,7 @@ from comms.node import Received
 from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
 from planner.risk import RiskStatistics, risk_statistics
-from planner.types import BoolArray
+from planner.types import BoolArray, FloatArray
 
 RISK_AT_FACTORS = (1.0, 1.05)
 _STILL_OPEN = (StripState.OPEN, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
@@ -126,6 +126,20 @@ class Metrics:
         primaries = {name for name, one in self.vehicles.items() if one.role is Role.SURVEY}
         return risk_statistics(*self.map.risk_of(primaries), self.inside)
 
+    def targets_met(self) -> tuple[FloatArray, BoolArray]:
+        """Of each target the fleet's residual risk where it lies, and whether nobody has detected it; both of shape
+        (targets,)."""
+        if self.map is None or self.targets is None:
+            return np.zeros(0), np.zeros(0, dtype=np.bool_)
+        grid = self.map.grid
+        x_m = np.array([target.x_m for target in self.targets.targets])
+        y_m = np.array([target.y_m for target in self.targets.targets])
+        across, along = grid.frame.to_sweep(x_m, y_m)
+        columns = np.clip(np.rint(across / grid.cell_m).astype(int), 0, grid.columns - 1)
+        rows = np.clip(np.floor(along / grid.cell_m).astype(int), 0, grid.rows - 1)
+        missed = ~np.isin(np.arange(x_m.size), sorted(self.detected))
+        return self.map.risk[rows, columns], missed
+
     def close(self) -> None:
         """The mission has ended: times that were not reached have the risk of its end."""
         primary_ms = self.primary_ms()
@@ -201,19 +215,13 @@ class Metrics:
             strip.accepted_ms = received.header.sent_ms
 
     def _truth_summary(self) -> dict[str, Any]:
-        count = len(self.targets.targets) if self.targets else 0
-        if not count or self.map is None or self.targets is None:
-            return {"targets": count, "missed_share": None, "predicted_missed_share": None}
-        grid = self.map.grid
-        x_m = np.array([target.x_m for target in self.targets.targets])
-        y_m = np.array([target.y_m for target in self.targets.targets])
-        across, along = grid.frame.to_sweep(x_m, y_m)
-        columns = np.clip(np.rint(across / grid.cell_m).astype(int), 0, grid.columns - 1)
-        rows = np.clip(np.floor(along / grid.cell_m).astype(int), 0, grid.rows - 1)
+        risk, missed = self.targets_met()
+        if not risk.size:
+            return {"targets": 0, "missed_share": None, "predicted_missed_share": None}
         return {
-            "targets": count,
-            "missed_share": len(set(range(count)) - self.detected) / count,
-            "predicted_missed_share": float(self.map.risk[rows, columns].mean()),
+            "targets": risk.size,
+            "missed_share": float(missed.mean()),
+            "predicted_missed_share": float(risk.mean()),
         }
 
     def _strip_summary(self) -> dict[str, Any]:

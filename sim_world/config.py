@@ -66,8 +66,8 @@ class SensorConfig:
     along_bin_m: float = 5.0
     range_bin_m: float = 5.0
     look_m: float = 20.0
-    noise_cell: float = 0.23
-    noise_track: float = 0.05
+    noise_cell: float = 0.0
+    noise_track: float = 0.0
     sonar: Callable[..., SonarModel] | None = None
 
     def __post_init__(self) -> None:

@@ -28,7 +28,7 @@ from planner.lawnmower import lawnmower
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
 from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision, counted_range_m, lowest_range_m
-from planner.types import FloatArray, Track
+from planner.types import DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import SurveyConfig
 
@@ -69,6 +69,8 @@ class SurveyAgent(Agent):
         self._inside = self.area.inside(spec)
         self._rho = run.rho
         self._hotspots = HotspotMap.empty(spec)
+        if self.config.prior is not None:
+            self._publish_prior(self.config.prior)
         self._decide(r_eff_m=None)
         if self.ahead:
             self._begin_track(now_ms)
@@ -137,12 +139,19 @@ class SurveyAgent(Agent):
         if self._tally is not None:
             curve = self._tally.curve()
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
-            every = math.ceil(curve.p_detect.size / MOST_CURVE_POINTS)
-            p_detect = np.minimum(curve.p_detect[::every], HIGHEST_P_DETECT)  # a mean of such may be above by rounding
-            message = Curve(track.number, self._range_bin_m * every, p_detect, r_eff_m)
-            self.publish(CURVE.key(vehicle=self.vehicle), message)
+            self._publish_curve(track.number, self._range_bin_m, curve.p_detect, r_eff_m)
         self.r_eff_m.append(r_eff_m)
         self._after_track(now_ms)
+
+    def _publish_prior(self, prior: DetectionCurve) -> None:
+        """What holds before the first track, as the curve of track 0."""
+        range_m = np.arange(0.0, math.floor(prior.range_m[-1]) + 1.0)
+        self._publish_curve(0, 1.0, prior.at(range_m), effective_range_m(prior, self.config.threshold) or 0)
+
+    def _publish_curve(self, track: int, range_bin_m: float, p_detect: FloatArray, r_eff_m: int) -> None:
+        every = math.ceil(p_detect.size / MOST_CURVE_POINTS)
+        p_detect = np.minimum(p_detect[::every], HIGHEST_P_DETECT)  # a mean of such may be above by rounding
+        self.publish(CURVE.key(vehicle=self.vehicle), Curve(track, range_bin_m * every, p_detect, r_eff_m))
 
     def _after_track(self, now_ms: int) -> None:
         new = len(self.flown) - self._flown_at_decision

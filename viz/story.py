@@ -158,9 +158,10 @@ def _plan(plan: Plan) -> str:
 
 
 def _curve(curve: Curve) -> tuple[str, bool]:
+    of = f"track {curve.track}" if curve.track else "earlier missions"
     if curve.r_eff_m == 0:
-        return f"track {curve.track}: no range is admissible", True
-    return f"track {curve.track}: r_eff {curve.r_eff_m} m, best P_d {curve.p_detect.max(initial=0.0):.2f}", False
+        return f"{of}: no range is admissible", True
+    return f"{of}: r_eff {curve.r_eff_m} m, best P_d {curve.p_detect.max(initial=0.0):.2f}", False
 
 
 def _hotspots(sender: str, news: _HotspotNews) -> Line:

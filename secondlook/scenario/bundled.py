@@ -28,7 +28,8 @@ def curve_names() -> list[str]:
 
 @cache
 def curve(name: str) -> dict[str, Value]:
-    """A bundled detection curve: `range_m` and `p_detect`, lists of the same length."""
+    """A bundled detection curve: `range_m` and `p_detect`, lists of the same length, and the noise calibrated with it,
+    `noise_cell` and `noise_track`."""
     return read(_text("curves", name), name).data
 
 

@@ -18,6 +18,9 @@ from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle
 _TAGS = frozenset({"survey", "revisit", "uniform", "patchy"})
 _KEY_MARK = "[key]"
 
+# A default that is made from other fields was not, as one of these has an error of its own.
+_FOLLOWS = "default_factory_not_called"
+
 # What has keys that the other member of its union lacks.
 _FULLER: dict[type[BaseModel] | None, tuple[type[BaseModel] | None, str]] = {
     RevisitVehicle: (SurveyVehicle, "a survey vehicle"),
@@ -62,7 +65,8 @@ def explain(
         places: where each value of `data` stands, the whole under `()`.
         classes: for the `id()` of a mapping within `data`, the class it was taken for.
     """
-    problems = (_problem(error, data, places, classes) for error in errors)
+    mistakes = (error for error in errors if error["type"] != _FOLLOWS)
+    problems = (_problem(error, data, places, classes) for error in mistakes)
     return [problem for problem in problems if problem]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
@@ -11,14 +11,20 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 from planner.types import DetectionCurve
 from secondlook.parts import CURVE, SONAR, PartError
 from secondlook.scenario import bundled
+from secondlook.scenario.dialect import Value
 from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, part, refused
 
 
 class Curve(Mapping):
-    """A detection curve P(y): P_d over lateral range, linear between its points and 0 outside."""
+    """A detection curve P(y): P_d over lateral range, linear between its points and 0 outside.
+
+    `noise_cell`, `noise_track`: the noise that was calibrated with it, for sensors that do not name their own.
+    """
 
     range_m: Annotated[tuple[LengthOrZero, ...], Field(strict=False, min_length=2, max_length=10_000)]
     p_detect: Annotated[tuple[PDetect, ...], Field(strict=False)]
+    noise_cell: Noise | None = None
+    noise_track: Noise | None = None
 
     @field_validator("range_m")
     @classmethod
@@ -34,6 +40,11 @@ class Curve(Mapping):
         if "range_m" in info.data and len(p_detect) != len(info.data["range_m"]):
             raise refused(f"must have as many entries as range_m, {len(info.data['range_m'])} and not {len(p_detect)}")
         return p_detect
+
+    @property
+    def detection_curve(self) -> DetectionCurve:
+        """P(y) for the planner."""
+        return DetectionCurve(np.array(self.range_m), np.array(self.p_detect))
 
 
 def _take_bundled(value: object) -> object:
@@ -58,21 +69,40 @@ def _take_bundled(value: object) -> object:
     return {"range_m": np.asarray(made.range_m).tolist(), "p_detect": np.asarray(made.p_detect).tolist()}
 
 
+OptionalCurve = Annotated[Curve | None, BeforeValidator(_take_bundled)]
+"""A curve inline, a bundled one's name, or `package.module:Class` of what makes one."""
+
+CALIBRATED = "muscle"
+"""The bundled curve whose noise holds for every sensor that has none of its own."""
+
+
+def _noise(name: Literal["noise_cell", "noise_track"]) -> Any:
+    """The default of a sensor's noise: its curve's, or else the calibrated one."""
+
+    def default(sensor: dict[str, Any]) -> Value:
+        curve = sensor.get("curve")
+        own = None if curve is None else getattr(curve, name)
+        return bundled.curve(CALIBRATED)[name] if own is None else own
+
+    return Field(default_factory=default)
+
+
 class Sensor(Mapping):
     """A side-looking sonar.
 
     What it detects is either a `curve`, bundled, inline or made by `package.module:Class`, or, flat, `p_detect` up to
     `range_m`; `sonar`: `package.module:Class` of a true model of your own, given that curve and the seabed.
-    `noise_cell`, `noise_track`: standard deviation of P_d per cell and per track, in logits. `look_m`: length of track
-    in one look; `along_bin_m`, `range_bin_m`: the bins of a look.
+    `noise_cell`, `noise_track`: standard deviation of P_d per cell and per track, in logits; what is left out is the
+    curve's, or else the calibrated one's. `look_m`: length of track in one look; `along_bin_m`, `range_bin_m`: the bins
+    of a look.
     """
 
-    curve: Annotated[Curve | None, BeforeValidator(_take_bundled)] = None
+    curve: OptionalCurve = None
     sonar: Annotated[str, part(SONAR)] | None = None
     p_detect: PDetect | None = None
     range_m: Length | None = None
-    noise_cell: Noise = 0.23
-    noise_track: Noise = 0.05
+    noise_cell: Noise = _noise("noise_cell")
+    noise_track: Noise = _noise("noise_track")
     along_bin_m: Bin = 5.0
     range_bin_m: Bin = 1.0
     look_m: Length = 20.0
@@ -101,5 +131,5 @@ class Sensor(Mapping):
     def detection_curve(self, nadir_gap_m: float) -> DetectionCurve:
         """P(y): the curve as given, or the flat one from the nadir gap to `range_m`."""
         if self.curve is not None:
-            return DetectionCurve(np.array(self.curve.range_m), np.array(self.curve.p_detect))
+            return self.curve.detection_curve
         return DetectionCurve(np.array([nadir_gap_m, self.range_m]), np.array([self.p_detect, self.p_detect]))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from planner.curve import effective_range_m
 from secondlook.parts import NODE, SPACING
-from secondlook.scenario.sensor import Sensor
+from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
 from secondlook.scenario.values import (
     TOLERANCE,
     Coordinate,
@@ -76,24 +77,51 @@ class SurveyVehicle(VehicleBase):
 
     `spacing`: whether it adapts its track spacing to what it sees, or keeps to the plan. `range_m`: r_max, the range it
     is told to plan with until it has flown the first pair of tracks. `threshold`: P_d from which data is admissible.
-    `hotspot_risk`: residual risk from which a cell is worth a second look.
+    `prior_curve`: P(y) as earlier missions have measured it, the one that holds until the first track is flown; where
+    `range_m` is left out, its r_eff is what to plan with. `hotspot_risk`: residual risk from which a cell is worth a
+    second look.
     """
 
     role: Literal["survey"]
     altitude_m: Length = 15.0
     run_in_m: LengthOrZero = 20.0
-    range_m: Length
+    range_m: Length | None = None
     spacing: Annotated[str, part(SPACING)] = "adaptive"
     threshold: OpenShare = 0.05
+    prior_curve: OptionalCurve = None
     hotspot_risk: OpenShare = 0.55
 
     @field_validator("range_m")
     @classmethod
-    def _check_range(cls, range_m: float, info: ValidationInfo) -> float:
+    def _check_range(cls, range_m: float | None, info: ValidationInfo) -> float | None:
         lowest_m = 3 * info.data.get("nadir_gap_m", 0.0)
-        if range_m < lowest_m - TOLERANCE:
+        if range_m is not None and range_m < lowest_m - TOLERANCE:
             raise refused(f"must be at least 3 times nadir_gap_m, {lowest_m:g}")
         return range_m
+
+    @field_validator("prior_curve")
+    @classmethod
+    def _check_prior(cls, prior: Curve | None, info: ValidationInfo) -> Curve | None:
+        if prior is not None and info.data.keys() >= {"range_m", "threshold"} and info.data["range_m"] is None:
+            lowest_m = 3 * info.data.get("nadir_gap_m", 0.0)
+            r_eff_m = effective_range_m(prior.detection_curve, info.data["threshold"])
+            if not r_eff_m or r_eff_m < lowest_m - TOLERANCE:
+                raise refused(f"must without range_m be admissible up to 3 times nadir_gap_m, {lowest_m:g}")
+        return prior
+
+    @model_validator(mode="after")
+    def _check_told(self) -> Self:
+        if self.range_m is None and self.prior_curve is None:
+            raise refused("must have range_m, or prior_curve to read it off")
+        return self
+
+    @property
+    def told_range_m(self) -> float:
+        """r_max as told, or else r_eff of the prior curve."""
+        if self.range_m is not None:
+            return self.range_m
+        assert self.prior_curve is not None
+        return effective_range_m(self.prior_curve.detection_curve, self.threshold) or 0
 
 
 class RevisitVehicle(VehicleBase):

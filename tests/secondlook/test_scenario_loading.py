@@ -21,13 +21,14 @@ from secondlook.scenario import (
     load_scenario,
     scenario_hash,
 )
-from secondlook.scenario.bundled import scenario_text
+from secondlook.scenario.bundled import curve, scenario_text
 from secondlook.scenario.dialect import dump
 from secondlook.scenario.overrides import override
 from secondlook.scenario.reader import read, read_value
 
 Write = Callable[[str | bytes], str]
 BUNDLED = [name for name, _ in bundled_scenarios()]
+MUSCLE: dict[str, Any] = curve("muscle")
 TELLARO: dict[str, Any] = read(scenario_text("tellaro"), "tellaro").data
 
 
@@ -44,7 +45,7 @@ def load_text(folder: Path, text: str) -> Scenario:
 
 
 def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
-    assert BUNDLED == ["patchy", "tellaro"]
+    assert BUNDLED == ["paper", "patchy", "tellaro"]
     for name, description in bundled_scenarios():
         assert load_scenario(name).name == name
         assert description
@@ -54,7 +55,17 @@ def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
 def test_bundled_scenarios_hide_no_default_from_their_reader(name: str) -> None:
     written = yaml.safe_load(load_scenario(name).to_yaml())
     in_file = yaml.safe_load(scenario_text(name))
-    in_file["vehicles"]["primary"]["sensor"]["curve"] = written["vehicles"]["primary"]["sensor"]["curve"]
+    for vehicle_id, vehicle in in_file["vehicles"].items():
+        as_written = written["vehicles"][vehicle_id]
+        # Named in the file, written out in full; and the noise is the curve's, which has it in one place.
+        for holder, out, key in (
+            (vehicle["sensor"], as_written["sensor"], "curve"),
+            (vehicle, as_written, "prior_curve"),
+        ):
+            if key in holder:
+                holder[key] = out[key]
+        for key in ("noise_cell", "noise_track"):
+            vehicle["sensor"][key] = MUSCLE[key]
     assert in_file == written
 
 
@@ -63,9 +74,14 @@ def test_tellaro_is_the_published_mission() -> None:
     assert scenario.area.extent_m == (1212, 400)
     (primary,) = scenario.survey_vehicles.values()
     assert (primary.nadir_gap_m, primary.range_m, primary.threshold) == (40, 145, 0.05)
-    curve = primary.sensor.detection_curve(primary.nadir_gap_m)
-    assert curve.at(np.array([24.9, 70, 100, 130, 131])) == pytest.approx([0, 0.49, 0.20, 0.07, 0])
-    assert curve.range_m[np.argmax(curve.p_detect)] == 70
+    seen = primary.sensor.detection_curve(primary.nadir_gap_m)
+    assert seen.at(np.array([24.9, 131])).tolist() == [0, 0]
+    assert seen.range_m[np.argmax(seen.p_detect)] == 70
+    steps = np.diff(seen.p_detect)
+    assert (steps[seen.range_m[1:] <= 70] > 0).all()
+    assert (steps[seen.range_m[1:] > 70] < 0).all()
+    # Where data ends it is well above the threshold, so that no track's own error moves r_eff.
+    assert seen.at(130) > 0.06
     (helper,) = scenario.revisit_vehicles.values()
     flat = helper.sensor.detection_curve(helper.nadir_gap_m)
     assert flat.at(np.array([0, 12, 25, 25.1])) == pytest.approx([0.7, 0.7, 0.7, 0])
@@ -81,6 +97,26 @@ def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: st
     assert isinstance(helper, RevisitVehicle)
     assert (helper.nadir_gap_m, helper.run_in_m, helper.altitude_m) == (0, 5, 5)
     assert scenario.coordinator.allocator == "greedy"
+
+
+def test_noise_that_a_sensor_leaves_out_is_its_curves_or_else_the_calibrated_one(write: Write, valid_text: str) -> None:
+    own = "{range_m: [20, 130], p_detect: [0.5, 0.1], noise_cell: 0.4}"
+    scenario = load_scenario(write(valid_text), [f"vehicles.primary.sensor={{curve: {own}, noise_track: 0.01}}"])
+    sensors = [vehicle.sensor for vehicle in scenario.vehicles.values()]
+    assert [(sensor.noise_cell, sensor.noise_track) for sensor in sensors] == [
+        (0.4, 0.01),
+        (MUSCLE["noise_cell"], MUSCLE["noise_track"]),
+    ]
+
+
+def test_without_a_told_range_the_prior_curve_tells_it(write: Write, valid_text: str) -> None:
+    # From 0.3 at 100 m to 0.1 at 140 m it falls by 0.005 a metre: at 0.125 it is at 135 m.
+    prior = "prior_curve: {range_m: [30, 100, 140], p_detect: [0.2, 0.3, 0.1]}\n    threshold: 0.125"
+    scenario = load_scenario(write(valid_text.replace("range_m: 145", prior)))
+    (primary,) = scenario.survey_vehicles.values()
+    assert (primary.range_m, primary.told_range_m) == (None, 135)
+    told = load_scenario(write(valid_text.replace("range_m: 145", "range_m: 145\n    prior_curve: muscle")))
+    assert told.survey_vehicles["primary"].told_range_m == 145
 
 
 @pytest.mark.parametrize(

@@ -87,6 +87,22 @@ MISTAKES = {
         "range_m: 119.9",
         ["bad.yaml:12: vehicles.primary.range_m: 119.9 is not allowed; must be at least 3 times nadir_gap_m, 120"],
     ),
+    "neither range nor prior": (
+        "    range_m: 145\n",
+        "",
+        [
+            'bad.yaml:5: vehicles.primary: {"role": "survey", "start": {"x_m": 0, "y_m": -40}, "spee... '
+            "is not allowed; must have range_m, or prior_curve to read it off"
+        ],
+    ),
+    "prior that is not admissible far enough": (
+        "range_m: 145",
+        "prior_curve: {range_m: [30, 119], p_detect: [0.3, 0.3]}",
+        [
+            'bad.yaml:12: vehicles.primary.prior_curve: {"range_m": [30, 119], "p_detect": [0.3, 0.3]} is not allowed; '
+            "must without range_m be admissible up to 3 times nadir_gap_m, 120"
+        ],
+    ),
     "survey key on a revisit vehicle": (
         "speed_mps: 2",
         "speed_mps: 2\n    threshold: 0.1",
@@ -412,8 +428,8 @@ def test_a_file_that_is_no_scenario_is_told(write: Write, content: bytes, expect
 
 
 def test_a_name_that_is_not_bundled_is_told_with_those_that_are() -> None:
-    assert lines_of("telaro") == ["telaro: no such scenario, did you mean tellaro? (there are patchy, tellaro)"]
-    assert lines_of("xyz") == ["xyz: no such scenario (there are patchy, tellaro)"]
+    assert lines_of("telaro") == ["telaro: no such scenario, did you mean tellaro? (there are paper, patchy, tellaro)"]
+    assert lines_of("xyz") == ["xyz: no such scenario (there are paper, patchy, tellaro)"]
 
 
 def test_paths_that_are_no_readable_file_are_told(tmp_path: Path) -> None:

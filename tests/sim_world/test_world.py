@@ -36,14 +36,15 @@ AREA = ((0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (0.0, 400.0))
 CURVE = DetectionCurve(
     np.array([0.0, 25.0, 40.0, 70.0, 100.0, 130.0, 130.9]), np.array([0.0, 0.0, 0.2, 0.49, 0.2, 0.07, 0.07])
 )
-SENSOR = SensorConfig(CURVE, noise_cell=0.0, noise_track=0.0)
+SENSOR = SensorConfig(CURVE)
+NOISY_SENSOR = SensorConfig(CURVE, noise_cell=0.2, noise_track=0.05)
 A = VehicleConfig("a", 0.0, -100.0, 0.0, speed_mps=2.0, turn_radius_m=20.0, altitude_m=10.0, sensor=SENSOR)
 B = replace(A, vehicle="b", start_x_m=600.0, speed_mps=1.5, turn_radius_m=8.0)
 QUIET = WorldConfig(seed=1, area=AREA, vehicles=(A,))
 NOISY = WorldConfig(
     seed=1,
     area=AREA,
-    vehicles=(replace(A, sensor=SensorConfig(CURVE)), replace(B, sensor=SensorConfig(CURVE))),
+    vehicles=(replace(A, sensor=NOISY_SENSOR), replace(B, sensor=NOISY_SENSOR)),
     seabed=SeabedConfig("patchy", ripple_fields=7, vegetation_patches=7),
     targets=TargetsConfig(200, false_alarms_per_km2=500.0),
 )

@@ -43,7 +43,7 @@ from comms.messages import (
 )
 from planner.fleet_map import FleetMap
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
-from planner.types import BoolArray, GridSpec
+from planner.types import BoolArray, DetectionCurve, GridSpec
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
@@ -51,7 +51,13 @@ SEES_TO_130_M = flat(0.3, 25, 130)
 SMALL = run_info(360, 200, cell_m=10)
 
 
-def survey(spacing: SpacingPlanner | None = None, *, nadir_gap_m: float = 40, range_m: float = 145) -> OneNode:
+def survey(
+    spacing: SpacingPlanner | None = None,
+    *,
+    nadir_gap_m: float = 40,
+    range_m: float = 145,
+    prior: DetectionCurve | None = None,
+) -> OneNode:
     """A survey agent that waits for the run."""
     config = SurveyConfig(
         vehicle=PRIMARY,
@@ -62,6 +68,7 @@ def survey(spacing: SpacingPlanner | None = None, *, nadir_gap_m: float = 40, ra
         hotspot_risk=0.6,
         run_in_m=20,
         endurance_ms=36_000_000,
+        prior=prior,
     )
     return OneNode(SurveyAgent(config), Role.SURVEY)
 
@@ -161,6 +168,18 @@ class TestThePapersExperiments:
         assert [curve.track for curve in curves] == list(range(1, 9))
         assert all(curve.r_eff_m == 130 and curve.range_bin_m == 1 for curve in curves)
         assert curves[0].p_detect[[24, 25, 130, 131]].tolist() == [0, 0.3, 0.3, 0]
+
+    def test_until_the_first_track_is_flown_the_prior_curve_holds(self) -> None:
+        # It falls from 0.25 at 70 m by 0.005 a metre: 0.05 is at 110 m.
+        prior = DetectionCurve(np.array([30.0, 70.0, 119.5]), np.array([0.25, 0.25, 0.0025]))
+        agent = on_its_way(survey(prior=prior))
+        (curve,) = agent.all(Curve)
+        assert (curve.track, curve.range_bin_m, curve.r_eff_m) == (0, 1, 110)
+        assert curve.p_detect[[29, 30, 70, 100]].tolist() == pytest.approx([0, 0.25, 0.25, 0.1])
+        assert curve.p_detect.size == 120
+        assert agent.last(Plan).r_eff_m == ()
+        fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
+        assert agent.last(Curve).track == 1
 
 
 class TestSpacingAtItsLimits:

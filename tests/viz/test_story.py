@@ -102,6 +102,10 @@ def test_the_run_is_introduced() -> None:
             line("track 4: r_eff 130 m, best P_d 0.43"),
         ),
         (
+            said(CURVE, Curve(0, 1.0, np.array([0.0, 0.5]), 120), vehicle="primary"),
+            line("earlier missions: r_eff 120 m, best P_d 0.50"),
+        ),
+        (
             said(CURVE, Curve(4, 5.0, np.array([]), 0), vehicle="primary"),
             line("track 4: no range is admissible", warns=True),
         ),

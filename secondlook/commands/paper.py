@@ -1,0 +1,90 @@
+"""`secondlook paper`: the paper's experiments, its tables and figures beside ours."""
+
+from __future__ import annotations
+
+import json
+import sys
+from concurrent.futures.process import BrokenProcessPool
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+
+from secondlook.errors import UserError
+from secondlook.paper.extra import require_extra
+from secondlook.paper.measured import MeasuredMission
+from secondlook.paper.published import PublishedMission, published_missions
+from secondlook.paper.report import as_json as entries_of
+from secondlook.paper.report import differing_decisions, mean_difference, tables
+from secondlook.paper.side_by_side import measure_all
+from secondlook.processes import RunFailedError
+from secondlook.signals import signals_interrupt
+
+FAILED = 1
+
+
+def paper(
+    out: Annotated[Path | None, typer.Option(help="Folder for the figures, as PNG; none are drawn without.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    seeds: Annotated[int, typer.Option(min=1, max=1000, help="Runs of the six missions, to tell the spread.")] = 1,
+) -> None:
+    """Fly the paper's three experiments, and compare its tables with what comes of them."""
+    require_extra()
+    if out is not None:
+        _make(out)
+    runs = _measure(seeds, shown=sys.stderr.isatty() and not as_json)
+    if as_json:
+        typer.echo(json.dumps(entries_of(runs), indent=2))
+    else:
+        console = Console(soft_wrap=True, highlight=False)
+        for table in tables(runs):
+            console.print(table, "")
+        difference = mean_difference(runs[0])
+        console.print(f"The twelve means of Table 2 differ from the paper's by {difference:.4f} on average.")
+    if out is not None:
+        # Only who draws needs matplotlib.
+        files = import_module("secondlook.paper.figures").draw_all(runs[0], out)
+        if not as_json:
+            typer.echo(f"Figures: {', '.join(str(file) for file in files)}")
+    differing = differing_decisions(runs)
+    if differing:
+        sys.stderr.write("Decisions differ from the paper's:\n" + "".join(f"  {line}\n" for line in differing))
+        raise typer.Exit(FAILED)
+
+
+def seed_of(run: int, mission: int) -> int:
+    """Every mission has a sea of its own: also those that fly the same tracks."""
+    return 1 + run * len(published_missions()) + mission
+
+
+def _measure(runs: int, *, shown: bool) -> list[list[MeasuredMission]]:
+    missions: list[tuple[PublishedMission, int]] = [
+        (mission, seed_of(run, index)) for run in range(runs) for index, mission in enumerate(published_missions())
+    ]
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("missions"))
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
+        task = progress.add_task("paper", total=len(missions))
+        try:
+            with signals_interrupt():
+                measured = measure_all(missions, lambda done: progress.update(task, completed=done))
+        except RunFailedError as error:
+            failure = str(error)
+        except BrokenProcessPool:
+            failure = "a process that measured a mission has died"
+        except KeyboardInterrupt:
+            failure = "interrupted"
+        else:
+            each = len(published_missions())
+            return [measured[start : start + each] for start in range(0, len(measured), each)]
+    sys.stderr.write(f"{failure}\n")
+    raise typer.Exit(FAILED)
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error

@@ -1,0 +1,1 @@
+"""The paper beside the program: its three experiments flown, its tables and figures made anew."""

@@ -1,0 +1,25 @@
+"""Is predicted risk true? As many targets are missed as the map says; `bench/predicted_risk.py` asks more missions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from missions import fly_scenario
+
+from secondlook.scenario import load_scenario
+
+HALF_THE_AREA = "area.polygon_m=[[0, 0], [600, 0], [600, 400], [0, 400]]"
+
+
+@pytest.mark.parametrize("scenario", ["tellaro", "patchy"])
+def test_the_share_of_targets_missed_is_the_mean_residual_risk_where_they_lie(scenario: str) -> None:
+    settings = (HALF_THE_AREA, "targets.count=1000")
+    met = [fly_scenario(load_scenario(scenario, settings, seed)).metrics.targets_met() for seed in range(1, 5)]
+    predicted, true = (np.concatenate(values) for values in zip(*met, strict=True))
+    assert true.size == 4000
+    # 4000 targets: the standard error of the share is below 0.008.
+    assert true.mean() == pytest.approx(predicted.mean(), abs=0.025)
+    # Not only on average: of those said to be safest and of those said to be worst.
+    safest, worst = predicted <= np.quantile(predicted, 0.25), predicted >= np.quantile(predicted, 0.75)
+    for part in (safest, worst):
+        assert true[part].mean() == pytest.approx(predicted[part].mean(), abs=0.05)
