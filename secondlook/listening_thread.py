@@ -9,18 +9,21 @@ from comms.node import Listener
 from comms.routing import Routing
 from comms.zenoh_host import ListenerHost
 from comms.zenoh_session import open_client
+from secondlook.observer import RunStopped
 
 
 class ListeningThread:
     """Listens at the hub, under a node's id as host and user name, from `start` to the run's end or to `stop`.
 
-    Whatever happens, the listener is closed by then. `error` is what went wrong.
+    Whatever happens, the listener is closed by then. `error` is what went wrong; `stopped`: the listener has raised
+    RunStopped.
     """
 
     def __init__(
         self, node_id: str, listener: Listener, keys: RunKeys, routing: Routing, password: str, patience_s: float
     ) -> None:
         self.error: Exception | None = None
+        self.stopped = False
         self._node_id = node_id
         self._listener = listener
         self._keys = keys
@@ -66,6 +69,9 @@ class ListeningThread:
                 )
                 if self._stopping.is_set():
                     self._host.interrupt()
-                self._host.run()
+                try:
+                    self._host.run()
+                except RunStopped:
+                    self.stopped = True
         except Exception as error:
             self.error = error

@@ -20,7 +20,7 @@ from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.log_file import log_to_file
 from secondlook.node_spec import NodeSpec, make_node, make_nodes
-from secondlook.observer import Observer, Progress
+from secondlook.observer import Observer, Progress, RunStopped, Watch
 from secondlook.processes import Processes, RunFailedError
 from secondlook.scenario import Scenario
 from secondlook.signals import signals_interrupt
@@ -36,7 +36,8 @@ class RunOptions:
     """`folder`: where the files of the run go; it exists. `processes`: see `host_plans.plan_hosts`. `record`: with
     recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
     shows the mission while it runs, see `viz.live_server.LiveServer`. `faults`, `events`: what goes wrong on purpose;
-    with events each node concerned has a process of its own."""
+    with events each node concerned has a process of its own. `watch`: told each message in the order of sending; by
+    raising `RunStopped` it ends the run early, which is no failure."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -46,6 +47,7 @@ class RunOptions:
     live_pipe: Path | None = None
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
+    watch: Watch | None = None
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -59,7 +61,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     fleet = build_fleet(scenario, record=options.record)
     timeline(options.events, Routing(fleet.roster))  # refuses what does not fit
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
-    observer = Observer(options.folder, with_messages=options.record, progress=options.progress)
+    observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
     run = _Run(fleet, observer, options)
     result, failure = None, None
     try:
@@ -67,6 +69,8 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
             result = run.on_local() if options.bus == "local" else run.on_zenoh()
     except (NodeError, RunawayError, RunFailedError) as error:
         ending, failure = "failed", str(error)
+    except RunStopped:
+        ending = "stopped"
     except KeyboardInterrupt:
         ending, failure = "interrupted", f"interrupted at {observer.metrics.now_ms / 1000:.0f} s of the mission"
     else:

@@ -15,21 +15,30 @@ from secondlook.mission_files import MissionFiles
 PROGRESS_EVERY_MS = 10_000
 
 Progress = Callable[[Metrics], None]
+Watch = Callable[[Received], None]
+
+
+class RunStopped(BaseException):
+    """Raised by a watch that has seen enough, to end the run early; not an error."""
 
 
 class Observer:
     """A listener that writes messages.mpk, events.jsonl and at the end risk.npz into `folder`.
 
-    `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds.
+    `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds. `watch` is told each
+    message, last of all, and may raise RunStopped.
     """
 
-    def __init__(self, folder: Path, *, with_messages: bool, progress: Progress | None = None) -> None:
+    def __init__(
+        self, folder: Path, *, with_messages: bool, progress: Progress | None = None, watch: Watch | None = None
+    ) -> None:
         self.metrics = Metrics()
         self.messages: Counter[str] = Counter()
         self._folder = folder
         self._files = MissionFiles(folder, with_messages=with_messages)
         self._progress = progress
         self._progress_due_ms = 0
+        self._watch = watch
 
     def on_message(self, received: Received) -> None:
         """Takes one message."""
@@ -39,6 +48,8 @@ class Observer:
         if self._progress is not None and self.metrics.now_ms >= self._progress_due_ms:
             self._progress_due_ms = self.metrics.now_ms + PROGRESS_EVERY_MS
             self._progress(self.metrics)
+        if self._watch is not None:
+            self._watch(received)
 
     def close(self) -> None:
         """Writes what is held; also after an interrupted run."""

@@ -22,6 +22,7 @@ from secondlook.fleet import Fleet
 from secondlook.host_plans import HUB, OBSERVER, RECORDER, plan_hosts
 from secondlook.listening_thread import ListeningThread
 from secondlook.node_spec import NodeSpec
+from secondlook.observer import RunStopped
 from secondlook.verdict import Verdict
 
 LOOK_EVERY_S = 0.1
@@ -93,7 +94,7 @@ class Processes:
         return {host: child.pid for host, child in self._children.items()}
 
     def run(self) -> BusResult:
-        """Starts all, waits for the run's end; raises RunFailedError."""
+        """Starts all, waits for the run's end; raises RunFailedError, and RunStopped where the observer does."""
         self._start_all()
         self._hub_heard_s = time.monotonic()
         while True:
@@ -101,6 +102,8 @@ class Processes:
                 if "result" in words:
                     return self._end(words["result"])
                 self._take(child, words)
+            if self._listening.stopped:
+                raise RunStopped
             now_s = time.monotonic()
             for child in self._children.values():
                 fate = None if child.host in self._killed else child.fate()

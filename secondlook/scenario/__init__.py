@@ -1,11 +1,11 @@
 """Scenarios: what a mission is made of, read from YAML, validated, with every mistake told by line.
 
-Use `load_scenario`, `bundled_scenarios`, `scenario_hash` and the classes of the model from here.
+Use `load_scenario`, `make_scenario`, `bundled_scenarios`, `scenario_hash` and the classes of the model from here.
 """
 
 from secondlook.scenario.area import Area
 from secondlook.scenario.errors import Place, Problem, ScenarioError
-from secondlook.scenario.load import bundled_scenarios, load_scenario
+from secondlook.scenario.load import bundled_scenarios, load_scenario, make_scenario
 from secondlook.scenario.model import (
     Coordinator,
     Mission,
@@ -36,5 +36,6 @@ __all__ = [
     "UniformSeabed",
     "bundled_scenarios",
     "load_scenario",
+    "make_scenario",
     "scenario_hash",
 ]

@@ -9,11 +9,12 @@ from pathlib import Path
 from pydantic import BaseModel, ValidationError
 
 from secondlook.scenario import bundled
+from secondlook.scenario.dialect import Value
 from secondlook.scenario.errors import Place, Problem, ScenarioError
 from secondlook.scenario.explain import explain, nearest
 from secondlook.scenario.model import Scenario
 from secondlook.scenario.overrides import override
-from secondlook.scenario.reader import LARGEST_FILE_BYTES, decode, read
+from secondlook.scenario.reader import LARGEST_FILE_BYTES, Document, decode, read
 
 
 def load_scenario(
@@ -30,7 +31,20 @@ def load_scenario(
         ScenarioError: there is no such scenario, or it cannot be used; all that is wrong, one sentence a line.
     """
     source = os.fspath(name_or_path)
-    document = override(read(_text(source), source), overrides, seed)
+    return _validated(override(read(_text(source), source), overrides, seed))
+
+
+def make_scenario(data: dict[str, Value], overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
+    """The scenario that plain data says, as a file's content would; overrides, seed and errors as `load_scenario`."""
+    return _validated(override(Document(data, {(): Place("scenario")}), overrides, seed))
+
+
+def bundled_scenarios() -> list[tuple[str, str]]:
+    """Name and description of each bundled scenario, sorted by name."""
+    return [(name, load_scenario(name).description) for name in bundled.scenario_names()]
+
+
+def _validated(document: Document) -> Scenario:
     classes: dict[int, type[BaseModel]] = {}
     problems = document.problems
     try:
@@ -40,11 +54,6 @@ def load_scenario(
     if problems:
         raise ScenarioError(problems)
     return scenario
-
-
-def bundled_scenarios() -> list[tuple[str, str]]:
-    """Name and description of each bundled scenario, sorted by name."""
-    return [(name, load_scenario(name).description) for name in bundled.scenario_names()]
 
 
 def _text(source: str) -> str:

@@ -1,0 +1,202 @@
+"""A fleet in the hands of a test: flown to the end or up to a condition, with whatever is to go wrong on the way."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+from comms.node import Received
+from secondlook.errors import UserError
+from secondlook.mission import Bus, RunOptions, run_mission
+from secondlook.mission_files import NOT_FOR_PEOPLE
+from secondlook.observer import RunStopped
+from secondlook.testing.flight import Flight
+from secondlook.testing.heard import Heard
+from secondlook.testing.sources import Overrides, ScenarioSource, scenario_from
+
+Condition = Callable[[Heard], bool]
+"""Asked after each message, with all that was heard so far."""
+
+BUSES: tuple[Bus, ...] = ("local", "zenoh")
+_LAST_HEARD = 5
+_LONGEST = 160
+
+
+class NotRepeatedError(AssertionError):
+    """The same mission has gone another way: a part of it is not deterministic. The text says where."""
+
+
+class Fleet:
+    """The fleet of a scenario.
+
+    Args:
+        scenario, overrides, seed: see `scenario_from`.
+        folder: where the files of each flight go, each into a folder of its own.
+        bus: `local`, all in this process, or `zenoh`, a process for each node.
+        processes: on `zenoh`, over how many processes the nodes are spread.
+        record: with a recording, mission.rrd, and messages.mpk.
+
+    A mission repeats exactly. `run_until` makes use of that: it ends the flight when its condition holds, and a later
+    `run` or `run_until` flies the same mission again from its start, and on from there. That it is the same until then
+    is verified message for message; NotRepeatedError tells where it is not. After `run` the next flight begins anew.
+
+    Raises UserError, in one sentence, for what cannot be used.
+    """
+
+    def __init__(
+        self,
+        scenario: ScenarioSource = "tellaro",
+        *,
+        folder: Path,
+        overrides: Overrides = (),
+        seed: int | None = None,
+        bus: Bus = "local",
+        processes: int | None = None,
+        record: bool = False,
+    ) -> None:
+        self.scenario = scenario_from(scenario, overrides, seed)
+        self.bus = _checked(bus)
+        self.folder = folder
+        self._processes = processes
+        self._record = record
+        self._heard: Heard | None = None
+        self._until_now: list[Received] = []
+
+    @property
+    def now_s(self) -> float:
+        """How far the mission has come: the simulated time at which `run_until` has ended it, 0 before."""
+        return self._until_now[-1].header.sent_ms / 1000 if self._until_now else 0.0
+
+    @property
+    def heard(self) -> Heard:
+        """All that was said in the latest flight, also in one that has failed."""
+        if self._heard is None:
+            raise UserError("nothing was heard yet: the fleet was not flown")
+        return self._heard
+
+    def messages(self, keys: str = "*") -> list[Received]:
+        """The messages of the latest flight whose keys are like a pattern; see `Heard.messages`."""
+        return self.heard.messages(keys)
+
+    def run(self, *, bus: Bus | None = None) -> Flight:
+        """Flies the mission to its end, on another bus than the fleet's if one is given.
+
+        Raises RunFailedError, in one sentence, if it fails.
+        """
+        flight, _ = self._fly(_Watch(self._new_heard(), self._until_now), self.bus if bus is None else _checked(bus))
+        self._until_now = []
+        return flight
+
+    def run_until(self, condition: Condition, *, timeout_s: float) -> Flight:
+        """Flies on until the condition holds.
+
+        `timeout_s`: simulated seconds from `now_s` in which it must come to hold; else AssertionError tells what was
+        heard last. The condition is asked after each message from now on, in the order of sending, which is the same
+        on both buses.
+        """
+        if not timeout_s > 0:
+            raise UserError(f"timeout_s: {timeout_s} is not allowed; must be more than 0 simulated seconds")
+        until_s = self.now_s + timeout_s
+        flight, holds = self._fly(_Watch(self._new_heard(), self._until_now, condition, until_s), self.bus)
+        if not holds:
+            when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {flight.end_s:g} s"
+            raise AssertionError(f"the condition did not come to hold {when}; heard last:\n{_last_words(flight.heard)}")
+        self._until_now = list(flight.heard)
+        return flight
+
+    def _new_heard(self) -> Heard:
+        return Heard(tuple(self.scenario.vehicles))
+
+    def _fly(self, watch: _Watch, bus: Bus) -> tuple[Flight, bool]:
+        folder = next(one for n in count(1) if not (one := self.folder / f"flight-{n}").exists())
+        folder.mkdir(parents=True)
+        self._heard = watch.heard
+        summary = run_mission(
+            self.scenario, RunOptions(folder, bus, self._processes, record=self._record, watch=watch.take)
+        )
+        if watch.error is not None:
+            raise watch.error
+        watch.check_all_repeated()
+        return Flight(self.scenario, bus, folder, watch.heard, summary), watch.holds
+
+
+class _Watch:
+    """Keeps what is heard, holds its beginning to what was heard before, and ends the run at the condition or when
+    the time is over."""
+
+    def __init__(
+        self,
+        heard: Heard,
+        until_now: list[Received],
+        condition: Condition | None = None,
+        until_s: float = math.inf,
+    ) -> None:
+        self.heard = heard
+        self.holds = False
+        self.error: Exception | None = None
+        self._until_now = until_now
+        self._condition = condition
+        self._until_ms = until_s * 1000
+
+    def take(self, received: Received) -> None:
+        """Takes one message; raises RunStopped."""
+        try:
+            self._take(received)
+        except Exception as error:  # of the condition, say: told to the test, not as a failure of the observer's
+            self.error = error
+            raise RunStopped from error
+
+    def _take(self, received: Received) -> None:
+        place = len(self.heard)
+        if place < len(self._until_now):
+            before = self._until_now[place]
+            if (before.key, before.payload) != (received.key, received.payload):
+                raise NotRepeatedError(_difference(place, before, received))
+            self.heard.take(received)
+        elif received.header.sent_ms > self._until_ms:
+            raise RunStopped
+        else:
+            self.heard.take(received)
+            if self._condition is not None and self._condition(self.heard):
+                self.holds = True
+                raise RunStopped
+
+    def check_all_repeated(self) -> None:
+        """Raises NotRepeatedError where the run has ended before it came to what is new."""
+        if len(self.heard) < len(self._until_now):
+            raise NotRepeatedError(_difference(len(self.heard), self._until_now[len(self.heard)], None))
+
+
+def first_difference(before: list[Received], after: list[Received]) -> str | None:
+    """In words, where one mission parts from another; None where they are the same."""
+    for place in range(max(len(before), len(after))):
+        one, other = (said[place] if place < len(said) else None for said in (before, after))
+        if one is None or other is None or (one.key, one.payload) != (other.key, other.payload):
+            return _difference(place, one, other)
+    return None
+
+
+def _difference(place: int, before: Received | None, after: Received | None) -> str:
+    was, now = (_told(one) if one is not None else "nothing more" for one in (before, after))
+    return (
+        f"the mission does not repeat: after {place} messages that agree there was\n  {was}\nand now there is\n  {now}"
+    )
+
+
+def _last_words(heard: Heard) -> str:
+    said = [one for one in heard if one.topic not in NOT_FOR_PEOPLE][-_LAST_HEARD:]
+    return "\n".join(f"  {_told(one)}" for one in said) or "  nothing"
+
+
+def _told(one: Received) -> str:
+    said = repr(one.message)
+    said = said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
+    return f"{one.key} from {one.header.sender} at {one.header.sent_ms / 1000:.3f} s: {said}"
+
+
+def _checked(bus: Bus) -> Bus:
+    if bus not in BUSES:
+        raise UserError(f"bus: {bus!r} is not allowed; must be {' or '.join(BUSES)}")
+    return bus
