@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test pictures lock clean
+.PHONY: run test pictures golden lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -28,6 +28,15 @@ pictures: .venv/.test-ready
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png
 	@$(BIN)/secondlook paper --out docs/paper
 	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
+
+# The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
+GOLDEN := tests/secondlook/golden
+golden: .venv/.run-ready
+	@rm -rf runs/golden
+	@$(BIN)/secondlook run tests/support/brief.yaml --bus local --out runs/golden
+	@mkdir -p $(GOLDEN)
+	@cp runs/golden/scenario.yaml $(GOLDEN)
+	@gzip --best --no-name --stdout runs/golden/messages.mpk >$(GOLDEN)/messages.mpk.gz
 
 test: .venv/.test-ready
 	$(BIN)/ruff check

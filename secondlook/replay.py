@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
 from comms.clock import WRAP_UP_MS
+from comms.codec import decode
 from comms.node import Node, Received
 from comms.routing import Routing
 from comms.runner import Intake, NodeRunner, Outgoing
@@ -34,12 +37,20 @@ class ReplayResult:
 
 
 def replay_node(
-    node_id: str, node: Node, routing: Routing, recording: Sequence[tuple[str, bytes]], *, whole: bool
+    node_id: str,
+    node: Node,
+    routing: Routing,
+    recording: Sequence[tuple[str, bytes]],
+    *,
+    whole: bool,
+    tolerance: float = 0.0,
 ) -> ReplayResult:
     """Feeds a node its mail and wake-ups and compares what it publishes with what the recording has from it.
 
     `recording`: key and payload of every message. `whole`: the mission was recorded to its end; of one that was cut off
-    only what the recording still holds is compared. Raises NodeError where the node fails.
+    only what the recording still holds is compared. `tolerance`: 0 compares byte for byte; else numbers with a fraction
+    may differ by as much, absolutely or relatively, and all else must be the same. Raises NodeError where the node
+    fails.
     """
     intake = Intake(routing)
     messages = [received for key, payload in recording if (received := intake.open(key, payload)) is not None]
@@ -66,7 +77,7 @@ def replay_node(
                 if not whole and now_ms >= last_ms:
                     return ReplayResult(agreed, None)
                 return ReplayResult(agreed, _difference(agreed, now_ms, None, said))
-            if (said.key, said.payload) != (expected[agreed].key, expected[agreed].payload):
+            if not _agrees(expected[agreed], said, tolerance):
                 return ReplayResult(agreed, _difference(agreed, now_ms, expected[agreed], said))
             agreed += 1
         while times and times[-1] <= now_ms:
@@ -75,6 +86,30 @@ def replay_node(
     if agreed < len(expected):
         return ReplayResult(agreed, _difference(agreed, expected[agreed].header.sent_ms, expected[agreed], None))
     return ReplayResult(agreed, None)
+
+
+def _agrees(recorded: Received, said: Outgoing, tolerance: float) -> bool:
+    if recorded.key != said.key or tolerance == 0.0:
+        return (recorded.key, recorded.payload) == (said.key, said.payload)
+    header, message = decode(said.payload, said.route.topic.message)
+    return header == recorded.header and _near(recorded.message, message, tolerance)
+
+
+def _near(one: Any, other: Any, tolerance: float) -> bool:
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, float):
+        return math.isclose(one, other, rel_tol=tolerance, abs_tol=tolerance)
+    if isinstance(one, np.ndarray):
+        if one.shape != other.shape or one.dtype != other.dtype:
+            return False
+        whole = not np.issubdtype(one.dtype, np.floating)
+        return bool((one == other).all() if whole else np.allclose(one, other, rtol=tolerance, atol=tolerance))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(_near(*pair, tolerance) for pair in zip(one, other, strict=True))
+    if is_dataclass(one):
+        return all(_near(getattr(one, name.name), getattr(other, name.name), tolerance) for name in fields(one))
+    return bool(one == other)
 
 
 def _difference(agreed: int, now_ms: int, recorded: Received | None, replayed: Outgoing | None) -> Difference:

@@ -21,6 +21,9 @@ DIFFERS = 1
 def replay(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     node: Annotated[str, typer.Option(help="Whom to replay: a vehicle's id, coordinator or world.")] = "coordinator",
+    tolerance: Annotated[
+        float, typer.Option(min=0, max=1, help="By how much numbers with a fraction may differ; 0: byte for byte.")
+    ] = 0.0,
 ) -> None:
     """Feed one node of a recorded mission what it heard, and compare what it says with the recording."""
     scenario_file = run / "scenario.yaml"
@@ -35,12 +38,14 @@ def replay(
             Routing(fleet.roster),
             recording,
             whole=(run / "summary.json").exists(),
+            tolerance=tolerance,
         )
     except NodeError as error:
         typer.echo(f"{error}", err=True)
         raise typer.Exit(DIFFERS) from error
     if result.difference is None:
-        typer.echo(f"{node}: all {result.agreed} messages are said again, byte for byte")
+        how = f"numbers within {tolerance:g}" if tolerance else "byte for byte"
+        typer.echo(f"{node}: all {result.agreed} messages are said again, {how}")
         return
     difference = result.difference
     typer.echo(
