@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -16,6 +17,7 @@ from comms.local_bus import run_local
 from comms.result import BusResult, Ending
 from comms.routing import Routing
 from comms.runner import NodeError
+from comms.zenoh_session import PATIENCE_S
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.log_file import log_to_file
@@ -25,7 +27,10 @@ from secondlook.processes import Processes, RunFailedError
 from secondlook.scenario import Scenario
 from secondlook.signals import signals_interrupt
 from secondlook.summary import summarise
+from secondlook.watchdog import NoReturn, Watchdog, WatchedNode
 from viz.recorder_config import RecorderConfig
+
+log = logging.getLogger("secondlook.mission")
 
 Bus = Literal["zenoh", "local"]
 LOGS = "logs"
@@ -37,7 +42,8 @@ class RunOptions:
     recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
     shows the mission while it runs, see `viz.live_server.LiveServer`. `faults`, `events`: what goes wrong on purpose;
     with events each node concerned has a process of its own. `watch`: told each message in the order of sending; by
-    raising `RunStopped` it ends the run early, which is no failure."""
+    raising `RunStopped` it ends the run early, which is no failure. `patience_s`: wall time after which a node that
+    does not answer is given up."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -48,6 +54,7 @@ class RunOptions:
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
     watch: Watch | None = None
+    patience_s: float = PATIENCE_S
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -110,15 +117,20 @@ class _Run:
         except NodeError:
             self._observer.close()
             raise
-        return run_local(
-            Routing(fleet.roster),
-            {node_id: partial(make_node, node_id, spec) for node_id, spec in fleet.specs.items()},
-            {OBSERVER: self._observer, **recorder},
-            fleet.run_info,
-            fleet.time_limit_ms,
-            faults=options.faults,
-            events=options.events,
-        )
+        try:
+            with Watchdog(options.patience_s) as watchdog:
+                return run_local(
+                    Routing(fleet.roster),
+                    {node_id: partial(_make, node_id, spec, watchdog) for node_id, spec in fleet.specs.items()},
+                    {OBSERVER: self._observer, **recorder},
+                    fleet.run_info,
+                    fleet.time_limit_ms,
+                    faults=options.faults,
+                    events=options.events,
+                )
+        except NoReturn as error:
+            log.error("%s; it was at", error, exc_info=error)
+            raise RunFailedError(str(error)) from None
 
     def on_zenoh(self) -> BusResult:
         options, recorder = self._options, self._recorder.get(RECORDER)
@@ -128,11 +140,16 @@ class _Run:
             self._observer,
             recorder,
             options.processes,
+            patience_s=options.patience_s,
             faults=options.faults,
             events=options.events,
         ) as processes:
             self.processes = processes.count
             return processes.run()
+
+
+def _make(node_id: str, spec: NodeSpec, watchdog: Watchdog) -> WatchedNode:
+    return WatchedNode(node_id, make_node(node_id, spec), watchdog)
 
 
 def _not_over(result: BusResult, scenario: Scenario) -> str:

@@ -8,6 +8,7 @@ from itertools import count
 from pathlib import Path
 
 from comms.node import Received
+from comms.zenoh_session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.mission import Bus, RunOptions, run_mission
 from secondlook.mission_files import NOT_FOR_PEOPLE
@@ -37,6 +38,7 @@ class Fleet:
         bus: `local`, all in this process, or `zenoh`, a process for each node.
         processes: on `zenoh`, over how many processes the nodes are spread.
         record: with a recording, mission.rrd, and messages.mpk.
+        patience_s: wall time after which a node that does not answer is given up; `math.inf` to step through one.
 
     A mission repeats exactly. `run_until` makes use of that: it ends the flight when its condition holds, and a later
     `run` or `run_until` flies the same mission again from its start, and on from there. That it is the same until then
@@ -55,12 +57,14 @@ class Fleet:
         bus: Bus = "local",
         processes: int | None = None,
         record: bool = False,
+        patience_s: float = PATIENCE_S,
     ) -> None:
         self.scenario = scenario_from(scenario, overrides, seed)
         self.bus = _checked(bus)
         self.folder = folder
         self._processes = processes
         self._record = record
+        self._patience_s = patience_s
         self._heard: Heard | None = None
         self._until_now: list[Received] = []
 
@@ -113,9 +117,10 @@ class Fleet:
         folder = next(one for n in count(1) if not (one := self.folder / f"flight-{n}").exists())
         folder.mkdir(parents=True)
         self._heard = watch.heard
-        summary = run_mission(
-            self.scenario, RunOptions(folder, bus, self._processes, record=self._record, watch=watch.take)
+        options = RunOptions(
+            folder, bus, self._processes, record=self._record, watch=watch.take, patience_s=self._patience_s
         )
+        summary = run_mission(self.scenario, options)
         if watch.error is not None:
             raise watch.error
         watch.check_all_repeated()
