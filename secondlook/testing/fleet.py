@@ -8,14 +8,17 @@ from itertools import count
 from pathlib import Path
 
 from comms.node import Received
+from comms.routing import Routing
 from comms.zenoh_session import PATIENCE_S
 from secondlook.errors import UserError
+from secondlook.fleet import build_fleet
 from secondlook.mission import Bus, RunOptions, run_mission
 from secondlook.mission_files import NOT_FOR_PEOPLE
 from secondlook.observer import RunStopped
 from secondlook.testing.flight import Flight
 from secondlook.testing.heard import Heard
 from secondlook.testing.sources import Overrides, ScenarioSource, scenario_from
+from secondlook.testing.trouble import Trouble
 
 Condition = Callable[[Heard], bool]
 """Asked after each message, with all that was heard so far."""
@@ -29,8 +32,8 @@ class NotRepeatedError(AssertionError):
     """The same mission has gone another way: a part of it is not deterministic. The text says where."""
 
 
-class Fleet:
-    """The fleet of a scenario.
+class Fleet(Trouble):
+    """The fleet of a scenario. What is to go wrong in it is scheduled with the methods of `Trouble`.
 
     Args:
         scenario, overrides, seed: see `scenario_from`.
@@ -38,11 +41,13 @@ class Fleet:
         bus: `local`, all in this process, or `zenoh`, a process for each node.
         processes: on `zenoh`, over how many processes the nodes are spread.
         record: with a recording, mission.rrd, and messages.mpk.
+        fault_seed: decides which messages are struck by faults that have a probability.
         patience_s: wall time after which a node that does not answer is given up; `math.inf` to step through one.
 
     A mission repeats exactly. `run_until` makes use of that: it ends the flight when its condition holds, and a later
-    `run` or `run_until` flies the same mission again from its start, and on from there. That it is the same until then
-    is verified message for message; NotRepeatedError tells where it is not. After `run` the next flight begins anew.
+    `run` or `run_until` flies the same mission again from its start, and on from there with the trouble that was
+    scheduled since. That it is the same until then is verified message for message; NotRepeatedError tells where it is
+    not. After `run` the next flight begins anew, and trouble may be scheduled at any time again.
 
     Raises UserError, in one sentence, for what cannot be used.
     """
@@ -57,9 +62,11 @@ class Fleet:
         bus: Bus = "local",
         processes: int | None = None,
         record: bool = False,
+        fault_seed: int = 0,
         patience_s: float = PATIENCE_S,
     ) -> None:
         self.scenario = scenario_from(scenario, overrides, seed)
+        super().__init__(Routing(build_fleet(self.scenario, record=False).roster), fault_seed)
         self.bus = _checked(bus)
         self.folder = folder
         self._processes = processes
@@ -90,7 +97,7 @@ class Fleet:
         Raises RunFailedError, in one sentence, if it fails.
         """
         flight, _ = self._fly(_Watch(self._new_heard(), self._until_now), self.bus if bus is None else _checked(bus))
-        self._until_now = []
+        self._until_now, self._from_ms = [], 0
         return flight
 
     def run_until(self, condition: Condition, *, timeout_s: float) -> Flight:
@@ -108,6 +115,7 @@ class Fleet:
             when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {flight.end_s:g} s"
             raise AssertionError(f"the condition did not come to hold {when}; heard last:\n{_last_words(flight.heard)}")
         self._until_now = list(flight.heard)
+        self._from_ms = flight.heard.now_ms + 1
         return flight
 
     def _new_heard(self) -> Heard:
@@ -117,14 +125,22 @@ class Fleet:
         folder = next(one for n in count(1) if not (one := self.folder / f"flight-{n}").exists())
         folder.mkdir(parents=True)
         self._heard = watch.heard
+        faults, events = self.faults, self.events
         options = RunOptions(
-            folder, bus, self._processes, record=self._record, watch=watch.take, patience_s=self._patience_s
+            folder,
+            bus,
+            self._processes,
+            record=self._record,
+            faults=faults,
+            events=events,
+            watch=watch.take,
+            patience_s=self._patience_s,
         )
         summary = run_mission(self.scenario, options)
         if watch.error is not None:
             raise watch.error
         watch.check_all_repeated()
-        return Flight(self.scenario, bus, folder, watch.heard, summary), watch.holds
+        return Flight(self.scenario, bus, folder, watch.heard, summary, self.routing, faults, events), watch.holds
 
 
 class _Watch:

@@ -7,8 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from comms.events import NodeEvent
+from comms.faults import NO_FAULTS, Faults
 from comms.messages import RunInfo
 from comms.node import Received
+from comms.routing import Routing
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray
 from secondlook.metrics import Metrics
@@ -20,13 +23,17 @@ from secondlook.testing.heard import Heard
 @dataclass(frozen=True)
 class Flight:
     """`heard`: every message but the clock's control words, in the order of sending. `summary`: summary.json's content.
-    `folder`: where the files of the run are."""
+    `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`: what went
+    wrong on purpose."""
 
     scenario: Scenario
     bus: Bus
     folder: Path
     heard: Heard
     summary: dict[str, Any]
+    routing: Routing
+    faults: Faults = NO_FAULTS
+    events: tuple[NodeEvent, ...] = ()
 
     @property
     def digest(self) -> str | None:

@@ -1,0 +1,165 @@
+"""What is to go wrong in a mission on purpose, and when: nodes killed, frozen, let in late; words lost, late, corrupt.
+
+The same trouble strikes alike in every flight and on every bus. Times are simulated seconds.
+"""
+
+from __future__ import annotations
+
+import math
+
+from comms.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
+from comms.faults import CutOff, FaultKind, Faults, MessageFault
+from comms.routing import Routing
+from secondlook.errors import UserError
+from secondlook.testing.patterns import key_pattern
+
+
+class Trouble:
+    """Schedules trouble for the fleet that `routing` describes; `seed` decides where what has a probability strikes.
+
+    Where no time is given, trouble begins now: at the moment at which `Fleet.run_until` has ended, or at the mission's
+    start. Before that moment nothing can be changed any more. UserError tells, in one sentence, what is not allowed.
+    """
+
+    def __init__(self, routing: Routing, seed: int) -> None:
+        self.routing = routing
+        self.events: tuple[NodeEvent, ...] = ()
+        self._seed = seed
+        self._message_faults: list[MessageFault] = []
+        self._cut_offs: list[CutOff] = []
+        self._from_ms = 0
+
+    @property
+    def faults(self) -> Faults:
+        """All faults on messages that are scheduled."""
+        return Faults(self._seed, self._message_faults, self._cut_offs)
+
+    def kill(self, node: str, *, at_s: float | None = None) -> None:
+        """The node, a vehicle's id or `coordinator`, is gone from then on; over Zenoh its process gets SIGKILL."""
+        self._plan(Kill(node, self._event_ms(at_s)))
+
+    def freeze(self, node: str, *, for_s: float, at_s: float | None = None) -> None:
+        """The node does nothing for a while and then finds its mail waiting; over Zenoh its process is stopped."""
+        at_ms = self._event_ms(at_s)
+        self._plan(Freeze(node, at_ms, at_ms + _span_ms("for_s", for_s)))
+
+    def join(self, node: str, *, at_s: float | None = None) -> None:
+        """A node that was killed comes back, started anew; one that was not has been absent until then."""
+        join = Join(node, self._event_ms(at_s))
+        if self._from_ms > 0 and node in absent_at_start([*self.events, join]) - absent_at_start(self.events):
+            raise UserError(f"join: {node!r} is not allowed; must be killed before, or be let in late from the start")
+        self._plan(join)
+
+    def cut_off(self, vehicle: str, *, for_s: float, from_s: float | None = None) -> None:
+        """For a while nothing crosses the water from the vehicle's agent or to it. Agent and vehicle go on talking."""
+        vehicles = self._vehicles()
+        if vehicle not in vehicles:
+            raise UserError(f"cut_off: {vehicle!r} is not allowed; must be one of {', '.join(vehicles)}")
+        from_ms = self._time_ms("from_s", from_s)
+        self._cut_offs.append(CutOff(vehicle, from_ms, from_ms + _span_ms("for_s", for_s)))
+
+    def drop(
+        self, keys: str, *, probability: float = 1.0, to: str = "", from_s: float | None = None, for_s: float = math.inf
+    ) -> None:
+        """Messages whose keys are like a pattern, `agent/*/coverage/*` say, are lost.
+
+        `probability`: for each message and reader by itself. `to`: the only reader concerned, by its node id; all if
+        left out. What is sent from `from_s` on, for `for_s`, is concerned. So it is with the faults that follow.
+        """
+        self._strike(FaultKind.DROP, keys, probability, to, from_s, for_s)
+
+    def repeat(
+        self,
+        keys: str,
+        *,
+        after_s: float = 1.0,
+        probability: float = 1.0,
+        to: str = "",
+        from_s: float | None = None,
+        for_s: float = math.inf,
+    ) -> None:
+        """Messages are delivered a second time, `after_s` later."""
+        self._strike(FaultKind.REPEAT, keys, probability, to, from_s, for_s, _span_ms("after_s", after_s))
+
+    def delay(
+        self,
+        keys: str,
+        *,
+        by_s: float,
+        probability: float = 1.0,
+        to: str = "",
+        from_s: float | None = None,
+        for_s: float = math.inf,
+    ) -> None:
+        """Messages are delivered `by_s` later."""
+        self._strike(FaultKind.DELAY, keys, probability, to, from_s, for_s, _span_ms("by_s", by_s))
+
+    def reorder(
+        self,
+        keys: str,
+        *,
+        within_s: float = 1.0,
+        probability: float = 1.0,
+        to: str = "",
+        from_s: float | None = None,
+        for_s: float = math.inf,
+    ) -> None:
+        """Messages are delivered later by anything up to `within_s`, so that others overtake them."""
+        self._strike(FaultKind.REORDER, keys, probability, to, from_s, for_s, _span_ms("within_s", within_s))
+
+    def corrupt(
+        self, keys: str, *, probability: float = 1.0, to: str = "", from_s: float | None = None, for_s: float = math.inf
+    ) -> None:
+        """Messages arrive with one byte changed."""
+        self._strike(FaultKind.CORRUPT, keys, probability, to, from_s, for_s)
+
+    def _strike(
+        self,
+        kind: FaultKind,
+        keys: str,
+        probability: float,
+        to: str,
+        from_s: float | None,
+        for_s: float,
+        delay_ms: int = 1,
+    ) -> None:
+        key_pattern(keys, self._vehicles())
+        readers = [one.node_id for one in self.routing.roster if not one.listens_only and one.role.value != "clock"]
+        if to and to not in readers:
+            raise UserError(f"{kind.value}: to: {to!r} is not allowed; must be one of {', '.join(readers)}")
+        if not 0 <= probability <= 1:
+            raise UserError(f"{kind.value}: probability: {probability} is not allowed; must be from 0 to 1")
+        from_ms = self._time_ms("from_s", from_s)
+        until_ms = None if for_s == math.inf else from_ms + _span_ms("for_s", for_s)
+        self._message_faults.append(MessageFault(kind, keys, probability, to, from_ms, until_ms, delay_ms))
+
+    def _plan(self, event: NodeEvent) -> None:
+        events = (*self.events, event)
+        try:
+            timeline(events, self.routing)
+        except ValueError as error:
+            raise UserError(str(error)) from error
+        self.events = events
+
+    def _event_ms(self, at_s: float | None) -> int:
+        return max(1, self._time_ms("at_s", at_s))
+
+    def _time_ms(self, name: str, time_s: float | None) -> int:
+        if time_s is None:
+            return self._from_ms
+        if not 0 <= time_s < math.inf:
+            raise UserError(f"{name}: {time_s} is not allowed; must be simulated seconds since the mission's start")
+        time_ms = round(time_s * 1000)
+        if time_ms < self._from_ms:
+            now_s = (self._from_ms - 1) / 1000
+            raise UserError(f"{name}: {time_s} is not allowed; must be after now, which is {now_s:g} s of the mission")
+        return time_ms
+
+    def _vehicles(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(vehicle for node in self.routing.roster for vehicle in node.vehicles))
+
+
+def _span_ms(name: str, span_s: float) -> int:
+    if not 0.001 <= span_s < math.inf:
+        raise UserError(f"{name}: {span_s} is not allowed; must be at least 0.001 simulated seconds")
+    return round(span_s * 1000)

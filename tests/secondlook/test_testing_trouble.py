@@ -1,0 +1,226 @@
+"""Trouble on purpose: what a test schedules strikes when and whom it says, alike in every flight and on both buses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flights import BRIEF
+
+from comms.messages import AgentState
+from comms.node import Received
+from secondlook.errors import UserError
+from secondlook.testing import Fleet, Flight, Heard
+
+MakeFleet = Callable[..., Fleet]
+
+
+@pytest.fixture
+def brief(tmp_path: Path) -> MakeFleet:
+    """Makes a fleet of the brief mission."""
+    return lambda **options: Fleet(BRIEF, **{"folder": tmp_path / "flown", **options})
+
+
+def times_s(flight: Flight, sender: str) -> list[float]:
+    """When a node has said anything."""
+    return [one.header.sent_ms / 1000 for one in flight.heard if one.header.sender == sender]
+
+
+def first_task(heard: Heard) -> bool:
+    """The coordinator has offered a strip."""
+    return heard.last("coord/task/*") is not None
+
+
+class TestNodes:
+    def test_a_killed_node_says_nothing_more(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.kill("helper", at_s=60)
+        said_s = times_s(fleet.run(), "helper")
+        assert 50 < max(said_s) < 60
+
+    def test_one_that_joins_again_is_another_incarnation(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.kill("helper", at_s=60)
+        fleet.join("helper", at_s=70)
+        flight = fleet.run()
+        assert not any(60 <= at_s < 70 for at_s in times_s(flight, "helper"))
+        incarnations = [one.header.incarnation for one in flight.messages("agent/helper/*")]
+        assert set(incarnations) == {0, 1}
+        assert incarnations == sorted(incarnations)
+
+    def test_one_that_joins_late_was_absent(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.join("helper", at_s=30.5)
+        said_s = times_s(fleet.run(), "helper")
+        assert min(said_s) >= 30.5
+
+    def test_a_frozen_node_goes_on_later(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.freeze("primary", at_s=20, for_s=15)
+        said_s = times_s(fleet.run(), "primary")
+        assert not any(20 <= at_s < 35 for at_s in said_s)
+        assert any(35 <= at_s < 36 for at_s in said_s)
+
+    def test_a_vehicle_that_is_cut_off_is_not_heard_by_the_coordinator(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.cut_off("primary", from_s=10, for_s=80)
+        assert min(one.header.sent_ms for one in fleet.run().messages("coord/strip/*")) >= 90_000
+        assert any(10 <= at_s < 90 for at_s in times_s(fleet.run(), "primary"))
+
+
+class TestMessages:
+    @pytest.fixture
+    def hotspot(self, brief: MakeFleet) -> Received:
+        """What the primary says of a hotspot after 50.5 s."""
+        said = brief().run().messages("agent/*/hotspot/*")
+        return next(one for one in said if 50_500 < one.header.sent_ms < 99_000)
+
+    def test_what_is_lost_changes_the_mission(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.drop("agent/*/hotspot/*")
+        flight = fleet.run()
+        assert flight.messages("coord/strip/*") == []
+        assert flight.summary["dropped"] == {"lost by a fault": len(flight.messages("agent/*/hotspot/*"))}
+
+    @pytest.mark.parametrize(
+        ("schedule", "later_ms"),
+        [
+            (lambda fleet: fleet.drop("agent/*/hotspot/*"), []),
+            (lambda fleet: fleet.delay("agent/*/hotspot/*", by_s=2.5), [2500]),
+            (lambda fleet: fleet.repeat("agent/primary/*", after_s=3), [0, 3000]),
+            (lambda fleet: fleet.reorder("*", within_s=0.001), [1]),
+            (lambda fleet: fleet.corrupt("*/hotspot/?"), [0]),
+            (lambda fleet: fleet.drop("*", to="coordinator"), []),
+            (lambda fleet: fleet.drop("*", to="helper"), [0]),
+            (lambda fleet: fleet.drop("*", probability=0), [0]),
+            (lambda fleet: fleet.drop("agent/helper/*"), [0]),
+            (lambda fleet: fleet.drop("*", for_s=50), [0]),
+            (lambda fleet: fleet.drop("*", from_s=50), []),
+            (lambda fleet: fleet.drop("*", from_s=50, for_s=0.5), [0]),
+            (lambda fleet: fleet.cut_off("primary", from_s=50, for_s=100), []),
+            (lambda fleet: fleet.cut_off("helper", from_s=50, for_s=100), [0]),
+        ],
+    )
+    def test_faults_strike_as_scheduled(
+        self, brief: MakeFleet, hotspot: Received, schedule: Callable[[Fleet], None], later_ms: list[int]
+    ) -> None:
+        fleet = brief()
+        schedule(fleet)
+        deliveries = fleet.faults.deliveries("coordinator", hotspot, fleet.routing)
+        assert [one.later_ms for one in deliveries] == later_ms
+        assert any(one.payload != hotspot.payload for one in deliveries) == ("corrupt" in schedule.__code__.co_names)
+
+    def test_what_strikes_by_chance_strikes_again_alike_and_otherwise_with_another_seed(self, brief: MakeFleet) -> None:
+        digests = []
+        for fault_seed in (1, 1, 2):
+            fleet = brief(fault_seed=fault_seed)
+            fleet.drop("*", probability=0.2)
+            digests.append(fleet.run().digest)
+        assert digests[0] == digests[1] != digests[2]
+
+
+class TestInMidMission:
+    @pytest.mark.parametrize("bus", ["local", "zenoh"])
+    def test_trouble_from_now_on_leaves_what_was(self, brief: MakeFleet, bus: Any) -> None:
+        fleet = brief(bus=bus)
+        before = fleet.run_until(first_task, timeout_s=100)
+        fleet.kill("helper")
+        fleet.drop("agent/primary/coverage/*", probability=0.5)
+        flight = fleet.run()  # raises NotRepeatedError where what was is another
+        assert [one.payload for one in flight.heard[: len(before.heard)]] == [one.payload for one in before.heard]
+        assert max(times_s(flight, "helper")) <= before.heard.now_s
+        assert flight.summary["dropped"]["lost by a fault"] > 0
+        other = brief()
+        other.kill("helper", at_s=before.heard.now_s + 0.001)
+        other.drop("agent/primary/coverage/*", probability=0.5, from_s=before.heard.now_s + 0.001)
+        assert other.run().digest == flight.digest
+
+    def test_one_condition_after_the_other_with_trouble_in_between(self, brief: MakeFleet) -> None:
+        def lost(heard: Heard) -> bool:
+            last = heard.last("coord/strip/*")
+            return last is not None and "lost" in getattr(last.message, "reason", "")
+
+        fleet = brief(overrides={"coordinator.lost_after_s": 10})
+        fleet.run_until(first_task, timeout_s=100)
+        offered_s = fleet.now_s
+        fleet.kill("helper", at_s=offered_s + 5)
+        fleet.run_until(lost, timeout_s=30)
+        heard_s = max(times_s_of(fleet.heard, "agent/helper/state"))
+        assert fleet.now_s == pytest.approx(heard_s + 10, abs=0.01)
+        fleet.join("helper")
+        again = fleet.run().messages("agent/helper/state")[-1]
+        assert isinstance(again.message, AgentState)
+        assert again.header.incarnation == 1
+
+    def test_what_was_cannot_be_changed_any_more(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.run_until(lambda heard: heard.now_s > 20, timeout_s=30)
+        now = rf"must be after now, which is {fleet.now_s:g} s of the mission$"
+        too_late: list[Callable[[], None]] = [
+            lambda: fleet.kill("helper", at_s=fleet.now_s),
+            lambda: fleet.freeze("helper", at_s=1, for_s=1),
+            lambda: fleet.drop("*", from_s=0),
+            lambda: fleet.cut_off("helper", from_s=3, for_s=1),
+        ]
+        for schedule in too_late:
+            with pytest.raises(UserError, match=now):
+                schedule()
+        with pytest.raises(UserError, match="join: 'helper' is not allowed; must be killed before"):
+            fleet.join("helper", at_s=50)
+        assert (fleet.events, bool(fleet.faults)) == ((), False)
+        fleet.run()
+        fleet.kill("helper", at_s=1)  # the next flight begins anew
+
+
+def times_s_of(heard: Heard, keys: str) -> list[float]:
+    """When messages were sent."""
+    return [one.header.sent_ms / 1000 for one in heard.messages(keys)]
+
+
+@pytest.mark.parametrize(
+    ("schedule", "sentence"),
+    [
+        (
+            lambda fleet: fleet.kill("world"),
+            "'world' cannot be killed, frozen or joined; must be one of primary, helper",
+        ),
+        (
+            lambda fleet: fleet.kill("helpr"),
+            "'helpr' cannot be killed, frozen or joined; must be one of primary, helper",
+        ),
+        (lambda fleet: fleet.kill("helper", at_s=-1), "at_s: -1 is not allowed; must be simulated seconds since the"),
+        (lambda fleet: fleet.kill("helper", at_s=float("nan")), "at_s: nan is not allowed; must be simulated seconds"),
+        (lambda fleet: [fleet.kill("helper", at_s=5), fleet.kill("helper", at_s=6)], "helper: kill at 6000 ms is not"),
+        (lambda fleet: fleet.freeze("helper", at_s=5, for_s=0), "for_s: 0 is not allowed; must be at least 0.001 sim"),
+        (
+            lambda fleet: fleet.cut_off("coordinator", for_s=5),
+            "cut_off: 'coordinator' is not allowed; must be one of p",
+        ),
+        (lambda fleet: fleet.cut_off("helper", for_s=float("inf")), "for_s: inf is not allowed; must be at least"),
+        (
+            lambda fleet: fleet.drop("agent/*/hotspots/*"),
+            "no key is like 'agent/*/hotspots/*'; there are run, veh",
+        ),
+        (lambda fleet: fleet.drop("*", probability=20), "drop: probability: 20 is not allowed; must be from 0 to 1"),
+        (
+            lambda fleet: fleet.drop("*", to="observer"),
+            "drop: to: 'observer' is not allowed; must be one of world",
+        ),
+        (lambda fleet: fleet.delay("*", by_s=0), "by_s: 0 is not allowed; must be at least 0.001 simulated seconds"),
+        (lambda fleet: fleet.repeat("*", after_s=-1), "after_s: -1 is not allowed; must be at least 0.001 simulated"),
+        (lambda fleet: fleet.reorder("*", within_s=0), "within_s: 0 is not allowed; must be at least 0.001 simulated"),
+        (
+            lambda fleet: fleet.corrupt("*", for_s=0),
+            "for_s: 0 is not allowed; must be at least 0.001 simulated seconds",
+        ),
+    ],
+)
+def test_bad_arguments_are_refused_in_one_sentence(
+    brief: MakeFleet, schedule: Callable[[Fleet], None], sentence: str
+) -> None:
+    with pytest.raises(UserError) as refused:
+        schedule(brief())
+    assert str(refused.value).startswith(sentence)
+    assert "\n" not in str(refused.value)
