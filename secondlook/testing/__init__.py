@@ -12,7 +12,17 @@ from secondlook.processes import RunFailedError
 from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError
 from secondlook.testing.flight import Flight
 from secondlook.testing.heard import Heard
+from secondlook.testing.map_assertions import assert_maps_converged, assert_risk_at_most
+from secondlook.testing.mission_assertions import assert_all_finished, assert_no_message_dropped, assert_repeats
 from secondlook.testing.sources import scenario_from
+from secondlook.testing.strip_assertions import (
+    assert_never_assigned_to_lost,
+    assert_no_strip_lost,
+    assert_no_strip_served_twice,
+    assert_one_strip_at_a_time,
+    assert_strips_offered_within,
+    number_of,
+)
 
 __all__ = [
     "Condition",
@@ -21,5 +31,16 @@ __all__ = [
     "Heard",
     "NotRepeatedError",
     "RunFailedError",
+    "assert_all_finished",
+    "assert_maps_converged",
+    "assert_never_assigned_to_lost",
+    "assert_no_message_dropped",
+    "assert_no_strip_lost",
+    "assert_no_strip_served_twice",
+    "assert_one_strip_at_a_time",
+    "assert_repeats",
+    "assert_risk_at_most",
+    "assert_strips_offered_within",
+    "number_of",
     "scenario_from",
 ]

@@ -1,0 +1,141 @@
+"""What must hold of the fleet's map, from the messages of a flight."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from comms.events import Kill
+from comms.messages import AgentState, CoverageTile, Look, MissionOver
+from comms.node import Received
+from planner.fleet_map import FleetMap, VehicleLayer
+from secondlook.errors import UserError
+from secondlook.testing.fail import fail_if
+from secondlook.testing.flight import Flight
+from secondlook.testing.reached import lives, reached
+from vehicle_agent.coverage import CoverageLayer
+
+
+def assert_maps_converged(flight: Flight, *, reader: str = "coordinator") -> None:
+    """At the mission's end there is one map: each vehicle has told of its coverage what its looks sum up to, and what
+    the reader has joined from the tiles that reached it is the join of all the newest tiles.
+
+    Of a vehicle that was killed the tiles that it published count, whatever it had seen after them. `reader`: the node
+    whose map is asked for; of one that was started anew, that of its last start. The observer hears everything.
+    """
+    __tracebackhide__ = True
+    if not any(isinstance(one.message, MissionOver) for one in flight.heard):
+        raise UserError("assert_maps_converged needs a mission that was flown to its end: maps need not agree before")
+    problems = []
+    published = _joined(flight, [one for one in flight.heard if isinstance(one.message, CoverageTile)])
+    killed = {one.node_id for one in flight.events if isinstance(one, Kill)}
+    for vehicle in flight.scenario.vehicles:
+        if vehicle not in killed:
+            problems += _own_layer_is_told(flight, vehicle, published.layers.get(vehicle))
+    if reader not in flight.routing.nodes:
+        raise UserError(f"reader: {reader!r} is not allowed; must be one of {', '.join(flight.routing.nodes)}")
+    its_lives = lives(flight, reader)
+    if not its_lives:
+        raise UserError(f"reader: {reader!r} is not allowed; it was absent to the end")
+    got = [one for _, one in reached(flight, reader, its_lives[-1]) if isinstance(one.message, CoverageTile)]
+    problems += _has_all(flight, reader, _joined(flight, got), published)
+    fail_if(problems, "the maps have not converged")
+
+
+def assert_risk_at_most(
+    flight: Flight,
+    *,
+    mean: float | None = None,
+    worst30_mean: float | None = None,
+    uncovered_share: float | None = None,
+) -> None:
+    """The fleet's residual risk in the end, its mean over the worst 30 % of the area, and the share of the area that
+    nobody has seen, are no more than this."""
+    __tracebackhide__ = True
+    risk = flight.summary["risk"]
+    limits = {"mean": mean, "worst30_mean": worst30_mean, "uncovered_share": uncovered_share}
+    fail_if(
+        [
+            f"{name} is {risk[name]:.4f} at {flight.end_s:g} s, and not at most {limit:g}"
+            for name, limit in limits.items()
+            if limit is not None and not risk[name] <= limit
+        ],
+        "the residual risk is too large",
+    )
+
+
+def _joined(flight: Flight, tiles: Iterable[Received]) -> FleetMap:
+    joined = FleetMap(flight.run_info.grid.spec, flight.run_info.rho)
+    for one in tiles:
+        tile = one.message
+        assert isinstance(tile, CoverageTile)
+        joined.take(
+            one.vehicle,
+            (one.header.incarnation, tile.version),
+            tile.first_row,
+            tile.first_column,
+            tile.sum_levels,
+            tile.largest_levels,
+            tile.settled,
+        )
+    return joined
+
+
+def _own_layer_is_told(flight: Flight, vehicle: str, told: VehicleLayer | None) -> list[str]:
+    """What the vehicle's looks sum up to, as far as it had them when it last spoke, is in its tiles."""
+    own = CoverageLayer(vehicle, flight.run_info.grid.spec)
+    spoke_ms = [one.header.sent_ms for one in flight.messages(f"agent/{vehicle}/state") if _is_state(one)]
+    taken: set[tuple[int, int]] = set()
+    for life in lives(flight, vehicle):
+        for due_ms, one in reached(flight, vehicle, life):
+            look = one.message
+            if isinstance(look, Look) and look.valid and due_ms <= max(spoke_ms, default=0):
+                name = one.header.incarnation, look.number
+                if name not in taken:  # one that is delivered twice is one look
+                    taken.add(name)
+                    own.add(look)
+    shape = flight.run_info.grid.spec.shape
+    nothing = np.zeros(shape, dtype=np.uint8)
+    sums, largest = (nothing, nothing) if told is None else (told.sum_levels, told.largest_levels)
+    differs = (own.layer.sum_levels() != sums) | (own.layer.largest_levels() != largest)
+    if not differs.any():
+        return []
+    row, column = (int(place) for place in np.argwhere(differs)[0])
+    told_here = f"{sums[row, column]} in its tiles and {own.layer.sum_levels()[row, column]} by its looks"
+    return [
+        f"{vehicle}: {int(differs.sum())} cells differ between its tiles and its looks up to"
+        f" {max(spoke_ms, default=0) / 1000:.3f} s, first row {row}, column {column}: {told_here}"
+    ]
+
+
+def _is_state(one: Received) -> bool:
+    return isinstance(one.message, AgentState)
+
+
+def _has_all(flight: Flight, reader: str, has: FleetMap, published: FleetMap) -> list[str]:
+    """The reader's newest tiles are those that were published last."""
+    problems = []
+    for vehicle, layer in published.layers.items():
+        versions = has.layers[vehicle].versions if vehicle in has.layers else {}
+        for place, newest in layer.versions.items():
+            if versions.get(place) != newest:
+                missed = next(one for one in flight.heard if _is_tile(one, vehicle, place, newest))
+                instead = f"in version {versions[place][1]}" if place in versions else "not at all"
+                problems.append(
+                    f"{reader} has {missed.key} {instead}: version {newest[1]}, the last, was sent at"
+                    f" {missed.header.sent_ms / 1000:.3f} s and did not reach it"
+                )
+    if not problems and not np.array_equal(has.risk, published.risk):
+        problems.append(f"{reader} has the newest tiles, but another residual risk")
+    return problems
+
+
+def _is_tile(one: Received, vehicle: str, place: tuple[int, int], version: tuple[int, int]) -> bool:
+    tile = one.message
+    return (
+        isinstance(tile, CoverageTile)
+        and one.vehicle == vehicle
+        and (tile.first_row, tile.first_column) == place
+        and (one.header.incarnation, tile.version) == version
+    )

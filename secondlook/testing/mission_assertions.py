@@ -1,0 +1,70 @@
+"""What must hold of a mission as a whole."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from comms.group import LOST
+from comms.messages import AgentState, MissionOver, Mode
+from secondlook.errors import UserError
+from secondlook.mission import Bus
+from secondlook.testing.fail import fail_if
+from secondlook.testing.fleet import Fleet, first_difference
+from secondlook.testing.flight import Flight
+from secondlook.testing.reached import lives
+
+
+def assert_all_finished(flight: Flight) -> None:
+    """The coordinator has said that the mission is over, and the last word of every vehicle that is still there is that
+    it has finished."""
+    __tracebackhide__ = True
+    problems = []
+    if not any(isinstance(one.message, MissionOver) for one in flight.heard):
+        problems.append(f"the coordinator has not said by {flight.heard.now_s:.3f} s that the mission is over")
+    for vehicle in flight.scenario.vehicles:
+        its_lives = lives(flight, vehicle)
+        if not its_lives or its_lives[-1].killed:
+            continue
+        states = [one for one in flight.messages(f"agent/{vehicle}/state") if isinstance(one.message, AgentState)]
+        if not states:
+            problems.append(f"{vehicle} has never told its state")
+            continue
+        last = states[-1].message
+        if isinstance(last, AgentState) and last.mode is not Mode.FINISHED:
+            problems.append(
+                f"{vehicle} was last heard at {states[-1].header.sent_ms / 1000:.3f} s, and in {last.mode.value}"
+            )
+    fail_if(problems, "not everyone has finished")
+
+
+def assert_no_message_dropped(flight: Flight) -> None:
+    """No message was refused for what it is: malformed, too long, of an unknown key, from the wrong sender, unfit for
+    the map. Those that were lost on purpose do not count; those corrupted on purpose do."""
+    __tracebackhide__ = True
+    if flight.digest is None:
+        raise UserError(
+            "assert_no_message_dropped needs a mission that was flown to its end: what is dropped is told then"
+        )
+    dropped = {reason: count for reason, count in flight.summary["dropped"].items() if reason != LOST}
+    where = f"; which, is told in {flight.folder / 'logs'}" if (flight.folder / "logs").exists() else ""
+    fail_if([f"{count}: {reason}{where}" for reason, count in dropped.items()], "messages were dropped")
+
+
+def assert_repeats(fleet: Fleet, buses: Sequence[Bus] = ("local", "local")) -> Flight:
+    """The fleet's mission, flown once on each of these buses, is the same each time, message for message.
+
+    Returns the first flight. `("local", "zenoh")` holds both buses to one mission, and a part to what it may hang on:
+    over Zenoh the order of a Python set of texts is another.
+    """
+    __tracebackhide__ = True
+    if len(buses) < 2:
+        raise UserError(f"buses: {list(buses)} is not allowed; must be at least two, to compare")
+    first = fleet.run(bus=buses[0])
+    for bus in buses[1:]:
+        flight = fleet.run(bus=bus)
+        difference = first_difference(list(first.heard), list(flight.heard))
+        if difference is None and flight.digest != first.digest:
+            difference = f"the digests differ: {first.digest} and {flight.digest}"
+        if difference is not None:
+            raise AssertionError(f"{first.bus}, then {flight.bus}: {difference}")
+    return first

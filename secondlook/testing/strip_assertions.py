@@ -1,0 +1,253 @@
+"""What must hold of strips and of those who serve them, from the messages of a flight."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+from comms.events import Kill
+from comms.messages import (
+    AgentState,
+    Message,
+    MissionOver,
+    Mode,
+    Role,
+    StripState,
+    StripStatus,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+from comms.node import Received
+from coordinator.coordinator import ANSWER_WITHIN_MS
+from coordinator.ledger import ENDED, WITH_A_VEHICLE
+from secondlook.testing.fail import fail_if
+from secondlook.testing.flight import Flight
+from secondlook.testing.reached import lives, reached
+
+M = TypeVar("M", bound=Message)
+_AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
+
+
+def assert_no_strip_lost(flight: Flight) -> None:
+    """Every strip that was ever published is accounted for: numbers and revisions have no gaps, an ended strip stays
+    as it is, and at the end each is done, failed, withdrawn, open, or with a vehicle that is at it.
+
+    Open ones are left only where the deadline has ended the mission. A strip that is with a vehicle counts as lost when
+    that vehicle has not said for `coordinator.lost_after_s` and 10 s more that it is at it.
+    """
+    __tracebackhide__ = True
+    problems = []
+    strips: dict[int, tuple[Received, StripStatus]] = {}
+    incarnation = 0
+    for one, status in _all(flight, StripStatus):
+        if one.header.incarnation != incarnation:  # the coordinator has started anew, and its numbers with it
+            incarnation, strips = one.header.incarnation, {}
+        number = number_of(one)
+        before = strips.get(number)
+        at = f"at {_s(one)} s"
+        if before is None and number != len(strips) + 1:
+            problems.append(f"strip {number} is published {at}, but strip {len(strips) + 1} never was")
+        expected = 1 if before is None else before[1].revision + 1
+        if status.revision != expected:
+            problems.append(f"strip {number} comes in revision {status.revision} {at}, where {expected} was due")
+        if before is not None and before[1].state in ENDED:
+            was = f"was {before[1].state.value} at {_s(before[0])} s"
+            problems.append(f"strip {number} {was}, and is {status.state.value} {at}")
+        strips[number] = one, status
+    problems += [word for number, last in strips.items() if (word := _lost(flight, number, *last))]
+    problems += _left_too_early(flight, strips)
+    fail_if(problems, "strips are lost")
+
+
+def _lost(flight: Flight, number: int, said: Received, status: StripStatus) -> str | None:
+    if status.state not in WITH_A_VEHICLE:
+        return None
+    vehicle, signs_ms = status.vehicle, [said.header.sent_ms] if status.state is StripState.OFFERED else []
+    if vehicle not in flight.scenario.vehicles:
+        return f"strip {number} is {status.state.value} with nobody since {_s(said)} s"
+    for one in flight.messages(f"agent/{vehicle}/*"):
+        message = one.message
+        at_it = isinstance(message, TaskStatus) and message.strip == number and message.state in _AT_WORK
+        working = isinstance(message, AgentState) and message.works_on == number and message.mode is not Mode.SURVEY
+        if at_it or working:
+            signs_ms.append(one.header.sent_ms)
+    end_ms = flight.heard.now_ms
+    if signs_ms and end_ms - max(signs_ms) <= _lost_after_ms(flight) + ANSWER_WITHIN_MS:
+        return None
+    last = f"last said at {max(signs_ms) / 1000:.3f} s that it is" if signs_ms else "never said that it is"
+    at_the_end = f"is {status.state.value} with {vehicle} at the end, {end_ms / 1000:.3f} s"
+    return f"strip {number} {at_the_end}, but {vehicle} {last} at it"
+
+
+def _left_too_early(flight: Flight, strips: dict[int, tuple[Received, StripStatus]]) -> list[str]:
+    overs = _all(flight, MissionOver)
+    primary_s = flight.summary["time"]["primary_s"]
+    if not overs or primary_s is None:
+        return []
+    over_ms = overs[0][0].header.sent_ms
+    if over_ms >= int(primary_s * 1000 * flight.scenario.mission.deadline_factor):
+        return []
+    return [
+        f"strip {number} was still {status.state.value} when the mission was over at {over_ms / 1000:.3f} s, before its"
+        " deadline"
+        for number, (_, status) in strips.items()
+        if status.state not in ENDED
+    ]
+
+
+@dataclass(frozen=True)
+class _Service:
+    vehicle: str
+    since_ms: int
+
+
+def assert_no_strip_served_twice(flight: Flight) -> None:
+    """No strip is worked on by two vehicles at the same time, and none is swept to its end twice.
+
+    A coordinator that is started anew numbers its strips from 1 again; what vehicles go on saying of the work they had
+    from the one before is left out.
+    """
+    __tracebackhide__ = True
+    problems = []
+    of_old: set[tuple[int, str]] = set()
+    at_work: dict[int, dict[str, _Service]] = {}
+    done: dict[int, tuple[str, int]] = {}
+    incarnations: dict[str, int] = {}
+    kills = sorted((one for one in flight.events if isinstance(one, Kill)), key=lambda one: -one.at_ms)
+    for one in flight.heard:
+        now_ms, sender = one.header.sent_ms, one.header.sender
+        gone = {sender} if one.header.incarnation != incarnations.setdefault(sender, one.header.incarnation) else set()
+        incarnations[sender] = one.header.incarnation
+        while kills and kills[-1].at_ms <= now_ms:
+            gone.add(kills.pop().node_id)
+        for serving in at_work.values():
+            for vehicle in gone:
+                serving.pop(vehicle, None)
+        if sender in gone and flight.routing.nodes[sender].role is Role.COORDINATOR:
+            of_old = {(strip, vehicle) for strip, serving in at_work.items() for vehicle in serving}
+            at_work, done = {}, {}
+        status = one.message
+        if isinstance(status, Task):
+            of_old.discard((status.strip, one.vehicle))
+        if not isinstance(status, TaskStatus) or (status.strip, sender) in of_old:
+            continue
+        serving = at_work.setdefault(status.strip, {})
+        if status.state in _AT_WORK:
+            for other in serving.values():
+                if other.vehicle != sender and sender not in serving:
+                    meanwhile = f"{other.vehicle} was at it too, since {other.since_ms / 1000:.3f} s"
+                    problems.append(f"strip {status.strip} was taken by {sender} at {_s(one)} s while {meanwhile}")
+            serving.setdefault(sender, _Service(sender, now_ms))
+            continue
+        was_at_it = serving.pop(sender, None) is not None
+        if status.state is TaskState.DONE and (was_at_it or status.strip not in done):
+            if status.strip in done:
+                vehicle, before_ms = done[status.strip]
+                before = f"by {vehicle} until {before_ms / 1000:.3f} s and by {sender} until {_s(one)} s"
+                problems.append(f"strip {status.strip} was swept twice, {before}")
+            done[status.strip] = sender, now_ms
+    fail_if(problems, "strips are served twice")
+
+
+def assert_one_strip_at_a_time(flight: Flight) -> None:
+    """No vehicle has two strips by the coordinator's books, and none that is with a vehicle is without its name."""
+    __tracebackhide__ = True
+    problems = []
+    strip_of: dict[str, int] = {}
+    for one, status in _all(flight, StripStatus):
+        number = number_of(one)
+        strip_of = {vehicle: its for vehicle, its in strip_of.items() if its != number}
+        if status.state not in WITH_A_VEHICLE:
+            continue
+        what = f"strip {number} is {status.state.value}"
+        if not status.vehicle:
+            problems.append(f"{what} at {_s(one)} s with nobody")
+        elif status.vehicle in strip_of:
+            other = strip_of[status.vehicle]
+            problems.append(f"{what} with {status.vehicle} at {_s(one)} s, which has strip {other} as well")
+        else:
+            strip_of[status.vehicle] = number
+    fail_if(problems, "vehicles have two strips")
+
+
+def assert_never_assigned_to_lost(flight: Flight) -> None:
+    """No strip is offered to a vehicle whose newest state that had reached the coordinator by then was as old as
+    `coordinator.lost_after_s` or older."""
+    __tracebackhide__ = True
+    problems = []
+    for life in lives(flight, "coordinator"):
+        states = [(due_ms, one) for due_ms, one in reached(flight, "coordinator", life) if one.topic.name == "state"]
+        for one, task in _all(flight, Task):
+            now_ms = one.header.sent_ms
+            if task.action is not TaskAction.TAKE or one.header.incarnation != life.incarnation:
+                continue
+            sent_ms = [
+                said.header.sent_ms for due_ms, said in states if said.vehicle == one.vehicle and due_ms <= now_ms
+            ]
+            if not sent_ms or now_ms - max(sent_ms) >= _lost_after_ms(flight):
+                heard = f"had last heard of at {max(sent_ms) / 1000:.3f} s" if sent_ms else "had never heard of"
+                problems.append(
+                    f"strip {task.strip} was given to {one.vehicle} at {_s(one)} s, which the coordinator {heard}"
+                )
+    fail_if(problems, "strips are given to vehicles that are lost")
+
+
+def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
+    """No strip stays open for longer than `within_s` while a helper is free that has neither refused it nor failed at
+    it; a helper is free as long as it says that it is idle."""
+    __tracebackhide__ = True
+    problems = []
+    open_since: dict[int, int] = {}
+    idle_since: dict[str, int] = {}
+    not_for: set[tuple[int, str]] = set()
+    serving: dict[int, str] = {}
+    helpers = {one.vehicle for one in flight.run_info.vehicles if one.role is Role.REVISIT}
+    told: set[int] = set()
+    for one in flight.heard:
+        now_ms, message = one.header.sent_ms, one.message
+        free = {vehicle: since_ms for vehicle, since_ms in idle_since.items() if vehicle not in serving.values()}
+        for number, opened_ms in open_since.items():
+            waits_ms = [max(opened_ms, ms) for name, ms in free.items() if (number, name) not in not_for]
+            if waits_ms and now_ms - min(waits_ms) > within_s * 1000 and number not in told:
+                told.add(number)
+                since_s = min(waits_ms) / 1000
+                problems.append(f"strip {number} waits since {since_s:.3f} s and was not offered by {_s(one)} s")
+        if isinstance(message, AgentState) and one.vehicle in helpers:
+            if message.mode is Mode.IDLE:
+                idle_since.setdefault(one.vehicle, now_ms)
+            else:
+                idle_since.pop(one.vehicle, None)
+        elif isinstance(message, TaskStatus) and message.state in (TaskState.REFUSED, TaskState.FAILED):
+            not_for.add((message.strip, one.vehicle))
+        elif isinstance(message, StripStatus):
+            number = number_of(one)
+            serving.pop(number, None)
+            if message.state is StripState.OPEN:
+                open_since.setdefault(number, now_ms)
+            else:
+                open_since.pop(number, None)
+            if message.state in WITH_A_VEHICLE:
+                serving[number] = message.vehicle
+        for kill in flight.events:
+            if isinstance(kill, Kill) and kill.at_ms <= now_ms:
+                idle_since.pop(kill.node_id, None)
+    fail_if(problems, "strips wait for a helper that is free")
+
+
+def number_of(received: Received) -> int:
+    """The number that ends a message's key: a strip's, say."""
+    return int(received.key.rsplit("/", 1)[1])
+
+
+def _all(flight: Flight, kind: type[M]) -> list[tuple[Received, M]]:
+    return [(one, one.message) for one in flight.heard if isinstance(one.message, kind)]
+
+
+def _lost_after_ms(flight: Flight) -> int:
+    return round(flight.scenario.coordinator.lost_after_s * 1000)
+
+
+def _s(received: Received) -> str:
+    return f"{received.header.sent_ms / 1000:.3f}"
