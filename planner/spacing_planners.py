@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
+from planner.cover import fewest_tracks, spans_left
 from planner.spacing import adapt_range, track_offsets
 
 LENGTH_TOLERANCE_M = 1e-6
@@ -16,13 +18,25 @@ class SpacingDecision:
     """Tracks for what is still to be covered.
 
     `range_m`: the sensor range that spaces them (r_adpt). `offsets_m`: across-track offsets in the order of flying.
-    `replans`: whether to ask again after the first pair. `note`: in words, what is out of the ordinary; else empty.
+    `replans`: whether to ask again after the first two. `note`: in words, what is out of the ordinary; else empty.
+    `singles`: single tracks, not pairs.
     """
 
     range_m: int
     offsets_m: tuple[float, ...]
     replans: bool
     note: str = ""
+    singles: bool = False
+
+
+@dataclass(frozen=True)
+class FlownTrack:
+    """A track flown: its offset, and up to which range what lies beside it counts as covered. That is its own r_eff;
+    of a `single` one at least the range that it was laid for, so that no place is planned for twice as it was."""
+
+    across_m: float
+    range_m: float
+    single: bool
 
 
 class SpacingPlanner(Protocol):
@@ -33,9 +47,20 @@ class SpacingPlanner(Protocol):
         admissible), None before the first pair is flown."""
 
 
+@runtime_checkable
+class SinglesPlanner(SpacingPlanner, Protocol):
+    """A planner that can also lay single tracks, wherever something is left. It is asked for those first."""
+
+    def cover(self, width_m: float, flown: Sequence[FlownTrack], r_eff_m: int) -> SpacingDecision | None:
+        """Tracks for what these have left of [0, width_m], none if that is nothing; None to go on with `decide`."""
+
+
 @dataclass(frozen=True)
 class AdaptiveSpacing:
     """Algorithm 1 of the paper, run again after every pair on the width beyond the covered edge.
+
+    Where r_eff falls below 3 r_min, pairs do not close their nadir gaps (equation 1). From then on the fewest single
+    tracks are laid over all that is left, before and behind.
 
     `nadir_gap_m`: r_min. `told_range_m`: the upper limit until the first pair is flown; then r_eff takes its place.
     """
@@ -49,12 +74,28 @@ class AdaptiveSpacing:
         highest_m = counted_range_m(r_eff_m, self.nadir_gap_m, self.told_range_m)
         note = ""
         if r_eff_m is not None and r_eff_m < highest_m:
-            # Paired tracks cannot close the nadir gap at such a range (equation 1): the gaps become hotspots.
-            why = "is below 3 r_min" if self.nadir_gap_m > 0 else "is nothing to plan with"
-            note = f"r_eff {r_eff_m} m {why}: planning with {highest_m:g} m, gaps remain"
+            note = f"r_eff {r_eff_m} m is nothing to plan with: planning with {highest_m:g} m, gaps remain"
         choice = adapt_range(width_m - covered_m, self.nadir_gap_m, lowest_m, highest_m)
         offsets = track_offsets(width_m, self.nadir_gap_m, choice.range_m, covered_m=covered_m)
         return SpacingDecision(choice.range_m, tuple(offsets), replans=True, note=note)
+
+    def cover(self, width_m: float, flown: Sequence[FlownTrack], r_eff_m: int) -> SpacingDecision | None:
+        """See `SinglesPlanner`."""
+        pairs_m = lowest_range_m(self.nadir_gap_m)
+        covers = r_eff_m > math.ceil(self.nadir_gap_m - LENGTH_TOLERANCE_M)
+        goes_on = any(track.single for track in flown)
+        if not goes_on and not (covers and r_eff_m < pairs_m):
+            return None
+        left = spans_left(width_m, self.nadir_gap_m, [(track.across_m, track.range_m) for track in flown])
+        found = fewest_tracks(left, self.nadir_gap_m, r_eff_m if covers else pairs_m)
+        many = "the fewest" if found.fewest else "few"
+        if not covers:
+            note = f"r_eff {r_eff_m} m is nothing to plan with: {many} single tracks for {pairs_m} m, gaps remain"
+        elif r_eff_m < pairs_m:
+            note = f"r_eff {r_eff_m} m is below 3 r_min: {many} single tracks over all that is left"
+        else:
+            note = f"{many} single tracks over all that is left"
+        return SpacingDecision(found.range_m, found.offsets_m, replans=True, note=note, singles=True)
 
 
 @dataclass(frozen=True)

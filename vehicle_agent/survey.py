@@ -27,7 +27,14 @@ from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Reach, UnderWay, settled_cells
-from planner.spacing_planners import LENGTH_TOLERANCE_M, SpacingDecision, counted_range_m, lowest_range_m
+from planner.spacing_planners import (
+    LENGTH_TOLERANCE_M,
+    FlownTrack,
+    SinglesPlanner,
+    SpacingDecision,
+    counted_range_m,
+    lowest_range_m,
+)
 from planner.types import DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import SurveyConfig
@@ -48,6 +55,7 @@ class SurveyAgent(Agent):
         self.flown: list[Track] = []
         self.ahead: list[Track] = []  # the first one is under way
         self.covered_m = 0.0
+        self.looked: list[FlownTrack] = []
         self.r_adpt_m: list[int] = []
         self.r_eff_m: list[int] = []
         self._flown_at_decision = 0
@@ -71,7 +79,7 @@ class SurveyAgent(Agent):
         self._hotspots = HotspotMap.empty(spec)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
-        self._decide(r_eff_m=None)
+        self._take(self.config.spacing.decide(self.area.width_m, 0.0, None), r_eff_m=None)
         if self.ahead:
             self._begin_track(now_ms)
         else:
@@ -141,6 +149,9 @@ class SurveyAgent(Agent):
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
             self._publish_curve(track.number, self._range_bin_m, curve.p_detect, r_eff_m)
         self.r_eff_m.append(r_eff_m)
+        singles = self.decision.singles
+        counted_m = max(r_eff_m, self.decision.range_m) if singles else r_eff_m
+        self.looked.append(FlownTrack(track.across_m, counted_m, singles))
         self._after_track(now_ms)
 
     def _publish_prior(self, prior: DetectionCurve) -> None:
@@ -174,17 +185,22 @@ class SurveyAgent(Agent):
         self.hold()
 
     def _replan(self) -> None:
-        r_eff_m = self.r_eff_m[-1]
+        r_eff_m, spacing = self.r_eff_m[-1], self.config.spacing
+        singles = (
+            spacing.cover(self.area.width_m, self.looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
+        )
         self.covered_m = max(self.covered_m, self._edge_m(self.flown, r_eff_m))
-        if self.covered_m < self.area.width_m - LENGTH_TOLERANCE_M:
-            self._decide(r_eff_m)
+        if singles is not None and singles.offsets_m:
+            self._take(singles, r_eff_m)
+        elif singles is None and self.covered_m < self.area.width_m - LENGTH_TOLERANCE_M:
+            self._take(spacing.decide(self.area.width_m, self.covered_m, r_eff_m), r_eff_m)
         else:
             self.ahead = []
             self._publish_plan("")
 
-    def _decide(self, r_eff_m: int | None) -> None:
+    def _take(self, decision: SpacingDecision, r_eff_m: int | None) -> None:
         before = self.r_adpt_m[-1] if self.r_adpt_m else None
-        self.decision = self.config.spacing.decide(self.area.width_m, self.covered_m, r_eff_m)
+        self.decision = decision
         self.r_adpt_m.append(self.decision.range_m)
         self._flown_at_decision = len(self.flown)
         number = self._last_number + 1
@@ -246,6 +262,10 @@ class SurveyAgent(Agent):
         assert self.coverage is not None
         if not self.decision.replans or not self.ahead:
             return None
+        if self.decision.singles:
+            later = self.ahead[max(0, TRACKS_A_PAIR - (len(self.flown) - self._flown_at_decision)) :]
+            # Where these lie will change, but not by much.
+            return min(track.across_m for track in later) - reach.far_m if later else None
         pair = [*self.flown[self._flown_at_decision :], *self.ahead][:TRACKS_A_PAIR]
         r_eff_m = self.r_eff_m[-1] if self.r_eff_m else math.floor(reach.far_m)
         edge_m = self._edge_m(pair, r_eff_m)

@@ -94,7 +94,7 @@ class Sensor(Mapping):
     `range_m`; `sonar`: `package.module:Class` of a true model of your own, given that curve and the seabed.
     `noise_cell`, `noise_track`: standard deviation of P_d per cell and per track, in logits; what is left out is the
     curve's, or else the calibrated one's. `look_m`: length of track in one look; `along_bin_m`, `range_bin_m`: the bins
-    of a look.
+    of a look, in whole centimetres.
     """
 
     curve: OptionalCurve = None
@@ -106,6 +106,14 @@ class Sensor(Mapping):
     along_bin_m: Bin = 5.0
     range_bin_m: Bin = 1.0
     look_m: Length = 20.0
+
+    @field_validator("along_bin_m", "range_bin_m")
+    @classmethod
+    def _check_centimetres(cls, bin_m: float) -> float:
+        # Looks travel in centimetres: with other bins they would gape or overlap.
+        if round(bin_m * 100) < 1 or abs(bin_m * 100 - round(bin_m * 100)) > TOLERANCE:
+            raise refused("must be a whole number of centimetres")
+        return bin_m
 
     @field_validator("look_m")
     @classmethod

@@ -10,6 +10,8 @@ from planner.spacing import track_count
 from planner.spacing_planners import (
     AdaptiveSpacing,
     FixedSpacing,
+    FlownTrack,
+    SinglesPlanner,
     SpacingDecision,
     counted_range_m,
     lowest_range_m,
@@ -65,12 +67,13 @@ class TestThePapersFigures:
 
 
 class TestAdaptiveSpacing:
-    @pytest.mark.parametrize("r_eff_m", [119, 80, 1, 0])
-    def test_below_three_nadir_gaps_plans_with_those_and_says_so(self, r_eff_m: int) -> None:
+    @pytest.mark.parametrize("r_eff_m", [40, 1, 0])
+    def test_where_nothing_is_admissible_plans_with_three_nadir_gaps_and_says_so(self, r_eff_m: int) -> None:
         planner = AdaptiveSpacing(NADIR_GAP_M, 145)
+        assert planner.cover(WIDTH_M, [], r_eff_m) is None
         decision = planner.decide(WIDTH_M, 366, r_eff_m)
         assert decision.range_m == 120
-        assert decision.note == f"r_eff {r_eff_m} m is below 3 r_min: planning with 120 m, gaps remain"
+        assert decision.note == f"r_eff {r_eff_m} m is nothing to plan with: planning with 120 m, gaps remain"
         assert counted_range_m(r_eff_m, planner.nadir_gap_m, planner.told_range_m) == 120
 
     @pytest.mark.parametrize("r_eff_m", [None, 120, 130])
@@ -119,6 +122,70 @@ class TestAdaptiveSpacing:
         least_m = 3 * lowest_range_m(nadir_gap_m) - nadir_gap_m
         assert len(offsets) <= 2 * (math.ceil(width_m / least_m) + 1)
         assert max(offsets) + counted_range_m(r_eff_m, planner.nadir_gap_m, planner.told_range_m) >= width_m - 1e-6
+
+
+def pairs(*flown: tuple[float, float]) -> list[FlownTrack]:
+    return [FlownTrack(across_m, range_m, single=False) for across_m, range_m in flown]
+
+
+class TestSingleTracks:
+    def test_are_not_laid_while_pairs_suffice(self) -> None:
+        planner = AdaptiveSpacing(NADIR_GAP_M, 145)
+        assert planner.cover(WIDTH_M, pairs((138, 119), (236, 120)), 120) is None
+        assert AdaptiveSpacing(0, 50).cover(90, [], 1) is None
+        assert isinstance(planner, SinglesPlanner)
+        assert not isinstance(FixedSpacing(NADIR_GAP_M, 145), SinglesPlanner)
+
+    def test_cover_all_that_is_left_before_and_behind(self) -> None:
+        # Left are 0 to 38, 98 to 136, 238 to 276 and 336 to 836 m. Of r 100 m: two tracks behind see the three gaps
+        # (no one sees more than two of them), four beyond cover 380 m of the 500, five 440, six 640.
+        decision = AdaptiveSpacing(NADIR_GAP_M, 145).cover(836, pairs((138, 100), (236, 100)), 100)
+        assert decision is not None
+        assert (decision.singles, decision.replans, len(decision.offsets_m)) == (True, True, 8)
+        assert decision.range_m <= 100
+        assert decision.note == "r_eff 100 m is below 3 r_min: the fewest single tracks over all that is left"
+
+    def test_go_on_whatever_r_eff_is_once_begun(self) -> None:
+        planner = AdaptiveSpacing(NADIR_GAP_M, 145)
+        begun = [FlownTrack(100, 100, single=True), FlownTrack(160, 100, single=True)]
+        wide = planner.cover(320, begun, 130)
+        assert wide is not None
+        assert (len(wide.offsets_m), wide.note) == (1, "the fewest single tracks over all that is left")
+        blind = planner.cover(320, begun, 0)
+        assert blind is not None
+        assert (len(blind.offsets_m), blind.note) == (
+            1,
+            "r_eff 0 m is nothing to plan with: the fewest single tracks for 120 m, gaps remain",
+        )
+
+    def test_end_where_nothing_is_left(self) -> None:
+        begun = [FlownTrack(float(across_m), 100, single=True) for across_m in (100, 160, 220)]
+        decision = AdaptiveSpacing(NADIR_GAP_M, 145).cover(320, begun, 100)
+        assert decision is not None
+        assert decision.offsets_m == ()
+
+    @given(
+        width_m=st.floats(1, 600),
+        nadir_gap_m=st.sampled_from([0.5, 10.0, 20.0, 25.3]),
+        reaches_m=st.lists(st.integers(0, 90), min_size=1, max_size=6),
+    )
+    def test_any_survey_ends_with_everything_counted(
+        self, width_m: float, nadir_gap_m: float, reaches_m: list[int]
+    ) -> None:
+        planner = AdaptiveSpacing(nadir_gap_m, 80)
+        flown = pairs((80, reaches_m[0]), (140, reaches_m[-1]))
+        r_eff_m = math.ceil(nadir_gap_m) + 1
+        for _ in range(1 + math.ceil(width_m)):
+            decision = planner.cover(width_m, flown, r_eff_m)
+            if decision is None:
+                assert r_eff_m >= lowest_range_m(nadir_gap_m)
+                return
+            if not decision.offsets_m:
+                return
+            for across_m in decision.offsets_m[:2]:
+                r_eff_m = reaches_m[len(flown) % len(reaches_m)]
+                flown.append(FlownTrack(across_m, max(r_eff_m, decision.range_m), single=True))
+        raise AssertionError("the survey does not end")
 
 
 class TestFixedSpacing:

@@ -295,6 +295,16 @@ MISTAKES = {
             "must see beyond nadir_gap_m, 25"
         ],
     ),
+    "bins of other than whole centimetres": (
+        "curve: muscle",
+        "curve: muscle, along_bin_m: 2.505, range_bin_m: 0.001",
+        [
+            "bad.yaml:13: vehicles.primary.sensor.along_bin_m: 2.505 is not allowed; "
+            "must be a whole number of centimetres",
+            "bad.yaml:13: vehicles.primary.sensor.range_bin_m: 0.001 is not allowed; "
+            "must be a whole number of centimetres",
+        ],
+    ),
     "look of a bin and a half": (
         "curve: muscle",
         "curve: muscle, look_m: 7.5",
