@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.check import check
+from secondlook.commands.geojson import geojson
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
@@ -44,7 +45,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, paper, replay):
+for command in (run, scenarios, check, plan, paper, replay, geojson):
     app.command()(command)
 
 

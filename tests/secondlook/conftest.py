@@ -1,9 +1,14 @@
-"""A short scenario that is valid, for tests to spoil."""
+"""A short scenario that is valid, and a brief mission that was flown, for tests to spoil."""
 
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from flights import BRIEF
+
+from secondlook.mission import RunOptions, run_mission
+from secondlook.scenario import load_scenario
 
 VALID = """\
 name: trial
@@ -45,3 +50,17 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str | by
         return "bad.yaml"
 
     return write_file
+
+
+@pytest.fixture(scope="session")
+def brief_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a brief mission that was flown and recorded; not to be changed."""
+    folder = tmp_path_factory.mktemp("brief-run")
+    run_mission(load_scenario(str(BRIEF)), RunOptions(folder, bus="local"))
+    return folder
+
+
+@pytest.fixture
+def brief_copy(brief_run: Path, tmp_path: Path) -> Path:
+    """The same as a copy, for tests to spoil."""
+    return shutil.copytree(brief_run, tmp_path / "run")
