@@ -14,7 +14,7 @@ from secondlook.recorded import to_geojson
 
 mission = secondlook.load(sys.argv[1])
 print(f"{mission.run.scenario}, seed {mission.run.seed}: {mission.area.area / 1e6:.2f} km² in {mission.end_s:.0f} s")
-for vehicle, path in mission.paths().items():
+for vehicle, path in mission.paths.items():
     print(f"{vehicle} has flown {path.length_m:.0f} m")
 
 # %% What the primaries planned, and when they changed their minds
@@ -32,7 +32,7 @@ row, column = divmod(int(gain.argmax()), gain.shape[1])
 print(f"the most was gained at x {fleet.x_m[row, column]:.0f} m, y {fleet.y_m[row, column]:.0f} m")
 
 # %% What became of the strips
-for strip in mission.strips():
+for strip in mission.strips:
     before, after = alone.mean_within(strip.polygon), fleet.mean_within(strip.polygon)
     told = f"risk {before:.2f} to {after:.2f}" if strip.state is StripState.DONE else strip.history[-1].reason
     print(f"strip {strip.number}, {strip.polygon.area:.0f} m²: {strip.state.value}, {told}")

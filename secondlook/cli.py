@@ -13,6 +13,7 @@ from secondlook.commands.geojson import geojson
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
+from secondlook.commands.report import report
 from secondlook.commands.run import run
 from secondlook.commands.scenarios import scenarios
 from secondlook.errors import UserError
@@ -45,7 +46,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, paper, replay, geojson):
+for command in (run, scenarios, check, plan, paper, replay, report, geojson):
     app.command()(command)
 
 

@@ -45,7 +45,7 @@ def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None)
 def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
     run = mission.run
     yield mission.area, {"kind": "area", "scenario": run.scenario, "seed": run.seed}
-    for track in mission.tracks():
+    for track in mission.tracks:
         yield (
             track.line,
             {
@@ -59,10 +59,10 @@ def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str
                 "ended_s": track.ended_s,
             },
         )
-    for path in mission.paths().values():
+    for path in mission.paths.values():
         line = path.line.simplify(PATH_STEP_M)
         yield line, {"kind": "path", "vehicle": path.vehicle, "length_m": round(path.length_m, 1)}
-    for hotspot in mission.hotspots():
+    for hotspot in mission.hotspots:
         yield (
             hotspot.polygon,
             {
@@ -75,7 +75,7 @@ def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str
                 "changed_s": hotspot.changed_s,
             },
         )
-    for strip in mission.strips():
+    for strip in mission.strips:
         yield (
             strip.polygon,
             {

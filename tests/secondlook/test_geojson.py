@@ -44,10 +44,10 @@ def test_every_kind_is_there_and_every_ring_is_closed_and_counterclockwise(
     kinds = Counter(feature["properties"]["kind"] for feature in collection["features"])
     assert kinds == {
         "area": 1,
-        "track": len(mission.tracks()),
+        "track": len(mission.tracks),
         "path": 2,
-        "hotspot": len(mission.hotspots()),
-        "strip": len(mission.strips()),
+        "hotspot": len(mission.hotspots),
+        "strip": len(mission.strips),
     }
     closed = 0
     for feature in collection["features"]:
@@ -65,7 +65,7 @@ def test_without_an_origin_places_are_metres_and_it_says_so(mission: RecordedMis
     area = shape(collection["features"][0]["geometry"])
     assert shapely.equals(area, shapely.box(0, 0, 300, 100))
     strip = next(one for one in collection["features"] if one["properties"]["kind"] == "strip")
-    assert shapely.hausdorff_distance(shape(strip["geometry"]), mission.strips()[0].polygon) < 0.01
+    assert shapely.hausdorff_distance(shape(strip["geometry"]), mission.strips[0].polygon) < 0.01
 
 
 def test_with_an_origin_places_are_degrees(mission: RecordedMission) -> None:
