@@ -16,6 +16,7 @@ from secondlook.commands.replay import replay
 from secondlook.commands.report import report
 from secondlook.commands.run import run
 from secondlook.commands.scenarios import scenarios
+from secondlook.commands.view import view
 from secondlook.errors import UserError
 
 WRONG_USE = 2
@@ -46,7 +47,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, paper, replay, report, geojson):
+for command in (run, scenarios, check, plan, paper, replay, view, report, geojson):
     app.command()(command)
 
 

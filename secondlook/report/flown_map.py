@@ -24,7 +24,8 @@ ROUND_NUMBERS = 8  # the scale bar is about an eighth of the width
 def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     """What was flown over the risk that is left. A strip's element has the id `ids` with its number."""
     paths, strips, tracks = mission.paths, mission.strips, mission.tracks
-    shown = shapely.union_all([mission.area, *(path.line for path in paths.values()), *(s.polygon for s in strips)])
+    all_of_it = [mission.area, *(path.line for path in paths.values()), *(strip.polygon for strip in strips)]
+    shown = shapely.GeometryCollection(all_of_it)
     west_m, south_m, east_m, north_m = shown.bounds
     unit_m = max((east_m - west_m) / WIDTH_PX, (north_m - south_m) / HEIGHT_PX)
     frame = MapFrame.around(shown, MARGIN_PX * unit_m)

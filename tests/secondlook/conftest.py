@@ -1,11 +1,13 @@
 """A short scenario that is valid, and a brief mission that was flown, for tests to spoil."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from browser import chromium
 from flights import BRIEF
+from playwright.sync_api import Browser
 
 from secondlook.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
@@ -64,3 +66,10 @@ def brief_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def brief_copy(brief_run: Path, tmp_path: Path) -> Path:
     """The same as a copy, for tests to spoil."""
     return shutil.copytree(brief_run, tmp_path / "run")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A real browser; skips where there is none."""
+    with chromium() as running:
+        yield running
