@@ -47,6 +47,16 @@ def encode(header: Header, message: Message) -> bytes:
 
 def decode(payload: bytes, message_type: type[Message]) -> tuple[Header, Message]:
     """Header and message of a payload; raises WireError, and nothing else, where it is not one of `message_type`."""
+    header, body = _parts(payload)
+    return header, record_of(message_type).decode(body)
+
+
+def header_of(payload: bytes) -> Header:
+    """The header alone, whatever the message; raises WireError, and nothing else, where there is none."""
+    return _parts(payload)[0]
+
+
+def _parts(payload: bytes) -> tuple[Header, Any]:
     try:
         parts: Any = msgpack.unpackb(payload)
     except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
@@ -57,7 +67,7 @@ def decode(payload: bytes, message_type: type[Message]) -> tuple[Header, Message
     if type(version) is not int or version != SCHEMA_VERSION:
         raise WireError(f"of another schema version than {SCHEMA_VERSION}")
     _check(sender, incarnation, sequence, sent_ms)
-    return Header(sender, incarnation, sequence, sent_ms), record_of(message_type).decode(body)
+    return Header(sender, incarnation, sequence, sent_ms), body
 
 
 def _check(sender: Any, incarnation: Any, sequence: Any, sent_ms: Any) -> None:

@@ -9,11 +9,14 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.check import check
+from secondlook.commands.geojson import geojson
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
+from secondlook.commands.report import report
 from secondlook.commands.run import run
 from secondlook.commands.scenarios import scenarios
+from secondlook.commands.view import view
 from secondlook.errors import UserError
 
 WRONG_USE = 2
@@ -44,7 +47,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, paper, replay):
+for command in (run, scenarios, check, plan, paper, replay, view, report, geojson):
     app.command()(command)
 
 

@@ -22,15 +22,16 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
     if not live:
         yield make_folder(), None
         return
-    from viz.live_server import LiveServer, LiveViewError, check_display  # noqa: PLC0415 - it imports rerun: not for all
+    from viz.live_server import LiveServer  # noqa: PLC0415 - it imports rerun: not for all
+    from viz.viewer_program import ViewerError, check_display  # noqa: PLC0415
 
     try:
         if not web:
             check_display()
         folder = make_folder()
         server = LiveServer(folder.absolute().name, web=web)
-    except LiveViewError as error:
-        raise UserError(str(error)) from error
+    except ViewerError as error:
+        raise UserError(f"--live: {error}") from error
     watched = sys.stderr.isatty()
     with server:
         if web:
@@ -38,8 +39,8 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
         else:
             try:
                 server.open_window()
-            except LiveViewError as error:
-                raise UserError(f"{error}; add --web to watch in a browser") from error
+            except ViewerError as error:
+                raise UserError(f"--live: {error}; add --web to watch in a browser") from error
         yield folder, server.pipe
         if web and watched:
             with contextlib.suppress(KeyboardInterrupt):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.metadata import version
 from typing import Any
 
 import numpy as np
@@ -38,6 +39,7 @@ def summarise(
     return {
         "scenario": scenario.name,
         "seed": scenario.seed,
+        "version": version("secondlook"),
         "bus": bus,
         "processes": processes,
         "digest": None if result is None else result.digest,

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import signal
+from collections import Counter
 
+import pytest
 from hypothesis import settings
 
 # Whoever starts the tests in the background may have made them deaf to Ctrl-C, and what they start with them.
@@ -12,3 +14,13 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("secondlook", deadline=None)
 settings.load_profile("secondlook")
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Says loudly what this machine could not test, and why."""
+    skipped = [one.longrepr for one in terminalreporter.stats.get("skipped", [])]
+    reasons = Counter(str(told[2]).removeprefix("Skipped: ") for told in skipped if isinstance(told, tuple))
+    if reasons:
+        terminalreporter.section("NOT TESTED on this machine", sep="!", bold=True, yellow=True)
+        for reason, count in reasons.items():
+            terminalreporter.line(f"{count} test{'s' if count > 1 else ''} skipped: {reason}", bold=True, yellow=True)

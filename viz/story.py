@@ -25,6 +25,8 @@ from comms.messages import (
 from comms.node import Received
 
 MOST_NAMED = 3
+TELLING = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, MissionOver)
+"""Messages that may be worth a line; of the others there is nothing to tell."""
 
 
 @dataclass(frozen=True, slots=True)

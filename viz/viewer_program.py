@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import rerun_cli  # type: ignore[import-untyped]
@@ -13,6 +16,77 @@ PROGRAM = str(Path(rerun_cli.__file__).with_name("rerun"))
 # On this machine only, where the default is every network; the system picks the port.
 BIND = ("--bind", "127.0.0.1", "--port", "0")
 LISTENING = re.compile(r"Listening for gRPC connections on (127\.0\.0\.1:\d+)")
+WEB_PAGE = re.compile(r"Hosting a web-viewer at (http://127\.0\.0\.1:\d+)")
+READY_WITHIN_S = 20.0
+POLL_S = 0.05
+
+# It outlives this process if it must, and needs no Python for it.
+# Standard input closes when this process ends, however it ends.
+GUARD = 'read -r word; [ "$word" = keep ] || kill -9 "$1"; rm -rf "$2"'
+
+
+class ViewerError(RuntimeError):
+    """Nothing can be shown; the text says why and what helps, in one sentence."""
+
+
+def check_display() -> None:
+    """Raises ViewerError where there is no display for a window."""
+    if sys.platform in ("darwin", "win32") or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"):
+        return
+    raise ViewerError("there is no display for the viewer's window; add --web to watch in a browser")
+
+
+def start(command: list[str], log: Path, stdin: int, held_open: tuple[int, ...] = ()) -> subprocess.Popen[bytes]:
+    """Starts a program in a session of its own: Ctrl-C is for the command."""
+    with log.open("wb") as output:
+        return subprocess.Popen(
+            command,
+            stdin=stdin,
+            stdout=output,
+            stderr=output,
+            env=quiet_environment(),
+            cwd="/",
+            start_new_session=True,
+            pass_fds=held_open,
+        )
+
+
+def guard(process: subprocess.Popen[bytes], folder: Path) -> subprocess.Popen[bytes]:
+    """Ends the process and removes the folder when this process has ended or closes the guard's standard input; told
+    `keep` there, it only removes the folder."""
+    return subprocess.Popen(
+        ["/bin/sh", "-c", GUARD, "sh", str(process.pid), str(folder)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+
+
+def server_url(server: subprocess.Popen[bytes], log: Path) -> str:
+    """What a viewer connects to, once the server listens. Raises ViewerError where it does not."""
+    return f"rerun+http://{_said(LISTENING, server, log)}/proxy"
+
+
+def web_address(server: subprocess.Popen[bytes], log: Path) -> str:
+    """Where the viewer serves itself as a page, once it does. Raises ViewerError where it does not."""
+    return _said(WEB_PAGE, server, log)
+
+
+def wait_for(words: re.Pattern[str], process: subprocess.Popen[bytes], log: Path, within_s: float) -> str | None:
+    """What a program says, None where it has not after a while; raises ViewerError where it has ended instead."""
+    deadline = time.monotonic() + within_s
+    while time.monotonic() < deadline:
+        ended = process.poll() is not None  # before the log is read: then it is complete
+        text = log.read_text(errors="replace")
+        if found := words.search(text):
+            return found[found.lastindex or 0]
+        if ended:
+            said = [line for line in text.splitlines() if "rror" in line or "panicked" in line]
+            why = said[-1].rsplit(": ", 1)[-1] if said else "it does not say why"
+            raise ViewerError(f"the viewer does not start: {why}")
+        time.sleep(POLL_S)
+    return None
 
 
 def quiet_environment() -> dict[str, str]:
@@ -22,3 +96,10 @@ def quiet_environment() -> dict[str, str]:
     environment.pop("RUST_LOG", None)  # it would hide what the viewer says of its ports
     # The viewer would ask a host outside for a newer version of itself: a proxy that is not there keeps it from that.
     return environment | dict.fromkeys(("HTTPS_PROXY", "https_proxy"), "http://127.0.0.1:1")
+
+
+def _said(words: re.Pattern[str], server: subprocess.Popen[bytes], log: Path) -> str:
+    said = wait_for(words, server, log, READY_WITHIN_S)
+    if said is None:
+        raise ViewerError(f"the viewer was not ready after {READY_WITHIN_S:.0f} s")
+    return said

@@ -15,6 +15,7 @@ from secondlook.errors import UserError
 from secondlook.live_view import live_view
 from secondlook.mission import RunOptions, run_mission
 from secondlook.processes import RunFailedError
+from secondlook.report import write_report
 from secondlook.run_display import closing_table, progress_display
 from secondlook.scenario import load_scenario
 
@@ -39,7 +40,10 @@ def run(
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
-    no_record: Annotated[bool, typer.Option("--no-record", help="Without recording and messages.mpk.")] = False,
+    no_record: Annotated[
+        bool, typer.Option("--no-record", help="Without recording, messages.mpk and the report made of it.")
+    ] = False,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Without report.html.")] = False,
     live: Annotated[bool, typer.Option("--live", help="Show the mission in Rerun while it runs.")] = False,
     web: Annotated[bool, typer.Option("--web", help="With --live: in a browser, not in a window.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
@@ -59,6 +63,8 @@ def run(
                 failure = str(error)
             else:
                 failure = ""
+        if not (no_record or no_report):
+            _report(folder)
         if failure:
             sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
         elif as_json:
@@ -67,6 +73,13 @@ def run(
             closing_table(summary, folder)
     if failure:
         raise typer.Exit(MISSION_FAILED)
+
+
+def _report(folder: Path) -> None:
+    try:
+        write_report(folder)
+    except UserError as error:  # the mission is what counts
+        sys.stderr.write(f"{error}\n")
 
 
 def _folder(out: Path | None, name: str) -> Path:

@@ -15,6 +15,7 @@ from secondlook.scenario.model import (
     UniformSeabed,
     scenario_hash,
 )
+from secondlook.scenario.origin import Origin
 from secondlook.scenario.sensor import Curve, Sensor
 from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle
 
@@ -23,6 +24,7 @@ __all__ = [
     "Coordinator",
     "Curve",
     "Mission",
+    "Origin",
     "PatchySeabed",
     "Place",
     "Problem",

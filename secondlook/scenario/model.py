@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 from secondlook.parts import ALLOCATOR, NODE
 from secondlook.scenario.area import Area
 from secondlook.scenario.dialect import dump
+from secondlook.scenario.origin import Origin
 from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId
 
@@ -84,12 +85,13 @@ class Coordinator(Mapping):
 
 
 class Scenario(Mapping):
-    """One mission. `seed`: of everything random in it."""
+    """One mission. `seed`: of everything random in it. `origin`: where on Earth it is, if that matters."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=64)]
     description: Annotated[str, Field(max_length=1000)] = ""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
     area: Area
+    origin: Origin | None = None
     mission: Mission = Mission()
     seabed: Annotated[UniformSeabed | PatchySeabed, Field(discriminator="kind")] = UniformSeabed()
     targets: Targets = Targets()

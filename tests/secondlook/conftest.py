@@ -1,9 +1,16 @@
-"""A short scenario that is valid, for tests to spoil."""
+"""A short scenario that is valid, and a brief mission that was flown, for tests to spoil."""
 
-from collections.abc import Callable
+import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from browser import chromium
+from flights import BRIEF
+from playwright.sync_api import Browser
+
+from secondlook.mission import RunOptions, run_mission
+from secondlook.scenario import load_scenario
 
 VALID = """\
 name: trial
@@ -45,3 +52,24 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str | by
         return "bad.yaml"
 
     return write_file
+
+
+@pytest.fixture(scope="session")
+def brief_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a brief mission that was flown and recorded; not to be changed."""
+    folder = tmp_path_factory.mktemp("brief-run")
+    run_mission(load_scenario(str(BRIEF)), RunOptions(folder, bus="local"))
+    return folder
+
+
+@pytest.fixture
+def brief_copy(brief_run: Path, tmp_path: Path) -> Path:
+    """The same as a copy, for tests to spoil."""
+    return shutil.copytree(brief_run, tmp_path / "run")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A real browser; skips where there is none."""
+    with chromium() as running:
+        yield running

@@ -33,7 +33,7 @@ from secondlook.scenario import load_scenario, scenario_hash
 from secondlook.scenario.bundled import scenario_names
 from tests.viz.recordings import verify
 
-FILES = {"events.jsonl", "messages.mpk", "mission.rrd", "risk.npz", "scenario.yaml", "summary.json"}
+FILES = {"events.jsonl", "messages.mpk", "mission.rrd", "report.html", "risk.npz", "scenario.yaml", "summary.json"}
 
 
 @dataclass
@@ -174,7 +174,7 @@ def test_the_digest_is_the_same_in_any_number_of_processes(
     flown = fly(tmp_path / "out", "--processes", str(processes), "--no-record")
     assert (flown.code, flown.summary["digest"], flown.left) == (0, digest, {})
     assert flown.summary["processes"] == counted
-    assert {path.name for path in flown.folder.iterdir()} == FILES - {"messages.mpk", "mission.rrd"}
+    assert {path.name for path in flown.folder.iterdir()} == FILES - {"messages.mpk", "mission.rrd", "report.html"}
 
 
 def test_the_digest_is_the_same_on_a_busy_machine(tmp_path: Path, digest: str) -> None:
@@ -222,6 +222,18 @@ def test_another_seed_gives_another_digest(tmp_path: Path, digest: str) -> None:
     flown = fly(tmp_path / "out", "--bus", "local", "--seed", "4", "--no-record")
     assert (flown.code, flown.summary["seed"]) == (0, 4)
     assert flown.summary["digest"] != digest
+
+
+def test_the_report_is_left_out_on_request(tmp_path: Path) -> None:
+    flown = fly(tmp_path / "out", "--bus", "local", "--no-report")
+    assert (flown.code, flown.err) == (0, "")
+    assert {path.name for path in flown.folder.iterdir()} == FILES - {"report.html"}
+
+
+def test_a_run_that_fails_has_a_report_that_says_so(tmp_path: Path) -> None:
+    flown = fly(tmp_path / "out", "--bus", "local", "--set", "mission.time_limit_s=20")
+    assert flown.code == 1
+    assert flown.summary["failure"] in (flown.folder / "report.html").read_text()
 
 
 def test_json_is_the_summary_alone(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ def lines_of(source: str, overrides: tuple[str, ...] = (), seed: int | None = No
     return str(caught.value).splitlines()
 
 
-TOP_KEYS = "name, description, seed, area, mission, seabed, targets, vehicles, coordinator"
+TOP_KEYS = "name, description, seed, area, origin, mission, seabed, targets, vehicles, coordinator"
 POLYGON = "[[0, 0], [500, 0], [500, 400], [0, 400]]"
 
 # What of the valid text is replaced, by what, and the lines that come of it.

@@ -24,9 +24,10 @@ from comms.node import Received
 from tests.viz.recordings import entities, rows, verify
 from viz import live_server, viewer_program
 from viz.live_feed import LiveFeed
-from viz.live_server import LiveServer, LiveViewError
+from viz.live_server import LiveServer
 from viz.recorder import Recorder
 from viz.recorder_config import RecorderConfig
+from viz.viewer_program import ViewerError
 
 RUN = "tellaro-run"
 PATIENCE_S = 30.0
@@ -250,7 +251,7 @@ with LiveServer({RUN!r}, web=True) as server:
 
 def test_a_window_that_cannot_open_is_told_and_nothing_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_server, "WINDOW", ("--no-such-option",))
-    refused = pytest.raises(LiveViewError, match=r"^--live: the viewer does not start: ")
+    refused = pytest.raises(ViewerError, match=r"^the viewer does not start: ")
     with LiveServer(RUN, web=False) as server, refused:
         server.open_window()
     assert server.server.poll() is not None

@@ -43,7 +43,7 @@ from comms.topics import (
     TASK_STATUS,
     Topic,
 )
-from viz.story import Line, Story, number_of
+from viz.story import TELLING, Line, Story, number_of
 
 TIME_MS = 5000
 
@@ -162,3 +162,13 @@ def test_hotspots_of_one_time_share_a_line() -> None:
 def test_numbers_come_from_the_key() -> None:
     assert number_of(strip(StripState.OPEN)) == 3
     assert number_of(hotspot(5)) == 5
+
+
+def test_of_other_messages_there_is_nothing_to_tell(messages: list[Received]) -> None:
+    def told(heard: list[Received]) -> list[Line]:
+        story = Story()
+        return [line for received in heard for line in story.tell(received)] + story.rest()
+
+    telling = [one for one in messages if isinstance(one.message, TELLING)]
+    assert len(telling) < len(messages) / 10
+    assert told(telling) == told(messages)

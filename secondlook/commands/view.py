@@ -1,0 +1,72 @@
+"""`secondlook view`: a recorded mission in Rerun."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from secondlook.errors import UserError
+from viz.recording_file import is_recording, is_whole, repair
+from viz.recording_viewer import RecordingViewer
+from viz.viewer_program import ViewerError, check_display
+
+
+def view(
+    run: Annotated[Path, typer.Argument(help="The folder of a run.")],
+    web: Annotated[bool, typer.Option("--web", help="In a browser, not in a window.")] = False,
+) -> None:
+    """Open the recording of a run in Rerun, and end with its window or with Ctrl-C."""
+    recording = _recording(run)
+    try:
+        if not web:
+            check_display()
+        with _whole(recording) as whole, RecordingViewer(whole, web=web) as viewer:
+            if web:
+                typer.echo(f"The mission is shown at {viewer.page}; Ctrl-C ends it")
+            with contextlib.suppress(KeyboardInterrupt):
+                viewer.wait()
+    except ViewerError as error:
+        raise UserError(str(error)) from error
+
+
+def _recording(run: Path) -> Path:
+    recording = run / "mission.rrd"
+    if not run.is_dir():
+        raise UserError(f"{run}: there is no such folder; must be the folder of a run")
+    try:
+        if is_recording(recording):
+            return recording
+    except FileNotFoundError as error:
+        raise UserError(f"{run}: holds no mission.rrd; must be the folder of a run without --no-record") from error
+    except OSError as error:
+        raise UserError(f"{recording}: cannot be read: {error.strerror}") from error
+    raise UserError(f"{recording}: is not a recording; must be as the run wrote it")
+
+
+@contextmanager
+def _whole(recording: Path) -> Iterator[Path]:
+    """A recording that is whole: this one, after a repair if its run has ended, or else a copy of what there is."""
+    if is_whole(recording):
+        yield recording
+        return
+    run = recording.parent
+    # A recorder that still writes would go on writing into the file that is no longer there.
+    if (run / "summary.json").exists() and os.access(run, os.W_OK):
+        repaired = recording.with_name("mission.rrd.repaired")
+        repair(recording, repaired)
+        repaired.replace(recording)
+        typer.echo(f"{recording} had lost its end; it is repaired, with all that was written", err=True)
+        yield recording
+        return
+    with tempfile.TemporaryDirectory(prefix="secondlook-view-") as folder:
+        copy = Path(folder) / recording.name
+        repair(recording, copy)
+        typer.echo(f"{recording} has no end yet; what is there until now is shown from a copy", err=True)
+        yield copy

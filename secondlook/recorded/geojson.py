@@ -1,0 +1,116 @@
+"""A mission's area, tracks, paths, hotspots and strips as GeoJSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import shapely
+from shapely.geometry import mapping
+from shapely.geometry.base import BaseGeometry
+
+from secondlook.recorded.mission import RecordedMission
+from secondlook.recorded.wgs84 import GeographicOrigin
+
+LOCAL_FRAME = "local: metres, x east, y north of the mission frame's origin; not WGS84"
+LOCAL_DECIMALS, DEGREE_DECIMALS = 2, 7  # a centimetre
+PATH_STEP_M = 0.5  # how far a simplified path may lie off the positions that were told
+
+
+def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None) -> dict[str, Any]:
+    """A FeatureCollection; each feature's property `kind` is area, track, path, hotspot or strip.
+
+    Without an origin, given or in the scenario, coordinates are metres of the mission frame, and the member `frame`
+    says so: most programs would take them for degrees. With one the collection is as RFC 7946 asks: WGS84, longitude
+    first, outer rings counterclockwise, cut at the antimeridian; `frame` tells origin and projection.
+    """
+    if origin is None and "origin" in mission.scenario:
+        origin = GeographicOrigin(**mission.scenario["origin"])
+    frame = LOCAL_FRAME
+    if origin is not None:
+        place = f"latitude {origin.latitude_deg:.7f}, longitude {origin.longitude_deg:.7f}"
+        frame = f"WGS84, from the tangent plane (east, north) at {place}"
+    return {
+        "type": "FeatureCollection",
+        "frame": frame,
+        "features": [
+            {"type": "Feature", "geometry": drawn(geometry, origin), "properties": properties}
+            for geometry, properties in _features(mission)
+            if not geometry.is_empty
+        ],
+    }
+
+
+def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
+    run = mission.run
+    yield mission.area, {"kind": "area", "scenario": run.scenario, "seed": run.seed}
+    for track in mission.tracks:
+        yield (
+            track.line,
+            {
+                "kind": "track",
+                "vehicle": track.vehicle,
+                "number": track.number,
+                "flown": track.flown,
+                "planned_range_m": track.planned_range_m,
+                "r_eff_m": track.r_eff_m,
+                "begun_s": track.begun_s,
+                "ended_s": track.ended_s,
+            },
+        )
+    for path in mission.paths.values():
+        line = path.line.simplify(PATH_STEP_M)
+        yield line, {"kind": "path", "vehicle": path.vehicle, "length_m": round(path.length_m, 1)}
+    for hotspot in mission.hotspots:
+        yield (
+            hotspot.polygon,
+            {
+                "kind": "hotspot",
+                "vehicle": hotspot.vehicle,
+                "number": hotspot.number,
+                "state": hotspot.state.value,
+                "mean_risk": hotspot.mean_risk,
+                "found_s": hotspot.found_s,
+                "changed_s": hotspot.changed_s,
+            },
+        )
+    for strip in mission.strips:
+        yield (
+            strip.polygon,
+            {
+                "kind": "strip",
+                "number": strip.number,
+                "state": strip.state.value,
+                "vehicle": strip.vehicle or None,
+                "expected_m2": strip.expected_m2,
+                "published_s": strip.history[0].t_s,
+                "ended_s": strip.history[-1].t_s,
+                "reason": strip.history[-1].reason,
+            },
+        )
+
+
+def drawn(geometry: BaseGeometry, origin: GeographicOrigin | None) -> dict[str, Any]:
+    """A geometry of the mission frame as GeoJSON has it, in metres, or in degrees with an origin."""
+    if origin is not None:
+        geometry = shapely.transform(geometry, lambda places: np.column_stack(origin.to_degrees(*places.T)))
+        geometry = _cut_at_the_antimeridian(geometry)
+    decimals = LOCAL_DECIMALS if origin is None else DEGREE_DECIMALS
+    oriented = shapely.orient_polygons(geometry)
+    found: dict[str, Any] = mapping(shapely.transform(oriented, lambda places: np.round(places, decimals)))
+    return found
+
+
+def _cut_at_the_antimeridian(geometry: BaseGeometry) -> BaseGeometry:
+    west, _, east, _ = geometry.bounds
+    if west >= -180 and east <= 180:
+        return geometry
+    pieces = [_moved_into_range(geometry, turn_deg) for turn_deg in (-360.0, 0.0, 360.0)]
+    return shapely.union_all(pieces)
+
+
+def _moved_into_range(geometry: BaseGeometry, turn_deg: float) -> BaseGeometry:
+    """The part of a geometry that lies a turn away, brought back."""
+    there = shapely.box(turn_deg - 180, -90, turn_deg + 180, 90)
+    return shapely.transform(shapely.intersection(geometry, there), lambda places: places - [turn_deg, 0.0])

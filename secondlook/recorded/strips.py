@@ -1,0 +1,87 @@
+"""The strips that were cut for a second look, each with its fate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import shapely
+
+from comms.messages import StripState, StripStatus
+from planner.types import Strip
+from secondlook.recorded.said import Said
+
+
+@dataclass(frozen=True)
+class StripEvent:
+    """A change of a strip's state. `vehicle`: who it was with, "" for nobody; `reason`: why, in words."""
+
+    t_s: float
+    state: StripState
+    vehicle: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class StripRecord:
+    """A strip as the coordinator last told it, and each change of its state in `history`.
+
+    `expected_m2`: the residual risk, summed over its cells and times their area, that one look was expected to remove
+    when the strip was first published. `vehicle`: who it is or was with at last, "" for nobody.
+    """
+
+    strip: Strip
+    state: StripState
+    vehicle: str
+    expected_m2: float
+    history: tuple[StripEvent, ...]
+
+    @property
+    def number(self) -> int:
+        """Its number."""
+        return self.strip.number
+
+    @cached_property
+    def polygon(self) -> shapely.Polygon:
+        """Its rectangle, mission frame."""
+        one = self.strip
+        right = (math.cos(one.heading_rad) * one.width_m / 2, -math.sin(one.heading_rad) * one.width_m / 2)
+        return shapely.Polygon([
+            (x_m + side * right[0], y_m + side * right[1])
+            for (x_m, y_m), side in ((one.start, -1), (one.start, 1), (one.end, 1), (one.end, -1))
+        ])  # fmt: skip
+
+    @property
+    def centre_line(self) -> shapely.LineString:
+        """From its start to its end, mission frame."""
+        return shapely.LineString([self.strip.start, self.strip.end])
+
+    def first(self, state: StripState) -> float | None:
+        """When it was first in a state; None if it never was."""
+        return next((event.t_s for event in self.history if event.state is state), None)
+
+
+def strips(published: Iterable[Said[StripStatus]]) -> list[StripRecord]:
+    """Every strip that was ever published, by number."""
+    told: dict[int, list[Said[StripStatus]]] = {}
+    for one in published:
+        told.setdefault(one.number, []).append(one)
+    return [_record(number, statuses) for number, statuses in sorted(told.items())]
+
+
+def _record(number: int, told: list[Said[StripStatus]]) -> StripRecord:
+    last = told[-1].message
+    history: list[StripEvent] = []
+    for said in told:
+        event = StripEvent(said.t_s, said.message.state, said.message.vehicle, said.message.reason)
+        if not history or (event.state, event.vehicle) != (history[-1].state, history[-1].vehicle):
+            history.append(event)
+    return StripRecord(
+        Strip(number, (last.start_x_m, last.start_y_m), last.heading_rad, last.length_m, last.width_m),
+        last.state,
+        next((event.vehicle for event in reversed(history) if event.vehicle), ""),
+        told[0].message.removable_m2,
+        tuple(history),
+    )

@@ -1,0 +1,112 @@
+"""The area from above: tracks, paths, and the strips, each of which leads to its fate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import shapely
+
+from comms.messages import StripState
+from secondlook.recorded import PathRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
+from secondlook.report.axis import ticks
+from secondlook.report.fates import FATE_CLASS, fate_in_words
+from secondlook.report.map_frame import MapFrame
+from secondlook.report.svg import Element, drawing, element
+
+WIDTH_PX, HEIGHT_PX = 900.0, 620.0  # of the picture on a desk: what text and margins are measured by
+MARGIN_PX = 30.0
+PATH_STEP_PX = 0.5  # how far a drawn path may lie off the flown one
+LABEL_PX, LINE_PX = 40.0, 14.0
+ALONG = (0.5, 0.35, 0.65, 0.2, 0.8)  # where on a strip its number may stand, the best first
+ROUND_NUMBERS = 8  # the scale bar is about an eighth of the width
+
+
+def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
+    """What was flown over the risk that is left. A strip's element has the id `ids` with its number."""
+    paths, strips, tracks = mission.paths, mission.strips, mission.tracks
+    all_of_it = [mission.area, *(path.line for path in paths.values()), *(strip.polygon for strip in strips)]
+    shown = shapely.GeometryCollection(all_of_it)
+    west_m, south_m, east_m, north_m = shown.bounds
+    unit_m = max((east_m - west_m) / WIDTH_PX, (north_m - south_m) / HEIGHT_PX)
+    frame = MapFrame.around(shown, MARGIN_PX * unit_m)
+    kinds = dict.fromkeys(mission.primaries, "primary")
+    children = [
+        frame.risk(risk),
+        element("path", d=frame.line(mission.area), class_="area"),
+        *(_path(frame, path, kinds.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
+        *(_track(frame, track, unit_m) for track in tracks),
+        *(_strip(frame, strip, place, ids) for strip, place in _numbered(strips, LABEL_PX * unit_m)),
+        *_names(frame, [(path, kinds.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
+        *_scale(frame, unit_m),
+    ]
+    label = "The area from above with tracks, paths and strips"
+    return drawing(frame.width_m, frame.height_m, label, children, class_="map flown", style=f"--u:{unit_m:.4g}")
+
+
+def _path(frame: MapFrame, path: PathRecord, kind: str, unit_m: float) -> Element:
+    line = path.line.simplify(PATH_STEP_PX * unit_m)
+    title = element("title", f"{path.vehicle}: {path.length_m / 1000:.1f} km flown")
+    return element("path", title, d=frame.line(line), class_=f"path {kind}")
+
+
+def _track(frame: MapFrame, track: TrackRecord, unit_m: float) -> Element:
+    length_m = max(track.line.length, unit_m)
+    (x0_m, y0_m), (x1_m, y1_m) = track.line.coords[0], track.line.coords[-1]
+    back = 9 * unit_m / length_m
+    x, y = frame.place(x0_m + (x0_m - x1_m) * back, y0_m + (y0_m - y1_m) * back)
+    found = "" if track.r_eff_m is None else f", seen up to {track.r_eff_m} m"
+    state = "flown" if track.flown else "not flown"
+    return element(
+        "g",
+        element("title", f"{track.vehicle}, track {track.number}: {state}{found}"),
+        element("path", d=frame.line(track.line), class_=f"track {'' if track.flown else 'ahead'}"),
+        element("text", str(track.number), x=x, y=y, class_="track-number"),
+    )
+
+
+def _numbered(strips: Sequence[StripRecord], apart_m: float) -> Iterator[tuple[StripRecord, shapely.Point]]:
+    """Every strip with the place of its number: on the centre line where it keeps apart from those before it. What was
+    withdrawn comes first, so that it lies below the others."""
+    taken: list[shapely.Point] = []
+    for strip in sorted(strips, key=lambda one: one.state is not StripState.WITHDRAWN):
+        places = [strip.centre_line.interpolate(share, normalized=True) for share in ALONG]
+        place = max(places, key=lambda here: min((apart_m, *(here.distance(other) for other in taken))))
+        taken.append(place)
+        yield strip, place
+
+
+def _strip(frame: MapFrame, strip: StripRecord, number_at: shapely.Point, ids: str) -> Element:
+    x, y = frame.place(number_at.x, number_at.y)
+    return element(
+        "a",
+        element("title", f"strip {strip.number}: {fate_in_words(strip)}"),
+        element("path", d=frame.line(strip.polygon), class_="casing"),
+        element("path", d=frame.line(strip.polygon), class_="outline"),
+        element("text", str(strip.number), x=x, y=y),
+        href=f"#strip-{strip.number}",
+        id=f"{ids}{strip.number}",
+        class_=f"strip {FATE_CLASS[strip.state]}",
+    )
+
+
+def _names(frame: MapFrame, paths: Sequence[tuple[PathRecord, str]], unit_m: float) -> Iterator[Element]:
+    """The vehicles' names where they begin, one below the other where they begin together."""
+    lowest: list[tuple[float, float]] = []
+    for path, kind in sorted(paths, key=lambda one: -one[0].y_m[0]):
+        x, y = frame.place(path.x_m[0], path.y_m[0])
+        text_y = max([y, *(below + LINE_PX * unit_m for near, below in lowest if abs(near - x) < 80 * unit_m)])
+        lowest.append((x, text_y))
+        yield element(
+            "g",
+            element("circle", cx=x, cy=y, r=3.5 * unit_m),
+            element("text", path.vehicle, x=x + 7 * unit_m, y=text_y + 4 * unit_m),
+            class_=f"start {kind}",
+        )
+
+
+def _scale(frame: MapFrame, unit_m: float) -> Iterator[Element]:
+    length_m = ticks(frame.width_m, ROUND_NUMBERS)[1]
+    x, y = frame.width_m - 12 * unit_m, frame.height_m - 10 * unit_m
+    yield element("path", d=f"M{x - length_m:.1f},{y:.1f}H{x:.1f}", class_="scale")
+    yield element("text", f"{length_m:g} m", x=x - length_m / 2, y=y - 5 * unit_m, class_="scale-text")
+    yield element("text", "N ↑", x=x, y=16 * unit_m, class_="north")

@@ -1,0 +1,123 @@
+"""The report's page: everything that is known of a mission, put into the template."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import numpy as np
+from markupsafe import Markup
+
+from secondlook.recorded import RecordedMission, RiskMap
+from secondlook.report.fates import fate
+from secondlook.report.flown_map import flown_map
+from secondlook.report.histogram import histogram
+from secondlook.report.moments import log_lines, moments
+from secondlook.report.png import data_url, indexed_png
+from secondlook.report.reproduce import command_to_reproduce
+from secondlook.report.risk_chart import risk_chart
+from secondlook.report.risk_colours import LEVELS, palette
+from secondlook.report.risk_maps import risk_map
+from secondlook.report.risk_series import risk_series
+from secondlook.report.svg import Element, markup
+from secondlook.report.timeline import timeline
+
+WIDE_PX, NARROW_PX = 900.0, 360.0  # on a desk and on paper, and on a phone
+STRIP_ON_MAP = "on-map-"
+
+
+@dataclass(frozen=True)
+class TargetFigures:
+    """Of a simulation: how many targets there were, how many each vehicle was the first to find, how many were missed,
+    and which share should have been missed by the risk map."""
+
+    count: int
+    found_by: dict[str, int]
+    missed: int
+    predicted_missed_share: float
+
+
+def report_page(mission: RecordedMission) -> str:
+    """The whole page, which needs no other file. Of a run that ended before the mission began it tells that alone."""
+    flown = _flown(mission) if mission.has_begun else {}
+    return _template().render(
+        mission=mission,
+        summary=mission.summary,
+        name=mission.scenario.get("name", mission.folder.name),
+        settings=_settings(mission),
+        command=command_to_reproduce(mission),
+        style=Markup(_text("style.css")),
+        **flown,
+    )
+
+
+def _flown(mission: RecordedMission) -> dict[str, Any]:
+    before, after = mission.risk(vehicles=mission.primaries), mission.risk()
+    log = log_lines(mission)
+    mattered = moments(mission, log)
+    samples = risk_series(mission)
+    done = mission.activities
+    vehicles = [one.vehicle for one in mission.run.vehicles]
+    helped = bool(mission.helpers)
+    return {
+        "helped": helped,
+        "before": before.statistics,
+        "after": after.statistics,
+        "before_map": markup(risk_map(mission, before, "Residual risk before the second looks")),
+        "after_map": markup(risk_map(mission, after, "Residual risk after the second looks")),
+        "scale": Markup(data_url(indexed_png(np.arange(LEVELS, dtype=np.uint8)[np.newaxis], palette()))),
+        "flown_map": markup(flown_map(mission, after, STRIP_ON_MAP)),
+        "on_map": STRIP_ON_MAP,
+        "moments": mattered,
+        "risk_chart": _at_both_widths(lambda width_px: risk_chart(samples, mattered, width_px)),
+        "histogram": _at_both_widths(lambda width_px: histogram(before, after if helped else None, width_px)),
+        "timeline": _at_both_widths(lambda width_px: timeline(vehicles, mission.helpers, done, width_px)),
+        "tracks": mission.tracks,
+        "paths": mission.paths,
+        "fates": [fate(strip, before, after) for strip in mission.strips],
+        "targets": _targets(mission, after),
+        "log": log,
+    }
+
+
+def _at_both_widths(draw: Callable[[float], Element]) -> Markup:
+    """A drawing for wide and one for narrow pages, of which the style sheet shows one."""
+    return Markup('<div class="wide">{}</div><div class="narrow">{}</div>').format(
+        markup(draw(WIDE_PX)), markup(draw(NARROW_PX))
+    )
+
+
+def _targets(mission: RecordedMission, after: RiskMap) -> TargetFigures | None:
+    targets = mission.targets
+    if not targets:
+        return None
+    found_by = Counter(target.found_by for target in targets if target.found_by is not None)
+    at_targets = [float(after.at(target.point.x, target.point.y)) for target in targets]
+    return TargetFigures(len(targets), dict(found_by), len(targets) - found_by.total(), statistics.fmean(at_targets))
+
+
+def _settings(mission: RecordedMission) -> str:
+    file = mission.folder / "scenario.yaml"
+    return file.read_text(encoding="utf-8") if file.exists() else ""
+
+
+def _text(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+@cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
+    )
+    environment.filters["seconds"] = lambda t_s: "–" if t_s is None else f"{t_s:.0f} s"
+    environment.filters["minutes"] = lambda t_s: f"{t_s / 60:.0f} minutes"
+    environment.filters["share"] = lambda share: f"{100 * share:.0f} %"
+    environment.filters["risk"] = lambda risk: "–" if risk != risk else f"{risk:.2f}"  # noqa: PLR0124 - NaN
+    return environment.from_string(_text("template.html"))

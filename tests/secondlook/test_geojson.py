@@ -1,0 +1,186 @@
+"""A mission on a map: GeoJSON in local metres, and in degrees as RFC 7946 asks."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import Counter
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import strategies as st
+from shapely.geometry import shape
+
+import secondlook
+from secondlook import cli
+from secondlook.recorded import GeographicOrigin, RecordedMission, to_geojson
+from secondlook.recorded.geojson import LOCAL_FRAME, drawn
+from secondlook.scenario import ScenarioError, load_scenario
+
+PLACE = GeographicOrigin(44.08, 9.83)
+
+
+@pytest.fixture(scope="module")
+def mission(brief_run: Path) -> RecordedMission:
+    return secondlook.load(brief_run)
+
+
+def rings(geometry: dict[str, Any]) -> Iterator[list[list[float]]]:
+    if geometry["type"] == "Polygon":
+        yield from geometry["coordinates"]
+
+
+@pytest.mark.parametrize("origin", [None, PLACE])
+def test_every_kind_is_there_and_every_ring_is_closed_and_counterclockwise(
+    mission: RecordedMission, origin: GeographicOrigin | None
+) -> None:
+    collection = json.loads(json.dumps(to_geojson(mission, origin)))
+    assert collection["type"] == "FeatureCollection"
+    kinds = Counter(feature["properties"]["kind"] for feature in collection["features"])
+    assert kinds == {
+        "area": 1,
+        "track": len(mission.tracks),
+        "path": 2,
+        "hotspot": len(mission.hotspots),
+        "strip": len(mission.strips),
+    }
+    closed = 0
+    for feature in collection["features"]:
+        assert feature.keys() == {"type", "geometry", "properties"}
+        for ring in rings(feature["geometry"]):
+            assert ring[0] == ring[-1]
+            assert shapely.LinearRing(ring).is_ccw
+            closed += 1
+    assert closed == kinds["area"] + kinds["hotspot"] + kinds["strip"]
+
+
+def test_without_an_origin_places_are_metres_and_it_says_so(mission: RecordedMission) -> None:
+    collection = to_geojson(mission)
+    assert collection["frame"] == LOCAL_FRAME
+    area = shape(collection["features"][0]["geometry"])
+    assert shapely.equals(area, shapely.box(0, 0, 300, 100))
+    strip = next(one for one in collection["features"] if one["properties"]["kind"] == "strip")
+    assert shapely.hausdorff_distance(shape(strip["geometry"]), mission.strips[0].polygon) < 0.01
+
+
+def test_with_an_origin_places_are_degrees(mission: RecordedMission) -> None:
+    collection = to_geojson(mission, PLACE)
+    assert collection["frame"].startswith("WGS84")
+    west, south, east, north = shape(collection["features"][0]["geometry"]).bounds
+    assert (west, south) == pytest.approx((9.83, 44.08), abs=2e-7)
+    # A degree of latitude at 44.08 N is 111.115 km, one of longitude 80.092 km.
+    assert (east - west) * 80_092 == pytest.approx(300, abs=0.1)
+    assert (north - south) * 111_115 == pytest.approx(100, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("latitude_deg", "metres_a_degree_north", "metres_a_degree_east"),
+    # Tables of the ellipsoid; at the equator a degree east is pi / 180 of the semi-major axis.
+    [(0.0, 110_574.3, 111_319.5), (45.0, 111_131.7, 78_846.8), (-60.0, 111_412.3, 55_800.0)],
+)
+def test_degrees_are_as_long_as_the_tables_say(
+    latitude_deg: float, metres_a_degree_north: float, metres_a_degree_east: float
+) -> None:
+    here = GeographicOrigin(latitude_deg, 20.0)
+    east_deg, _ = here.to_degrees(np.array([100.0]), np.array([0.0]))
+    _, north_deg = here.to_degrees(np.array([0.0]), np.array([100.0]))
+    assert 100 / (east_deg[0] - 20) == pytest.approx(metres_a_degree_east, rel=1e-5)
+    assert 100 / (north_deg[0] - latitude_deg) == pytest.approx(metres_a_degree_north, rel=1e-5)
+
+
+def earth_centred(longitude_deg: float, latitude_deg: float) -> np.ndarray[Any, np.dtype[np.float64]]:
+    a_m, e2 = 6_378_137.0, 0.00669437999014
+    longitude, latitude = math.radians(longitude_deg), math.radians(latitude_deg)
+    n_m = a_m / math.sqrt(1 - e2 * math.sin(latitude) ** 2)
+    out_m = n_m * math.cos(latitude)
+    return np.array([
+        out_m * math.cos(longitude), out_m * math.sin(longitude), n_m * (1 - e2) * math.sin(latitude)
+    ])  # fmt: skip
+
+
+@given(st.floats(-85, 85), st.floats(-180, 180), st.floats(0, 10_000), st.floats(0, 2 * math.pi))
+def test_places_lie_where_the_tangent_plane_has_them(
+    latitude_deg: float, longitude_deg: float, distance_m: float, bearing_rad: float
+) -> None:
+    x_m, y_m = distance_m * math.sin(bearing_rad), distance_m * math.cos(bearing_rad)
+    found = GeographicOrigin(latitude_deg, longitude_deg).to_degrees(np.array([x_m]), np.array([y_m]))
+    moved_m = earth_centred(found[0][0], found[1][0]) - earth_centred(longitude_deg, latitude_deg)
+    longitude, latitude = math.radians(longitude_deg), math.radians(latitude_deg)
+    east = np.array([-math.sin(longitude), math.cos(longitude), 0.0])
+    up = np.array([
+        math.cos(latitude) * math.cos(longitude), math.cos(latitude) * math.sin(longitude), math.sin(latitude)
+    ])  # fmt: skip
+    north = np.cross(up, east)
+    assert (moved_m @ east, moved_m @ north) == pytest.approx((x_m, y_m), abs=0.02)
+
+
+def test_what_crosses_the_antimeridian_is_cut_there() -> None:
+    # 0.001 degrees of longitude at 10 N are 109.6 m.
+    here = GeographicOrigin(10.0, 179.999)
+    cut = shape(drawn(shapely.box(-500, 0, 500, 300), here))
+    assert cut.geom_type == "MultiPolygon"
+    west, east = sorted(part.bounds for part in shapely.get_parts(cut))
+    assert (west[0], east[2]) == (-180.0, 180.0)
+    widths_m = [(part[2] - part[0]) * 109_639 for part in (east, west)]
+    assert widths_m == pytest.approx([500 + 109.6, 500 - 109.6], abs=0.5)
+    assert drawn(shapely.LineString([(-500, 0), (500, 0)]), here)["type"] == "MultiLineString"
+    assert shape(drawn(shapely.box(200, 0, 500, 300), here)).bounds[2] < -179.99
+    assert shape(drawn(shapely.box(-500, 0, 0, 300), here)).bounds[0] > 179.99
+
+
+@pytest.mark.parametrize("place", [(89.5, 0.0), (0.0, 181.0), (math.nan, 0.0), (0.0, math.inf)])
+def test_an_origin_that_is_none_is_refused(place: tuple[float, float]) -> None:
+    with pytest.raises(ValueError, match="is not allowed; must be a number of degrees from -"):
+        GeographicOrigin(*place)
+
+
+def test_the_scenario_may_hold_the_origin(write: Callable[[str], str], valid_text: str, brief_copy: Path) -> None:
+    scenario = load_scenario(write(valid_text + "origin: {latitude_deg: 44.08, longitude_deg: 9.83}\n"))
+    assert scenario.origin is not None
+    (brief_copy / "scenario.yaml").write_text(scenario.to_yaml())
+    mission = secondlook.load(brief_copy)
+    assert to_geojson(mission) == to_geojson(mission, PLACE)
+    assert to_geojson(mission, GeographicOrigin(0, 0)) != to_geojson(mission, PLACE)
+    with pytest.raises(ScenarioError, match=r"origin\.latitude_deg: 91 is not allowed; must be"):
+        load_scenario(write(valid_text + "origin: {latitude_deg: 91, longitude_deg: 9.83}\n"))
+
+
+def command(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int | str | None:
+    monkeypatch.setattr("sys.argv", ["secondlook", "geojson", *arguments])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    return stopped.value.code
+
+
+def test_the_command_prints_or_writes_it(
+    mission: RecordedMission, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    run, out = str(mission.folder), tmp_path / "mission.geojson"
+    assert command(monkeypatch, run) == 0
+    assert json.loads(capsys.readouterr().out) == json.loads(json.dumps(to_geojson(mission)))
+    assert command(monkeypatch, run, "--origin", "44.08", "9.83", "--out", str(out)) == 0
+    assert json.loads(out.read_text()) == json.loads(json.dumps(to_geojson(mission, PLACE)))
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (("--origin", "90", "0"), "--origin: latitude 90 is not allowed; must be a number of degrees from -89 to 89"),
+        (("--out", "/dev/null/map"), "--out /dev/null/map: Not a directory; must be a file that can be written"),
+    ],
+)
+def test_the_command_refuses_in_one_sentence(
+    mission: RecordedMission,
+    arguments: tuple[str, ...],
+    said: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert command(monkeypatch, str(mission.folder), *arguments) == 2
+    assert capsys.readouterr().err == f"{said}\n"

@@ -1,0 +1,75 @@
+"""A recording that lost its end is known and made whole, with all that it had."""
+
+from __future__ import annotations
+
+import struct
+import warnings
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from rerun.chunk import RrdReader
+
+from tests.viz.recordings import entities, rows, timelines, verify
+from viz.recording_file import is_recording, is_whole, repair
+from viz.viewer_program import ViewerError
+
+SHOWN = (("/area/risk", "GridMap:data"), ("/metrics/mean_risk", "Scalars:scalars"), ("/log/primary", "TextLog:text"))
+
+
+def counted(recording: Path) -> Counter[str]:
+    """How many rows each entity has."""
+    with warnings.catch_warnings():  # that the file has no end
+        warnings.simplefilter("ignore")
+        found: Counter[str] = Counter()
+        for chunk in RrdReader(recording).stream():
+            found[str(chunk.entity_path)] += chunk.num_rows
+    return found
+
+
+def ends_of_messages(whole: bytes) -> list[int]:
+    """Where each message of a file ends: after a head of 12 bytes each has its kind, its length and its payload."""
+    ends = [12]
+    while ends[-1] + 16 <= len(whole):
+        _, length = struct.unpack_from("<QQ", whole, ends[-1])
+        ends.append(ends[-1] + 16 + length)
+    return [end for end in ends if end <= len(whole)]
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.93, 0.99])
+@pytest.mark.parametrize("more", [0, 1, 100])
+def test_a_recording_that_was_cut_off_keeps_what_it_had(
+    recording: Path, tmp_path: Path, share: float, more: int
+) -> None:
+    whole = recording.read_bytes()
+    end = max(end for end in ends_of_messages(whole) if end <= share * len(whole))
+    had, cut = tmp_path / "had.rrd", tmp_path / "cut.rrd"
+    had.write_bytes(whole[:end])
+    cut.write_bytes(whole[: end + more])  # in the midst of a message, or between two
+    assert is_recording(cut)
+    assert not is_whole(cut)
+    repaired = tmp_path / "repaired.rrd"
+    repair(cut, repaired)
+    assert verify(repaired).returncode == 0
+    assert is_whole(repaired)
+    assert counted(repaired) == counted(had)
+    assert timelines(repaired) == {"sim_time"}
+    for entity, component in SHOWN:
+        kept = rows(repaired, entity, component)
+        assert kept == rows(recording, entity, component)[: len(kept)]
+    assert share < 0.9 or entities(repaired) == entities(recording)
+
+
+def test_a_whole_recording_is_known(recording: Path, tmp_path: Path) -> None:
+    assert is_recording(recording)
+    assert is_whole(recording)
+    text = tmp_path / "text.rrd"
+    for content in ("", "RRF", "Hello RRF2FOOT"):
+        text.write_text(content)
+        assert not is_recording(text)
+        assert not is_whole(text)
+
+
+def test_what_cannot_be_repaired_is_told(recording: Path, tmp_path: Path) -> None:
+    with pytest.raises(ViewerError, match=r"mission\.rrd: cannot be repaired: "):
+        repair(recording, tmp_path / "no" / "folder.rrd")
