@@ -75,6 +75,23 @@ class NoAllocator:
         return {}
 
 
+def checked_offers(
+    offers: Mapping[str, int], strips: Sequence[OpenStrip], helpers: Sequence[FreeHelper]
+) -> list[tuple[str, int]]:
+    """An allocator's offers, sorted; raises ValueError for any that is not of an open strip to a free helper, or for a
+    strip that is offered twice."""
+    if not isinstance(offers, Mapping):
+        raise ValueError(f"the allocator must answer with a mapping from vehicle to strip number, not {offers!r}")
+    free = {helper.vehicle for helper in helpers}
+    left = {one.strip.number for one in strips}
+    for vehicle, number in offers.items():
+        if vehicle not in free or number not in left:
+            gives = f"the allocator gives strip {number!r} to {vehicle!r}"
+            raise ValueError(f"{gives}; must give an open strip, and each once, to a free helper")
+        left.remove(number)
+    return sorted(offers.items())
+
+
 def service_s(strip: Strip, helper: FreeHelper) -> float:
     """Seconds for a helper to get to the nearer end of a strip and along it once."""
     pose = Pose(helper.x_m, helper.y_m, helper.heading_rad)

@@ -29,7 +29,7 @@ from comms.messages import (
 )
 from comms.node import Publication, Received, Step
 from comms.topics import MISSION_OVER, STRIP, TASK
-from coordinator.allocation import FreeHelper, OpenStrip
+from coordinator.allocation import FreeHelper, OpenStrip, checked_offers
 from coordinator.config import CoordinatorConfig
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
@@ -355,7 +355,7 @@ class Coordinator:
         helpers = [helper for name in self.vehicles if (helper := self._free_helper(name, now_ms)) is not None]
         if not strips or not helpers:
             return
-        for vehicle, number in sorted(self.config.allocator.assign(strips, helpers).items()):
+        for vehicle, number in checked_offers(self.config.allocator.assign(strips, helpers), strips, helpers):
             record = self.ledger.get(number)
             assert record is not None
             self._say(TaskAction.TAKE, record.strip, vehicle)

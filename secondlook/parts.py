@@ -44,7 +44,10 @@ class PartKind:
         match = _OWN.fullmatch(text)
         if match is None:
             raise PartError(f"must be {self._names()}")
-        found = _import(match.group(1), match.group(2))
+        return self.checked(_import(match.group(1), match.group(2)), text)
+
+    def checked(self, found: Any, text: str) -> Callable[..., Any]:
+        """`found`, which is called `text`, as the maker of a part; raises PartError where it cannot be one."""
         if not callable(found):
             raise PartError(f"must be {self._names()}; that is a {type(found).__name__}")
         self._check_call(found, self.arguments, f"{text} must take ({', '.join(self.arguments)})")

@@ -8,6 +8,9 @@ from secondlook.rooms import check_rooms
 
 check_rooms()
 
+from typing import TYPE_CHECKING, Any
+
+from secondlook.errors import UserError
 from secondlook.processes import RunFailedError
 from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError
 from secondlook.testing.flight import Flight
@@ -23,6 +26,15 @@ from secondlook.testing.strip_assertions import (
     assert_strips_offered_within,
     number_of,
 )
+
+if TYPE_CHECKING:
+    from secondlook.testing.checks import (
+        check_allocator,
+        check_detection_curve,
+        check_node,
+        check_sonar_model,
+        check_spacing_planner,
+    )
 
 __all__ = [
     "Condition",
@@ -41,6 +53,24 @@ __all__ = [
     "assert_repeats",
     "assert_risk_at_most",
     "assert_strips_offered_within",
+    "check_allocator",
+    "check_detection_curve",
+    "check_node",
+    "check_sonar_model",
+    "check_spacing_planner",
     "number_of",
     "scenario_from",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The conformance checks, which need hypothesis, are imported when they are asked for."""
+    if not name.startswith("check_") or name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        from secondlook.testing import checks  # noqa: PLC0415
+    except ModuleNotFoundError as error:
+        if error.name != "hypothesis":
+            raise
+        raise UserError(f"{name} needs the package hypothesis; it comes with secondlook[testing]") from error
+    return getattr(checks, name)

@@ -9,9 +9,9 @@ from typing import Any, get_type_hints
 import msgpack
 import numpy as np
 import pytest
-from any_message import MESSAGE_TYPES, any_message, headers, kind_of, largest_message
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from largest_message import MESSAGE_TYPES, headers, largest_message
 
 from comms.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, SCHEMA_VERSION, Header, decode, encode
 from comms.messages import (
@@ -29,6 +29,7 @@ from comms.topics import TASK, TOPICS, Topic
 from comms.wire import LARGEST_MS, Scaled, WireError
 from comms.zenoh_session import LARGEST_MESSAGE_BYTES
 from planner.tiles import TILE_CELLS
+from secondlook.testing.checks.any_message import any_message, kind_of
 
 HEADER = Header("alpha", 0, 3, 4500)
 NAV = Nav(1.0, -2.5, 0.5, 1.5, 15.0, 0.0)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from any_mail import Letter, deliver, letters
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
+from deliver import deliver
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode
@@ -26,6 +26,7 @@ from coordinator.allocation import GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
+from secondlook.testing.checks.any_mail import Letter, letters
 
 HELPERS = [HELPER, SECOND_HELPER]
 ALL = [PRIMARY, *HELPERS]

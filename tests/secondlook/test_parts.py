@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -29,6 +30,18 @@ class NoHelpers:
 class Clueless:
     def assign(self, strips, helpers):
         raise RuntimeError("no idea")
+
+class ToThePrimary:
+    def assign(self, strips, helpers):
+        return {"primary": strips[0].strip.number}
+
+class Vague:
+    def assign(self, strips, helpers):
+        return {helper.vehicle: float("nan") for helper in helpers}
+
+class Speechless:
+    def assign(self, strips, helpers):
+        return None
 
 class Every60:
     def __init__(self, nadir_gap_m, told_range_m):
@@ -165,6 +178,26 @@ def test_a_part_that_fails_ends_the_mission_with_one_sentence(
     ]
     assert code == 1
     assert any(line.startswith(sentence) for line in told), error
+
+
+@pytest.mark.parametrize(
+    ("allocator", "sentence"),
+    [
+        (
+            "ToThePrimary",
+            "ValueError: the allocator gives strip 1 to 'primary'; must give an open strip, and each once, to",
+        ),
+        (
+            "Vague",
+            "ValueError: the allocator gives strip nan to 'helper'; must give an open strip, and each once, to a fr",
+        ),
+        ("Speechless", "ValueError: the allocator must answer with a mapping from vehicle to strip number, not None"),
+    ],
+)
+def test_an_answer_that_is_none_is_told_for_what_it_is(folder: Path, allocator: str, sentence: str) -> None:
+    code, _, error = run(folder, f"coordinator.allocator=own:{allocator}")
+    assert code == 1
+    assert re.search(rf"^coordinator has failed at \d+\.\d+ s: {re.escape(sentence)}", error, re.MULTILINE), error
 
 
 @pytest.mark.parametrize("made", ["own:not_a_curve", "own:Clueless"])

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from any_mail import Letter, deliver, letters
 from by_hand import HELPER, PRIMARY, nav, run_info
+from deliver import deliver
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode
@@ -11,6 +11,7 @@ from one_node import OneNode
 from comms.messages import AgentState, CoverageTile, Mode, Role, TaskState, TaskStatus
 from comms.topics import LOOK, MANEUVER_STATUS, MISSION_OVER, NAV, TASK
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
+from secondlook.testing.checks.any_mail import Letter, letters
 from vehicle_agent.config import RevisitConfig, SurveyConfig
 from vehicle_agent.revisit import RevisitAgent
 from vehicle_agent.survey import SurveyAgent

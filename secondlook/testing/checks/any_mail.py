@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from hypothesis import strategies as st
-from likely_message import likely_message
-from one_node import OneNode
 
 from comms.messages import Look, Maneuver, ManeuverStatus
 from comms.topics import Topic
+from secondlook.testing.checks.likely_message import likely_message
 
 
 @dataclass(frozen=True)
@@ -43,23 +42,10 @@ def letters(topics: Sequence[tuple[Topic, Sequence[str]]], most: int) -> st.Sear
     return st.lists(st.one_of([of_topic(entry) for entry in topics]), min_size=most // 2, max_size=most)
 
 
-def deliver(node: OneNode, mail: Sequence[Letter]) -> None:
-    """Gives the node its mail; `OneNode` holds what it says and when it wants to be woken to the rules.
-
-    Looks and statuses of manoeuvre 0 are made to be of the one that the node has commanded last.
-    """
-    for letter in mail:
-        commanded = node.all(Maneuver)
-        message = letter.message
-        if isinstance(message, Look) and message.maneuver == 0 and commanded:
-            message = replace(message, maneuver=commanded[-1].number)
-        elif isinstance(message, ManeuverStatus) and message.number == 0 and commanded:
-            message = replace(message, number=commanded[-1].number)
-        node.hear(
-            letter.key,
-            message,
-            at_ms=node.now_ms + letter.after_ms if letter.after_ms else None,
-            sequence=letter.sequence,
-            incarnation=letter.incarnation,
-        )
-    node.wait(100)
+def about_last(message: Any, commanded: Maneuver | None) -> Any:
+    """Looks and statuses of manoeuvre 0 become those of the manoeuvre that the node has commanded last."""
+    if commanded is not None and isinstance(message, Look) and message.maneuver == 0:
+        return replace(message, maneuver=commanded.number)
+    if commanded is not None and isinstance(message, ManeuverStatus) and message.number == 0:
+        return replace(message, number=commanded.number)
+    return message

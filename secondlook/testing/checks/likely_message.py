@@ -6,7 +6,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from any_message import any_message
 from hypothesis import strategies as st
 
 from comms.messages import (
@@ -26,6 +25,7 @@ from comms.messages import (
     TaskStatus,
     Vertex,
 )
+from secondlook.testing.checks.any_message import any_message
 
 
 @cache

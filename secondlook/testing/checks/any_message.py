@@ -1,4 +1,4 @@
-"""Messages of every type made from the kinds their fields are annotated with: any that is valid, and the largest."""
+"""Messages of every type made from the kinds their fields are annotated with: any that is valid."""
 
 from __future__ import annotations
 
@@ -9,42 +9,15 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import numpy as np
 from hypothesis import strategies as st
 
-from comms.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, Header
-from comms.messages import Message
-from comms.wire import (
-    IDENTIFIER,
-    LARGEST_MS,
-    AtMost,
-    Flag,
-    Mask,
-    Packed,
-    Scaled,
-    Whole,
-    Words,
-)
+from comms.wire import AtMost, Flag, Mask, Packed, Scaled, Whole, Words
 
-MESSAGE_TYPES: tuple[type[Any], ...] = get_args(Message)
 MOST_DRAWN = 6  # entries of a tuple and elements along an axis: enough to differ, and quick to draw
-
-headers = st.builds(
-    Header,
-    st.from_regex(IDENTIFIER, fullmatch=True),
-    st.integers(0, LARGEST_INCARNATION),
-    st.integers(0, LARGEST_SEQUENCE),
-    st.integers(0, LARGEST_MS),
-)
 
 
 def any_message(message_type: type[Any]) -> st.SearchStrategy[Any]:
     """Valid messages of a type, each field anywhere in its range."""
     hints = get_type_hints(message_type, include_extras=True)
     return st.builds(message_type, **{one.name: _any(hints[one.name]) for one in fields(message_type)})
-
-
-def largest_message(message_type: type[Any], *, tile_cells: int) -> Any:
-    """A message of a type that takes the most bytes its fields allow; a coverage tile has `tile_cells` a side."""
-    hints = get_type_hints(message_type, include_extras=True)
-    return message_type(**{one.name: _largest(hints[one.name], tile_cells) for one in fields(message_type)})
 
 
 def kind_of(hint: Any) -> Any:
@@ -54,7 +27,8 @@ def kind_of(hint: Any) -> Any:
     return next((note for note in get_args(hint)[1:] if not isinstance(note, AtMost)), None)
 
 
-def _bounded_tuple(hint: Any) -> tuple[Any, int]:
+def bounded_tuple(hint: Any) -> tuple[Any, int]:
+    """What a tuple of a bounded length holds, and how many at most."""
     base, bound = get_args(hint)
     return get_args(base)[0], bound.count
 
@@ -80,7 +54,7 @@ def _any(hint: Any) -> st.SearchStrategy[Any]:
         return st.sampled_from(hint)
     if is_dataclass(hint):
         return any_message(hint)  # type: ignore[arg-type]
-    entry, most = _bounded_tuple(hint)
+    entry, most = bounded_tuple(hint)
     return st.lists(_any(entry), max_size=min(most, MOST_DRAWN)).map(tuple)
 
 
@@ -92,27 +66,3 @@ def _arrays(draw: st.DrawFn, dimensions: int, dtype: str, steps_per_unit: int | 
         top = 2 if dtype == "?" else np.iinfo(dtype).max + 1
         return generator.integers(0, top, shape).astype(dtype)
     return generator.choice([0.0, high, *generator.uniform(0.0, high, 4)], shape)
-
-
-def _largest(hint: Any, tile_cells: int) -> Any:
-    match kind_of(hint):
-        case Scaled(low=low, high=high):
-            return max(low, high, key=abs)
-        case Whole(high=high):
-            return high
-        case Flag():
-            return True
-        case Words(longest=longest):
-            return "a" * longest
-        case Packed(dimensions=2, dtype=dtype):
-            return np.full((tile_cells, tile_cells), np.iinfo(dtype).max, dtype)
-        case Packed() as packed:
-            return np.full((1,) * (packed.dimensions - 1) + (packed.most,), packed.high)
-        case Mask():
-            return np.full((tile_cells, tile_cells), True)
-    if isinstance(hint, type) and issubclass(hint, enum.Enum):
-        return list(hint)[-1]
-    if is_dataclass(hint):
-        return largest_message(hint, tile_cells=tile_cells)  # type: ignore[arg-type]
-    entry, most = _bounded_tuple(hint)
-    return (_largest(entry, tile_cells),) * most

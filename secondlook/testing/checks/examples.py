@@ -1,0 +1,125 @@
+"""Checks a part against many examples: what it is made from, how it is called, and that it comes back."""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Callable
+from typing import Any
+
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+from hypothesis.errors import Flaky
+
+from secondlook.parts import PartError, PartKind
+from secondlook.watchdog import NoReturn, Watchdog
+
+EXAMPLES = 100
+PATIENCE_S = 10.0
+_TRIES = 100  # for a smaller example
+
+
+class _SmallEnough(BaseException):
+    """No example smaller than those that have failed is looked for any more."""
+
+
+class Checked:
+    """A maker of parts under check, a class of the user's, say; `kind` says what is asked of it.
+
+    `patience_s`: wall time in which each of its calls has to come back. Whatever is wrong raises AssertionError.
+    """
+
+    def __init__(self, kind: PartKind, part: Any, patience_s: float = PATIENCE_S) -> None:
+        __tracebackhide__ = True
+        self.name = part if isinstance(part, str) else getattr(part, "__qualname__", repr(part))
+        try:
+            self._maker = kind.maker(part) if isinstance(part, str) else kind.checked(part, self.name)
+        except PartError as error:
+            raise AssertionError(f"{self.name}: {error}") from error
+        self._kind = kind
+        self.watchdog = Watchdog(patience_s)
+
+    def make(self, **arguments: Any) -> Any:
+        """One part; what it must have is there."""
+        part = self._within("being made", lambda: self._maker(**arguments))
+        for method, names in self._kind.methods.items():
+            must = f"{self._kind.what} must have {method}({', '.join(names)})"
+            found = getattr(part, method, None)
+            if not callable(found):
+                raise AssertionError(f"{self.name}: {must}; it has no {method}")
+            try:
+                inspect.signature(found).bind(*names)
+            except TypeError as error:
+                raise AssertionError(f"{self.name}: {must}; {error}") from error
+        return part
+
+    def ask(self, part: Any, method: str, *arguments: Any) -> Any:
+        """What a part answers."""
+        return self._within(method, lambda: getattr(part, method)(*arguments))
+
+    def against(
+        self, check: Callable[..., None], examples: int, *, small: bool = True, **strategies: st.SearchStrategy[Any]
+    ) -> None:
+        """Runs a check for so many examples, the same ones each time. `small`: of those that fail a small one is told,
+        which takes some time."""
+        __tracebackhide__ = True
+        failures: dict[str, AssertionError] = {}
+        tries = 0
+
+        def tried(**example: Any) -> None:
+            nonlocal tries
+            tries += bool(failures)
+            if tries > _TRIES:
+                raise _SmallEnough
+            try:
+                check(**example)
+            except AssertionError as error:
+                failures[repr(example)] = error
+                raise
+
+        run = settings(
+            max_examples=examples,
+            deadline=None,
+            database=None,
+            derandomize=True,
+            report_multiple_bugs=False,
+            phases=[Phase.generate, Phase.shrink] if small else [Phase.generate],
+            suppress_health_check=list(HealthCheck),
+        )(given(**strategies)(tried))
+        try:
+            self.watched(run)
+        except (_SmallEnough, Flaky):  # flaky is what does not fail each time, which is worse
+            example, error = min(failures.items(), key=lambda failure: len(failure[0]))
+            error.add_note(f"Failing example: {example}")
+            raise error from None
+
+    def watched(self, run: Callable[[], None]) -> None:
+        """Runs a check, once for each `Checked`; a call that does not come back fails it at once."""
+        __tracebackhide__ = True
+        try:
+            with self.watchdog:
+                run()
+        except NoReturn as error:
+            raise AssertionError(str(error)) from error
+
+    def _within(self, what: str, call: Callable[[], Any]) -> Any:
+        self.watchdog.begin(f"{self.name}, {what},")
+        try:
+            return call()
+        except Exception as error:
+            raise AssertionError(f"{self.name} has failed, {what}: {type(error).__name__}: {error}") from error
+        finally:
+            self.watchdog.end()
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite real number; True and False are none."""
+    try:
+        return not isinstance(value, bool) and math.isfinite(value)
+    except TypeError:
+        return False
+
+
+def is_whole(value: Any) -> bool:
+    """Whether a value can stand for a whole number as it is."""
+    return not isinstance(value, bool) and hasattr(value, "__index__")
