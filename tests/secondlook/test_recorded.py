@@ -18,7 +18,7 @@ import shapely
 from flights import events
 
 import secondlook
-from comms.messages import AgentState, Mode, Plan, RunInfo, StripState, StripStatus
+from comms.messages import AgentState, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
@@ -26,6 +26,7 @@ from secondlook.recorded import Activity, RecordedMission, RiskMap, Said
 from secondlook.recorded.activities import activities
 from secondlook.recorded.key_pattern import key_matcher
 from secondlook.recorded.strips import strips
+from secondlook.recorded.tracks import tracks
 
 
 @pytest.fixture(scope="module")
@@ -273,3 +274,18 @@ def test_the_example_runs(brief_copy: Path) -> None:
     assert done.stdout.startswith("brief, seed 3: 0.03 km² in ")
     assert "\nstrip 1, " in done.stdout
     assert json.loads((brief_copy / "mission.geojson").read_text())["type"] == "FeatureCollection"
+
+
+def test_a_tracks_range_is_its_pairs() -> None:
+    def plan(flown: int, r_adpt_m: tuple[int, ...]) -> Plan:
+        planned = tuple(PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 80, flown=n <= flown) for n in range(1, 6))
+        return Plan(1, planned, r_adpt_m, (130, 125, 120)[:flown], "")
+
+    told = [Said("", "p", "p", 0.0, plan(0, ())), Said("", "p", "p", 9.0, plan(3, (138, 120)))]
+    done = [Activity("p", Mode.TRANSIT, 2, 0.0, 3.0), Activity("p", Mode.SURVEY, 2, 3.0, 5.0)]
+    found = tracks(told, done)
+    assert [one.planned_range_m for one in found] == [138, 138, 120, 120, 120]
+    assert [one.r_eff_m for one in found] == [130, 125, 120, None, None]
+    assert [(one.begun_s, one.ended_s) for one in found] == [(None, None), (3.0, 5.0), *[(None, None)] * 3]
+    assert [one.planned_range_m for one in tracks(told[:1], [])] == [None] * 5
+    assert list(found[3].line.coords) == [(40, 0), (40, 80)]
