@@ -276,16 +276,21 @@ def test_the_example_runs(brief_copy: Path) -> None:
     assert json.loads((brief_copy / "mission.geojson").read_text())["type"] == "FeatureCollection"
 
 
-def test_a_tracks_range_is_its_pairs() -> None:
-    def plan(flown: int, r_adpt_m: tuple[int, ...]) -> Plan:
-        planned = tuple(PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 80, flown=n <= flown) for n in range(1, 6))
-        return Plan(1, planned, r_adpt_m, (130, 125, 120)[:flown], "")
+def test_a_track_was_laid_for_the_latest_range_before_it_was_flown() -> None:
+    def said(t_s: float, tracks: int, flown: int, r_adpt_m: tuple[int, ...]) -> Said[Plan]:
+        planned = (PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 80, flown=n <= flown) for n in range(1, tracks + 1))
+        return Said("", "p", "p", t_s, Plan(1, tuple(planned), r_adpt_m, (130, 125, 120)[:flown], ""))
 
-    told = [Said("", "p", "p", 0.0, plan(0, ())), Said("", "p", "p", 9.0, plan(3, (138, 120)))]
+    told = [
+        said(0.0, 4, 0, (138,)),
+        said(1.0, 4, 1, (138,)),  # the second of a pair is flown as planned
+        said(2.0, 5, 2, (138, 120)),
+        said(3.0, 5, 3, (138, 120, 110)),
+    ]
     done = [Activity("p", Mode.TRANSIT, 2, 0.0, 3.0), Activity("p", Mode.SURVEY, 2, 3.0, 5.0)]
     found = tracks(told, done)
-    assert [one.planned_range_m for one in found] == [138, 138, 120, 120, 120]
+    assert [one.planned_range_m for one in found] == [138, 138, 120, 110, 110]
     assert [one.r_eff_m for one in found] == [130, 125, 120, None, None]
     assert [(one.begun_s, one.ended_s) for one in found] == [(None, None), (3.0, 5.0), *[(None, None)] * 3]
-    assert [one.planned_range_m for one in tracks(told[:1], [])] == [None] * 5
     assert list(found[3].line.coords) == [(40, 0), (40, 80)]
+    assert [one.planned_range_m for one in tracks([said(0.0, 2, 0, ())], [])] == [None, None]
