@@ -18,13 +18,12 @@ from types import TracebackType
 import rerun as rr
 
 from viz.live_feed import new_stream
-from viz.viewer_program import BIND, PROGRAM, guard, server_url, start, wait_for, web_address
+from viz.viewer_program import BIND, PROGRAM, guard, server_url, start, wait_for, wait_for_end, web_address
 from viz.web_page import WebPage
 
 DRAWS = re.compile(r"wgpu adapter")
 WINDOW = ("--expect-data-soon", "--hide-welcome-screen")
 SERVER_MEMORY = "1GiB"  # of this, the oldest entries go first
-NOTICED_WITHIN_S = 1.0  # a signal that comes just as a wait begins
 WINDOW_WITHIN_S = 8.0  # a window that is still there then is taken for open, even if it has not said so
 
 # The window has all it shows from the server.
@@ -95,11 +94,7 @@ class LiveServer:
 
     def wait(self) -> None:
         """Waits until the server has ended, by itself or by what interrupts this process."""
-        # A wait without a timeout would take no notice of a signal that comes just as it begins.
-        while True:
-            with contextlib.suppress(subprocess.TimeoutExpired):
-                self.server.wait(timeout=NOTICED_WITHIN_S)
-                return
+        wait_for_end(self.server)
 
     def close(self) -> None:
         """Ends the server, or leaves it to the window."""

@@ -8,7 +8,7 @@ import tempfile
 from pathlib import Path
 from types import TracebackType
 
-from viz.viewer_program import BIND, PROGRAM, guard, server_url, start, wait_for, web_address
+from viz.viewer_program import BIND, PROGRAM, guard, server_url, start, wait_for, wait_for_end, web_address
 from viz.web_page import WebPage
 
 DRAWS = re.compile(r"wgpu adapter")
@@ -55,7 +55,7 @@ class RecordingViewer:
 
     def wait(self) -> None:
         """Waits until the window is closed, or what interrupts this process."""
-        self.process.wait()
+        wait_for_end(self.process)
 
     def close(self) -> None:
         """Ends the viewer."""

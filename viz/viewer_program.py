@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import subprocess
@@ -19,6 +20,7 @@ LISTENING = re.compile(r"Listening for gRPC connections on (127\.0\.0\.1:\d+)")
 WEB_PAGE = re.compile(r"Hosting a web-viewer at (http://127\.0\.0\.1:\d+)")
 READY_WITHIN_S = 20.0
 POLL_S = 0.05
+NOTICED_WITHIN_S = 1.0  # a signal that comes just as a wait begins
 
 # It outlives this process if it must, and needs no Python for it.
 # Standard input closes when this process ends, however it ends.
@@ -96,6 +98,15 @@ def quiet_environment() -> dict[str, str]:
     environment.pop("RUST_LOG", None)  # it would hide what the viewer says of its ports
     # The viewer would ask a host outside for a newer version of itself: a proxy that is not there keeps it from that.
     return environment | dict.fromkeys(("HTTPS_PROXY", "https_proxy"), "http://127.0.0.1:1")
+
+
+def wait_for_end(process: subprocess.Popen[bytes]) -> None:
+    """Waits until a program has ended, by itself or by what interrupts this process."""
+    # A wait without a timeout would take no notice of a signal that comes just as it begins.
+    while True:
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(timeout=NOTICED_WITHIN_S)
+            return
 
 
 def _said(words: re.Pattern[str], server: subprocess.Popen[bytes], log: Path) -> str:

@@ -27,11 +27,14 @@ def view(
     try:
         if not web:
             check_display()
-        with _whole(recording) as whole, RecordingViewer(whole, web=web) as viewer:
+        with (
+            contextlib.suppress(KeyboardInterrupt),
+            _whole(recording) as whole,
+            RecordingViewer(whole, web=web) as viewer,
+        ):
             if web:
                 typer.echo(f"The mission is shown at {viewer.page}; Ctrl-C ends it")
-            with contextlib.suppress(KeyboardInterrupt):
-                viewer.wait()
+            viewer.wait()
     except ViewerError as error:
         raise UserError(str(error)) from error
 

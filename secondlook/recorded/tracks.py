@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import shapely
@@ -35,22 +35,28 @@ class TrackRecord:
 def tracks(plans: Iterable[Said[Plan]], done: Iterable[Activity]) -> list[TrackRecord]:
     """The tracks of each vehicle's last plan, by vehicle and number."""
     surveys = {(one.vehicle, one.works_on): one for one in done if one.mode is Mode.SURVEY}
-    last = {one.vehicle: one for one in plans}
-    return [track for _, plan in sorted(last.items()) for track in _tracks(plan, surveys)]
+    ranges_m: dict[tuple[str, int], int] = {}
+    last: dict[str, Said[Plan]] = {}
+    for said in plans:
+        last[said.vehicle] = said
+        # What is still to be flown is laid for the latest range.
+        ahead = [track.number for track in said.message.tracks if not track.flown]
+        ranges_m |= {(said.vehicle, number): said.message.r_adpt_m[-1] for number in ahead if said.message.r_adpt_m}
+    return [track for _, said in sorted(last.items()) for track in _tracks(said, ranges_m, surveys)]
 
 
-def _tracks(said: Said[Plan], surveys: dict[tuple[str, int], Activity]) -> Iterable[TrackRecord]:
-    plan, found_m = said.message, iter(said.message.r_eff_m)
-    for index, track in enumerate(plan.tracks):
-        # One range a pair; what is still to be planned has the latest.
-        pair = min(index // 2, len(plan.r_adpt_m) - 1)
+def _tracks(
+    said: Said[Plan], ranges_m: dict[tuple[str, int], int], surveys: dict[tuple[str, int], Activity]
+) -> Iterator[TrackRecord]:
+    found_m = iter(said.message.r_eff_m)
+    for track in said.message.tracks:
         survey = surveys.get((said.vehicle, track.number))
         yield TrackRecord(
             said.vehicle,
             track.number,
             track.across_m,
             track.flown,
-            planned_range_m=plan.r_adpt_m[pair] if plan.r_adpt_m else None,
+            planned_range_m=ranges_m.get((said.vehicle, track.number)),
             r_eff_m=next(found_m, None) if track.flown else None,
             begun_s=survey.begun_s if survey else None,
             ended_s=survey.ended_s if survey else None,

@@ -23,7 +23,9 @@ ROUND_NUMBERS = 8  # the scale bar is about an eighth of the width
 
 def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     """What was flown over the risk that is left. A strip's element has the id `ids` with its number."""
-    paths, strips, tracks = mission.paths, mission.strips, mission.tracks
+    paths, tracks = mission.paths, mission.tracks
+    # What was withdrawn lies below the others.
+    strips = sorted(mission.strips, key=lambda strip: strip.state is not StripState.WITHDRAWN)
     all_of_it = [mission.area, *(path.line for path in paths.values()), *(strip.polygon for strip in strips)]
     shown = shapely.GeometryCollection(all_of_it)
     west_m, south_m, east_m, north_m = shown.bounds
@@ -35,7 +37,8 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         element("path", d=frame.line(mission.area), class_="area"),
         *(_path(frame, path, kinds.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
-        *(_strip(frame, strip, place, ids) for strip, place in _numbered(strips, LABEL_PX * unit_m)),
+        *(_strip(frame, strip, ids) for strip in strips),
+        *(_number(frame, strip, place) for strip, place in _places(strips, LABEL_PX * unit_m)),
         *_names(frame, [(path, kinds.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
         *_scale(frame, unit_m),
     ]
@@ -64,25 +67,33 @@ def _track(frame: MapFrame, track: TrackRecord, unit_m: float) -> Element:
     )
 
 
-def _numbered(strips: Sequence[StripRecord], apart_m: float) -> Iterator[tuple[StripRecord, shapely.Point]]:
-    """Every strip with the place of its number: on the centre line where it keeps apart from those before it. What was
-    withdrawn comes first, so that it lies below the others."""
+def _places(strips: Sequence[StripRecord], apart_m: float) -> Iterator[tuple[StripRecord, shapely.Point]]:
+    """Every strip with the place of its number: on the centre line where it keeps apart from those before it."""
     taken: list[shapely.Point] = []
-    for strip in sorted(strips, key=lambda one: one.state is not StripState.WITHDRAWN):
+    for strip in strips:
         places = [strip.centre_line.interpolate(share, normalized=True) for share in ALONG]
         place = max(places, key=lambda here: min((apart_m, *(here.distance(other) for other in taken))))
         taken.append(place)
         yield strip, place
 
 
-def _strip(frame: MapFrame, strip: StripRecord, number_at: shapely.Point, ids: str) -> Element:
-    x, y = frame.place(number_at.x, number_at.y)
+def _number(frame: MapFrame, strip: StripRecord, place: shapely.Point) -> Element:
+    x, y = frame.place(place.x, place.y)
+    return element(
+        "a",
+        element("title", f"strip {strip.number}: {fate_in_words(strip)}"),
+        element("text", str(strip.number), x=x, y=y),
+        href=f"#strip-{strip.number}",
+        class_=f"strip number {FATE_CLASS[strip.state]}",
+    )
+
+
+def _strip(frame: MapFrame, strip: StripRecord, ids: str) -> Element:
     return element(
         "a",
         element("title", f"strip {strip.number}: {fate_in_words(strip)}"),
         element("path", d=frame.line(strip.polygon), class_="casing"),
         element("path", d=frame.line(strip.polygon), class_="outline"),
-        element("text", str(strip.number), x=x, y=y),
         href=f"#strip-{strip.number}",
         id=f"{ids}{strip.number}",
         class_=f"strip {FATE_CLASS[strip.state]}",

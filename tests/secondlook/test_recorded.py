@@ -18,7 +18,7 @@ import shapely
 from flights import events
 
 import secondlook
-from comms.messages import AgentState, Mode, Plan, RunInfo, StripState, StripStatus
+from comms.messages import AgentState, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
@@ -26,6 +26,7 @@ from secondlook.recorded import Activity, RecordedMission, RiskMap, Said
 from secondlook.recorded.activities import activities
 from secondlook.recorded.key_pattern import key_matcher
 from secondlook.recorded.strips import strips
+from secondlook.recorded.tracks import tracks
 
 
 @pytest.fixture(scope="module")
@@ -273,3 +274,23 @@ def test_the_example_runs(brief_copy: Path) -> None:
     assert done.stdout.startswith("brief, seed 3: 0.03 km² in ")
     assert "\nstrip 1, " in done.stdout
     assert json.loads((brief_copy / "mission.geojson").read_text())["type"] == "FeatureCollection"
+
+
+def test_a_track_was_laid_for_the_latest_range_before_it_was_flown() -> None:
+    def said(t_s: float, tracks: int, flown: int, r_adpt_m: tuple[int, ...]) -> Said[Plan]:
+        planned = (PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 80, flown=n <= flown) for n in range(1, tracks + 1))
+        return Said("", "p", "p", t_s, Plan(1, tuple(planned), r_adpt_m, (130, 125, 120)[:flown], ""))
+
+    told = [
+        said(0.0, 4, 0, (138,)),
+        said(1.0, 4, 1, (138,)),  # the second of a pair is flown as planned
+        said(2.0, 5, 2, (138, 120)),
+        said(3.0, 5, 3, (138, 120, 110)),
+    ]
+    done = [Activity("p", Mode.TRANSIT, 2, 0.0, 3.0), Activity("p", Mode.SURVEY, 2, 3.0, 5.0)]
+    found = tracks(told, done)
+    assert [one.planned_range_m for one in found] == [138, 138, 120, 110, 110]
+    assert [one.r_eff_m for one in found] == [130, 125, 120, None, None]
+    assert [(one.begun_s, one.ended_s) for one in found] == [(None, None), (3.0, 5.0), *[(None, None)] * 3]
+    assert list(found[3].line.coords) == [(40, 0), (40, 80)]
+    assert [one.planned_range_m for one in tracks([said(0.0, 2, 0, ())], [])] == [None, None]

@@ -59,7 +59,7 @@ def test_a_click_on_a_strip_leads_to_its_fate_and_back(browser: Browser, report:
         page, row = seen.page, f"#strip-{strip}"
         plain = page.locator(row).evaluate(BACKGROUND)
         assert not in_view(page, row)
-        page.locator(f"#on-map-{strip} text").click()
+        page.locator(f"a.strip.number[href='#strip-{strip}'] text").click()
         page.wait_for_url(re.compile(f"{row}$"))
         assert in_view(page, row)
         assert page.locator(row).evaluate(BACKGROUND) != plain
@@ -79,7 +79,7 @@ def test_it_fits_the_width_of_a_phone(browser: Browser, report: str, strip: int,
         phone = width < 640
         assert page.locator(".chart.timeline").nth(1).is_visible() is phone
         assert page.locator(".chart.timeline").nth(0).is_visible() is not phone
-        page.locator(f"#on-map-{strip} text").click()
+        page.locator(f"a.strip.number[href='#strip-{strip}'] text").click()
         page.wait_for_url(re.compile(f"#strip-{strip}$"))
         assert in_view(page, f"#strip-{strip}")
 

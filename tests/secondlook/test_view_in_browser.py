@@ -10,14 +10,14 @@ from playwright.sync_api import Browser
 
 from viz.recording_viewer import RecordingViewer
 
-PATIENCE_S = 120.0
+PATIENCE_S = 240.0  # drawn without a graphics card, maybe on a busy machine
 PIXELS = 2_000  # of the map, at the least; the page without a mission has none
 
 
 def test_the_page_shows_the_mission(browser: Browser, brief_run: Path) -> None:
     with (
         RecordingViewer(brief_run / "mission.rrd", web=True) as viewer,
-        visit(browser, f"{viewer.page}&renderer=webgl", width=1200, height=800) as seen,
+        visit(browser, f"{viewer.page}&renderer=webgl", width=900, height=600) as seen,
     ):
         deadline = time.monotonic() + PATIENCE_S
         colours = [0]

@@ -15,6 +15,7 @@ import pytest
 from playwright.sync_api import Browser, Page, sync_playwright
 
 HINT = "Pages were not tested in a browser, as no Chromium is installed (Debian, Ubuntu: chromium)."
+PATIENCE_MS = 240_000  # it draws without a graphics card, and the machine may be busy
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = (
     "--no-sandbox",
@@ -79,6 +80,7 @@ def visit(
 ) -> Iterator[Visit]:
     """Opens a page in a window of a size."""
     context = browser.new_context(viewport={"width": width, "height": height}, color_scheme=scheme)
+    context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
     visited = Visit(page)
     page.on("request", lambda request: visited.requests.append(request.url))
