@@ -18,7 +18,7 @@ from secondlook.paper.extra import require_extra
 from secondlook.paper.measured import MeasuredMission
 from secondlook.paper.published import PublishedMission, published_missions
 from secondlook.paper.report import as_json as entries_of
-from secondlook.paper.report import differing_decisions, mean_difference, tables
+from secondlook.paper.report import conclusions, differing_decisions, tables
 from secondlook.paper.side_by_side import measure_all
 from secondlook.processes import RunFailedError
 from secondlook.signals import signals_interrupt
@@ -42,8 +42,8 @@ def paper(
         console = Console(soft_wrap=True, highlight=False)
         for table in tables(runs):
             console.print(table, "")
-        difference = mean_difference(runs[0])
-        console.print(f"The twelve means of Table 2 differ from the paper's by {difference:.4f} on average.")
+        for sentence in conclusions(runs):
+            console.print(sentence)
     if out is not None:
         # Only who draws needs matplotlib.
         files = import_module("secondlook.paper.figures").draw_all(runs[0], out)

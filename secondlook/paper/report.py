@@ -11,14 +11,17 @@ from rich.table import Table
 from secondlook.paper.measured import MeasuredMission
 from secondlook.paper.published import PublishedMission
 
-TABLE_1 = {"no_coverage_share": ("no coverage", "{:.2%}", "{:+.2%}"), "tracks": ("tracks", "{:.0f}", "{:+.0f}")}
+TABLE_1 = {"no_coverage_share": ("no coverage", "{:.2%}", "{:+z.2%}"), "tracks": ("tracks", "{:.0f}", "{:+z.0f}")}
 TABLE_2 = {
-    "mean": ("mean", "{:.3f}", "{:+.3f}"),
-    "rc_mean": ("rc mean", "{:.3f}", "{:+.3f}"),
-    "rc_std": ("rc std", "{:.3f}", "{:+.3f}"),
-    "rc_n": ("rc n", "{:.0f}", "{:+.0f}"),
+    "mean": ("mean", "{:.3f}", "{:+z.3f}"),
+    "rc_mean": ("rc mean", "{:.3f}", "{:+z.3f}"),
+    "rc_std": ("rc std", "{:.3f}", "{:+z.3f}"),
+    "rc_n": ("rc n", "{:.0f}", "{:+z.0f}"),
 }
 """What a figure is called and how it and its differences are written."""
+
+HEADLINE = 3
+"""The experiment whose drop of the rc mean the paper's abstract tells."""
 
 Runs = Sequence[Sequence[MeasuredMission]]
 """The six missions again and again: the first run is the one that is shown, the others tell the spread."""
@@ -60,6 +63,26 @@ def mean_difference(run: Sequence[MeasuredMission]) -> float:
     return float(
         np.mean([abs(one.figures[name] - getattr(one.published, name)) for one in run for name in ("mean", "rc_mean")])
     )
+
+
+def rc_mean_drop(run: Sequence[MeasuredMission]) -> float:
+    """By how much adapting lowers the mean of the rightmost component in the headline's experiment."""
+    control, adaptive = (one.figures["rc_mean"] for one in run if one.published.experiment == HEADLINE)
+    return control - adaptive
+
+
+def conclusions(runs: Runs) -> list[str]:
+    """What the tables come to, a sentence each."""
+    over = "" if len(runs) == 1 else f" over {len(runs)} runs"
+    control, adaptive = (one.published.rc_mean for one in runs[0] if one.published.experiment == HEADLINE)
+    paper = control - adaptive
+    differences, drops = [mean_difference(run) for run in runs], [rc_mean_drop(run) for run in runs]
+    return [
+        f"The twelve means of Table 2 differ from the paper's by {differences[0]:.4f} on average"
+        + (f" ({min(differences):.4f} to {max(differences):.4f}{over})." if over else "."),
+        f"In experiment {HEADLINE} adapting lowers the rc mean by {drops[0]:.3f}, in the paper by {paper:.3f}"
+        + (f" ({min(drops):.3f} to {max(drops):.3f}{over})." if over else "."),
+    ]
 
 
 def _decisions(runs: Runs) -> Table:

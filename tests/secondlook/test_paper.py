@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 from sklearn.mixture import GaussianMixture
+from threadpoolctl import threadpool_limits
 
 from planner.types import DetectionCurve, FloatArray
 from secondlook import cli
@@ -23,7 +24,7 @@ from secondlook.paper.fit import fit_mixture
 from secondlook.paper.measured import MeasuredMission
 from secondlook.paper.mixture import Mixture
 from secondlook.paper.published import published_missions, published_sonar
-from secondlook.paper.report import as_json, differing_decisions, mean_difference, tables
+from secondlook.paper.report import as_json, conclusions, differing_decisions, mean_difference, rc_mean_drop, tables
 from secondlook.paper.side_by_side import measure_all
 from secondlook.paper.survey import Survey
 from secondlook.processes import RunFailedError
@@ -76,10 +77,11 @@ class TestPublished:
 
 
 class TestMixture:
-    @pytest.mark.parametrize(("components", "seed"), [(2, 1), (3, 2)])
-    def test_it_is_the_one_that_ten_starts_of_scikit_learn_find(self, components: int, seed: int) -> None:
-        risk = two_humps(1500, seed)
-        whole = GaussianMixture(components, tol=1e-6, max_iter=2000, n_init=10, random_state=0).fit(risk[:, None])
+    def test_it_is_the_one_that_ten_starts_of_scikit_learn_find(self) -> None:
+        # With these cells the starts end differently, and neither the first nor the last of them ends best.
+        risk, components = two_humps(400, seed=7), 3
+        with threadpool_limits(limits=1):
+            whole = GaussianMixture(components, tol=1e-6, max_iter=2000, n_init=10, random_state=0).fit(risk[:, None])
         order = np.argsort(whole.means_[:, 0])
         ours = fit_mixture(risk, components)
         assert ours.means == pytest.approx(whole.means_[order, 0], abs=1e-9)
@@ -135,8 +137,7 @@ class TestTheSixMissions:
                 assert one.figures[name] == pytest.approx(getattr(one.published, name), abs=0.025), one.published.name
             assert one.figures["rc_n"] == pytest.approx(one.published.rc_n, rel=0.25), one.published.name
         assert mean_difference(measured) <= 0.012
-        figures = {one.published.name: one.figures for one in measured}
-        assert 0.03 <= figures["3-control"]["rc_mean"] - figures["3-adaptive"]["rc_mean"] <= 0.08
+        assert 0.03 <= rc_mean_drop(measured) <= 0.08
 
     def test_the_figures_are_drawn(self, measured: list[MeasuredMission], tmp_path: Path) -> None:
         files = draw_all(measured, tmp_path)
@@ -209,6 +210,19 @@ class TestReport:
 
     def test_the_difference_is_averaged_over_means_of_either_kind(self) -> None:
         assert mean_difference([by_hand("1-control")]) == pytest.approx((0.654 - np.exp(-0.5) + 0.841 - 0.8) / 2)
+
+    def test_the_conclusions_tell_the_first_run_and_the_range_over_all(self) -> None:
+        def run(rc_mean: float) -> list[MeasuredMission]:
+            missions = [by_hand(name) for name in MISSIONS]
+            missions[4] = replace(missions[4], mixture=Mixture((1.0,), (rc_mean,), (0.1,), cells=4))
+            return missions
+
+        first, drop = conclusions([run(0.85), run(0.86)])
+        assert first.endswith(" over 2 runs).")
+        assert drop == (
+            "In experiment 3 adapting lowers the rc mean by 0.050, in the paper by 0.042 (0.050 to 0.060 over 2 runs)."
+        )
+        assert conclusions([run(0.83)])[1].endswith("by 0.030, in the paper by 0.042.")
 
     @pytest.mark.parametrize(
         "change",
