@@ -33,26 +33,27 @@ from vehicle_agent.config import RevisitConfig, SurveyConfig
 @dataclass(frozen=True)
 class Fleet:
     """A fleet ready to be run. `roster`: every node, clock, recorder and observer included. `specs`: how to make the
-    acting nodes, by node id."""
+    acting nodes, by node id. `factor`: by how much mission time runs faster than the wall clock; None for lockstep."""
 
     run_info: RunInfo
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
     time_limit_ms: int
+    factor: float | None = None
 
 
-def build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
-    """The fleet of a scenario; `record`: with a recorder.
+def build_fleet(scenario: Scenario, *, record: bool, factor: float | None = None) -> Fleet:
+    """The fleet of a scenario; `record`: with a recorder. `factor`: see `Fleet`.
 
     Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
     """
     try:
-        return _build_fleet(scenario, record=record)
+        return _build_fleet(scenario, record, factor)
     except ValueError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from error
 
 
-def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
+def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Fleet:
     area = SurveyArea(scenario.area.polygon_m, math.radians(scenario.area.track_heading_deg))
     grid = area.grid(scenario.area.cell_m)
     run_info = RunInfo(
@@ -60,7 +61,7 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
         scenario=scenario.name,
         scenario_sha256=scenario_hash(scenario),
         seed=scenario.seed,
-        mode=ClockMode.LOCKSTEP,
+        mode=ClockMode.LOCKSTEP if factor is None else ClockMode.WALL,
         area=_outline(scenario.area.polygon_m),
         grid=Grid(
             grid.frame.origin_x_m,
@@ -88,7 +89,7 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
     specs["coordinator"] = NodeSpec(
         scenario.coordinator.node or "coordinator.coordinator:Coordinator", _coordinator_config(scenario)
     )
-    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000))
+    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000), factor)
 
 
 def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:

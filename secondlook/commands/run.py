@@ -20,6 +20,8 @@ from secondlook.run_display import closing_table, progress_display
 from secondlook.scenario import load_scenario
 
 MISSION_FAILED = 1
+REAL_TIME = "--real-time"
+LARGEST_FACTOR = 1000.0
 
 
 class BusName(StrEnum):
@@ -37,6 +39,10 @@ def run(
     processes: Annotated[
         int | None, typer.Option(min=1, help="Over how many processes the nodes are spread; one each if left out.")
     ] = None,
+    real_time: Annotated[
+        float | None,
+        typer.Option(REAL_TIME, metavar="[FACTOR]", help="By the wall clock times a factor, 1 if left out."),
+    ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
@@ -53,10 +59,14 @@ def run(
         raise UserError("--web: says how to show a mission --live; must go with --live")
     if live and no_record:
         raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
+    if real_time is not None and not 0 < real_time <= LARGEST_FACTOR:
+        raise UserError(f"{REAL_TIME} {real_time:g}: is not allowed; must be above 0, at most {LARGEST_FACTOR:g}")
     mission = load_scenario(scenario, set_ or (), seed)
     with live_view(lambda: _folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
-            options = RunOptions(folder, bus.value, processes, record=not no_record, progress=progress, live_pipe=pipe)
+            options = RunOptions(
+                folder, bus.value, processes, record=not no_record, factor=real_time, progress=progress, live_pipe=pipe
+            )
             try:
                 summary = run_mission(mission, options)
             except RunFailedError as error:
