@@ -85,18 +85,21 @@ class WallClock:
         """A host says that it is there."""
         known = self._hosts.get(host)
         if known is None:
-            self._refuse(host, f"{host} is none of the scenario's nodes that the router knows")
+            self._refuse(host, hello, f"{host} is none of the scenario's nodes that the router knows")
         elif hello.schema != SCHEMA_VERSION:
-            self._refuse(host, f"the fleet speaks schema version {SCHEMA_VERSION}, {host} version {hello.schema}")
+            self._refuse(
+                host, hello, f"the fleet speaks schema version {SCHEMA_VERSION}, {host} version {hello.schema}"
+            )
         elif hello.scenario_sha256 != self._scenario_sha256:
             ours, theirs = self._scenario_sha256[:12], hello.scenario_sha256[:12]
             self._refuse(
                 host,
+                hello,
                 f"the router has another scenario than {host}, {ours} and not {theirs}: file, --seed and --set must be "
                 "the same everywhere",
             )
         elif known.instance not in ("", hello.instance) and now_s - known.heard_s < HERE_S:
-            self._refuse(host, f"another {host} takes part already")
+            self._refuse(host, hello, f"another {host} takes part already")
         else:
             self._greet(host, known, hello, now_s)
 
@@ -156,8 +159,8 @@ class WallClock:
             self._sum_up()
             self.phase = Phase.ENDED
 
-    def _refuse(self, host: str, sentence: str) -> None:
-        self.words.append((host, pack("refused", sentence)))
+    def _refuse(self, host: str, hello: Hello, sentence: str) -> None:
+        self.words.append((host, pack("refused", hello.instance, sentence)))
         self.notices.append(f"refused: {sentence}")
 
     def _greet(self, host: str, known: _Host, hello: Hello, now_s: float) -> None:

@@ -27,6 +27,7 @@ HELLO_EVERY_S = 1.0
 FIRST_HELLO_EVERY_S = 0.1  # until the clock has answered
 BEAT_EVERY_S = 0.5
 GOODBYE_WITHIN_S = 5.0
+CLOCK_LOST_AFTER_S = 3.0  # of wall time without a time signal; there are four a second
 GIVES_UP_AFTER_S = 20.0  # of wall time beyond the mission's time limit
 COMPLETE_WITHIN_S = 5.0  # so long a listener waits at the end for what is still missing
 
@@ -39,7 +40,8 @@ class WallHost:
     """Runs what sits in this process, over an open session, until the clock ends the run or someone interrupts it.
 
     `host`: under which it speaks with the clock. A while after the time limit it ends by itself, where a clock that is
-    not heard any more cannot end it. `notice`: told in words what a person should know.
+    not heard any more cannot end it. `notice`: told in words what a person should know. `interrupted`: whether someone
+    has ended it.
     """
 
     def __init__(
@@ -54,6 +56,8 @@ class WallHost:
         *,
         notice: Callable[[str], None] = lambda sentence: None,
     ) -> None:
+        self.interrupted = False
+        self._session = session
         self._keys = keys
         self._host = host
         self._seat = seat
@@ -69,13 +73,24 @@ class WallHost:
         self._result: BusResult | None = None
         self._finish_by_s = 0.0
         self._hello_at_s = self._beat_at_s = 0.0
+        self._clock_heard_s = time.monotonic()
+        self._clock_is_heard = True
         self._to_me = f"clock/to/{host}"
         # Last comes what the clock tells to this host: when that arrives the hub knows of all the rest.
         self._line = WallLine(
             session, keys, expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me], keeps=seat.keeps
         )
         self._post = WallPost(self._line, keys, routing)
-        self._token = session.liveliness().declare_token(keys.alive(host))
+
+    @property
+    def factor(self) -> float:
+        """By how much the mission's time runs faster than the wall clock; 1 as long as it is not known."""
+        return self._time.factor
+
+    @property
+    def now_ms(self) -> int:
+        """The mission's time; 0 as long as it is not known."""
+        return self._time.now_ms(time.monotonic()) if self._time.known else 0
 
     def interrupt(self) -> None:
         """From another thread: ends the run here early; listeners keep what they have."""
@@ -90,6 +105,7 @@ class WallHost:
             try:
                 self._live()
             except Interrupted:
+                self.interrupted = True
                 return None
             finally:
                 self._seat.close()
@@ -105,6 +121,7 @@ class WallHost:
         while True:
             now_s = time.monotonic()
             self._speak(now_s)
+            self._listen_for_clock(now_s)
             if self._time.known:
                 now_ms = self._time.now_ms(now_s)
                 self._post.publish(self._seat.act(now_ms))
@@ -140,6 +157,12 @@ class WallHost:
             if self._time.known:
                 self._post.beat(self._incarnation, self._seat.kept)
 
+    def _listen_for_clock(self, now_s: float) -> None:
+        heard = now_s - self._clock_heard_s < CLOCK_LOST_AFTER_S
+        if heard != self._clock_is_heard:
+            self._clock_is_heard = heard
+            self._notice("the router is heard again" if heard else "the router is not heard")
+
     def _take(self, received: Received) -> None:
         if not self._time.known:
             self._early.append(received)
@@ -158,8 +181,11 @@ class WallHost:
             self._post.intake.drop("senseless words", "clock", str(error))
 
     def _hear_time(self, now_ms: int | None, factor: float) -> None:
+        self._clock_heard_s = time.monotonic()
         if now_ms is None:
             self._waits_for_start = True
+            return
+        if not self._welcomed:  # nobody acts who may yet be refused
             return
         first = not self._time.known
         self._time.hear(now_ms, factor, time.monotonic())
@@ -178,7 +204,8 @@ class WallHost:
                 if not self._welcomed:
                     self._welcomed = True
                     self._hello_at_s = 0.0
-            case ["refused", str(sentence)]:
+                    self._token = self._session.liveliness().declare_token(self._keys.alive(self._host))
+            case ["refused", self._instance, str(sentence)]:  # not for another process of the same name
                 raise RefusedError(sentence)
             case ["finish", *_]:
                 self._result = unpack_finish(words)

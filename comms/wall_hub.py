@@ -24,6 +24,7 @@ from comms.wall_post import WallPost, Words
 from comms.wall_seats import NodeSeat
 from comms.wall_words import LastWord, WallKeys, pack_time, unpack_hello, unpack_last_word
 from comms.zenoh_hub import SIGN_OF_LIFE_EVERY_S, FleetError, HostLostError
+from comms.zenoh_session import PATIENCE_S
 
 TIME_EVERY_S = 0.25
 FROM = "clock/from/"
@@ -49,7 +50,7 @@ class WallHub:
         factor: float,
         *,
         strict: bool,
-        patience_s: float,
+        patience_s: float = PATIENCE_S,
         alive: Callable[[int], None] = lambda now_ms: None,
         notice: Callable[[str], None] = lambda sentence: None,
     ) -> None:
@@ -75,8 +76,12 @@ class WallHub:
         )
         self._post = WallPost(self._line, keys, routing)
 
+    def interrupt(self) -> None:
+        """From another thread or a signal's handler: `run` raises Interrupted."""
+        self._line.interrupt()
+
     def run(self) -> BusResult:
-        """Waits for all, runs the fleet to its end and returns the result; raises FleetError and NodeError."""
+        """Waits for all and runs the fleet to its end; raises FleetError, NodeError and Interrupted."""
         clock = self._clock
         while clock.phase is not Phase.ENDED:
             now_s = time.monotonic()
@@ -139,6 +144,8 @@ class WallHub:
         self._line.say(self._keys.time, pack_time(now_ms, self._clock.factor), drop=True)
 
     def _send_words(self) -> None:
+        if self._clock.words:
+            self._send_time(time.monotonic())  # who is welcomed before the start is to know that it was there
         for host, words in self._clock.words:
             self._line.say(self._keys.to_host(host), words)
         self._clock.words.clear()

@@ -10,6 +10,7 @@ import typer
 
 from secondlook.commands.check import check
 from secondlook.commands.geojson import geojson
+from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
@@ -50,6 +51,9 @@ def secondlook(
 
 for command in (run, scenarios, check, plan, paper, replay, view, report, geojson):
     app.command()(command)
+
+
+app.add_typer(node_app, name="node")
 
 
 def main() -> None:

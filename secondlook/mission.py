@@ -88,7 +88,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     else:
         ending = result.ending.value
         if result.ending is not Ending.OVER:
-            failure = _not_over(result, scenario)
+            failure = not_over(result, scenario)
     summary = summarise(
         scenario,
         observer,
@@ -164,7 +164,8 @@ def _make(node_id: str, spec: NodeSpec, watchdog: Watchdog) -> WatchedNode:
     return WatchedNode(node_id, make_node(node_id, spec), watchdog)
 
 
-def _not_over(result: BusResult, scenario: Scenario) -> str:
+def not_over(result: BusResult, scenario: Scenario) -> str:
+    """Why a run has ended although the mission is not over, in a sentence."""
     if result.ending is Ending.TIME_LIMIT:
         return f"the mission is not over at its time limit, mission.time_limit_s: {scenario.mission.time_limit_s:g}"
     return f"nothing is left to happen at {result.mission_ms / 1000:.3f} s, but the mission is not over"

@@ -86,8 +86,8 @@ def test_who_does_not_fit_is_refused_with_the_reason(host: str, said: Hello, sen
     told.hello(host, said, 1.0)
     ((refused, payload),) = told.words
     assert refused == host
-    name, reason = unpack(payload)
-    assert name == "refused"
+    name, instance, reason = unpack(payload)
+    assert (name, instance) == ("refused", said.instance)
     assert re.fullmatch(sentence, reason)
     assert "alpha" in told.missing
 
