@@ -24,6 +24,7 @@ from secondlook.scenario import (
     RevisitVehicle,
     Scenario,
     SurveyVehicle,
+    body_of,
     scenario_hash,
 )
 from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
@@ -33,7 +34,8 @@ from vehicle_agent.config import RevisitConfig, SurveyConfig
 @dataclass(frozen=True)
 class Fleet:
     """A fleet ready to be run. `roster`: every node, clock, recorder and observer included. `specs`: how to make the
-    acting nodes, by node id. `factor`: by how much mission time runs faster than the wall clock; None for lockstep."""
+    acting nodes that are ours, by node id. `factor`: by how much mission time runs faster than the wall clock; None for
+    lockstep."""
 
     run_info: RunInfo
     roster: tuple[RosterNode, ...]
@@ -75,15 +77,18 @@ def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Flee
         vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
     )
     encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
+    external = scenario.external_vehicles
+    simulated = [name for name in scenario.vehicles if name not in external]
     roster = [
         RosterNode("clock", Role.CLOCK),
-        RosterNode("world", Role.WORLD, tuple(scenario.vehicles)),
+        *([RosterNode("world", Role.WORLD, tuple(simulated))] if simulated else []),
+        *(RosterNode(body_of(name), Role.BODY, (name,)) for name in external),
         *(RosterNode(name, _role(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
         RosterNode("coordinator", Role.COORDINATOR),
         *([RosterNode("recorder", Role.RECORDER)] if record else []),
         RosterNode("observer", Role.OBSERVER),
     ]
-    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))}
+    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))} if simulated else {}
     for name, vehicle in scenario.vehicles.items():
         specs[name] = _agent_spec(name, vehicle)
     specs["coordinator"] = NodeSpec(
@@ -165,7 +170,9 @@ def _world_config(scenario: Scenario) -> WorldConfig:
     return WorldConfig(
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
-        vehicles=tuple(_body(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        vehicles=tuple(
+            _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
+        ),
         seabed=(
             SeabedConfig("patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength)
             if isinstance(seabed, PatchySeabed)

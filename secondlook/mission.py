@@ -19,6 +19,7 @@ from comms.routing import Routing
 from comms.runner import NodeError
 from comms.wall_local import run_local_by_wall
 from comms.zenoh_session import PATIENCE_S
+from secondlook.errors import UserError
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.log_file import log_to_file
@@ -63,11 +64,13 @@ class RunOptions:
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """Runs the mission and returns summary.json's content.
 
-    Raises RunFailedError, in one sentence, when a node fails or dies, when the mission is not over by its time limit,
-    and when the run is interrupted; what was recorded until then is readable, and summary.json tells how it ended.
-    Raises ValueError, before anything flies, for events that do not fit the fleet.
+    Raises UserError for a scenario with bodies that are not simulated, and ValueError, also before anything flies, for
+    events that do not fit the fleet. Raises RunFailedError, in one sentence, when a node fails or dies, when the mission
+    is not over by its time limit, and when the run is interrupted; what was recorded until then is readable, and
+    summary.json tells how it ended.
     """
     began_s = time.perf_counter()
+    check_bodies(scenario)
     fleet = build_fleet(scenario, record=options.record, factor=options.factor)
     if options.factor is not None and (options.faults or options.events):
         raise ValueError("faults and events are for lockstep alone")
@@ -104,6 +107,15 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     if failure is not None:
         raise RunFailedError(failure)
     return summary
+
+
+def check_bodies(scenario: Scenario) -> None:
+    """Raises UserError where a vehicle has a body that a run does not start."""
+    for vehicle in scenario.external_vehicles:
+        raise UserError(
+            f"vehicles.{vehicle}.body: external is a program of its own, which secondlook run cannot start; must be "
+            "simulated here, or the fleet started with secondlook node"
+        )
 
 
 class _Run:

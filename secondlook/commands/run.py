@@ -12,7 +12,7 @@ import typer
 
 from secondlook.errors import UserError
 from secondlook.live_view import live_view
-from secondlook.mission import RunOptions, run_mission
+from secondlook.mission import RunOptions, check_bodies, run_mission
 from secondlook.processes import RunFailedError
 from secondlook.report import write_report
 from secondlook.run_display import closing_table, progress_display
@@ -62,6 +62,7 @@ def run(
     if real_time is not None:
         check_factor(REAL_TIME, real_time)
     mission = load_scenario(scenario, set_ or (), seed)
+    check_bodies(mission)
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
             options = RunOptions(
