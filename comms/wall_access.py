@@ -15,7 +15,8 @@ def wall_access_rules(
 ) -> dict[str, Any]:
     """Zenoh's `access_control` configuration for these hosts: all that is not allowed here is denied.
 
-    What a host may read it may ask for; what it may write it may answer.
+    What a host may read it may ask for; what it may write it may answer. Everyone may know what is subscribed to and
+    what is kept: a host that routes for others on its side passes on only what it knows to be wanted.
     """
     allowed = {}
     for plan in hosts:
@@ -29,6 +30,7 @@ def wall_access_rules(
             "lives": (["ingress"], ["liveliness_token"], [keys.alive(plan.host)]),
             "asks": (["ingress"], ["query"], reads),
             "is-answered": (["egress"], ["reply"], reads),
+            "knows": (["egress"], ["declare_subscriber", "declare_queryable"], [keys.topic("**")]),
         }
         if writes:
             allowed[plan.host] |= {

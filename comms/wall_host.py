@@ -33,15 +33,15 @@ COMPLETE_WITHIN_S = 5.0  # so long a listener waits at the end for what is still
 
 
 class RefusedError(Exception):
-    """The clock does not let this process take part; the text is one sentence that says why."""
+    """The clock does not let this process take part, or does not answer; the text is one sentence that says why."""
 
 
 class WallHost:
     """Runs what sits in this process, over an open session, until the clock ends the run or someone interrupts it.
 
-    `host`: under which it speaks with the clock. A while after the time limit it ends by itself, where a clock that is
-    not heard any more cannot end it. `notice`: told in words what a person should know. `interrupted`: whether someone
-    has ended it.
+    `host`: under which it speaks with the clock, which is to answer within `answer_within_s`. A while after the time
+    limit it ends by itself, where a clock that is not heard any more cannot end it. `notice`: told in words what a
+    person should know. `interrupted`: whether someone has ended it.
     """
 
     def __init__(
@@ -54,6 +54,7 @@ class WallHost:
         scenario_sha256: str,
         time_limit_ms: int,
         *,
+        answer_within_s: float = math.inf,
         notice: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         self.interrupted = False
@@ -73,6 +74,7 @@ class WallHost:
         self._result: BusResult | None = None
         self._finish_by_s = 0.0
         self._hello_at_s = self._beat_at_s = 0.0
+        self._answer_by_s = time.monotonic() + answer_within_s
         self._clock_heard_s = time.monotonic()
         self._clock_is_heard = True
         self._to_me = f"clock/to/{host}"
@@ -122,6 +124,11 @@ class WallHost:
             now_s = time.monotonic()
             self._speak(now_s)
             self._listen_for_clock(now_s)
+            if not self._welcomed and now_s >= self._answer_by_s:
+                raise RefusedError(
+                    f"no answer from the router to {self._host} in run {self._keys.run}: the run there may be another, "
+                    "or the name in the certificate"
+                )
             if self._time.known:
                 now_ms = self._time.now_ms(now_s)
                 self._post.publish(self._seat.act(now_ms))
@@ -134,11 +141,12 @@ class WallHost:
             event = self._line.get(self._next_s(now_s) - time.monotonic())
             if event is None:
                 continue
-            match self._post.take(event, self._seat.kept.values):
-                case Received() as received:
-                    self._take(received)
-                case Words(key, words):
-                    self._hear(key, words)
+            for item in self._post.take(event, self._seat.kept.values):
+                match item:
+                    case Received():
+                        self._take(item)
+                    case Words(key, words):
+                        self._hear(key, words)
 
     def _next_s(self, now_s: float) -> float:
         next_s = min(self._hello_at_s, self._beat_at_s)
@@ -206,7 +214,7 @@ class WallHost:
                     self._hello_at_s = 0.0
                     self._token = self._session.liveliness().declare_token(self._keys.alive(self._host))
             case ["refused", self._instance, str(sentence)]:  # not for another process of the same name
-                raise RefusedError(sentence)
+                raise RefusedError(f"refused by the router: {sentence}")
             case ["finish", *_]:
                 self._result = unpack_finish(words)
                 self._finish_by_s = self._finish_by_s or time.monotonic() + COMPLETE_WITHIN_S
@@ -221,9 +229,9 @@ class WallHost:
             event = self._line.get(left_s)
             if event is None:
                 return
-            heard = self._post.take(event, self._seat.kept.values)  # others may still ask for what is kept
-            if isinstance(heard, Words) and heard.key == self._to_me and heard.words[0] == "goodbye":
-                return
+            for item in self._post.take(event, self._seat.kept.values):  # others may still ask for what is kept
+                if isinstance(item, Words) and item.key == self._to_me and item.words[0] == "goodbye":
+                    return
 
     def _say(self, words: bytes) -> None:
         self._line.say(self._keys.from_host(self._host), words)

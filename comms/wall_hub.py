@@ -91,10 +91,10 @@ class WallHub:
                 self._post.publish(self._seat.act(clock.time.now_ms(now_s)))
             self._speak(now_s)
             event = self._line.get(self._next_s(now_s) - time.monotonic())
-            if event is not None:
-                match self._post.take(event, self._all_kept):
-                    case Received() as received:
-                        self._take(received)
+            for item in [] if event is None else self._post.take(event, self._all_kept):
+                match item:
+                    case Received():
+                        self._take(item)
                     case Words(key, words) if key.startswith(FROM):
                         self._hear(key.removeprefix(FROM), words)
                     case Life(host, alive) if not alive:

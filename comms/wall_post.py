@@ -2,7 +2,8 @@
 missing.
 
 Whatever a link loses that its sender keeps is noticed at the sender's next beat, and asked for. So a process that comes
-late, or had no link for a while, gets what it has missed, wherever that was lost.
+late, or had no link for a while, gets what it has missed, wherever that was lost. Until all has come nothing else of
+that sender is passed on; then everything is, in the order of sending.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ class Words:
     words: list[Any]
 
 
+Item = Received | Words | Life
+
+
 class WallPost:
     """The post of the nodes of one process over its line."""
 
@@ -41,29 +45,29 @@ class WallPost:
         self._keys = keys
         self._heard = HeardMessages()
         self._beats: dict[str, Beat] = {}
-        self._asked: set[tuple[str, str]] = set()
+        self._asked: dict[str, set[str]] = {}
+        self._held: dict[str, list[Received]] = {}
 
-    def take(self, event: Event, kept: Callable[[], Iterable[KeptMessages]]) -> Received | Words | Life | None:
-        """Deals with what has arrived; returns a message that is news, words or news of a life, which are for others to
-        deal with. `kept`: what the nodes here keep."""
+    def take(self, event: Event, kept: Callable[[], Iterable[KeptMessages]]) -> list[Item]:
+        """Deals with what has arrived; returns messages that are news, words and news of a life, which are for others
+        to deal with. `kept`: what the nodes here keep."""
         match event:
             case Mail(key, payload) if key.startswith(WORDS):
                 return self._take_words(key, payload)
             case Mail(key, payload):
-                received = self.intake.open(key, payload)
-                return received if received is not None and self._heard.take(received) else None
+                return self._take_message(key, payload)
             case Asked():
                 found = [
                     pair for one in kept() for pair in one.matching(lambda key: self.line.is_asked_for(event, key))
                 ]
                 self.line.answer(event, found)
             case Answered(sender, expression, tally, answers):
-                self._asked.discard((sender, expression))
                 if answers:
                     self._heard.answered(sender, expression, tally)
+                return self._end_asking(sender, expression)
             case Life():
-                return event
-        return None
+                return [event]
+        return []
 
     def is_in_time(self, received: Received, now_ms: int) -> bool:
         """Whether a message may be handled; one that is too far ahead of our time is dropped."""
@@ -86,21 +90,39 @@ class WallPost:
         """Whether all is here that those who have told what they keep have kept for us."""
         return not any(self._missing(sender) for sender in self._beats)
 
-    def _take_words(self, key: str, payload: bytes) -> Words | None:
+    def _take_message(self, key: str, payload: bytes) -> list[Item]:
+        received = self.intake.open(key, payload)
+        if received is None or not self._heard.take(received):
+            return []
+        if received.header.sender in self._asked:
+            self._held.setdefault(received.header.sender, []).append(received)
+            return []
+        return [received]
+
+    def _end_asking(self, sender: str, expression: str) -> list[Item]:
+        asked = self._asked[sender]
+        asked.discard(expression)
+        if asked:
+            return []
+        del self._asked[sender]
+        return [*sorted(self._held.pop(sender, []), key=lambda one: one.header.order)]
+
+    def _take_words(self, key: str, payload: bytes) -> list[Item]:
         try:
             words = unpack(payload)
             if not key.startswith(BEAT):
-                return Words(key, words)
+                return [Words(key, words)]
             sender = key.removeprefix(BEAT)
             self._beats[sender] = unpack_beat(words)
         except ControlError as error:
             self.intake.drop("senseless words", key, str(error))
-            return None
+            return []
         for expression in self._missing(sender):
-            if (sender, expression) not in self._asked:
-                self._asked.add((sender, expression))
+            asked = self._asked.setdefault(sender, set())
+            if expression not in asked:
+                asked.add(expression)
                 self.line.ask(sender, expression, self._beats[sender].tallies[expression])
-        return None
+        return []
 
     def _missing(self, sender: str) -> list[str]:
         beat = self._beats[sender]

@@ -61,7 +61,7 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
     hosts = _hosts(fleet.roster)
     rules = None
     if link.certificates is not None:
-        rules = wall_access_rules(routing, _hosts(fleet.roster), keys, "cert_common_names")
+        rules = wall_access_rules(routing, _subjects(fleet.roster), keys, "cert_common_names")
     try:
         session, endpoint = open_router(link.listen or "", link.certificates, rules)
     except ConnectionFailedError as error:
@@ -185,13 +185,14 @@ def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
             Routing(fleet.roster),
             fleet.run_info.scenario_sha256,
             fleet.time_limit_ms,
+            answer_within_s=link.wait_s,
             notice=_say_as(host),
         )
         try:
             with _signals(guest.interrupt):
                 result = guest.run()
         except RefusedError as error:
-            raise UserError(f"refused by the router: {error}") from error
+            raise UserError(str(error)) from error
         return _Part(result, guest.factor, guest.now_ms if guest.interrupted else None)
 
 
@@ -202,6 +203,16 @@ def _hosts(roster: tuple[RosterNode, ...]) -> tuple[HostPlan, ...]:
     if any(node.role is Role.RECORDER for node in roster):
         plans.append(HostPlan(RECORDER, (RECORDER, OBSERVER)))
     return tuple(plans)
+
+
+def _subjects(roster: tuple[RosterNode, ...]) -> tuple[HostPlan, ...]:
+    """Whose certificates the router knows. A body that is not ours has one of its own, or speaks through its agent."""
+    bodies = {node.vehicles[0]: node.node_id for node in roster if node.role is Role.BODY}
+    hosts = tuple(
+        HostPlan(plan.host, (*plan.nodes, bodies[plan.host])) if plan.host in bodies else plan
+        for plan in _hosts(roster)
+    )
+    return (*hosts, *(HostPlan(body, (body,)) for body in bodies.values()))
 
 
 @contextmanager
@@ -228,6 +239,7 @@ def _signals(interrupt: Callable[[], None]) -> Iterator[None]:
 
 def _log_to_stderr() -> None:
     logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s", stream=sys.stderr)
+    logging.getLogger("secondlook").setLevel(logging.INFO)
 
 
 def _say(who: str, sentence: str) -> None:

@@ -168,6 +168,7 @@ def serve(session: zenoh.Session, run: str, name: str, vehicle: Vehicle) -> None
     signal_s = -math.inf
     incarnation, sequence = 0, 0
     latest = (-1, -1)
+    printed: ManeuverStatus | None = None
     while subscribers:
         said: list[tuple[str, Message]] = []
         try:
@@ -198,6 +199,9 @@ def serve(session: zenoh.Session, run: str, name: str, vehicle: Vehicle) -> None
                 said += vehicle.command(maneuver, now_ms)
         said += vehicle.advance(now_ms)
         for topic, message in said:
+            if isinstance(message, ManeuverStatus) and message != printed:
+                printed = message
+                print(f"manoeuvre {message.number}: {message.state.value}", flush=True)
             header = Header(f"{name}-body", incarnation, sequence, now_ms)
             session.put(f"{root}/veh/{name}/{topic}", encode(header, message))
             sequence += 1
