@@ -10,7 +10,7 @@ import zenoh
 
 from comms.codec import CLOCK
 from comms.control import ControlError, HostPlan
-from comms.kept import KeptMessages
+from comms.journal import Journal
 from comms.messages import RunInfo
 from comms.node import Received
 from comms.result import BusResult
@@ -63,7 +63,7 @@ class WallHub:
         listens = {plan.host: all(routing.nodes[node].listens_only for node in plan.nodes) for plan in hosts}
         self._clock = WallClock(listens, run_info.scenario_sha256, time_limit_ms, factor, time.monotonic())
         self._announced = Stamp(CLOCK, routing)(RUN.key(), run_info, 0)
-        self._kept = KeptMessages()
+        self._kept = Journal()
         self._time_at_s = self._beat_at_s = self._alive_at_s = 0.0
         self._under_way = False
         self._seat_closed = False
@@ -188,5 +188,5 @@ class WallHub:
     def _now_ms(self, now_s: float) -> int:
         return self._clock.time.now_ms(now_s) if self._clock.time.known else 0
 
-    def _all_kept(self) -> list[KeptMessages]:
+    def _all_kept(self) -> list[Journal]:
         return [self._kept, *self._seat.kept.values()]

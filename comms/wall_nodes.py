@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 
-from comms.kept import KeptMessages
+from comms.journal import Journal
 from comms.node import Node, Publication, Received, Step
 from comms.routing import Routing
 from comms.runner import NodeError, Outgoing, Stamp, failure_of
@@ -23,7 +23,7 @@ class WallNode:
     def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
         self.node_id = node_id
         self.wake_ms: int | None = None
-        self.kept = KeptMessages()
+        self.kept = Journal()
         self._node = node
         self._stamp = Stamp(node_id, routing, incarnation)
         self._held: list[Received] = []

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from comms.control import ControlError, unpack
-from comms.kept import HeardMessages, KeptMessages
+from comms.journal import HeardMessages, Journal
 from comms.node import Received
 from comms.routing import Routing
 from comms.runner import Intake, Outgoing
@@ -48,7 +48,7 @@ class WallPost:
         self._asked: dict[str, set[str]] = {}
         self._held: dict[str, list[Received]] = {}
 
-    def take(self, event: Event, kept: Callable[[], Iterable[KeptMessages]]) -> list[Item]:
+    def take(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
         """Deals with what has arrived; returns messages that are news, words and news of a life, which are for others
         to deal with. `kept`: what the nodes here keep."""
         match event:
@@ -76,7 +76,7 @@ class WallPost:
             self.intake.drop("ahead of time", received.header.sender, f"{received.key}: by {ahead_ms / 1000:.3f} s")
         return ahead_ms <= AHEAD_MS
 
-    def beat(self, incarnation: int, kept: Mapping[str, KeptMessages]) -> None:
+    def beat(self, incarnation: int, kept: Mapping[str, Journal]) -> None:
         """Tells what the nodes here keep."""
         for node, its in kept.items():
             self.line.say(self._keys.beat(node), pack_beat(Beat(incarnation, its.tallies)), drop=True)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Iterable, Mapping
 from typing import Protocol
 
-from comms.kept import KeptMessages
+from comms.journal import Journal
 from comms.kept_listener import KeptListener, close_all
 from comms.latency import STRIP_TO_TASK, StripLatency
 from comms.messages import Role
@@ -42,7 +42,7 @@ class Seat(Protocol):
         """When time is to be told next, None for any time."""
 
     @property
-    def kept(self) -> Mapping[str, KeptMessages]:
+    def kept(self) -> Mapping[str, Journal]:
         """By node id, what is kept for others."""
 
     def close(self) -> None:
@@ -86,7 +86,7 @@ class NodeSeat:
         return self._nodes.wake_ms
 
     @property
-    def kept(self) -> Mapping[str, KeptMessages]:
+    def kept(self) -> Mapping[str, Journal]:
         """What the nodes keep."""
         return {node_id: node.kept for node_id, node in self._nodes.nodes.items()}
 
@@ -109,7 +109,7 @@ class ListenerSeat:
 
     listens = True
     keeps: tuple[str, ...] = ()
-    kept: Mapping[str, KeptMessages] = {}
+    kept: Mapping[str, Journal] = {}
 
     def __init__(self, listeners: Mapping[str, Listener], routing: Routing) -> None:
         self.reads = tuple(one for node_id in listeners for one in routing.subscriptions(node_id))

@@ -53,7 +53,7 @@ class LastWord:
 
 @dataclass(frozen=True, slots=True)
 class Beat:
-    """`tallies`: see `comms.kept`."""
+    """`tallies`: see `comms.journal`."""
 
     incarnation: int
     tallies: dict[str, int]

@@ -65,9 +65,9 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """Runs the mission and returns summary.json's content.
 
     Raises UserError for a scenario with bodies that are not simulated, and ValueError, also before anything flies, for
-    events that do not fit the fleet. Raises RunFailedError, in one sentence, when a node fails or dies, when the mission
-    is not over by its time limit, and when the run is interrupted; what was recorded until then is readable, and
-    summary.json tells how it ended.
+    events that do not fit the fleet. Raises RunFailedError, in one sentence, when a node fails or dies, when the
+    mission is not over by its time limit, and when the run is interrupted; what was recorded until then is readable,
+    and summary.json tells how it ended.
     """
     began_s = time.perf_counter()
     check_bodies(scenario)

@@ -27,7 +27,6 @@ LOOK_M = 20.0
 ALONG_BIN_M = 5.0
 RANGE_BIN_M = 1.0
 NAV_EVERY_MS = 1_000
-REPEAT_EVERY_MS = 10_000  # so often the last word on a manoeuvre is said again: a link may have lost it
 STEP_S = 0.02
 
 
@@ -44,11 +43,16 @@ class Vehicle:
         self._looks = 0
         self._now_ms: int | None = None
         self._status: ManeuverStatus | None = None
-        self._nav_due_ms = self._repeat_due_ms = 0
+        self._nav_due_ms = 0
 
     def command(self, maneuver: Maneuver, now_ms: int) -> list[tuple[str, Message]]:
-        """Begins a manoeuvre in the place of the one before; returns what to say, each with its topic."""
+        """Begins a manoeuvre in the place of the one before; returns what to say, each with its topic.
+
+        An agent that has heard nothing of a manoeuvre for too long asks for it again: it is told how far that got.
+        """
         said = self.advance(now_ms)
+        if maneuver == self._maneuver and self._status is not None:
+            return [*said, ("maneuver_status", self._status)]
         self._maneuver, self._looked_m = maneuver, 0.0
         start, end = (maneuver.start_x_m, maneuver.start_y_m), (maneuver.end_x_m, maneuver.end_y_m)
         match maneuver.kind:
@@ -74,17 +78,15 @@ class Vehicle:
                 said += self._look()
             if (self.x_m, self.y_m) == self._to_come[0]:
                 self._to_come.pop(0)
+                reached_ms = now_ms - round(way_m / self.speed_mps * 1000)
                 if not self._to_come:
-                    said += self._say(ManeuverState.DONE, now_ms)
+                    said += self._say(ManeuverState.DONE, reached_ms)
                 elif self._on_track:
-                    said += self._say(ManeuverState.ON_TRACK, now_ms)
+                    said += self._say(ManeuverState.ON_TRACK, reached_ms)
         if now_ms >= self._nav_due_ms:
             self._nav_due_ms = now_ms + NAV_EVERY_MS
             speed_mps = self.speed_mps if self._to_come else 0.0
             said.append(("nav", Nav(self.x_m, self.y_m, self.heading_rad, speed_mps, 5.0, 0.0)))
-        if self._status is not None and now_ms >= self._repeat_due_ms:
-            self._repeat_due_ms = now_ms + REPEAT_EVERY_MS
-            said.append(("maneuver_status", self._status))
         return said
 
     @property
@@ -134,13 +136,13 @@ class Vehicle:
             )
             self._looked_m += LOOK_M
 
-    def _say(self, state: ManeuverState, now_ms: int) -> list[tuple[str, Message]]:
+    def _say(self, state: ManeuverState, at_ms: int) -> list[tuple[str, Message]]:
         assert self._maneuver is not None
         points = [(self.x_m, self.y_m), *self._to_come]
         left_m = sum(math.dist(here, there) for here, there in pairwise(points))
-        ends_ms = now_ms + round(left_m / self.speed_mps * 1000)
+        has_end = self._maneuver.kind is not ManeuverKind.HOLD
+        ends_ms = at_ms + round(left_m / self.speed_mps * 1000) if has_end else 0
         self._status = ManeuverStatus(self._maneuver.number, state, ends_ms, "")
-        self._repeat_due_ms = now_ms + REPEAT_EVERY_MS
         return [("maneuver_status", self._status)]
 
 
@@ -159,15 +161,9 @@ def serve(session: zenoh.Session, run: str, name: str, vehicle: Vehicle) -> None
     def enqueue(sample: zenoh.Sample) -> None:
         inbox.put((str(sample.key_expr), sample.payload.to_bytes()))
 
-    def ask_for_maneuver() -> None:
-        """The agent keeps its latest for whoever has missed it."""
-        session.get(maneuver_key, lambda reply: enqueue(reply.ok) if reply.ok is not None else None)
-
     subscribers = [session.declare_subscriber(key, enqueue) for key in (maneuver_key, time_key)]
     mission_time = MissionTime()
-    signal_s = -math.inf
     incarnation, sequence = 0, 0
-    latest = (-1, -1)
     printed: ManeuverStatus | None = None
     while subscribers:
         said: list[tuple[str, Message]] = []
@@ -183,20 +179,16 @@ def serve(session: zenoh.Session, run: str, name: str, vehicle: Vehicle) -> None
                 mission_time.hear(told_ms, factor, now_s)
                 if first:
                     incarnation = mission_time.now_ms(now_s) // 1000  # larger each time it is started
-                if now_s - signal_s > 2.0:  # at the beginning, and when the link was lost
-                    ask_for_maneuver()
-                signal_s = now_s
         if not mission_time.known:
             continue
         now_ms = mission_time.now_ms(now_s)
         if key == maneuver_key:
             try:
-                header, maneuver = decode(payload, Maneuver)
+                _, maneuver = decode(payload, Maneuver)
             except WireError:
                 continue
-            if isinstance(maneuver, Maneuver) and (header.incarnation, header.sequence) > latest:
-                latest = (header.incarnation, header.sequence)  # the same one may come twice
-                said += vehicle.command(maneuver, now_ms)
+            assert isinstance(maneuver, Maneuver)
+            said += vehicle.command(maneuver, now_ms)
         said += vehicle.advance(now_ms)
         for topic, message in said:
             if isinstance(message, ManeuverStatus) and message != printed:

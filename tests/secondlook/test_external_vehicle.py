@@ -77,11 +77,22 @@ def test_the_examples_vehicle_goes_to_a_place_and_holds_when_told(example: Modul
     assert not any(isinstance(message, Look) for _, _, message in said)
 
 
-def test_its_last_word_is_said_again_and_again(example: ModuleType) -> None:
+def test_of_a_manoeuvre_that_is_asked_for_again_it_says_how_far_it_got(example: ModuleType) -> None:
     vehicle = example.Vehicle(0.0, 0.0, 10.0, 15.0, 0.7)
-    vehicle.command(Maneuver(1, ManeuverKind.GOTO, 0, 0, 10, 0, 0), 0)
-    states = [message for _, _, message in sail(vehicle, 30_000, 100) if isinstance(message, ManeuverStatus)]
-    assert states == [ManeuverStatus(1, ManeuverState.DONE, 1_000, "")] * 3
+    track = Maneuver(1, ManeuverKind.FOLLOW, 0, 0, 0, 50, 0)
+    vehicle.command(track, 0)
+    sail(vehicle, 2_000, 100)
+    assert vehicle.command(track, 2_000)[-1] == (
+        "maneuver_status",
+        ManeuverStatus(1, ManeuverState.ON_TRACK, 5_000, ""),
+    )
+    assert vehicle.y_m == pytest.approx(20)
+    vehicle.advance(5_000)
+    assert vehicle.command(track, 9_000)[-1] == ("maneuver_status", ManeuverStatus(1, ManeuverState.DONE, 5_000, ""))
+    assert vehicle.command(Maneuver(2, ManeuverKind.HOLD, 0, 0, 0, 0, 0), 9_000)[-1] == (
+        "maneuver_status",
+        ManeuverStatus(2, ManeuverState.ACCEPTED, 0, ""),
+    )
 
 
 def test_an_external_body_has_its_vehicles_topics_and_the_world_has_not() -> None:

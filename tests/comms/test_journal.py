@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from comms.codec import Header, decode
-from comms.kept import MOST_TRIES, HeardMessages, KeptMessages
+from comms.journal import MOST_TRIES, HeardMessages, Journal
 from comms.messages import Contact
 from comms.node import Publication, Received
 from comms.routing import Routing
@@ -27,7 +27,7 @@ class Sender:
     said: list[Received] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.kept = KeptMessages()
+        self.kept = Journal()
         self._stamp = Stamp("alpha", ROUTING, self.incarnation)
         self._intake = Intake(ROUTING)
 

@@ -1,4 +1,4 @@
-"""Messages that are kept for whoever comes late or has lost its link: the sender's store, and what a receiver has.
+"""What is kept for whoever comes late or has lost its link: each sender's journal, and what a receiver has of it.
 
 Pure. A sender tells from time to time a tally of what it keeps under each of its key expressions: the sum over the kept
 messages of sequence number + 1. A receiver sums up what it has of them in the same way. Of each key it has no newer
@@ -19,8 +19,8 @@ from comms.topics import Keep, Topic
 MOST_TRIES = 3  # to get what a tally tells of, where answers come but something is still missing
 
 
-class KeptMessages:
-    """What one sender has said and keeps, as the topic table says."""
+class Journal:
+    """What one sender has said, as far as the topic table says that it is kept."""
 
     def __init__(self) -> None:
         self._count = 0
