@@ -31,6 +31,7 @@ from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.mission import not_over
 from secondlook.node_spec import NodeSpec, make_nodes
 from secondlook.observer import Observer
+from secondlook.report import write_report
 from secondlook.run_display import closing_table
 from secondlook.scenario import Scenario
 from secondlook.summary import summarise
@@ -135,6 +136,10 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
         factor=part.factor,
     )
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    try:
+        write_report(folder)
+    except UserError as error:  # the mission is what counts
+        _say(RECORDER, str(error))
     if failure is not None:
         _say(RECORDER, f"{failure}; what was recorded is in {folder}")
         return FAILED

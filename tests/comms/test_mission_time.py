@@ -48,6 +48,18 @@ def test_it_never_goes_back_and_is_behind_by_the_latest_signals_way_at_most(
         before_ms = now_ms
 
 
+def test_it_does_not_go_back_when_all_signals_come_late() -> None:
+    time = MissionTime()
+    time.hear(0, 1.0, 0.0)
+    before_ms = 0
+    for second in range(1, 2 * SIGNALS_KEPT):
+        time.hear(second * 1000 - 500, 1.0, float(second))  # half a second under way
+        now_ms = time.now_ms(float(second))
+        assert now_ms >= before_ms
+        before_ms = now_ms
+    assert before_ms == (2 * SIGNALS_KEPT - 1) * 1000 - 500
+
+
 def test_a_local_clock_that_runs_fast_is_put_right_by_and_by() -> None:
     time = MissionTime()
     for second in range(3 * SIGNALS_KEPT):  # the local clock loses a millisecond each second

@@ -12,6 +12,7 @@ import zenoh
 from by_wall import ROUTING, WALL_KEYS
 from certificates import make_certificates
 from fleets import EACH_ALONE
+from flights import until
 from required import missing_for_certificates, require
 
 from comms.control import HostPlan
@@ -77,8 +78,12 @@ def test_a_certificate_lets_its_node_read_what_is_for_it_alone(guarded: Guarded)
     heard = hears(
         guarded.session("beta"), "world/truth/**", "veh/alpha/nav", "veh/beta/nav", "clock/time", "clock/to/beta"
     )
-    while heard.empty():  # until the router knows of the last subscription
+
+    def is_heard() -> bool:
         guarded.router.put(WALL_KEYS.topic("clock/to/beta"), b"x")
+        return not heard.empty()
+
+    assert until(is_heard)  # the router knows of the last subscription
     for key in ("world/truth/targets", "veh/alpha/nav", "veh/beta/nav", "clock/time"):
         guarded.router.put(WALL_KEYS.topic(key), b"x")
     keys = set()
@@ -96,9 +101,7 @@ def test_what_is_kept_is_told_to_those_who_may_read_it(guarded: Guarded) -> None
     def answers(asker: zenoh.Session) -> list[bytes]:
         return [reply.ok.payload.to_bytes() for reply in asker.get(key, timeout=SOON_S) if reply.ok is not None]
 
-    while not answers(coordinator):
-        pass
-    assert answers(coordinator) == [b"kept"]
+    assert until(lambda: answers(coordinator) == [b"kept"])
     assert answers(beta) == []
 
 
@@ -113,8 +116,7 @@ def test_nobody_answers_for_somebody_else(guarded: Guarded) -> None:
         replies = coordinator.get(WALL_KEYS.topic(key), timeout=SOON_S)
         return [reply.ok.payload.to_bytes() for reply in replies if reply.ok is not None]
 
-    while not answers("agent/beta/state"):
-        pass
+    assert until(lambda: answers("agent/beta/state") == [b"from beta"])
     assert answers("agent/alpha/state") == []
 
 

@@ -53,7 +53,7 @@ def test_a_mission_by_the_wall_clock_ends_well_and_loses_nothing(tmp_path: Path,
     assert kept == summary["messages"]
     assert modes == [ClockMode.WALL]
     assert {path.name for path in flying.folder.iterdir()} == {
-        "events.jsonl", "messages.mpk", "mission.rrd", "risk.npz", "scenario.yaml", "summary.json",
+        "events.jsonl", "messages.mpk", "mission.rrd", "report.html", "risk.npz", "scenario.yaml", "summary.json",
     }  # fmt: skip
 
 

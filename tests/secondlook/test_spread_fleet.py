@@ -51,7 +51,7 @@ def test_a_mission_goes_on_while_router_and_helper_are_started_anew_and_nothing_
     assert summary["hotspots"]["revisited"] > 0
     assert summary["dropped"].keys() <= {"lost on the way to the observer"}
     assert {path.name for path in fleet.record.iterdir()} == {
-        "events.jsonl", "messages.mpk", "mission.rrd", "risk.npz", "scenario.yaml", "summary.json",
+        "events.jsonl", "messages.mpk", "mission.rrd", "report.html", "risk.npz", "scenario.yaml", "summary.json",
     }  # fmt: skip
     assert re.fullmatch(
         r"coordinator: the mission begins\n(coordinator: the router is (not heard|heard again)\n)*"
