@@ -2,41 +2,57 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from comms.control import HostPlan, RunKeys
 from comms.routing import Routing
 
+Identity = Literal["usernames", "cert_common_names"]
+Allowed = tuple[list[str], list[str], list[str]]
+"""Flows, kinds of message and key expressions of one rule."""
+
 
 def access_rules(routing: Routing, hosts: tuple[HostPlan, ...], keys: RunKeys) -> dict[str, Any]:
-    """Zenoh's `access_control` configuration for these hosts: all that is not allowed here is denied."""
-    rules: list[dict[str, Any]] = []
-    policies: list[dict[str, Any]] = []
+    """Zenoh's `access_control` configuration for these hosts in lockstep: all that is not allowed here is denied."""
+    allowed = {}
     for plan in hosts:
-        writes = [keys.topic(one) for node in plan.nodes for one in routing.publications(node)]
-        reads = [keys.topic(one) for node in plan.nodes for one in routing.subscriptions(node)]
+        writes, reads = topic_keys(routing, plan, keys)
         reads.append(keys.to_host(plan.host))
-        host_rules = {
+        allowed[plan.host] = {
             "writes": (["ingress"], ["put"], [*writes, keys.from_host(plan.host)]),
             "subscribes": (["ingress"], ["declare_subscriber"], reads),
             "reads": (["egress"], ["put"], reads),
             "lives": (["ingress"], ["liveliness_token"], [keys.alive(plan.host)]),
         }
-        for name, (flows, messages, key_exprs) in host_rules.items():
-            rules.append(
-                {
-                    "id": f"{plan.host}-{name}",
-                    "permission": "allow",
-                    "flows": flows,
-                    "messages": messages,
-                    "key_exprs": sorted(set(key_exprs)),
-                }
-            )
-        policies.append({"rules": [f"{plan.host}-{name}" for name in host_rules], "subjects": [plan.host]})
+    return access_control(allowed, "usernames")
+
+
+def topic_keys(routing: Routing, plan: HostPlan, keys: RunKeys) -> tuple[list[str], list[str]]:
+    """Full key expressions of what the nodes of a host may write, and may read."""
+    writes = [keys.topic(one) for node in plan.nodes for one in routing.publications(node)]
+    reads = [keys.topic(one) for node in plan.nodes for one in routing.subscriptions(node)]
+    return writes, reads
+
+
+def access_control(allowed: Mapping[str, Mapping[str, Allowed]], identity: Identity) -> dict[str, Any]:
+    """Zenoh's `access_control` configuration from named rules for each host; `identity`: what proves who it is."""
     return {
         "enabled": True,
         "default_permission": "deny",
-        "rules": rules,
-        "subjects": [{"id": plan.host, "usernames": [plan.host]} for plan in hosts],
-        "policies": policies,
+        "rules": [
+            {
+                "id": f"{host}-{name}",
+                "permission": "allow",
+                "flows": flows,
+                "messages": messages,
+                "key_exprs": sorted(set(key_exprs)),
+            }
+            for host, its in allowed.items()
+            for name, (flows, messages, key_exprs) in its.items()
+        ],
+        "subjects": [{"id": host, identity: [host]} for host in allowed],
+        "policies": [
+            {"rules": [f"{host}-{name}" for name in its], "subjects": [host]} for host, its in allowed.items()
+        ],
     }

@@ -21,7 +21,8 @@ CLOCK = "clock"  # the clock's id as a sender
 class Header:
     """Who sent a message, which of its messages it is, and when (simulated milliseconds).
 
-    `incarnation` counts a node's starts, `sequence` the messages of this incarnation, both from 0.
+    `incarnation` tells a node's starts apart: 0 for the first, larger for each later one. `sequence` counts the
+    messages of this incarnation from 0.
     """
 
     sender: str

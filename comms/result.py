@@ -17,12 +17,13 @@ class Ending(enum.Enum):
 @dataclass(frozen=True)
 class BusResult:
     """`mission_ms`: simulated time of the mission's end. `messages`: count per topic. `dropped`: count per reason.
-    `latencies_ms`: wall-clock latencies measured by the bus, by name; empty on the local bus."""
+    `latencies_ms`: wall-clock latencies measured by the bus, by name; empty on the local bus. A run by the wall clock
+    has no digest and no rounds."""
 
     ending: Ending
     mission_ms: int
-    digest: str
-    rounds: int
+    digest: str | None
+    rounds: int | None
     messages: dict[str, int]
     dropped: dict[str, int]
     latencies_ms: dict[str, list[float]] = field(default_factory=dict)

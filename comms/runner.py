@@ -93,18 +93,18 @@ class Intake:
         """The message, or None where it does not fit."""
         route = self._routing.route(key)
         if route is None:
-            self._drop("unknown key", "nobody", key)
+            self.drop("unknown key", "nobody", key)
             return None
         if len(payload) > route.topic.max_bytes:
-            self._drop("too long", route.writer, f"{key}: {len(payload)} bytes")
+            self.drop("too long", route.writer, f"{key}: {len(payload)} bytes")
             return None
         try:
             header, message = decode(payload, route.topic.message)
         except WireError as error:
-            self._drop("malformed", route.writer, f"{key}: {error}")
+            self.drop("malformed", route.writer, f"{key}: {error}")
             return None
         if header.sender != route.writer:
-            self._drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
+            self.drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
             return None
         vehicle = ""
         if route.topic.has_vehicle:
@@ -112,7 +112,8 @@ class Intake:
             vehicle = match.group("vehicle") if match else ""
         return Received(key, route.topic, vehicle, header, message, payload)
 
-    def _drop(self, reason: str, sender: str, detail: str) -> None:
+    def drop(self, reason: str, sender: str, detail: str) -> None:
+        """Counts what is not taken, and says why once for each sender and reason."""
         self.dropped[reason] += 1
         if (sender, reason) not in self._told:
             self._told.add((sender, reason))

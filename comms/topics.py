@@ -91,6 +91,11 @@ class Topic:
         chunk = chunk.replace(r"\{number\}", r"(?P<number>[0-9]+)").replace(r"\{tile\}", r"(?P<tile>[a-z0-9_-]+)")
         return re.compile(chunk)
 
+    def vehicle_of(self, key: str) -> str:
+        """The vehicle that a key of this topic names; "" where its keys name none."""
+        match = self.regex.fullmatch(key) if self.has_vehicle else None
+        return match.group("vehicle") if match else ""
+
     def expression(self, vehicle: str = "*") -> str:
         """The Zenoh key expression, below the run id, of this topic's keys for one vehicle or for all."""
         return self.pattern.format(vehicle=vehicle, number="*", tile="*")

@@ -32,11 +32,11 @@ def open_hub(
         with open(os.open(passwords, os.O_WRONLY | os.O_CREAT, 0o600), "w") as file:
             file.writelines(f"{name}:{password}\n" for name, password in users.items())
         config = _config("router", patience_s, listen=["tcp/127.0.0.1:0"])
-        _set(config, "scouting/delay", 0)
-        _set(config, "adminspace", {"enabled": True, "permissions": {"read": True, "write": False}})
-        _set(config, "transport/auth/usrpwd/dictionary_file", str(passwords))
+        set_config(config, "scouting/delay", 0)
+        set_config(config, "adminspace", {"enabled": True, "permissions": {"read": True, "write": False}})
+        set_config(config, "transport/auth/usrpwd/dictionary_file", str(passwords))
         if access_control is not None:
-            _set(config, "access_control", access_control)
+            set_config(config, "access_control", access_control)
         session = zenoh.open(config)
     # The session's own admin space is where the port that the system picked can be read.
     for reply in session.get(f"@/{session.info.zid()}/router"):
@@ -57,9 +57,9 @@ def open_client(
     """A session that speaks through the hub at `endpoint`; raises ConnectionFailedError where there is none, or none
     that lets `user` in with `password`. `patience_s`: see `_config`."""
     config = _config("client", patience_s, connect=[endpoint])
-    _set(config, "connect/timeout_ms", round(connect_timeout_s * 1000))
-    _set(config, "transport/auth/usrpwd/user", user)
-    _set(config, "transport/auth/usrpwd/password", password)
+    set_config(config, "connect/timeout_ms", round(connect_timeout_s * 1000))
+    set_config(config, "transport/auth/usrpwd/user", user)
+    set_config(config, "transport/auth/usrpwd/password", password)
     try:
         return zenoh.open(config)
     except zenoh.ZError as error:
@@ -98,17 +98,18 @@ def _config(mode: str, patience_s: float, *, listen: Iterable[str] = (), connect
     """`patience_s`: wall time after which the other side gives up a session from which nothing comes, not even a sign
     of life, and for which a put waits for one that takes nothing. An end of the process is noticed at once."""
     config = zenoh.Config()
-    _set(config, "mode", mode)
-    _set(config, "scouting/multicast/enabled", False)
-    _set(config, "listen/endpoints", list(listen))  # always: a router listens on all interfaces by default
-    _set(config, "connect/endpoints", list(connect))
-    _set(config, "transport/shared_memory/enabled", False)  # a killed process would leave segments behind
-    _set(config, "transport/link/rx/max_message_size", LARGEST_MESSAGE_BYTES)
-    _set(config, "transport/link/tx/lease", round(patience_s * 1000))
+    set_config(config, "mode", mode)
+    set_config(config, "scouting/multicast/enabled", False)
+    set_config(config, "listen/endpoints", list(listen))  # always: a router listens on all interfaces by default
+    set_config(config, "connect/endpoints", list(connect))
+    set_config(config, "transport/shared_memory/enabled", False)  # a killed process would leave segments behind
+    set_config(config, "transport/link/rx/max_message_size", LARGEST_MESSAGE_BYTES)
+    set_config(config, "transport/link/tx/lease", round(patience_s * 1000))
     block_us = round(patience_s * 1e6)
-    _set(config, "transport/link/tx/queue/congestion_control/block/wait_before_close", block_us)
+    set_config(config, "transport/link/tx/queue/congestion_control/block/wait_before_close", block_us)
     return config
 
 
-def _set(config: zenoh.Config, path: str, value: Any) -> None:
+def set_config(config: zenoh.Config, path: str, value: Any) -> None:
+    """Sets one key of a configuration."""
     config.insert_json5(path, json.dumps(value))

@@ -181,9 +181,11 @@ class Coordinator:
         return cells
 
     def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
-        was_idle, was_finished = vehicle.is_idle, vehicle.is_finished
+        was_idle, was_finished, was_lost = vehicle.is_idle, vehicle.is_finished, vehicle.lost
         if not vehicle.take_state(header, state, now_ms):
             return
+        if was_lost:
+            log.info("%s is heard again", vehicle.entry.vehicle)
         self._to_cut |= vehicle.is_finished and not was_finished
         self._to_assign |= vehicle.is_idle and not was_idle
         if vehicle.entry.role is Role.REVISIT and state.mode in (Mode.TRANSIT, Mode.REVISIT):
@@ -277,6 +279,7 @@ class Coordinator:
             if vehicle.lost or now_ms - vehicle.heard_ms < self.config.lost_after_ms:
                 continue
             vehicle.lost = True
+            log.info("%s is lost: nothing heard of it since %.0f s", name, vehicle.heard_ms / 1000)
             for record in self.ledger.in_state(*WITH_A_VEHICLE):
                 if record.vehicle == name:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")

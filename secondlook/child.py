@@ -24,13 +24,17 @@ from comms.access import access_rules
 from comms.clock import RunawayError
 from comms.control import RunKeys
 from comms.events import Change
+from comms.result import BusResult
 from comms.routing import Routing
 from comms.runner import NodeError
+from comms.wall_host import RefusedError
+from comms.wall_seats import ListenerSeat, NodeSeat
 from comms.zenoh_host import ListenerHost, serve_nodes
 from comms.zenoh_hub import FleetError, HostLostError, Hub
 from comms.zenoh_session import ConnectionFailedError, open_client, open_hub
 from secondlook.child_order import STATUS_FD, ChildOrder, read_order
 from secondlook.node_spec import make_nodes
+from secondlook.wall_child import run_host, run_hub
 
 FAILED = 1  # exit codes: after a sentence for the launcher, and when the launcher is gone
 ORPHANED = 3
@@ -56,7 +60,7 @@ def main() -> int:
     except HostLostError as error:
         tell(lost=error.host, at_ms=error.at_ms)
         return FAILED
-    except (NodeError, FleetError, RunawayError, ConnectionFailedError) as error:
+    except (NodeError, FleetError, RunawayError, ConnectionFailedError, RefusedError) as error:
         tell(failed=str(error))
         return FAILED
     return 0
@@ -97,6 +101,9 @@ def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
         watch.lines.get()
 
     nodes = make_nodes(order.specs)
+    if order.factor is not None:
+        _tell_result(run_hub(order, nodes, tell), tell)
+        return
     routing, keys = Routing(order.roster), RunKeys(order.run)
     rules = access_rules(routing, order.hosts, keys)
     session, endpoint = open_hub(order.passwords, rules, patience_s=order.patience_s)
@@ -115,14 +122,20 @@ def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
             alive=lambda now_ms: tell(alive_ms=now_ms),
         )
         tell(endpoint=endpoint)  # now that the hub hears whoever connects
-        result = hub.run(order.run_info)
-        tell(result={**asdict(result), "ending": result.ending.value})
+        _tell_result(hub.run(order.run_info), tell)
+
+
+def _tell_result(result: BusResult, tell: Callable[..., None]) -> None:
+    tell(result={**asdict(result), "ending": result.ending.value})
 
 
 def _be_host(order: ChildOrder) -> None:
     nodes = make_nodes(order.specs)
     endpoint = _read_endpoint(sys.stdin.buffer)
     _LauncherWatch()
+    if order.factor is not None:
+        run_host(order, endpoint, NodeSeat(nodes, Routing(order.roster)))
+        return
     with open_client(endpoint, order.host, order.password, patience_s=order.patience_s) as session:
         serve_nodes(session, RunKeys(order.run), order.plan, nodes, Routing(order.roster), order.faults)
 
@@ -131,6 +144,10 @@ def _be_listener(order: ChildOrder) -> None:
     ((node_id, listener),) = make_nodes(order.specs).items()
     endpoint = _read_endpoint(sys.stdin.buffer)
     watch = _LauncherWatch()
+    if order.factor is not None:
+        seat = ListenerSeat({node_id: listener}, Routing(order.roster))
+        run_host(order, endpoint, seat, lambda host: setattr(watch, "act", host.interrupt))
+        return
     with open_client(endpoint, order.host, order.password, patience_s=order.patience_s) as session:
         host = ListenerHost(session, RunKeys(order.run), order.host, node_id, listener, Routing(order.roster))
         watch.act = host.interrupt

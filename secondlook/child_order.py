@@ -20,7 +20,8 @@ STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor 
 @dataclass(frozen=True)
 class ChildOrder:
     """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock and
-    the planned `events`. `patience_s`: wall time after which someone silent is given up."""
+    the planned `events`. `patience_s`: wall time after which someone silent is given up. `factor`: by how much mission
+    time runs faster than the wall clock; None for lockstep."""
 
     run: str
     plan: HostPlan
@@ -36,6 +37,7 @@ class ChildOrder:
     run_info: RunInfo | None = None
     time_limit_ms: int = 0
     events: tuple[NodeEvent, ...] = ()
+    factor: float | None = None
 
     @property
     def host(self) -> str:

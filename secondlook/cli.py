@@ -10,14 +10,16 @@ import typer
 
 from secondlook.commands.check import check
 from secondlook.commands.geojson import geojson
+from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
 from secondlook.commands.report import report
-from secondlook.commands.run import run
+from secondlook.commands.run import REAL_TIME, run
 from secondlook.commands.scenarios import scenarios
 from secondlook.commands.view import view
 from secondlook.errors import UserError
+from secondlook.optional_value import with_number
 
 WRONG_USE = 2
 """Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""
@@ -51,10 +53,13 @@ for command in (run, scenarios, check, plan, paper, replay, view, report, geojso
     app.command()(command)
 
 
+app.add_typer(node_app, name="node")
+
+
 def main() -> None:
     """Run the command line, and exit: 0 done, 1 the mission failed, 2 wrong use or bad input."""
     try:
-        app()
+        app(with_number(sys.argv[1:], REAL_TIME, "1"))
     except UserError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(WRONG_USE)

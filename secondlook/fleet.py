@@ -24,6 +24,7 @@ from secondlook.scenario import (
     RevisitVehicle,
     Scenario,
     SurveyVehicle,
+    body_of,
     scenario_hash,
 )
 from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
@@ -33,26 +34,28 @@ from vehicle_agent.config import RevisitConfig, SurveyConfig
 @dataclass(frozen=True)
 class Fleet:
     """A fleet ready to be run. `roster`: every node, clock, recorder and observer included. `specs`: how to make the
-    acting nodes, by node id."""
+    acting nodes that are ours, by node id. `factor`: by how much mission time runs faster than the wall clock; None for
+    lockstep."""
 
     run_info: RunInfo
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
     time_limit_ms: int
+    factor: float | None = None
 
 
-def build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
-    """The fleet of a scenario; `record`: with a recorder.
+def build_fleet(scenario: Scenario, *, record: bool, factor: float | None = None) -> Fleet:
+    """The fleet of a scenario; `record`: with a recorder. `factor`: see `Fleet`.
 
     Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
     """
     try:
-        return _build_fleet(scenario, record=record)
+        return _build_fleet(scenario, record, factor)
     except ValueError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from error
 
 
-def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
+def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Fleet:
     area = SurveyArea(scenario.area.polygon_m, math.radians(scenario.area.track_heading_deg))
     grid = area.grid(scenario.area.cell_m)
     run_info = RunInfo(
@@ -60,7 +63,7 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
         scenario=scenario.name,
         scenario_sha256=scenario_hash(scenario),
         seed=scenario.seed,
-        mode=ClockMode.LOCKSTEP,
+        mode=ClockMode.LOCKSTEP if factor is None else ClockMode.WALL,
         area=_outline(scenario.area.polygon_m),
         grid=Grid(
             grid.frame.origin_x_m,
@@ -74,21 +77,24 @@ def _build_fleet(scenario: Scenario, *, record: bool) -> Fleet:
         vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
     )
     encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
+    external = scenario.external_vehicles
+    simulated = [name for name in scenario.vehicles if name not in external]
     roster = [
         RosterNode("clock", Role.CLOCK),
-        RosterNode("world", Role.WORLD, tuple(scenario.vehicles)),
+        *([RosterNode("world", Role.WORLD, tuple(simulated))] if simulated else []),
+        *(RosterNode(body_of(name), Role.BODY, (name,)) for name in external),
         *(RosterNode(name, _role(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
         RosterNode("coordinator", Role.COORDINATOR),
         *([RosterNode("recorder", Role.RECORDER)] if record else []),
         RosterNode("observer", Role.OBSERVER),
     ]
-    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))}
+    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))} if simulated else {}
     for name, vehicle in scenario.vehicles.items():
         specs[name] = _agent_spec(name, vehicle)
     specs["coordinator"] = NodeSpec(
         scenario.coordinator.node or "coordinator.coordinator:Coordinator", _coordinator_config(scenario)
     )
-    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000))
+    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000), factor)
 
 
 def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
@@ -164,7 +170,9 @@ def _world_config(scenario: Scenario) -> WorldConfig:
     return WorldConfig(
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
-        vehicles=tuple(_body(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        vehicles=tuple(
+            _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
+        ),
         seabed=(
             SeabedConfig("patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength)
             if isinstance(seabed, PatchySeabed)

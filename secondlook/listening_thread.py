@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import threading
+from typing import Any
 
 from comms.control import RunKeys
 from comms.node import Listener
 from comms.routing import Routing
+from comms.wall_host import WallHost
+from comms.wall_seats import ListenerSeat
+from comms.wall_words import WallKeys
 from comms.zenoh_host import ListenerHost
 from comms.zenoh_session import open_client
+from secondlook.fleet import Fleet
 from secondlook.observer import RunStopped
 
 
@@ -20,7 +25,14 @@ class ListeningThread:
     """
 
     def __init__(
-        self, node_id: str, listener: Listener, keys: RunKeys, routing: Routing, password: str, patience_s: float
+        self,
+        node_id: str,
+        listener: Listener,
+        keys: RunKeys,
+        routing: Routing,
+        password: str,
+        patience_s: float,
+        fleet: Fleet,
     ) -> None:
         self.error: Exception | None = None
         self.stopped = False
@@ -30,7 +42,8 @@ class ListeningThread:
         self._routing = routing
         self._password = password
         self._patience_s = patience_s
-        self._host: ListenerHost | None = None
+        self._fleet = fleet
+        self._host: ListenerHost | WallHost | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._listen, name=node_id, daemon=True)
         self._endpoint = ""
@@ -64,9 +77,7 @@ class ListeningThread:
     def _listen(self) -> None:
         try:
             with open_client(self._endpoint, self._node_id, self._password, patience_s=self._patience_s) as session:
-                self._host = ListenerHost(
-                    session, self._keys, self._node_id, self._node_id, self._listener, self._routing
-                )
+                self._host = self._make_host(session)
                 if self._stopping.is_set():
                     self._host.interrupt()
                 try:
@@ -75,3 +86,10 @@ class ListeningThread:
                     self.stopped = True
         except Exception as error:
             self.error = error
+
+    def _make_host(self, session: Any) -> ListenerHost | WallHost:
+        if self._fleet.factor is None:
+            return ListenerHost(session, self._keys, self._node_id, self._node_id, self._listener, self._routing)
+        seat = ListenerSeat({self._node_id: self._listener}, self._routing)
+        sha256, limit_ms = self._fleet.run_info.scenario_sha256, self._fleet.time_limit_ms
+        return WallHost(session, WallKeys(self._keys.run), self._node_id, seat, self._routing, sha256, limit_ms)

@@ -17,7 +17,9 @@ from comms.local_bus import run_local
 from comms.result import BusResult, Ending
 from comms.routing import Routing
 from comms.runner import NodeError
+from comms.wall_local import run_local_by_wall
 from comms.zenoh_session import PATIENCE_S
+from secondlook.errors import UserError
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.log_file import log_to_file
@@ -39,16 +41,18 @@ LOGS = "logs"
 @dataclass(frozen=True)
 class RunOptions:
     """`folder`: where the files of the run go; it exists. `processes`: see `host_plans.plan_hosts`. `record`: with
-    recording and messages.mpk. `progress`: told the figures as the mission goes on. `live_pipe`: where the recorder
-    shows the mission while it runs, see `viz.live_server.LiveServer`. `faults`, `events`: what goes wrong on purpose;
-    with events each node concerned has a process of its own. `watch`: told each message in the order of sending; by
-    raising `RunStopped` it ends the run early, which is no failure. `patience_s`: wall time after which a node that
-    does not answer is given up."""
+    recording and messages.mpk. `factor`: flies by the wall clock times this; None for lockstep. `progress`: told the
+    figures as the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
+    `viz.live_server.LiveServer`. `faults`, `events`: what goes wrong on purpose, in lockstep alone; with events each
+    node concerned has a process of its own. `watch`: told each message in the order of sending; by raising
+    `RunStopped` it ends the run early, which is no failure. `patience_s`: wall time after which a node that does not
+    answer is given up."""
 
     folder: Path
     bus: Bus = "zenoh"
     processes: int | None = None
     record: bool = True
+    factor: float | None = None
     progress: Progress | None = None
     live_pipe: Path | None = None
     faults: Faults = NO_FAULTS
@@ -60,12 +64,16 @@ class RunOptions:
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """Runs the mission and returns summary.json's content.
 
-    Raises RunFailedError, in one sentence, when a node fails or dies, when the mission is not over by its time limit,
-    and when the run is interrupted; what was recorded until then is readable, and summary.json tells how it ended.
-    Raises ValueError, before anything flies, for events that do not fit the fleet.
+    Raises UserError for a scenario with bodies that are not simulated, and ValueError, also before anything flies, for
+    events that do not fit the fleet. Raises RunFailedError, in one sentence, when a node fails or dies, when the
+    mission is not over by its time limit, and when the run is interrupted; what was recorded until then is readable,
+    and summary.json tells how it ended.
     """
     began_s = time.perf_counter()
-    fleet = build_fleet(scenario, record=options.record)
+    check_bodies(scenario)
+    fleet = build_fleet(scenario, record=options.record, factor=options.factor)
+    if options.factor is not None and (options.faults or options.events):
+        raise ValueError("faults and events are for lockstep alone")
     timeline(options.events, Routing(fleet.roster))  # refuses what does not fit
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
@@ -83,7 +91,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     else:
         ending = result.ending.value
         if result.ending is not Ending.OVER:
-            failure = _not_over(result, scenario)
+            failure = not_over(result, scenario)
     summary = summarise(
         scenario,
         observer,
@@ -93,11 +101,21 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
         wall_s=time.perf_counter() - began_s,
         ending=ending,
         failure=failure,
+        factor=options.factor,
     )
     (options.folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     if failure is not None:
         raise RunFailedError(failure)
     return summary
+
+
+def check_bodies(scenario: Scenario) -> None:
+    """Raises UserError where a vehicle has a body that a run does not start."""
+    for vehicle in scenario.external_vehicles:
+        raise UserError(
+            f"vehicles.{vehicle}.body: external is a program of its own, which secondlook run cannot start; must be "
+            "simulated here, or the fleet started with secondlook node"
+        )
 
 
 class _Run:
@@ -117,12 +135,18 @@ class _Run:
         except NodeError:
             self._observer.close()
             raise
+        listeners = {OBSERVER: self._observer, **recorder}
         try:
             with Watchdog(options.patience_s) as watchdog:
+                makers = {node_id: partial(_make, node_id, spec, watchdog) for node_id, spec in fleet.specs.items()}
+                if fleet.factor is not None:
+                    return run_local_by_wall(
+                        Routing(fleet.roster), makers, listeners, fleet.run_info, fleet.time_limit_ms, fleet.factor
+                    )
                 return run_local(
                     Routing(fleet.roster),
-                    {node_id: partial(_make, node_id, spec, watchdog) for node_id, spec in fleet.specs.items()},
-                    {OBSERVER: self._observer, **recorder},
+                    makers,
+                    listeners,
                     fleet.run_info,
                     fleet.time_limit_ms,
                     faults=options.faults,
@@ -152,7 +176,8 @@ def _make(node_id: str, spec: NodeSpec, watchdog: Watchdog) -> WatchedNode:
     return WatchedNode(node_id, make_node(node_id, spec), watchdog)
 
 
-def _not_over(result: BusResult, scenario: Scenario) -> str:
+def not_over(result: BusResult, scenario: Scenario) -> str:
+    """Why a run has ended although the mission is not over, in a sentence."""
     if result.ending is Ending.TIME_LIMIT:
         return f"the mission is not over at its time limit, mission.time_limit_s: {scenario.mission.time_limit_s:g}"
     return f"nothing is left to happen at {result.mission_ms / 1000:.3f} s, but the mission is not over"

@@ -74,7 +74,7 @@ class Processes:
         self._hub_alive_ms = 0
         self._selector = selectors.DefaultSelector()
         self._listening = ListeningThread(
-            OBSERVER, observer, self._keys, Routing(fleet.roster), self._passwords[OBSERVER], patience_s
+            OBSERVER, observer, self._keys, Routing(fleet.roster), self._passwords[OBSERVER], patience_s, fleet
         )
 
     def __enter__(self) -> Processes:
@@ -153,6 +153,7 @@ class Processes:
                 time_limit_ms=fleet.time_limit_ms,
                 faults=self._faults,
                 events=self._events,
+                factor=fleet.factor,
             )
         )
         for plan in self._plans:
@@ -169,6 +170,9 @@ class Processes:
                     patience_s=self._patience_s,
                     faults=self._faults,
                     is_listener=recorder is not None,
+                    run_info=fleet.run_info,
+                    time_limit_ms=fleet.time_limit_ms,
+                    factor=fleet.factor,
                 )
             )
 

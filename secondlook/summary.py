@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from importlib.metadata import version
 from typing import Any
 
@@ -23,12 +24,13 @@ def summarise(
     wall_s: float,
     ending: str,
     failure: str | None = None,
+    factor: float | None = None,
 ) -> dict[str, Any]:
     """summary.json's content.
 
     `result` is None for a run that was cut off: then digest and rounds are not known, and the rest is what the observer
     has heard until then. `ending`: a `comms.result.Ending`, or `failed` or `interrupted`. `failure`: the sentence that
-    the run failed with. `wall_s`: start-up included.
+    the run failed with. `wall_s`: start-up included. `factor`: of a run by the wall clock; None for lockstep.
     """
     told = observer.metrics.summary()
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
@@ -36,12 +38,17 @@ def summarise(
     if observer.metrics.misfits:
         dropped["does not fit the map"] = observer.metrics.misfits
     messages = observer.messages if result is None else result.messages
+    lost = Counter(messages)
+    lost.subtract(observer.messages)
+    if factor is not None and +lost:
+        dropped["lost on the way to the observer"] = (+lost).total()
     return {
         "scenario": scenario.name,
         "seed": scenario.seed,
         "version": version("secondlook"),
         "bus": bus,
         "processes": processes,
+        "factor": factor,
         "digest": None if result is None else result.digest,
         "ending": ending,
         **({} if failure is None else {"failure": failure}),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
@@ -13,13 +12,16 @@ import typer
 
 from secondlook.errors import UserError
 from secondlook.live_view import live_view
-from secondlook.mission import RunOptions, run_mission
+from secondlook.mission import RunOptions, check_bodies, run_mission
 from secondlook.processes import RunFailedError
 from secondlook.report import write_report
 from secondlook.run_display import closing_table, progress_display
+from secondlook.run_folder import run_folder
 from secondlook.scenario import load_scenario
 
 MISSION_FAILED = 1
+REAL_TIME = "--real-time"
+LARGEST_FACTOR = 1000.0
 
 
 class BusName(StrEnum):
@@ -37,6 +39,10 @@ def run(
     processes: Annotated[
         int | None, typer.Option(min=1, help="Over how many processes the nodes are spread; one each if left out.")
     ] = None,
+    real_time: Annotated[
+        float | None,
+        typer.Option(REAL_TIME, metavar="[FACTOR]", help="By the wall clock times a factor, 1 if left out."),
+    ] = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
@@ -53,10 +59,15 @@ def run(
         raise UserError("--web: says how to show a mission --live; must go with --live")
     if live and no_record:
         raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
+    if real_time is not None:
+        check_factor(REAL_TIME, real_time)
     mission = load_scenario(scenario, set_ or (), seed)
-    with live_view(lambda: _folder(out, mission.name), live=live, web=web) as (folder, pipe):
+    check_bodies(mission)
+    with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
-            options = RunOptions(folder, bus.value, processes, record=not no_record, progress=progress, live_pipe=pipe)
+            options = RunOptions(
+                folder, bus.value, processes, record=not no_record, factor=real_time, progress=progress, live_pipe=pipe
+            )
             try:
                 summary = run_mission(mission, options)
             except RunFailedError as error:
@@ -82,21 +93,7 @@ def _report(folder: Path) -> None:
         sys.stderr.write(f"{error}\n")
 
 
-def _folder(out: Path | None, name: str) -> Path:
-    if out is None:
-        stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
-        out = next(
-            path
-            for path in (
-                Path("runs") / f"{name}-{stamp}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 1000)))
-            )
-            if not path.exists()
-        )
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        taken = next(out.iterdir(), None)
-    except OSError as error:
-        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
-    if taken is not None:
-        raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
-    return out
+def check_factor(option: str, factor: float) -> None:
+    """Raises UserError for a factor that no clock can run by."""
+    if not 0 < factor <= LARGEST_FACTOR:
+        raise UserError(f"{option} {factor:g}: is not allowed; must be above 0, at most {LARGEST_FACTOR:g}")

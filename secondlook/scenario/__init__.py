@@ -17,7 +17,7 @@ from secondlook.scenario.model import (
 )
 from secondlook.scenario.origin import Origin
 from secondlook.scenario.sensor import Curve, Sensor
-from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle
+from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle, body_of
 
 __all__ = [
     "Area",
@@ -36,6 +36,7 @@ __all__ = [
     "SurveyVehicle",
     "Targets",
     "UniformSeabed",
+    "body_of",
     "bundled_scenarios",
     "load_scenario",
     "make_scenario",

@@ -13,7 +13,7 @@ from secondlook.scenario.area import Area
 from secondlook.scenario.dialect import dump
 from secondlook.scenario.origin import Origin
 from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
-from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId
+from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
 
 class Mission(Mapping):
@@ -105,6 +105,14 @@ class Scenario(Mapping):
             raise refused("must have a vehicle with role survey")
         return vehicles
 
+    @field_validator("vehicles")
+    @classmethod
+    def _check_bodies(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
+        for key, vehicle in vehicles.items():
+            if vehicle.body == "external" and body_of(key) in vehicles:
+                raise refused(f"must have no {body_of(key)}, as the external body of {key} is called")
+        return vehicles
+
     @property
     def survey_vehicles(self) -> dict[str, SurveyVehicle]:
         """The vehicles that survey, by id, in the scenario's order."""
@@ -114,6 +122,11 @@ class Scenario(Mapping):
     def revisit_vehicles(self) -> dict[str, RevisitVehicle]:
         """The vehicles that revisit, by id, in the scenario's order."""
         return {key: vehicle for key, vehicle in self.vehicles.items() if isinstance(vehicle, RevisitVehicle)}
+
+    @property
+    def external_vehicles(self) -> list[str]:
+        """The vehicles whose bodies are programs of somebody else's."""
+        return [key for key, vehicle in self.vehicles.items() if vehicle.body == "external"]
 
     def to_yaml(self) -> str:
         """This scenario as a file that loads as an equal one, defaults filled in and bundled curves written out."""

@@ -33,6 +33,11 @@ def _check_free(vehicle_id: str) -> str:
     return vehicle_id
 
 
+def body_of(vehicle: str) -> str:
+    """The node id of a vehicle's external body."""
+    return f"{vehicle}-body"
+
+
 VehicleId = Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=32), AfterValidator(_check_free)]
 
 
@@ -47,13 +52,13 @@ class Start(Mapping):
 class VehicleBase(Mapping):
     """What every vehicle has, whatever its role.
 
-    `body`: what moves it, for now always the simulated world. `endurance_s`: how long its battery lasts.
+    `body`: what moves it, the simulated world or a program of your own. `endurance_s`: how long its battery lasts.
     `run_in_m`: straight run before and after each track. `nadir_gap_m`: what it does not see beside its track, per
     side. `agent`: `package.module:Class` of a node of your own in its back seat.
     """
 
     role: str
-    body: Literal["simulated"] = "simulated"
+    body: Literal["simulated", "external"] = "simulated"
     start: Start
     speed_mps: Speed
     turn_radius_m: Length

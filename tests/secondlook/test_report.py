@@ -205,6 +205,12 @@ def test_a_bundled_mission_is_flown_again_by_its_name(mission: RecordedMission) 
     assert "0.48 km²" in Page(report_page(announced("tellaro", 7))).told
 
 
+def test_a_mission_by_the_wall_clock_is_flown_again_by_it() -> None:
+    by_wall = announced("tellaro", 7)
+    by_wall.summary = {"factor": 20.0}
+    assert command_to_reproduce(by_wall) == "secondlook run tellaro --real-time 20"
+
+
 def test_the_series_is_the_risk_at_each_time(mission: RecordedMission) -> None:
     samples = risk_series(mission)
     assert [samples[0].t_s, samples[-1].t_s] == [0.0, mission.end_s]

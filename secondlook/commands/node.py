@@ -1,0 +1,173 @@
+"""`secondlook node`: one node of a fleet spread over hosts, by the wall clock."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from secondlook.commands.run import check_factor
+from secondlook.endpoint import certificates, check_endpoint
+from secondlook.errors import UserError
+from secondlook.run_folder import run_folder
+from secondlook.scenario import Scenario, load_scenario
+from secondlook.spread_fleet import Link, run_node, run_recorder, run_router
+
+node_app = typer.Typer(no_args_is_help=True, help="Start one node of a fleet spread over hosts, by the wall clock.")
+
+ScenarioArgument = Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file, the same everywhere.")]
+Connect = Annotated[str, typer.Option(metavar="ENDPOINT", help="Where the router listens, e.g. tcp/127.0.0.1:7447.")]
+Listen = Annotated[
+    str | None,
+    typer.Option(metavar="ENDPOINT", help="Lets others speak through this node, such as the vehicle it sits on."),
+]
+Run = Annotated[
+    str | None, typer.Option(metavar="ID", help="The run's name, part of all keys; the scenario's if left out.")
+]
+Seed = Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Of everything random, the same everywhere.")]
+Set = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario, everywhere.")
+]
+Insecure = Annotated[bool, typer.Option("--insecure", help="Allow endpoints that leave this host in the clear.")]
+Authority = Annotated[
+    Path | None, typer.Option("--tls-ca", metavar="FILE", help="Certificate of the authority that is trusted.")
+]
+Certificate = Annotated[
+    Path | None, typer.Option("--tls-cert", metavar="FILE", help="This node's certificate; its name is the node's.")
+]
+Key = Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", help="The private key of that.")]
+Wait = Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="So long the router may take to be there.")]
+
+
+@node_app.command()
+def router(
+    scenario: ScenarioArgument,
+    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="Where to listen, e.g. tcp/127.0.0.1:7447.")],
+    factor: Annotated[float, typer.Option(help="By how much mission time runs faster than the wall clock.")] = 1.0,
+    no_record: Annotated[bool, typer.Option("--no-record", help="Do not wait for a recorder.")] = False,
+    run: Run = None,
+    seed: Seed = None,
+    set_: Set = None,
+    insecure: Insecure = False,
+    tls_ca: Authority = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+) -> None:
+    """What all others connect to: it routes, holds the clock and announces the run."""
+    check_endpoint("--listen", listen, insecure=insecure, any_port=True)
+    check_factor("--factor", factor)
+    mission = load_scenario(scenario, set_ or (), seed)
+    link = Link(_run_id(run, mission), certificates([listen], tls_ca, tls_cert, tls_key), listen=listen)
+    raise typer.Exit(run_router(mission, link, factor=factor, record=not no_record))
+
+
+@node_app.command()
+def world(
+    scenario: ScenarioArgument,
+    connect: Connect,
+    listen: Listen = None,
+    run: Run = None,
+    seed: Seed = None,
+    set_: Set = None,
+    insecure: Insecure = False,
+    tls_ca: Authority = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+    wait: Wait = 10.0,
+) -> None:
+    """The simulated sea, with all vehicles whose body is simulated."""
+    mission = load_scenario(scenario, set_ or (), seed)
+    link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
+    raise typer.Exit(run_node(mission, link, "world"))
+
+
+@node_app.command()
+def agent(
+    scenario: ScenarioArgument,
+    vehicle: Annotated[str, typer.Argument(help="The vehicle whose back seat it takes.")],
+    connect: Connect,
+    listen: Listen = None,
+    run: Run = None,
+    seed: Seed = None,
+    set_: Set = None,
+    insecure: Insecure = False,
+    tls_ca: Authority = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+    wait: Wait = 10.0,
+) -> None:
+    """The agent of one vehicle."""
+    mission = load_scenario(scenario, set_ or (), seed)
+    if vehicle not in mission.vehicles:
+        raise UserError(f"{vehicle}: is no vehicle of scenario {mission.name}; must be {' or '.join(mission.vehicles)}")
+    link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
+    raise typer.Exit(run_node(mission, link, vehicle))
+
+
+@node_app.command()
+def coordinator(
+    scenario: ScenarioArgument,
+    connect: Connect,
+    listen: Listen = None,
+    run: Run = None,
+    seed: Seed = None,
+    set_: Set = None,
+    insecure: Insecure = False,
+    tls_ca: Authority = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+    wait: Wait = 10.0,
+) -> None:
+    """The coordinator, which gives out the second looks."""
+    mission = load_scenario(scenario, set_ or (), seed)
+    link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
+    raise typer.Exit(run_node(mission, link, "coordinator"))
+
+
+@node_app.command()
+def recorder(
+    scenario: ScenarioArgument,
+    connect: Connect,
+    out: Annotated[Path | None, typer.Option(help="Folder for the files of the run, new or empty.")] = None,
+    run: Run = None,
+    seed: Seed = None,
+    set_: Set = None,
+    insecure: Insecure = False,
+    tls_ca: Authority = None,
+    tls_cert: Certificate = None,
+    tls_key: Key = None,
+    wait: Wait = 10.0,
+) -> None:
+    """The recorder, which writes all files of a run."""
+    mission = load_scenario(scenario, set_ or (), seed)
+    link = _link(mission, connect, None, run, insecure, tls_ca, tls_cert, tls_key, wait)
+    raise typer.Exit(run_recorder(mission, link, run_folder(out, mission.name)))
+
+
+def _link(
+    mission: Scenario,
+    connect: str,
+    listen: str | None,
+    run: str | None,
+    insecure: bool,
+    tls_ca: Path | None,
+    tls_cert: Path | None,
+    tls_key: Path | None,
+    wait: float,
+) -> Link:
+    check_endpoint("--connect", connect, insecure=insecure)
+    if listen is not None:
+        check_endpoint("--listen", listen, insecure=insecure)
+    endpoints = [connect] if listen is None else [connect, listen]
+    files = certificates(endpoints, tls_ca, tls_cert, tls_key)
+    return Link(_run_id(run, mission), files, connect, listen, wait)
+
+
+def _run_id(run: str | None, mission: Scenario) -> str:
+    if run is None:
+        return mission.name
+    if not re.fullmatch(r"[a-z0-9_-]{1,64}", run):
+        raise UserError(f"--run {run}: is not allowed; must be at most 64 of a-z, 0-9, _ and -")
+    return run

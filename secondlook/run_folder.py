@@ -1,0 +1,32 @@
+"""Where the files of a run go."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+from secondlook.errors import UserError
+
+
+def run_folder(out: Path | None, name: str) -> Path:
+    """The folder for the files of a run: `out`, new or empty, or a new one in `runs`, named after scenario and time.
+
+    Raises UserError.
+    """
+    if out is None:
+        stamp = datetime.now().astimezone().strftime("%Y%m%d-%H%M%S")
+        out = next(
+            path
+            for path in (
+                Path("runs") / f"{name}-{stamp}{suffix}" for suffix in ("", *(f"-{n}" for n in range(2, 1000)))
+            )
+            if not path.exists()
+        )
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        taken = next(out.iterdir(), None)
+    except OSError as error:
+        raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
+    if taken is not None:
+        raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
+    return out

@@ -1,0 +1,112 @@
+"""The toy fleet driven by the wall clock, at a hundred times its pace, on either bus."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import partial
+
+from fleets import EACH_ALONE, ROSTER, RUN_INFO, Scripted, password
+
+from comms.control import HostPlan
+from comms.messages import ClockMode, Role
+from comms.node import Listener, Node
+from comms.result import BusResult
+from comms.routing import Routing
+from comms.runner import NodeError
+from comms.wall_access import wall_access_rules
+from comms.wall_host import WallHost
+from comms.wall_hub import WallHub
+from comms.wall_local import run_local_by_wall
+from comms.wall_seats import ListenerSeat, NodeSeat
+from comms.wall_words import WallKeys
+from comms.zenoh_session import open_client, open_hub
+
+FACTOR = 100.0
+WALL_RUN = replace(RUN_INFO, mode=ClockMode.WALL)
+WALL_KEYS = WallKeys("toy")
+ROUTING = Routing(ROSTER)
+
+
+def filled(nodes: Mapping[str, Node]) -> dict[str, Node]:
+    """The nodes, and silent ones for those left out."""
+    acting = [node.node_id for node in ROSTER if not node.listens_only and node.role is not Role.CLOCK]
+    return {node_id: nodes.get(node_id, Scripted()) for node_id in acting}
+
+
+def _itself(node: Node) -> Node:
+    return node
+
+
+def on_local_by_wall(nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000) -> BusResult:
+    """Runs the toy fleet in this thread."""
+    makers = {node_id: partial(_itself, node) for node_id, node in filled(nodes).items()}
+    return run_local_by_wall(ROUTING, makers, {"observer": listener}, WALL_RUN, time_limit_ms, FACTOR)
+
+
+def on_zenoh_by_wall(
+    nodes: Mapping[str, Node],
+    listener: Listener,
+    *,
+    time_limit_ms: int = 60_000,
+    plans: tuple[HostPlan, ...] = EACH_ALONE,
+    before: Callable[[str], None] = lambda endpoint: None,
+) -> BusResult:
+    """Runs the toy fleet over Zenoh on loopback, the world at the hub, each host of `plans` behind a session.
+
+    `before` is told the hub's endpoint before any of them is started.
+    """
+    seated = filled(nodes)
+    users = {plan.host: password(plan.host) for plan in plans}
+    session, endpoint = open_hub(users, wall_access_rules(ROUTING, plans, WALL_KEYS))
+
+    def serve(plan: HostPlan) -> None:
+        with contextlib.suppress(NodeError), open_client(endpoint, plan.host, password(plan.host)) as own:
+            seat = (
+                ListenerSeat({"observer": listener}, ROUTING)
+                if plan.host == "observer"
+                else NodeSeat({name: seated[name] for name in plan.nodes}, ROUTING)
+            )
+            sha256 = WALL_RUN.scenario_sha256
+            hosts.append(WallHost(own, WALL_KEYS, plan.host, seat, ROUTING, sha256, time_limit_ms))
+            hosts[-1].run()
+
+    hosts: list[WallHost] = []
+    threads = [threading.Thread(target=serve, args=(plan,), name=plan.host, daemon=True) for plan in plans]
+    with session:
+        before(endpoint)
+        seat = NodeSeat({"world": seated["world"]}, ROUTING)
+        hub = WallHub(
+            session, WALL_KEYS, ROUTING, plans, seat, WALL_RUN, time_limit_ms, FACTOR, strict=True, patience_s=10.0
+        )
+        for thread in threads:
+            thread.start()
+        try:
+            return hub.run()
+        finally:
+            for host in hosts:
+                host.interrupt()
+            for thread in threads:
+                thread.join(timeout=20)
+                assert not thread.is_alive(), f"{thread.name} has not ended"
+
+
+def on_zenoh_by_wall_grouped(
+    nodes: Mapping[str, Node], listener: Listener, *, time_limit_ms: int = 60_000
+) -> BusResult:
+    """The same with coordinator and one agent behind one session."""
+    plans = (
+        HostPlan("alpha", ("alpha",)),
+        HostPlan("both", ("beta", "coordinator")),
+        HostPlan("observer", ("observer",)),
+    )
+    return on_zenoh_by_wall(nodes, listener, plans=plans, time_limit_ms=time_limit_ms)
+
+
+WALL_BUSES: dict[str, Callable[..., BusResult]] = {
+    "local": on_local_by_wall,
+    "zenoh": on_zenoh_by_wall,
+    "zenoh-grouped": on_zenoh_by_wall_grouped,
+}

@@ -1,0 +1,144 @@
+"""Fleets whose processes are started one by one with `secondlook node`, as on several hosts."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from flights import BRIEF, until
+
+from comms.codec import decode
+from comms.messages import CoverageTile
+from comms.topics import TOPICS, Keep, topic_of
+from secondlook.mission_files import read_messages
+
+# So that a slow machine does no harm: nobody is lost soon, and the helper has time for its strips.
+PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=1.5")
+
+
+class Started:
+    """One process of a fleet; what it says is in a file."""
+
+    def __init__(self, name: str, log: Path, arguments: Sequence[str | Path], before: Sequence[str] = ()) -> None:
+        self.name = name
+        self._log = log
+        command = [*before, str(Path(sys.executable).with_name("secondlook")), "node", *map(str, arguments)]
+        with log.open("ab") as out:
+            self.process = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=out, stderr=out, cwd=log.parent, env={**os.environ}
+            )
+
+    @property
+    def said(self) -> str:
+        """All it has printed."""
+        return self._log.read_text()
+
+    def says(self, words: str, timeout_s: float = 30.0) -> bool:
+        """Whether it prints these words in time."""
+        return until(lambda: words in self.said or self.process.poll() is not None, timeout_s) and words in self.said
+
+    def ends(self, timeout_s: float = 60.0) -> int:
+        """Its exit code."""
+        return self.process.wait(timeout_s)
+
+
+class SpreadFleet:
+    """Processes that share an endpoint and options, in `folder`. `started` has the last one of each name."""
+
+    def __init__(self, folder: Path, endpoint: str, *options: str, scenario: Path = BRIEF) -> None:
+        self.folder = folder
+        self.endpoint = endpoint
+        self.options = options
+        self.scenario = scenario
+        self.started: dict[str, Started] = {}
+        self._all: list[Started] = []
+
+    def router(self, factor: float, *more: str, before: Sequence[str] = ()) -> Started:
+        """Starts the router."""
+        own = ("--listen", self.endpoint, "--factor", str(factor))
+        return self._start("router", ["router", self.scenario, *own, *self.options, *more], before)
+
+    def node(self, *role: str, name: str = "", more: Sequence[str] = (), before: Sequence[str] = ()) -> Started:
+        """Starts a node: its role and, for an agent, its vehicle. `name`: of the process, if not the node's."""
+        own = ["--connect", self.endpoint, "--wait", "60"]
+        out = ["--out", "record"] if role == ("recorder",) else []
+        return self._start(
+            name or role[-1], [role[0], self.scenario, *role[1:], *own, *out, *self.options, *more], before
+        )
+
+    def stop(self) -> None:
+        """Kills what still runs."""
+        for one in self._all:
+            one.process.kill()
+            one.process.wait()
+
+    @property
+    def record(self) -> Path:
+        """The recorder's folder."""
+        return self.folder / "record"
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        """The recorder's summary."""
+        summary: dict[str, Any] = json.loads((self.record / "summary.json").read_text())
+        return summary
+
+    def _start(self, name: str, arguments: Sequence[str | Path], before: Sequence[str]) -> Started:
+        started = self.started[name] = Started(name, self.folder / f"{name}.txt", arguments, before)
+        self._all.append(started)
+        return started
+
+
+@contextmanager
+def spread_fleet(folder: Path, endpoint: str, *options: str, scenario: Path = BRIEF) -> Iterator[SpreadFleet]:
+    """A fleet to start processes of."""
+    fleet = SpreadFleet(folder, endpoint, *options, scenario=scenario)
+    try:
+        yield fleet
+    finally:
+        fleet.stop()
+
+
+def loopback_endpoint() -> str:
+    """One on which nobody listens now."""
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+
+
+def interrupt(one: Started) -> None:
+    """Ctrl-C."""
+    one.process.send_signal(signal.SIGINT)
+
+
+def kill(one: Started) -> None:
+    """Without a chance to say so."""
+    one.process.kill()
+    one.process.wait()
+
+
+def lost_of_what_is_kept(fleet: SpreadFleet) -> dict[str, int]:
+    """By topic, what of that which is kept for whoever has missed it the recorder has not got in the end."""
+    said = Counter(fleet.summary["messages"])
+    heard = Counter[str]()
+    newest_tile = Counter[str]()
+    for key, payload in read_messages(fleet.record / "messages.mpk"):
+        found = topic_of(key)
+        assert found is not None
+        topic, vehicle = found
+        heard[topic.name] += 1
+        message = decode(payload, topic.message)[1]
+        if isinstance(message, CoverageTile):
+            newest_tile[vehicle] = max(newest_tile[vehicle], message.version)
+    lost = {topic.name: said[topic.name] - heard[topic.name] for topic in TOPICS if topic.keep is Keep.EVENTS}
+    lost["coverage"] = said["coverage"] - newest_tile.total()  # each tile that is published has the next version
+    return {name: count for name, count in lost.items() if count}
