@@ -24,14 +24,14 @@ run: .venv/.run-ready
 # The pictures in the README and the docs, from the program itself; that of the report needs Chromium.
 CHROMIUM ?= chromium
 pictures: .venv/.test-ready
+	@$(BIN)/secondlook paper --out docs/paper
+	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run tellaro --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png
 	@"$(CHROMIUM)" --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1210 \
 		--screenshot=docs/report.png "file://$(CURDIR)/runs/pictures/report.html" >/dev/null 2>&1 || { \
 		echo "No picture of the report: that needs Chromium (Debian, Ubuntu: chromium)." >&2; exit 1; }
-	@$(BIN)/secondlook paper --out docs/paper
-	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 
 # The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
 GOLDEN := tests/secondlook/golden
