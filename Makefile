@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test pictures golden lock clean
+.PHONY: run test example pictures golden lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -48,6 +48,18 @@ test: .venv/.test-ready
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/pytest
+
+# An example's tests, as a user runs them: against the wheel, in an environment of its own, away from this folder.
+example: .venv/.test-ready
+	@set -e; home=$$(mktemp -d); trap 'rm -rf "$$home" build' EXIT; rm -rf build; \
+	echo "Installing the wheel into an environment of its own"; \
+	$(PIP) wheel --quiet --no-deps --no-build-isolation --wheel-dir "$$home" .; \
+	sed -n '/^[^ ].*==/s/ *\\$$//p' requirements-dev.lock >"$$home/constraints.txt"; \
+	"$(PYTHON)" -m venv "$$home/venv"; \
+	"$$home/venv/bin/python" -m pip --disable-pip-version-check install --quiet \
+		--constraint "$$home/constraints.txt" "$$(ls "$$home"/*.whl)[testing]"; \
+	cp -R examples/own_allocator "$$home/tests"; cd "$$home/tests"; \
+	"$$home/venv/bin/python" -m pytest
 
 # The stamps are what makes a second call start at once.
 .venv/.made:
