@@ -14,6 +14,7 @@ from spread import PATIENT, SpreadFleet, interrupt, kill, loopback_endpoint, los
 
 from secondlook import cli
 
+FACTOR = 15.0
 NODES = (("world",), ("agent", "primary"), ("agent", "helper"), ("coordinator",))
 
 
@@ -26,7 +27,7 @@ def fleet(tmp_path: Path) -> Iterator[SpreadFleet]:
 def test_a_mission_goes_on_while_router_and_helper_are_started_anew_and_nothing_kept_is_lost(
     fleet: SpreadFleet,
 ) -> None:
-    fleet.router(20)
+    fleet.router(FACTOR)
     for role in NODES:
         fleet.node(*role)
     coordinator = fleet.started["coordinator"]
@@ -38,7 +39,7 @@ def test_a_mission_goes_on_while_router_and_helper_are_started_anew_and_nothing_
     assert all(fleet.started[name].says("the mission begins") for name in ("world", "primary", "recorder", "helper"))
     kill(fleet.started["router"])
     kill(fleet.started["helper"])
-    fleet.router(20)
+    fleet.router(FACTOR)
     again = fleet.node("agent", "helper", name="helper again")
     assert fleet.started["router"].says("the mission is under way")
     assert again.says("helper: the mission is at ")
@@ -46,7 +47,7 @@ def test_a_mission_goes_on_while_router_and_helper_are_started_anew_and_nothing_
     assert {one.name: one.ends() for one in going} == {one.name: 0 for one in going}
     assert lost_of_what_is_kept(fleet) == {}
     summary = fleet.summary
-    assert (summary["ending"], summary["factor"], summary["digest"]) == ("over", 20.0, None)
+    assert (summary["ending"], summary["factor"], summary["digest"]) == ("over", FACTOR, None)
     assert summary["vehicles"]["primary"]["tracks"] == 4
     assert summary["hotspots"]["revisited"] > 0
     assert summary["dropped"].keys() <= {"lost on the way to the observer"}
@@ -77,9 +78,15 @@ def test_ctrl_c_ends_one_process_alone(fleet: SpreadFleet) -> None:
     assert (world.ends(), world.said.endswith("world: interrupted at 0 s of the mission\n")) == (1, True)
 
 
-def test_another_scenario_is_refused(fleet: SpreadFleet) -> None:
+def test_another_scenario_is_refused_and_another_run_not_answered(fleet: SpreadFleet) -> None:
     assert fleet.router(1).says("listens on")
     other = fleet.node("world", more=["--seed", "9"])
+    elsewhere = fleet.node("coordinator", more=["--run", "elsewhere", "--wait", "2"])
+    assert elsewhere.ends() == 2
+    assert elsewhere.said == (
+        "no answer from the router to coordinator in run elsewhere: the run there may be another, or the name in the "
+        "certificate\n"
+    )
     assert other.ends() == 2
     assert re.fullmatch(
         r"refused by the router: the router has another scenario than world, \w{12} and not \w{12}: file, --seed and "

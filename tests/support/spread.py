@@ -21,8 +21,9 @@ from comms.messages import CoverageTile
 from comms.topics import TOPICS, Keep, topic_of
 from secondlook.mission_files import read_messages
 
-# So that a slow machine does no harm: nobody is lost soon, and the helper has time for its strips.
-PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=1.5")
+# So that a slow machine does no harm: nobody is lost soon, and the helper has time for its strips, after which the
+# mission is over anyway.
+PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=6")
 
 
 class Started:
