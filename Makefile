@@ -30,6 +30,9 @@ pictures: .venv/.test-ready
 	@"$(CHROMIUM)" --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1210 \
 		--screenshot=docs/report.png "file://$(CURDIR)/runs/pictures/report.html" >/dev/null 2>&1 || { \
 		echo "No picture of the report: that needs Chromium (Debian, Ubuntu: chromium)." >&2; exit 1; }
+	@rm -rf runs/pictures
+	@$(BIN)/secondlook run headland --out runs/pictures
+	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 5800 --out docs/headland.png
 	@$(BIN)/secondlook paper --out docs/paper
 	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 

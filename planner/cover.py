@@ -7,7 +7,7 @@ cover up to the next whole metre keeps each whole cell of which a point was seen
 
 A run of w cells needs the least n with `n (r - r_min) + (r + r_min) floor(n / k) >= w`, k being
 `ceil((r + r_min) / (r - r_min))`: k tracks side by side close each other's gaps. For k = 2 that is Algorithm 1's count;
-decision 8 in docs/decisions proves it. Anything else is searched: the nearest cell left is seen by some track, and of
+decision 7 in docs/decisions proves it. Anything else is searched: the nearest cell left is seen by some track, and of
 those that see it with their right side the farthest is best. A branch ends where the count above, or cells of which no
 track sees two, need more tracks than are left, or where a part of what is left has failed with as many.
 """
