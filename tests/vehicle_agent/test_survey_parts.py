@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
+import pytest
 import shapely
 from by_hand import PRIMARY, P_Detect, flat, fly, nav, run_info, tell_status, to_follow
 from hypothesis import given, settings
@@ -115,7 +116,9 @@ class TestPartByPart:
         layer = node_of(agent).coverage.layer.sum_levels()  # type: ignore[union-attr]
         assert (layer[node_of(agent)._inside] > 0).all()
 
-    def test_hotspots_lie_in_the_area_and_none_in_a_part_still_to_come(self) -> None:
+    # With the other sonar the tracks still to come, as they would lie now, leave most of their part unseen.
+    @pytest.mark.parametrize("p_detect", [SEES_TO_130_M, flat(0.04, 25, 50)])
+    def test_hotspots_lie_in_the_area_and_none_in_a_part_still_to_come(self, p_detect: P_Detect) -> None:
         agent = surveyor(announced(WITH_ROCKS, cell_m=5))
         node = node_of(agent)
         later = node._parts[-1].area
@@ -127,9 +130,9 @@ class TestPartByPart:
             assert not (node.coverage.settled & to_come).any()
             maneuver = to_follow(agent)
             assert maneuver is not None
-            fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+            fly(agent, PRIMARY, maneuver, p_detect)
         assert node.coverage.settled.any()
-        fly_all(agent, SEES_TO_130_M)
+        fly_all(agent, p_detect)
         assert (node.coverage.settled == node._inside).all()
         outside = L_SHAPE.polygon.buffer(15)  # an outline covers its notches with little to spare
         for one in agent.all(Hotspot):
