@@ -32,6 +32,9 @@ pictures: .venv/.test-ready
 	@"$(CHROMIUM)" --headless --no-sandbox --disable-gpu --hide-scrollbars --window-size=1100,1210 \
 		--screenshot=docs/report.png "file://$(CURDIR)/runs/pictures/report.html" >/dev/null 2>&1 || { \
 		echo "No picture of the report: that needs Chromium (Debian, Ubuntu: chromium)." >&2; exit 1; }
+	@rm -rf runs/pictures
+	@$(BIN)/secondlook run headland --out runs/pictures
+	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 5800 --out docs/headland.png
 
 # The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
 GOLDEN := tests/secondlook/golden

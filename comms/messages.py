@@ -29,7 +29,7 @@ from comms.wire import (
     Text,
     YesNo,
 )
-from planner.types import GridSpec, SweepFrame
+from planner.types import GridSpec, Point, SweepFrame
 
 
 class Role(enum.Enum):
@@ -98,10 +98,18 @@ class Grid:
 
 
 @dataclass(frozen=True, slots=True)
+class Hole:
+    """What is left out of an area: a hole's outline."""
+
+    outline: Annotated[tuple[Vertex, ...], AtMost(50)]
+
+
+@dataclass(frozen=True, slots=True)
 class RunInfo:
     """What is run: published once by the clock before anything else. Everyone takes area, grid and roster from here.
 
     `area`: the survey area's outline. `rho`: correlation of looks at one cell in the residual risk, 0 for none.
+    `holes`: what is not to be surveyed within the area.
     """
 
     schema: Count
@@ -113,6 +121,17 @@ class RunInfo:
     grid: Grid
     rho: Probability
     vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(100)]
+    holes: Annotated[tuple[Hole, ...], AtMost(20)] = ()
+
+    @property
+    def outline(self) -> tuple[Point, ...]:
+        """The survey area's corners, mission frame."""
+        return tuple((corner.x_m, corner.y_m) for corner in self.area)
+
+    @property
+    def hole_outlines(self) -> tuple[tuple[Point, ...], ...]:
+        """The corners of each hole, mission frame."""
+        return tuple(tuple((corner.x_m, corner.y_m) for corner in hole.outline) for hole in self.holes)
 
 
 @dataclass(frozen=True, slots=True)

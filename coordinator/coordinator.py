@@ -34,9 +34,9 @@ from coordinator.config import CoordinatorConfig
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
 from coordinator.vehicles import KnownVehicle
-from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
 from planner.groups import neighbours
+from planner.region import Region
 from planner.types import BoolArray, FloatArray, Strip
 
 log = logging.getLogger("secondlook.coordinator")
@@ -115,8 +115,7 @@ class Coordinator:
     def _begin(self, run: RunInfo, now_ms: int) -> None:
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
-        outline = tuple((corner.x_m, corner.y_m) for corner in run.area)
-        self._inside = SurveyArea(outline, spec.frame.heading_rad).inside(spec)
+        self._inside = Region(run.outline, run.hole_outlines).inside(spec)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
         helpers = [entry for entry in run.vehicles if entry.role is Role.REVISIT]
         if helpers:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from planner.types import BoolArray, GridSpec
+from planner.types import BoolArray, GridSpec, SweepFrame
 
 
 @dataclass(frozen=True)
@@ -19,44 +19,30 @@ class Reach:
 
 
 @dataclass(frozen=True)
-class UnderWay:
-    """The track being flown: its offset, how far along (sweep frame) it has been looked, and whether it runs towards
-    larger along positions."""
+class Ahead:
+    """What is still to be looked at of a track: its offset and from where to where along, in the grid's sweep frame."""
 
     across_m: float
-    looked_to_m: float
-    ascending: bool
+    from_m: float
+    to_m: float
 
 
-def settled_cells(
-    grid: GridSpec,
-    remaining_across_m: Sequence[float],
-    reach: Reach,
-    under_way: UnderWay | None = None,
-    frontier_m: float | None = None,
-) -> BoolArray:
-    """Cells that neither the remaining tracks nor the rest of the one under way can see, shape grid.shape.
-
-    Tracks run along the grid. `remaining_across_m`: offsets of the tracks not begun. `frontier_m`: columns beyond it
-    are not settled even where no planned track reaches, because the plan is still to be revised there. One cell of
-    margin is kept about the reach.
-    """
-    columns_open = np.zeros(grid.columns, dtype=np.bool_)
-    for across_m in remaining_across_m:
-        columns_open |= _in_reach(grid, across_m, reach)
-    if frontier_m is not None:
-        columns_open |= grid.across_m > frontier_m
-    settled = np.broadcast_to(~columns_open, grid.shape).copy()
-    if under_way is not None:
-        if under_way.ascending:
-            ahead = grid.along_m > under_way.looked_to_m - grid.cell_m
-        else:
-            ahead = grid.along_m < under_way.looked_to_m + grid.cell_m
-        settled[np.ix_(ahead, _in_reach(grid, under_way.across_m, reach))] = False
+def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach) -> BoolArray:
+    """Cells that none of these can see, shape grid.shape. One cell of margin is kept about what they see."""
+    settled = np.ones(grid.shape, dtype=np.bool_)
+    for one in ahead:
+        distance_m = np.abs(grid.across_m - one.across_m)
+        columns = (distance_m >= reach.near_m - grid.cell_m) & (distance_m <= reach.far_m + grid.cell_m)
+        rows = (grid.along_m > one.from_m - grid.cell_m) & (grid.along_m < one.to_m + grid.cell_m)
+        settled[np.ix_(rows, columns)] = False
     return settled
 
 
-def _in_reach(grid: GridSpec, across_m: float, reach: Reach) -> BoolArray:
-    distance_m = np.abs(grid.across_m - across_m)
-    inside: BoolArray = (distance_m >= reach.near_m - grid.cell_m) & (distance_m <= reach.far_m + grid.cell_m)
-    return inside
+def cells_within(
+    grid: GridSpec, frame: SweepFrame, across_m: tuple[float, float], along_m: tuple[float, float]
+) -> BoolArray:
+    """Cells with their centre in a rectangle of another sweep frame, without its sides; shape grid.shape."""
+    x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
+    u_m, v_m = frame.to_sweep(x_m, y_m)
+    within: BoolArray = (u_m > across_m[0]) & (u_m < across_m[1]) & (v_m > along_m[0]) & (v_m < along_m[1])
+    return within

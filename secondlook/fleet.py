@@ -11,10 +11,10 @@ import numpy as np
 import shapely
 
 from comms.codec import CLOCK, SCHEMA_VERSION, Header, encode
-from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
+from comms.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.routing import RosterNode
 from coordinator.config import CoordinatorConfig
-from planner.area import SurveyArea
+from planner.region import Region
 from planner.types import Point
 from secondlook.errors import UserError
 from secondlook.node_spec import NodeSpec
@@ -27,8 +27,12 @@ from secondlook.scenario import (
     body_of,
     scenario_hash,
 )
+from secondlook.survey_area import region_of, track_heading_rad
 from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
 from vehicle_agent.config import RevisitConfig, SurveyConfig
+
+AS_CONVEX = 1e-6
+"""Share of its area that an outline's dents may have for it to count as convex."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +60,7 @@ def build_fleet(scenario: Scenario, *, record: bool, factor: float | None = None
 
 
 def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Fleet:
-    area = SurveyArea(scenario.area.polygon_m, math.radians(scenario.area.track_heading_deg))
-    grid = area.grid(scenario.area.cell_m)
+    grid = region_of(scenario).about(track_heading_rad(scenario)).grid(scenario.area.cell_m)
     run_info = RunInfo(
         schema=SCHEMA_VERSION,
         scenario=scenario.name,
@@ -75,7 +78,9 @@ def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Flee
         ),
         rho=scenario.mission.rho,
         vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
     )
+    Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
     encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
     external = scenario.external_vehicles
     simulated = [name for name in scenario.vehicles if name not in external]
@@ -98,13 +103,16 @@ def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Flee
 
 
 def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
-    """The area's corners as they travel, in whole centimetres; without those that rounding has turned into dents."""
-    corners = [(round(x_m, 2), round(y_m, 2)) for x_m, y_m in polygon_m]
-    hull = shapely.MultiPoint(corners).convex_hull
+    """Corners as they travel, in whole centimetres; of a convex outline without those that rounding makes dents of."""
+    corners = dict.fromkeys((round(x_m, 2), round(y_m, 2)) for x_m, y_m in polygon_m)
+    hull = shapely.MultiPoint(list(corners)).convex_hull
     if not isinstance(hull, shapely.Polygon):
         raise ValueError("an area that has none in whole centimetres cannot be surveyed")
+    given = shapely.Polygon(polygon_m)
+    if given.convex_hull.area - given.area > AS_CONVEX * given.area:
+        return tuple(Vertex(*corner) for corner in corners)
     convex = set(hull.exterior.coords)
-    return tuple(Vertex(*corner) for corner in dict.fromkeys(corners) if corner in convex)
+    return tuple(Vertex(*corner) for corner in corners if corner in convex)
 
 
 def _role(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
@@ -170,6 +178,7 @@ def _world_config(scenario: Scenario) -> WorldConfig:
     return WorldConfig(
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
+        holes=tuple(scenario.area.holes_m),
         vehicles=tuple(
             _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),

@@ -23,8 +23,8 @@ from comms.messages import (
     TruthTargets,
 )
 from comms.node import Received
-from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
+from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
 
@@ -165,8 +165,7 @@ class Metrics:
         self.run = run
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
-        outline = tuple((corner.x_m, corner.y_m) for corner in run.area)
-        self.inside = SurveyArea(outline, spec.frame.heading_rad).inside(spec)
+        self.inside = Region(run.outline, run.hole_outlines).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role) for entry in run.vehicles}
 
     def _pass_time(self, sent_ms: int) -> None:

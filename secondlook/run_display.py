@@ -62,6 +62,9 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     )
     table.add_row("residual risk", f"{risk['mean']:.3f}, primary alone {alone['mean']:.3f}")
     table.add_row("worst 30 %", f"{risk['worst30_mean']:.3f}, primary alone {alone['worst30_mean']:.3f}")
+    table.add_row(
+        "not seen", f"{risk['uncovered_share']:.2%} of the area, primary alone {alone['uncovered_share']:.2%}"
+    )
     table.add_row("files", str(folder))
     console = Console(soft_wrap=True, highlight=False)
     console.print(table)

@@ -9,8 +9,13 @@ from planner.types import BoolArray, FloatArray, Point
 MOST_BATCHES = 1000
 
 
-def uniform_points(outline: tuple[Point, ...], count: int, generator: np.random.Generator) -> FloatArray:
-    """`count` points inside an outline, uniformly distributed, mission frame, shape (count, 2).
+def uniform_points(
+    outline: tuple[Point, ...],
+    count: int,
+    generator: np.random.Generator,
+    holes: tuple[tuple[Point, ...], ...] = (),
+) -> FloatArray:
+    """`count` points inside an outline and outside its holes, uniformly distributed, mission frame, shape (count, 2).
 
     Raises:
         ValueError: the outline encloses too little of its bounding box for points to be found.
@@ -22,7 +27,10 @@ def uniform_points(outline: tuple[Point, ...], count: int, generator: np.random.
         if len(found) >= count:
             return found[:count]
         candidates = generator.uniform(low, high, size=(max(64, 2 * count), 2))
-        found = np.concatenate([found, candidates[_inside(corners, candidates)]])
+        inside = _inside(corners, candidates)
+        for hole in holes:
+            inside &= ~_inside(np.asarray(hole, dtype=np.float64), candidates)
+        found = np.concatenate([found, candidates[inside]])
     raise ValueError("the area's outline encloses next to nothing")
 
 

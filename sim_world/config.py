@@ -151,21 +151,24 @@ class TargetsConfig:
 
 @dataclass(frozen=True)
 class WorldConfig:
-    """The whole sea: `area` is the survey area's outline, at least three corners; vehicles are those simulated here."""
+    """The whole sea. `area`, `holes`: outlines of the survey area and of what is left out of it, at least three corners
+    each. `vehicles`: those simulated here."""
 
     seed: int
     area: tuple[Point, ...]
     vehicles: tuple[VehicleConfig, ...]
     seabed: SeabedConfig = field(default_factory=SeabedConfig)
     targets: TargetsConfig = field(default_factory=TargetsConfig)
+    holes: tuple[tuple[Point, ...], ...] = ()
 
     def __post_init__(self) -> None:
         _require(self.seed >= 0, "seed", self.seed, "0 or more")
-        _require(len(self.area) >= 3, "area", f"{len(self.area)} corners", "at least three")
-        _require(
-            all(abs(coordinate) <= FARTHEST_M for corner in self.area for coordinate in corner),
-            "area", "its corners", f"at most {FARTHEST_M:.0f} m from the origin along each axis",
-        )  # fmt: skip
+        for name, outline in (("area", self.area), *(("holes", hole) for hole in self.holes)):
+            _require(len(outline) >= 3, name, f"{len(outline)} corners", "at least three")
+            _require(
+                all(abs(coordinate) <= FARTHEST_M for corner in outline for coordinate in corner),
+                name, "its corners", f"at most {FARTHEST_M:.0f} m from the origin along each axis",
+            )  # fmt: skip
         names = [vehicle.vehicle for vehicle in self.vehicles]
         _require(len(set(names)) == len(names), "vehicles", ", ".join(names), "different names")
 

@@ -29,10 +29,12 @@ class Passed:
 
 
 class Targets:
-    """All targets of a world, uniformly distributed over its area; their true positions."""
+    """All targets of a world, uniformly distributed over its area without the holes; their true positions."""
 
-    def __init__(self, area: tuple[Point, ...], count: int, seed: int) -> None:
-        points = uniform_points(area, count, random_stream(seed, "world", "targets"))
+    def __init__(
+        self, area: tuple[Point, ...], count: int, seed: int, holes: tuple[tuple[Point, ...], ...] = ()
+    ) -> None:
+        points = uniform_points(area, count, random_stream(seed, "world", "targets"), holes)
         self._x_m, self._y_m = points[:, 0], points[:, 1]
 
     def truth(self) -> TruthTargets:

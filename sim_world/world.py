@@ -21,7 +21,7 @@ class World:
     """
 
     def __init__(self, config: WorldConfig) -> None:
-        self._targets = Targets(config.area, config.targets.count, config.seed)
+        self._targets = Targets(config.area, config.targets.count, config.seed, config.holes)
         seabed = make_seabed(config.seabed, config.area, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)
         self._bodies = {one.vehicle: Body(one, config, seabed, self._targets) for one in by_id}

@@ -1,5 +1,5 @@
-"""The survey agent: flies the tracks, learns how well the sonar sees, lays the next pair accordingly, and says early
-what was seen badly."""
+"""The survey agent: flies the tracks part by part, learns how well the sonar sees, lays the next accordingly, and says
+early what was seen badly."""
 
 from __future__ import annotations
 
@@ -21,26 +21,20 @@ from comms.messages import (
     Vertex,
 )
 from comms.topics import CURVE, HOTSPOT, PLAN
-from planner.area import SurveyArea
 from planner.curve import RangeTally, effective_range_m
+from planner.first_plan import parts_in_order
 from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
+from planner.region import Region
 from planner.risk import HIGHEST_P_DETECT, residual_risk
-from planner.settle import Reach, UnderWay, settled_cells
-from planner.spacing_planners import (
-    LENGTH_TOLERANCE_M,
-    FlownTrack,
-    SinglesPlanner,
-    SpacingDecision,
-    counted_range_m,
-    lowest_range_m,
-)
-from planner.types import DetectionCurve, FloatArray, Track
+from planner.settle import Ahead, Reach, cells_within, settled_cells
+from planner.spacing_planners import SpacingDecision
+from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import SurveyConfig
+from vehicle_agent.part_survey import PartSurvey
 
 HOTSPOTS_EVERY_MS = 30_000
-TRACKS_A_PAIR = 2
 MOST_CURVE_POINTS = 4096  # what a curve may hold on the wire
 
 
@@ -50,20 +44,20 @@ class SurveyAgent(Agent):
     def __init__(self, config: SurveyConfig) -> None:
         super().__init__(config.vehicle, config.endurance_ms)
         self.config = config
-        self.area: SurveyArea
-        self.decision: SpacingDecision
         self.flown: list[Track] = []
-        self.ahead: list[Track] = []  # the first one is under way
-        self.covered_m = 0.0
-        self.looked: list[FlownTrack] = []
+        self.ahead: list[Track] = []  # in the present part; the first one is under way
+        self.later: list[Track] = []  # in the parts after it, as they would lie with what is known now
         self.r_adpt_m: list[int] = []
         self.r_eff_m: list[int] = []
-        self._flown_at_decision = 0
+        self._parts: list[PartSurvey] = []
+        self._part = 0
+        self._first_reverse = False  # whether tracks of odd numbers run against the part's heading
         self._last_number = 0
         self._tally: RangeTally | None = None
         self._range_bin_m = 0.0
+        self._along_bin_m = 0.0
         self._reach: Reach | None = None
-        self._under_way: UnderWay | None = None
+        self._looked_to_m: float | None = None  # along the track under way, in the grid's frame
         self._plan_revision = 0
         self._hotspots: HotspotMap
         self._hotspot_revisions: dict[int, int] = {}
@@ -72,22 +66,22 @@ class SurveyAgent(Agent):
 
     def on_run(self, run: RunInfo, now_ms: int) -> None:
         """Lays the first tracks and begins."""
-        spec = run.grid.spec
-        self.area = SurveyArea(tuple((corner.x_m, corner.y_m) for corner in run.area), spec.frame.heading_rad)
-        self._inside = self.area.inside(spec)
+        self._grid = run.grid.spec
+        region = Region(run.outline, run.hole_outlines)
+        self._inside = region.inside(self._grid)
         self._rho = run.rho
-        self._hotspots = HotspotMap.empty(spec)
+        self._hotspots = HotspotMap.empty(self._grid)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
-        self._take(self.config.spacing.decide(self.area.width_m, 0.0, None), r_eff_m=None)
-        if self.ahead:
-            self._begin_track(now_ms)
-        else:
-            self._finish()
+        parts = parts_in_order(region, self._grid.frame.heading_rad, self.config.nadir_gap_m, self.config.range_m)
+        self._parts = [PartSurvey(part, self.config) for part in parts]
+        self._begin_part(0)
+        self._go_on(now_ms)
 
     def on_look(self, look: Look, now_ms: int) -> None:
         """Notes how far the sonar sees; of a look at the present track also its P_d and how far the track is looked."""
         self._new_looks = True
+        self._along_bin_m = max(self._along_bin_m, look.along_bin_m)
         seen = look.p_detect.max(axis=(0, 1)).nonzero()[0]
         if seen.size:
             near_m, far_m = float(seen[0] * look.range_bin_m), float(seen[-1] * look.range_bin_m)
@@ -100,7 +94,7 @@ class SurveyAgent(Agent):
             self._range_bin_m = look.range_bin_m
         if look.range_bin_m == self._range_bin_m:
             self._tally.add(look.p_detect)
-        self._under_way = self._looked(self.ahead[0], look)
+        self._looked_to_m = self._end_along_m(look)
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Reacts to a track's start and end."""
@@ -134,7 +128,7 @@ class SurveyAgent(Agent):
         self._last_number = track.number
         self.mode = Mode.TRANSIT
         self.works_on = track.number
-        self._under_way = None
+        self._looked_to_m = None
         self._tally = None
         self.follow(track, self.config.run_in_m)
         self.report_state(now_ms)
@@ -142,16 +136,14 @@ class SurveyAgent(Agent):
     def _end_track(self, now_ms: int) -> None:
         track = self.ahead.pop(0)
         self.flown.append(track)
-        self._under_way = None
+        self._looked_to_m = None
         r_eff_m = 0
         if self._tally is not None:
             curve = self._tally.curve()
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
             self._publish_curve(track.number, self._range_bin_m, curve.p_detect, r_eff_m)
         self.r_eff_m.append(r_eff_m)
-        singles = self.decision.singles
-        counted_m = max(r_eff_m, self.decision.range_m) if singles else r_eff_m
-        self.looked.append(FlownTrack(track.across_m, counted_m, singles))
+        self._parts[self._part].flown(track, r_eff_m)
         self._after_track(now_ms)
 
     def _publish_prior(self, prior: DetectionCurve) -> None:
@@ -165,18 +157,27 @@ class SurveyAgent(Agent):
         self.publish(CURVE.key(vehicle=self.vehicle), Curve(track, range_bin_m * every, p_detect, r_eff_m))
 
     def _after_track(self, now_ms: int) -> None:
-        new = len(self.flown) - self._flown_at_decision
-        # Where all that a decision laid was refused there is nothing new to decide on.
-        if self.decision.replans and (new >= TRACKS_A_PAIR or (new > 0 and not self.ahead)):
-            self._replan()
-        else:
+        part = self._parts[self._part]
+        if part.is_due(self.ahead):
+            decision = part.next(self.r_eff_m[-1])
+            self.ahead = []
+            if decision is not None:
+                self._lay(decision, self._words(decision))
+        elif self.ahead:
             self._publish_plan("")
+        self._go_on(now_ms)
+        self._find_hotspots(now_ms)
+        self.report(now_ms)
+
+    def _go_on(self, now_ms: int) -> None:
+        """To the next track, or the next part's first, or the end."""
+        while not self.ahead and self._part + 1 < len(self._parts):
+            self._begin_part(self._part + 1)
         if self.ahead:
             self._begin_track(now_ms)
         else:
+            self._publish_plan(self._ending())
             self._finish()
-        self._find_hotspots(now_ms)
-        self.report(now_ms)
 
     def _finish(self) -> None:
         self.mode = Mode.FINISHED
@@ -184,61 +185,77 @@ class SurveyAgent(Agent):
         self.expected_end_ms = 0
         self.hold()
 
-    def _replan(self) -> None:
-        r_eff_m, spacing = self.r_eff_m[-1], self.config.spacing
-        singles = (
-            spacing.cover(self.area.width_m, self.looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
-        )
-        self.covered_m = max(self.covered_m, self._edge_m(self.flown, r_eff_m))
-        if singles is not None and singles.offsets_m:
-            self._take(singles, r_eff_m)
-        elif singles is None and self.covered_m < self.area.width_m - LENGTH_TOLERANCE_M:
-            self._take(spacing.decide(self.area.width_m, self.covered_m, r_eff_m), r_eff_m)
-        else:
-            self.ahead = []
-            self._publish_plan("")
+    def _begin_part(self, place: int) -> None:
+        """Lays the first tracks of a part, from the end that is nearer."""
+        self._part = place
+        part = self._parts[place]
+        decision = part.first(self.r_eff_m[-1] if self.r_eff_m else None)
+        if self.flown:
+            here = self.flown[-1].end
+            legs = lawnmower(part.area, decision.offsets_m[:1], decision.range_m)
+            turned = any(math.dist(here, leg.end) < math.dist(here, leg.start) for leg in legs)
+            self._first_reverse = turned ^ ((self._last_number + 1) % 2 == 0)
+        which = f"part {place + 1} of {len(self._parts)}: " if len(self._parts) > 1 else ""
+        self._lay(decision, f"{which}spacing for {decision.range_m} m", counts=True)
 
-    def _take(self, decision: SpacingDecision, r_eff_m: int | None) -> None:
-        before = self.r_adpt_m[-1] if self.r_adpt_m else None
-        self.decision = decision
-        self.r_adpt_m.append(self.decision.range_m)
-        self._flown_at_decision = len(self.flown)
-        number = self._last_number + 1
-        self.ahead = lawnmower(
-            self.area,
-            self.decision.offsets_m,
-            self.decision.range_m,
+    def _words(self, decision: SpacingDecision) -> str:
+        """What a decision changes."""
+        before, now = self.r_adpt_m[-1], decision.range_m
+        learned = f"r_eff {self.r_eff_m[-1]} m after track {len(self.flown)}"
+        return f"{learned}, spacing stays at {now} m" if before == now else f"{learned}, spacing {before} to {now} m"
+
+    def _lay(self, decision: SpacingDecision, words: str, *, counts: bool = False) -> None:
+        """Takes a decision on the present part; of the parts after it what follows from the same knowledge."""
+        self.r_adpt_m.append(decision.range_m)
+        self.ahead = self._legs(self._parts[self._part], decision, self._last_number + 1)
+        self.later = []
+        for part in self._parts[self._part + 1 :]:
+            to_come = part.first(self.r_eff_m[-1] if self.r_eff_m else None)
+            number = self._last_number + len(self.ahead) + len(self.later) + 1
+            self.later += self._legs(part, to_come, number)
+        if counts:
+            words += f", {len(self.ahead)} track{'' if len(self.ahead) == 1 else 's'}"
+        self._publish_plan(f"{words}; {decision.note}" if decision.note else words)
+
+    def _legs(self, part: PartSurvey, decision: SpacingDecision, number: int) -> list[Track]:
+        return lawnmower(
+            part.area,
+            decision.offsets_m,
+            decision.range_m,
             first_number=number,
-            first_reverse=number % 2 == 0,
+            first_reverse=self._first_reverse ^ (number % 2 == 0),
         )
-        if before is None:
-            words = f"spacing for {self.decision.range_m} m, {len(self.ahead)} tracks"
-        elif before == self.decision.range_m:
-            words = f"r_eff {r_eff_m} m after track {len(self.flown)}, spacing stays at {before} m"
-        else:
-            words = f"r_eff {r_eff_m} m after track {len(self.flown)}, spacing {before} to {self.decision.range_m} m"
-        self._publish_plan(f"{words}; {self.decision.note}" if self.decision.note else words)
+
+    def _ending(self) -> str:
+        """In words, how much of the area the survey leaves unseen."""
+        assert self.coverage is not None
+        unseen = (self.coverage.layer.sum_levels() == 0) & self._inside
+        if not unseen.any():
+            return "the survey ends, all of the area is seen"
+        return f"the survey ends, {unseen.sum() / self._inside.sum():.2%} of the area is not seen"
 
     def _publish_plan(self, note: str) -> None:
         self._plan_revision += 1
-        tracks = [(track, True) for track in self.flown] + [(track, False) for track in self.ahead]
+        tracks = [(track, True) for track in self.flown] + [(track, False) for track in (*self.ahead, *self.later)]
         message = Plan(
             revision=self._plan_revision,
-            tracks=tuple(PlannedTrack(t.number, t.across_m, *t.start, *t.end, flown) for t, flown in tracks),
+            tracks=tuple(PlannedTrack(t.number, self._across_m(t), *t.start, *t.end, flown) for t, flown in tracks),
             r_adpt_m=tuple(self.r_adpt_m),
             r_eff_m=tuple(self.r_eff_m),
             note=note,
         )
         self.publish(PLAN.key(vehicle=self.vehicle), message)
 
-    def _looked(self, track: Track, look: Look) -> UnderWay:
-        frame = self.area.frame
+    def _across_m(self, track: Track) -> float:
+        """A track's offset in the grid's frame; its own is in that of its part."""
+        return float(self._grid.frame.to_sweep(*track.start)[0])
+
+    def _end_along_m(self, look: Look) -> float:
+        """Where a look ends, along the grid."""
         end_m = look.first_along_m + look.p_detect.shape[1] * look.along_bin_m
         x_m = look.origin_x_m + end_m * math.sin(look.heading_rad)
         y_m = look.origin_y_m + end_m * math.cos(look.heading_rad)
-        _, along_m = frame.to_sweep(x_m, y_m)
-        _, (starts_m, ends_m) = frame.to_sweep(*_columns(track))
-        return UnderWay(track.across_m, float(along_m), ascending=bool(ends_m > starts_m))
+        return float(self._grid.frame.to_sweep(x_m, y_m)[1])
 
     def _settle(self) -> None:
         """Marks the cells that no remaining track of the plan can improve; before the first look that is not known."""
@@ -248,39 +265,31 @@ class SurveyAgent(Agent):
             return
         if self._reach is None:
             return
-        remaining = self.ahead if self._under_way is None else self.ahead[1:]
-        self.coverage.settled = self._inside & settled_cells(
-            self.coverage.grid,
-            [track.across_m for track in remaining],
-            self._reach,
-            self._under_way,
-            self._frontier_m(self._reach),
+        ahead = [self._still_ahead(track) for track in (*self.ahead, *self.later)]
+        settled = self._inside & settled_cells(self._grid, ahead, self._reach)
+        part, far_m = self._parts[self._part], self._reach.far_m
+        frontier_m = part.frontier_m(
+            self.ahead, self._reach, self.r_eff_m[-1] if self.r_eff_m else None, self._grid.cell_m
         )
+        if frontier_m is not None:
+            settled &= ~self._cells_within(part, frontier_m, far_m)
+        for later in self._parts[self._part + 1 :]:
+            settled &= ~self._cells_within(later, -far_m, far_m)
+        self.coverage.settled = settled
 
-    def _frontier_m(self, reach: Reach) -> float | None:
-        """The column beyond which the next replanning may still lay tracks that see; None where it will not."""
-        assert self.coverage is not None
-        if not self.decision.replans or not self.ahead:
-            return None
-        if self.decision.singles:
-            later = self.ahead[max(0, TRACKS_A_PAIR - (len(self.flown) - self._flown_at_decision)) :]
-            # Where these lie will change, but not by much.
-            return min(track.across_m for track in later) - reach.far_m if later else None
-        pair = [*self.flown[self._flown_at_decision :], *self.ahead][:TRACKS_A_PAIR]
-        r_eff_m = self.r_eff_m[-1] if self.r_eff_m else math.floor(reach.far_m)
-        edge_m = self._edge_m(pair, r_eff_m)
-        if edge_m >= self.area.width_m - LENGTH_TOLERANCE_M:
-            return None
-        # Whatever r_eff will be, a next pair begins no nearer to this one than at twice the least range. Where the far
-        # side is near its tracks are pulled in; then they lie as they would with what is known now.
-        nearest_m = max(track.across_m for track in pair) + 2 * lowest_range_m(self.config.nadir_gap_m)
-        pulled_in_m = min(self.config.spacing.decide(self.area.width_m, edge_m, r_eff_m).offsets_m)
-        return min(nearest_m, pulled_in_m) - reach.far_m - self.coverage.grid.cell_m
+    def _still_ahead(self, track: Track) -> Ahead:
+        """What is not yet looked at of a track; its last bin may reach beyond its end."""
+        from_m, to_m = (float(self._grid.frame.to_sweep(*end)[1]) for end in (track.start, track.end))
+        end_m = to_m + math.copysign(self._along_bin_m, to_m - from_m)
+        if self._looked_to_m is not None and track is self.ahead[0]:
+            from_m = self._looked_to_m
+        return Ahead(self._across_m(track), min(from_m, end_m), max(from_m, end_m))
 
-    def _edge_m(self, tracks: list[Track], r_eff_m: int) -> float:
-        """The edge up to which these tracks cover the area."""
-        counted_m = counted_range_m(r_eff_m, self.config.nadir_gap_m, self.config.range_m)
-        return max(track.across_m for track in tracks) + min(self.decision.range_m, counted_m)
+    def _cells_within(self, part: PartSurvey, from_across_m: float, beyond_m: float) -> BoolArray:
+        """Cells that tracks over a part, from an offset on, may see."""
+        margin_m = self._grid.cell_m + self._along_bin_m
+        across_m = (from_across_m, part.area.width_m + beyond_m)
+        return cells_within(self._grid, part.area.frame, across_m, (-margin_m, part.area.length_m + margin_m))
 
     def _find_hotspots(self, now_ms: int) -> None:
         assert self.coverage is not None
@@ -321,7 +330,3 @@ class SurveyAgent(Agent):
         self._hotspot_revisions[number] = revision
         message = Hotspot(revision, state, outline, mean_risk, cells, growing, merged_into)
         self.publish(HOTSPOT.key(vehicle=self.vehicle, number=number), message)
-
-
-def _columns(track: Track) -> tuple[FloatArray, FloatArray]:
-    return np.array([track.start[0], track.end[0]]), np.array([track.start[1], track.end[1]])

@@ -7,8 +7,8 @@ import rerun as rr
 
 from comms.messages import CoverageTile, RunInfo
 from comms.node import Received
-from planner.area import SurveyArea
 from planner.fleet_map import FleetMap
+from planner.region import Region
 from planner.risk import risk_statistics
 from planner.types import BoolArray
 from viz import palette, paths
@@ -30,7 +30,7 @@ class RiskMap:
     """Joins tiles and draws the map at most once per `draw_every_ms` of simulated time, and only where it changed.
 
     `/area/risk` is one byte a cell: the residual risk times 255, the row farthest along first. Cells that nobody has
-    seen are covered by `/area/unseen`.
+    seen and those outside the area are covered by `/area/unseen`.
     """
 
     def __init__(self, canvas: Canvas, run: RunInfo, extent: Extent, draw_every_ms: int) -> None:
@@ -81,6 +81,7 @@ class RiskMap:
         self._canvas.put(time_ms, paths.RISK, rr.GridMap.from_fields(data=levels.tobytes()))
         cover = np.zeros((*seen.shape, 4), dtype=np.uint8)
         cover[~seen[::-1]] = (*palette.UNSEEN, 255)
+        cover[~self._inside[::-1]] = (*palette.BACKGROUND, 255)  # cells outside count for nothing
         self._canvas.put(time_ms, paths.UNSEEN, rr.GridMap.from_fields(data=cover.tobytes()))
         self._add_statistics(time_ms)
 
@@ -104,9 +105,10 @@ class RiskMap:
             rr.Transform3D(translation=[float(corner_x_m), float(corner_y_m), UNSEEN_Z_M], rotation=turn),
             _cover(spec.columns, spec.rows, spec.cell_m),
         )
+        rings = [ring(one, OUTLINE_Z_M) for one in (run.area, *(hole.outline for hole in run.holes))]
         self._canvas.put_static(
             paths.OUTLINE,
-            rr.LineStrips3D([ring(run.area, OUTLINE_Z_M)], colors=[palette.OUTLINE], radii=rr.Radius.ui_points(1.0)),
+            rr.LineStrips3D(rings, colors=[palette.OUTLINE], radii=rr.Radius.ui_points(1.0)),
         )
         self._put_scale(extent)
 
@@ -136,10 +138,10 @@ class RiskMap:
 def _inside(run: RunInfo) -> BoolArray:
     spec = run.grid.spec
     try:
-        area = SurveyArea(tuple((corner.x_m, corner.y_m) for corner in run.area), spec.frame.heading_rad)
+        region = Region(run.outline, run.hole_outlines)
     except ValueError:  # no polygon to survey: a picture of the whole grid is better than none
         return np.ones(spec.shape, dtype=np.bool_)
-    return area.inside(spec)
+    return region.inside(spec)
 
 
 def _levels(columns: int, rows: int, cell_m: float) -> rr.GridMap:

@@ -23,6 +23,7 @@ from comms.messages import (
     TaskStatus,
 )
 from comms.node import Received
+from planner.types import Point
 
 MOST_NAMED = 3
 TELLING = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, MissionOver)
@@ -149,8 +150,12 @@ def _run(run: RunInfo) -> str:
 
 
 def _area_km2(run: RunInfo) -> float:
-    corners = zip(run.area, (*run.area[1:], *run.area[:1]), strict=True)
-    return abs(sum(a.x_m * b.y_m - b.x_m * a.y_m for a, b in corners)) / 2e6
+    return (_ring_m2(run.outline) - sum(_ring_m2(hole) for hole in run.hole_outlines)) / 1e6
+
+
+def _ring_m2(ring: tuple[Point, ...]) -> float:
+    corners = zip(ring, (*ring[1:], *ring[:1]), strict=True)
+    return abs(sum(a[0] * b[1] - b[0] * a[1] for a, b in corners)) / 2
 
 
 def _plan(plan: Plan) -> str:

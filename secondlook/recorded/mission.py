@@ -112,7 +112,7 @@ class RecordedMission:
     @cached_property
     def area(self) -> shapely.Polygon:
         """The survey area."""
-        return shapely.Polygon([(corner.x_m, corner.y_m) for corner in self.run.area])
+        return shapely.Polygon(self.run.outline, self.run.hole_outlines)
 
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.

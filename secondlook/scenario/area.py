@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
-from shapely import Polygon
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
+from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates
 
 from planner.types import SweepFrame
 from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapping, check_pair, refused
@@ -15,35 +15,61 @@ from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapp
 LARGEST_GRID_CELLS = 20_000_000
 
 Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(check_pair), Field(strict=False)]
+Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=1000)]
+
+Outlines = tuple[tuple[Point, ...], ...]
+
+
+def _check_word(value: object) -> object:
+    if isinstance(value, str) and value != "auto":
+        raise refused("must be a number of degrees, or auto")
+    return value
+
+
+TrackHeading = Annotated[
+    Annotated[Heading, Tag("degrees")] | Annotated[Literal["auto"], Tag("auto")],
+    Discriminator(lambda value: "auto" if value == "auto" else "degrees"),
+    BeforeValidator(_check_word),
+]
 
 
 class Area(Mapping):
-    """A convex polygon in the mission frame, the compass heading of the tracks, and the map's cell."""
+    """A polygon in the mission frame, convex or not, and holes in it that are not surveyed; the compass heading of the
+    tracks, `auto` for the one that needs the fewest; and the map's cell."""
 
-    polygon_m: Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=1000)]
-    track_heading_deg: Heading = 0.0
+    polygon_m: Corners
+    holes_m: Annotated[tuple[Corners, ...], Field(strict=False, max_length=20)] = ()
+    track_heading_deg: TrackHeading = 0.0
     cell_m: Bin = 5.0
 
     @property
     def extent_m(self) -> tuple[float, float]:
-        """Extent across and along the tracks."""
+        """Extent across and along the tracks; of the narrowest rectangle about it where their heading is `auto`."""
         return _extent_m(self.polygon_m, self.track_heading_deg)
 
     @field_validator("polygon_m")
     @classmethod
     def _check_polygon(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
-        for index, point in enumerate(polygon_m):
-            if point in polygon_m[:index]:
-                raise refused(f"must be the corners in order, each once, but ({point[0]:g}, {point[1]:g}) is repeated")
-        polygon = Polygon(polygon_m)
-        hull_m2 = polygon.convex_hull.area
-        if hull_m2 < TOLERANCE:
-            raise refused("must have an area, but all corners lie on one line")
-        if not polygon.is_valid:
-            raise refused("must be the corners in order, but its sides cross")
-        if hull_m2 - polygon.area > TOLERANCE * hull_m2:
-            raise refused("must be convex")
+        _check_outline(polygon_m)
         return polygon_m
+
+    @field_validator("holes_m")
+    @classmethod
+    def _check_holes(
+        cls, holes_m: tuple[tuple[Point, ...], ...], info: ValidationInfo
+    ) -> tuple[tuple[Point, ...], ...]:
+        for hole in holes_m:
+            _check_outline(hole)
+        if "polygon_m" not in info.data:
+            return holes_m
+        holes = [Polygon(hole) for hole in holes_m]
+        if not all(Polygon(info.data["polygon_m"]).contains_properly(hole) for hole in holes):
+            raise refused("must lie inside polygon_m, without touching it")
+        if not MultiPolygon(holes).is_valid or any(
+            one.intersects(other) for index, one in enumerate(holes) for other in holes[:index]
+        ):
+            raise refused("must not touch each other")
+        return holes_m
 
     @field_validator("cell_m")
     @classmethod
@@ -59,7 +85,21 @@ class Area(Mapping):
         return cell_m
 
 
-def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float) -> tuple[float, float]:
+def _check_outline(corners: tuple[Point, ...]) -> None:
+    for index, point in enumerate(corners):
+        if point in corners[:index]:
+            raise refused(f"must be the corners in order, each once, but ({point[0]:g}, {point[1]:g}) is repeated")
+    if MultiPoint(corners).convex_hull.area < TOLERANCE:
+        raise refused("must have an area, but all corners lie on one line")
+    if not Polygon(corners).is_valid:
+        raise refused("must be the corners in order, but its sides cross")
+
+
+def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["auto"]) -> tuple[float, float]:
+    if track_heading_deg == "auto":
+        sides = np.diff(get_coordinates(Polygon(polygon_m).minimum_rotated_rectangle)[:3], axis=0)
+        across_m, along_m = sorted(np.hypot(*sides.T).tolist())
+        return across_m, along_m
     corners = np.array(polygon_m)
     across_m, along_m = SweepFrame(0, 0, math.radians(track_heading_deg)).to_sweep(corners[:, 0], corners[:, 1])
     return float(np.ptp(across_m)), float(np.ptp(along_m))

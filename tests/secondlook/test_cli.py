@@ -1,11 +1,13 @@
 """The command line as a user meets it: what it prints, where, and its exit codes."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from planner.spacing import track_offsets
 from secondlook import cli
 
 SecondLook = Callable[..., tuple[int | str | None, str, str]]
@@ -64,8 +66,31 @@ def test_plan_refuses_bad_numbers_in_one_sentence(
 
 
 def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
-    expected = "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
+    expected = (
+        "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
+        "primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered\n"
+    )
     assert secondlook("check", "tellaro") == (0, expected, "")
+
+
+def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook: SecondLook) -> None:
+    code, out, _ = secondlook("check", "headland")
+    told = re.fullmatch(
+        r"primary: (\d+) tracks along 90 degrees in (\d+) convex parts, \d\.\d km; up to 145 m all is covered",
+        out.splitlines()[1],
+    )
+    assert code == 0
+    assert told is not None
+    assert int(told[1]) >= int(told[2]) > 2
+
+
+def test_check_tells_what_a_plan_cannot_cover(secondlook: SecondLook, monkeypatch: pytest.MonkeyPatch) -> None:
+    # One track fewer: the last one's 90 m, but for what its neighbours see.
+    monkeypatch.setattr("planner.first_plan.track_offsets", lambda *told: track_offsets(*told)[:-1])
+    _, out, _ = secondlook("check", "tellaro")
+    share = re.search(r"6 tracks .* up to 145 m (\d\.\d\d)% is not covered", out)
+    assert share is not None
+    assert 5 < float(share[1]) < 9
 
 
 def test_check_tells_all_mistakes_without_a_traceback(
@@ -82,7 +107,7 @@ def test_check_tells_all_mistakes_without_a_traceback(
 def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
     code, out, err = secondlook("scenarios")
     assert (code, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()] == ["paper", "patchy", "tellaro"]
+    assert [line.split()[0] for line in out.splitlines()] == ["headland", "paper", "patchy", "tellaro"]
 
 
 def test_live_without_a_display_is_told_before_anything_flies(

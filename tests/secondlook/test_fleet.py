@@ -51,6 +51,20 @@ class TestTheAnnouncement:
         area = SurveyArea(tuple((corner.x_m, corner.y_m) for corner in run.area), run.grid.heading_rad)
         assert (area.width_m, area.length_m) == pytest.approx((1212, 400), abs=0.02)
 
+    def test_of_an_area_with_a_hole(self) -> None:
+        run = announced("area.holes_m=[[[100, 100], [200, 100], [150, 200.004]]]")
+        assert run.hole_outlines == (((100, 100), (200, 100), (150, 200)),)
+        assert announced().holes == ()
+
+    def test_of_an_area_that_is_concave_has_every_corner(self) -> None:
+        corners = [(0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (606.0, 200.0), (0.0, 400.0)]
+        assert announced(f"area.polygon_m={[list(one) for one in corners]}").outline == tuple(corners)
+
+    def test_of_a_heading_left_to_us(self) -> None:
+        run = announced("area.track_heading_deg=auto")
+        assert run.grid.heading_rad == pytest.approx(math.pi / 2, abs=1e-6)
+        assert (run.grid.columns, run.grid.rows) == (81, 243)
+
     def test_a_helpers_typical_p_detect_is_its_mean_over_the_swath(self) -> None:
         run = announced(
             "vehicles.helper.sensor={curve: {range_m: [0, 20, 40], p_detect: [0.2, 0.8, 0.2]}}",

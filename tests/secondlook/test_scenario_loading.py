@@ -1,6 +1,7 @@
 """What a scenario says when it loads: defaults, overrides, numbers, and what is written out again."""
 
 import copy
+import math
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -8,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import shapely
 import yaml
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -25,6 +27,7 @@ from secondlook.scenario.bundled import curve, scenario_text
 from secondlook.scenario.dialect import dump
 from secondlook.scenario.overrides import override
 from secondlook.scenario.reader import read, read_value
+from secondlook.survey_area import first_plans, track_heading_rad
 
 Write = Callable[[str | bytes], str]
 BUNDLED = [name for name, _ in bundled_scenarios()]
@@ -45,7 +48,7 @@ def load_text(folder: Path, text: str) -> Scenario:
 
 
 def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
-    assert BUNDLED == ["paper", "patchy", "tellaro"]
+    assert BUNDLED == ["headland", "paper", "patchy", "tellaro"]
     for name, description in bundled_scenarios():
         assert load_scenario(name).name == name
         assert description
@@ -85,6 +88,17 @@ def test_tellaro_is_the_published_mission() -> None:
     (helper,) = scenario.revisit_vehicles.values()
     flat = helper.sensor.detection_curve(helper.nadir_gap_m)
     assert flat.at(np.array([0, 12, 25, 25.1])) == pytest.approx([0.7, 0.7, 0.7, 0])
+
+
+def test_the_headland_is_concave_has_a_hole_and_leaves_the_heading_to_us() -> None:
+    scenario = load_scenario("headland")
+    area = scenario.area
+    outline = shapely.Polygon(area.polygon_m)
+    assert outline.convex_hull.area > 1.1 * outline.area
+    assert (len(area.holes_m), area.track_heading_deg) == (1, "auto")
+    assert math.degrees(track_heading_rad(scenario)) == pytest.approx(90)
+    (plan,) = first_plans(scenario, math.pi / 2).values()
+    assert len(plan.parts) > 1
 
 
 def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: str) -> None:

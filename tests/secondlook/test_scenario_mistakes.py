@@ -211,10 +211,34 @@ MISTAKES = {
             "must be the corners in order, each once, but (0, 0) is repeated"
         ],
     ),
-    "concave": (
+    "hole that crosses the outline": (
         POLYGON,
-        "[[0, 0], [50, 9], [99, 0], [50, 99]]",
-        ["bad.yaml:3: area.polygon_m: [[0, 0], [50, 9], [99, 0], [50, 99]] is not allowed; must be convex"],
+        POLYGON + "\n  holes_m: [[[10, 10], [20, 10], [15, 20]], [[490, 10], [510, 10], [490, 20]]]",
+        [
+            "bad.yaml:4: area.holes_m: [[[10, 10], [20, 10], [15, 20]], [[490, 10], [510, 10], [... is not allowed; "
+            "must lie inside polygon_m, without touching it"
+        ],
+    ),
+    "holes that touch": (
+        POLYGON,
+        POLYGON + "\n  holes_m: [[[10, 10], [20, 10], [15, 20]], [[15, 10], [25, 10], [20, 20]]]",
+        [
+            "bad.yaml:4: area.holes_m: [[[10, 10], [20, 10], [15, 20]], [[15, 10], [25, 10], [20... is not allowed; "
+            "must not touch each other"
+        ],
+    ),
+    "hole with crossing sides": (
+        POLYGON,
+        POLYGON + "\n  holes_m: [[[10, 10], [20, 20], [20, 10], [10, 20]]]",
+        [
+            "bad.yaml:4: area.holes_m: [[[10, 10], [20, 20], [20, 10], [10, 20]]] is not allowed; "
+            "must be the corners in order, but its sides cross"
+        ],
+    ),
+    "heading in a word": (
+        POLYGON,
+        POLYGON + "\n  track_heading_deg: north",
+        ['bad.yaml:4: area.track_heading_deg: "north" is not allowed; must be a number of degrees, or auto'],
     ),
     "corner with a third number": (
         POLYGON,
@@ -438,8 +462,10 @@ def test_a_file_that_is_no_scenario_is_told(write: Write, content: bytes, expect
 
 
 def test_a_name_that_is_not_bundled_is_told_with_those_that_are() -> None:
-    assert lines_of("telaro") == ["telaro: no such scenario, did you mean tellaro? (there are paper, patchy, tellaro)"]
-    assert lines_of("xyz") == ["xyz: no such scenario (there are paper, patchy, tellaro)"]
+    assert lines_of("telaro") == [
+        "telaro: no such scenario, did you mean tellaro? (there are headland, paper, patchy, tellaro)"
+    ]
+    assert lines_of("xyz") == ["xyz: no such scenario (there are headland, paper, patchy, tellaro)"]
 
 
 def test_paths_that_are_no_readable_file_are_told(tmp_path: Path) -> None:

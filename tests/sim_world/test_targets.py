@@ -33,6 +33,18 @@ def test_points_lie_uniformly_within_a_concave_outline() -> None:
     assert sum(quarters) == 1.0
 
 
+def test_no_point_lies_in_a_hole() -> None:
+    square = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
+    holes = (((1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)), ((2.5, 0.0), (3.0, 0.0), (3.0, 0.5), (2.5, 0.5)))
+    points = uniform_points(square, 3000, np.random.default_rng(1), holes)
+    x, y = points[:, 0], points[:, 1]
+    assert not ((x > 1) & (x < 2) & (y > 1) & (y < 2)).any()
+    assert not ((x > 2.5) & (y < 0.5)).any()
+    assert np.mean(y < 1) == pytest.approx(2.75 / 7.75, abs=0.035)  # 4 standard deviations
+    truth = Targets(square, 500, 1, holes[:1]).truth().targets
+    assert not any(1 < target.x_m < 2 and 1 < target.y_m < 2 for target in truth)
+
+
 @pytest.mark.parametrize("outline", [((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), ((5.0, 5.0), (5.0, 5.0), (5.0, 5.0))])
 def test_an_outline_around_nothing_is_refused(outline: tuple[tuple[float, float], ...]) -> None:
     with pytest.raises(ValueError, match="encloses"):

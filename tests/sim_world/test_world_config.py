@@ -49,6 +49,8 @@ def test_bins_follow_from_the_lengths() -> None:
         (WORLD, "seed", -1),
         (WORLD, "area", ((0.0, 0.0), (1.0, 0.0))),
         (WORLD, "area", ((0.0, 0.0), (1.0, 0.0), (0.0, float("nan")))),
+        (WORLD, "holes", (((0.1, 0.1), (0.2, 0.2)),)),
+        (WORLD, "holes", (((0.1, 0.1), (0.2, 0.2), (2e6, 0.1)),)),
         (WORLD, "vehicles", (VEHICLE, VEHICLE)),
         (TargetsConfig(), "count", 1001),
         (TargetsConfig(), "false_alarms_per_km2", -1.0),

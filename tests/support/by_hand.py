@@ -35,6 +35,8 @@ TRANSIT_MS = 20_000
 P_Detect = Callable[[FloatArray], FloatArray]
 """P_d over lateral range."""
 
+MOST_BINS_A_LOOK = 200  # along the track; more would not fit the wire with 141 range bins
+
 
 def vehicle(name: str, role: Role) -> RosterVehicle:
     """A vehicle of the fleet: a helper sees 25 m to either side with P_d 0.7."""
@@ -132,6 +134,7 @@ def fly(agent: OneNode, name: str, maneuver: Maneuver, p_detect: P_Detect, looks
     tell_status(agent, name, maneuver.number, ManeuverState.ACCEPTED, agent.now_ms + 1)
     tell_status(agent, name, maneuver.number, ManeuverState.ON_TRACK, agent.now_ms + TRANSIT_MS)
     began_ms, bins = agent.now_ms, math.ceil((length_m(maneuver) - 0.02) / 5)
+    looks = max(looks, math.ceil(bins / MOST_BINS_A_LOOK))
     edges = np.linspace(0, bins, looks + 1).round().astype(int).tolist()
     for first, end in pairwise(edges):
         x_m, y_m = _at(maneuver, end * 5.0)

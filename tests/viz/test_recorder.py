@@ -6,6 +6,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from comms.messages import (
     AgentState,
     CoverageTile,
     Curve,
+    Hole,
     Hotspot,
     Look,
     Message,
@@ -31,6 +33,7 @@ from comms.messages import (
     TruthLook,
     TruthPose,
     TruthTargets,
+    Vertex,
 )
 from comms.node import Received
 from comms.topics import TOPICS
@@ -89,6 +92,25 @@ def test_cells_without_a_look_are_covered(messages: list[Received], recording: P
     np.testing.assert_array_equal(opaque, risk_of(messages, time_ms) == 1.0)
     assert 0 < np.count_nonzero(opaque) < opaque.size
     assert (image(drawn[0][1]).reshape(-1, 4) == [*palette.UNSEEN, 255]).all()
+
+
+def test_cells_outside_the_area_look_like_the_background(
+    messages: list[Received], record: Record, tmp_path: Path
+) -> None:
+    run = next(one for one in messages if isinstance(one.message, RunInfo))
+    assert isinstance(run.message, RunInfo)
+    hole = Hole((Vertex(300, 100), Vertex(400, 100), Vertex(400, 200), Vertex(300, 200)))
+    with_hole = replace(run, message=replace(run.message, holes=(hole,)))
+    drawn = record([with_hole if one is run else one for one in messages], tmp_path / "hole.rrd")
+    cover = image(rows(drawn, "/area/unseen", "GridMap:data")[-1][1]).reshape(ROWS, COLUMNS, 4)[::-1]
+    outside = (cover == [*palette.BACKGROUND, 255]).all(axis=2)
+    spec = run.message.grid.spec
+    x_m, y_m = spec.frame.to_mission(spec.across_m[np.newaxis, :], spec.along_m[:, np.newaxis])
+    in_hole = (x_m > 300) & (x_m < 400) & (y_m > 100) & (y_m < 200)
+    assert in_hole.any()
+    assert outside[in_hole].all()
+    assert np.count_nonzero(outside) == np.count_nonzero(in_hole)
+    assert len(static(drawn, "/area/outline", "LineStrips3D:strips")) == 2
 
 
 @pytest.mark.parametrize("every_s", [10, 60])

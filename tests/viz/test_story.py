@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from comms.messages import (
     ClockMode,
     Curve,
     Grid,
+    Hole,
     Hotspot,
     HotspotState,
     ManeuverState,
@@ -82,6 +85,10 @@ def test_the_run_is_introduced() -> None:
     run = RunInfo(1, "tellaro", "0" * 64, 7, ClockMode.LOCKSTEP, area, Grid(0, 0, 0, 5, 2, 2), 0.0, vehicles)
     assert Story().tell(said(RUN, run)) == line(
         "mission tellaro, seed 7: a survey of 0.50 km² by primary, second looks by helper"
+    )
+    hole = Hole(tuple(Vertex(x_m, y_m) for x_m, y_m in ((100, 100), (300, 100), (300, 300), (100, 300))))
+    assert Story().tell(said(RUN, replace(run, holes=(hole,)))) == line(
+        "mission tellaro, seed 7: a survey of 0.46 km² by primary, second looks by helper"
     )
 
 

@@ -1,0 +1,142 @@
+"""A region cut into convex parts, each of which is surveyed by itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import shapely
+from shapely.ops import split
+
+from planner.area import SurveyArea
+from planner.region import Region
+from planner.types import SweepFrame
+
+SHALLOW_M = 10.0
+"""A dent that is no deeper is surveyed with the part about it."""
+LEAST_PART_M2 = 1.0
+"""What a cut leaves that is smaller is surveyed with nobody: rounding."""
+ON_A_LINE_M = 1e-6
+"""Lengths that differ by no more are taken as equal."""
+BEYOND_M = 1e-3
+"""So far a cut reaches beyond the boundary, so that rounding does not leave it short."""
+MOST_TO_BRANCH = 40
+"""Cuts from which only the one that promises most is followed to its end; of fewer the best two are."""
+
+TracksFor = Callable[[float], int]
+"""How many tracks a width in metres takes."""
+_Cost = tuple[int, float]
+"""Tracks, and their length in metres."""
+
+
+def convex_parts(
+    region: Region, track_heading_rad: float, tracks_for: TracksFor, *, thorough: bool = True
+) -> list[SurveyArea]:
+    """Convex parts that cover a region, to be swept along a heading: a convex region is its own only part.
+
+    Cuts are straight, through a corner that points inward: along the tracks, across them, or along a side. Of these
+    those are taken that lead to the fewest tracks, then to the shortest, by a search that follows the most promising.
+    A part may reach beyond the region by dents of up to `SHALLOW_M`.
+
+    Args:
+        region: what to survey.
+        track_heading_rad: compass heading of the tracks.
+        tracks_for: how many tracks a width takes, never fewer for a larger one.
+        thorough: follow more than one cut at a time, where there are not too many.
+
+    Returns:
+        The parts, in no particular order.
+
+    Raises:
+        ValueError: the heading is not finite.
+    """
+    if not region.holes and _is_convex(region.polygon, 0.0):
+        return [SurveyArea(region.outline, track_heading_rad)]
+    frame = region.about(track_heading_rad).frame
+    _, pieces = _best(_to(frame, region.polygon), tracks_for, thorough)
+    return [_part(frame, piece, track_heading_rad) for piece in pieces]
+
+
+def _best(polygon: shapely.Polygon, tracks_for: TracksFor, thorough: bool) -> tuple[_Cost, list[shapely.Polygon]]:
+    """The parts of a polygon in the sweep frame, and what they cost."""
+    if _is_convex(polygon, SHALLOW_M):
+        return _cost(_hull(polygon), tracks_for), [_hull(polygon)]
+    promising: list[tuple[_Cost, int, list[shapely.Polygon]]] = []
+    number = 0
+    for number, line in enumerate(_cuts(polygon)):
+        pieces = [piece for piece in _split(polygon, line) if piece.area > LEAST_PART_M2]
+        if len(pieces) > 1:
+            costs = [_cost(_hull(piece), tracks_for) for piece in pieces]
+            promising.append((_sum(costs), number, pieces))
+    promising.sort(key=lambda one: one[:2])
+    if not promising:  # no cut divides it
+        return _cost(_hull(polygon), tracks_for), [_hull(polygon)]
+    found = []
+    for _, _, pieces in promising[: 2 if thorough and number < MOST_TO_BRANCH else 1]:
+        parts = [_best(piece, tracks_for, thorough) for piece in pieces]
+        found.append((_sum([cost for cost, _ in parts]), [piece for _, some in parts for piece in some]))
+    return min(found, key=lambda one: one[0])
+
+
+def _cost(hull: shapely.Polygon, tracks_for: TracksFor) -> _Cost:
+    from_across_m, from_along_m, to_across_m, to_along_m = hull.bounds
+    tracks = tracks_for(to_across_m - from_across_m)
+    return tracks, round(tracks * (to_along_m - from_along_m), 3)
+
+
+def _sum(costs: list[_Cost]) -> _Cost:
+    return sum(tracks for tracks, _ in costs), sum(length_m for _, length_m in costs)
+
+
+def _hull(polygon: shapely.Polygon) -> shapely.Polygon:
+    hull = polygon.convex_hull
+    assert isinstance(hull, shapely.Polygon)
+    return hull
+
+
+def _split(polygon: shapely.Polygon, line: shapely.LineString) -> list[shapely.Polygon]:
+    return [piece for piece in split(polygon, line).geoms if isinstance(piece, shapely.Polygon)]
+
+
+def _is_convex(polygon: shapely.Polygon, shallow_m: float) -> bool:
+    """Whether no dent, and no hole, is deeper than that; with 0, whether it is a `SurveyArea` as it stands."""
+    hull = _hull(polygon)
+    if not shallow_m:
+        return bool(hull.area - polygon.area <= ON_A_LINE_M * polygon.length)
+    left_out = hull.difference(polygon)
+    return bool(left_out.buffer(-shallow_m / 2).is_empty)
+
+
+def _cuts(polygon: shapely.Polygon) -> Iterator[shapely.LineString]:
+    """Lines through each corner that points inward: right across the polygon, and as far as the next boundary only."""
+    from_across_m, from_along_m, to_across_m, to_along_m = polygon.bounds
+    reach_m = 2 * math.hypot(to_across_m - from_across_m, to_along_m - from_along_m)
+    exterior_first = shapely.orient_polygons(polygon)
+    for ring in (exterior_first.exterior, *exterior_first.interiors):
+        corners = np.array(ring.coords[:-1])
+        before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
+        inward = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0
+        for corner, one, other in zip(corners[inward], before[inward], after[inward], strict=True):
+            for direction in (np.array([0.0, 1.0]), np.array([1.0, 0.0]), one, other):
+                along = direction / np.hypot(*direction) * reach_m
+                line = shapely.LineString([corner - along, corner + along])
+                chords = shapely.get_parts(polygon.intersection(line))
+                touching = [one for one in chords if one.distance(shapely.Point(corner)) < ON_A_LINE_M]
+                ends = shapely.get_coordinates(touching)
+                if len(touching) < len(chords) and len(ends) > 1:
+                    places = (ends - corner) @ along / reach_m
+                    reached = corner + np.outer([places.min() - BEYOND_M, places.max() + BEYOND_M], along / reach_m)
+                    yield shapely.LineString(reached)
+                yield line
+
+
+def _to(frame: SweepFrame, polygon: shapely.Polygon) -> shapely.Polygon:
+    """A polygon of the mission frame in a sweep frame."""
+    return shapely.transform(polygon, lambda points: np.column_stack(frame.to_sweep(points[:, 0], points[:, 1])))
+
+
+def _part(frame: SweepFrame, piece: shapely.Polygon, track_heading_rad: float) -> SurveyArea:
+    across_m, along_m = np.array(piece.exterior.coords[:-1]).T
+    x_m, y_m = frame.to_mission(across_m, along_m)
+    return SurveyArea(tuple(zip(x_m.tolist(), y_m.tolist(), strict=True)), track_heading_rad)

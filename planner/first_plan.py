@@ -1,0 +1,103 @@
+"""The tracks over a whole region as far as they can be laid before anything is known but what the sonar is told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+from planner.area import SurveyArea
+from planner.convex_parts import convex_parts
+from planner.lawnmower import lawnmower
+from planner.part_order import in_order
+from planner.region import Region
+from planner.spacing import adapt_range, track_count, track_offsets
+from planner.spacing_planners import lowest_range_m
+from planner.types import Track
+
+MOST_SIDES = 6
+"""Of a region that has to be cut, the longest sides along which tracks are tried."""
+
+
+@dataclass(frozen=True)
+class FirstPlan:
+    """`parts`, in the order of flying, and the `tracks` of each, flown to and fro, numbered from 1 through all."""
+
+    parts: tuple[SurveyArea, ...]
+    tracks: tuple[tuple[Track, ...], ...]
+
+    @property
+    def track_count(self) -> int:
+        """Of all parts together."""
+        return sum(len(tracks) for tracks in self.tracks)
+
+    @property
+    def turns(self) -> int:
+        """One from track to track, two from part to part."""
+        return self.track_count + len(self.parts) - 2
+
+    @property
+    def length_m(self) -> float:
+        """Of all tracks together."""
+        return sum(track.length_m for tracks in self.tracks for track in tracks)
+
+
+def parts_in_order(
+    region: Region, track_heading_rad: float, nadir_gap_m: float, told_range_m: float, *, thorough: bool = True
+) -> list[SurveyArea]:
+    """The convex parts of a region as a sensor of this nadir gap and range surveys them.
+
+    The order begins at the corner from which tracks are laid. `thorough`: see `convex_parts`.
+
+    Raises:
+        ValueError: a number is not finite or out of its range (`planner.spacing.track_count`).
+    """
+    highest_m = max(math.floor(told_range_m), lowest_range_m(nadir_gap_m))
+
+    def tracks_for(width_m: float) -> int:
+        return track_count(width_m, nadir_gap_m, highest_m)
+
+    parts = convex_parts(region, track_heading_rad, tracks_for, thorough=thorough)
+    if len(parts) == 1:
+        return parts
+    frame = region.about(track_heading_rad).frame
+    return in_order(parts, (frame.origin_x_m, frame.origin_y_m))
+
+
+def first_plan(
+    region: Region, track_heading_rad: float, nadir_gap_m: float, told_range_m: float, *, thorough: bool = True
+) -> FirstPlan:
+    """The tracks by Algorithm 1, each part by itself; for numbers and errors see `parts_in_order`."""
+    parts = parts_in_order(region, track_heading_rad, nadir_gap_m, told_range_m, thorough=thorough)
+    lowest_m = lowest_range_m(nadir_gap_m)
+    laid: list[tuple[Track, ...]] = []
+    number = 1
+    for part in parts:
+        choice = adapt_range(part.width_m, nadir_gap_m, lowest_m, max(told_range_m, lowest_m))
+        offsets_m = track_offsets(part.width_m, nadir_gap_m, choice.range_m)
+        laid.append(tuple(lawnmower(part, offsets_m, choice.range_m, first_number=number)))
+        number += len(laid[-1])
+    return FirstPlan(tuple(parts), tuple(laid))
+
+
+@lru_cache(maxsize=8)
+def best_heading(region: Region, nadir_gap_m: float, told_range_m: float) -> float:
+    """The track heading that needs the fewest tracks, then the fewest turns, then the shortest tracks.
+
+    Tried are the headings of the region's sides: for a convex region the least width, and so the fewest tracks, is at
+    one of them. Where holes or dents make each try long, only those of the longest sides are. Of headings that are as
+    good the least is taken; [0, pi).
+    """
+    sides = [
+        (math.dist(one, other), math.atan2(other[0] - one[0], other[1] - one[1]) % math.pi)
+        for one, other in zip(region.outline, (*region.outline[1:], region.outline[0]), strict=True)
+    ]
+    if len(convex_parts(region, 0.0, lambda _: 1, thorough=False)) > 1:
+        sides = sorted(sides, reverse=True)[:MOST_SIDES]
+    headings = sorted({round(heading_rad, 9) % math.pi for _, heading_rad in sides})
+
+    def cost(heading_rad: float) -> tuple[int, int, float]:
+        plan = first_plan(region, heading_rad, nadir_gap_m, told_range_m, thorough=False)
+        return plan.track_count, plan.turns, round(plan.length_m, 3)
+
+    return min(headings, key=cost)

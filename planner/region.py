@@ -1,0 +1,60 @@
+"""What is surveyed: a polygon that may be concave and may have holes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from planner.area import SurveyArea
+from planner.types import BoolArray, GridSpec, Point
+
+ON_BOUNDARY_M = 1e-6
+"""A cell whose centre is as near to the boundary as this is inside."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A simple polygon and the holes in it, which are not to be surveyed; mission frame, corners not repeated.
+
+    Raises:
+        ValueError: a number is not finite, an outline has no area or crosses itself, or a hole does not lie inside.
+    """
+
+    outline: tuple[Point, ...]
+    holes: tuple[tuple[Point, ...], ...] = ()
+
+    def __post_init__(self) -> None:
+        rings = (self.outline, *self.holes)
+        if not all(math.isfinite(place_m) for ring in rings for point in ring for place_m in point):
+            raise ValueError("an area's corners must be finite numbers")
+        if not all(len(set(ring)) >= 3 for ring in rings):
+            raise ValueError("an area and its holes need at least 3 different corners each")
+        if not (self.polygon.is_valid and self.polygon.area > ON_BOUNDARY_M * self.polygon.length):
+            raise ValueError(
+                "an area must have an inside, its sides must not cross, its holes must lie in it and apart"
+            )
+
+    @cached_property
+    def polygon(self) -> shapely.Polygon:
+        """The same as a polygon of shapely."""
+        return shapely.Polygon(self.outline, self.holes)
+
+    def about(self, track_heading_rad: float) -> SurveyArea:
+        """The convex hull, to be swept along a heading: its frame and rectangle are those of the region.
+
+        Raises:
+            ValueError: the heading is not finite.
+        """
+        corners = shapely.get_coordinates(self.polygon.convex_hull)[:-1]
+        return SurveyArea(tuple((x_m, y_m) for x_m, y_m in corners.tolist()), track_heading_rad)
+
+    def inside(self, grid: GridSpec) -> BoolArray:
+        """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""
+        x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
+        with_boundary = self.polygon.buffer(ON_BOUNDARY_M, join_style="mitre")
+        shapely.prepare(with_boundary)
+        return np.asarray(shapely.contains_xy(with_boundary, x_m, y_m), dtype=np.bool_)

@@ -1,0 +1,32 @@
+"""From a scenario's area to what planning takes: the region, the heading of its tracks, and a first plan."""
+
+from __future__ import annotations
+
+import math
+
+from planner.first_plan import FirstPlan, best_heading, first_plan
+from planner.region import Region
+from secondlook.scenario import Scenario
+
+
+def region_of(scenario: Scenario) -> Region:
+    """What is surveyed, mission frame. Raises ValueError as `Region` does."""
+    return Region(scenario.area.polygon_m, scenario.area.holes_m)
+
+
+def track_heading_rad(scenario: Scenario) -> float:
+    """The compass heading of the tracks; where the scenario leaves it to us, the best for the first survey vehicle."""
+    heading_deg = scenario.area.track_heading_deg
+    if heading_deg != "auto":
+        return math.radians(heading_deg)
+    first = next(iter(scenario.survey_vehicles.values()))
+    return best_heading(region_of(scenario), first.nadir_gap_m, first.told_range_m)
+
+
+def first_plans(scenario: Scenario, heading_rad: float) -> dict[str, FirstPlan]:
+    """The tracks that Algorithm 1 lays for each survey vehicle, by its id, with the range that it is told."""
+    region = region_of(scenario)
+    return {
+        name: first_plan(region, heading_rad, vehicle.nadir_gap_m, vehicle.told_range_m)
+        for name, vehicle in scenario.survey_vehicles.items()
+    }

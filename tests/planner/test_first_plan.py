@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from regions import regions
+
+from planner.convex_parts import SHALLOW_M, convex_parts
+from planner.first_plan import best_heading, first_plan, parts_in_order
+from planner.part_order import in_order
+from planner.region import Region
+from planner.seen import seen_cells
+from planner.spacing import adapt_range, track_count, track_offsets
+from planner.types import Point, Track
+
+headings = st.floats(0, 2 * math.pi)
+sonars = st.tuples(st.integers(0, 40), st.integers(0, 60)).map(lambda one: (one[0], max(20, 3 * one[0] + one[1])))
+RECTANGLE = Region(((0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (0.0, 400.0)))
+L_SHAPE = Region(((0.0, 0.0), (800.0, 0.0), (800.0, 300.0), (300.0, 300.0), (300.0, 600.0), (0.0, 600.0)))
+SQUARE_WITH_HOLE = Region(
+    ((0.0, 0.0), (600.0, 0.0), (600.0, 600.0), (0.0, 600.0)),
+    (((200.0, 200.0), (400.0, 200.0), (400.0, 400.0), (200.0, 400.0)),),
+)
+
+
+def seen(track: Track, point: Point, nadir_gap_m: float, range_m: float) -> bool:
+    """The sensor's model, for one place and by itself: beside the track, from the nadir gap to the range."""
+    (x0, y0), (x1, y1) = track.start, track.end
+    length_m = math.dist(track.start, track.end)
+    along_m = ((point[0] - x0) * (x1 - x0) + (point[1] - y0) * (y1 - y0)) / length_m
+    lateral_m = abs((point[0] - x0) * (y1 - y0) - (point[1] - y0) * (x1 - x0)) / length_m
+    return nadir_gap_m - 1e-3 <= lateral_m <= range_m + 1e-3 and -1e-3 <= along_m <= length_m + 1e-3
+
+
+class TestCoverage:
+    @settings(max_examples=25)
+    @given(regions(), headings, sonars, st.integers(0, 2**32 - 1))
+    def test_every_place_of_a_region_is_seen_from_some_track(
+        self, region: Region, heading_rad: float, sonar: tuple[int, int], seed: int
+    ) -> None:
+        plan = first_plan(region, heading_rad, *sonar)
+        tracks = [track for part in plan.tracks for track in part]
+        low_x, low_y, high_x, high_y = region.polygon.bounds
+        places = np.random.default_rng(seed).uniform((low_x, low_y), (high_x, high_y), (40, 2))
+        places = np.concatenate([places, np.array(region.outline)])
+        for x_m, y_m in places[shapely.intersects_xy(region.polygon, places[:, 0], places[:, 1])].tolist():
+            assert any(seen(track, (x_m, y_m), *sonar) for track in tracks)
+
+    @settings(max_examples=12)
+    @given(regions(), headings, sonars)
+    def test_no_cell_that_is_told_covered_is_not(
+        self, region: Region, heading_rad: float, sonar: tuple[int, int]
+    ) -> None:
+        plan = first_plan(region, heading_rad, *sonar)
+        tracks = [track for part in plan.tracks for track in part][::2]  # half of them: much is not seen
+        grid = region.about(heading_rad).grid(40)
+        told = seen_cells(grid, tracks, *sonar)
+        for row, along_m in enumerate(grid.along_m.tolist()):
+            for column, across_m in enumerate(grid.across_m.tolist()):
+                x_m, y_m = grid.frame.to_mission(across_m, along_m)
+                assert told[row, column] == any(seen(track, (float(x_m), float(y_m)), *sonar) for track in tracks)
+
+
+class TestTracks:
+    @settings(max_examples=25)
+    @given(regions(), headings, sonars)
+    def test_no_part_takes_more_than_the_rectangle_about_it(
+        self, region: Region, heading_rad: float, sonar: tuple[int, int]
+    ) -> None:
+        plan = first_plan(region, heading_rad, *sonar)
+        for part, tracks in zip(plan.parts, plan.tracks, strict=True):
+            assert len(tracks) <= track_count(part.width_m, *sonar)
+            assert all(track.length_m <= part.length_m + 1e-6 for track in tracks)
+        numbers = [track.number for tracks in plan.tracks for track in tracks]
+        assert numbers == list(range(1, plan.track_count + 1))
+
+    def test_of_the_published_area(self) -> None:
+        plan = first_plan(RECTANGLE, 0, 40, 145)
+        assert [track.across_m for track in plan.tracks[0]] == track_offsets(1212, 40, 138)
+        assert (len(plan.parts), plan.track_count, plan.turns, plan.length_m) == (1, 7, 6, 2800)
+
+
+class TestParts:
+    def test_a_convex_region_is_its_own_only_part(self) -> None:
+        (part,) = parts_in_order(RECTANGLE, 0.5, 40, 145)
+        assert part.vertices == RECTANGLE.outline
+        assert part.track_heading_rad == 0.5
+
+    def test_an_l_is_cut_where_that_takes_the_fewest_tracks(self) -> None:
+        # Tracks north: cut at x = 300 m, 300 m and 500 m take 2 and 4 tracks of 120 m; cut at y = 300 m, 800 and 300 m
+        # would take 6 and 2.
+        parts = convex_parts(L_SHAPE, 0, lambda width_m: track_count(width_m, 40, 120))
+        assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
+
+    def test_a_hole_is_cut_out(self) -> None:
+        parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))
+        assert sum(shapely.Polygon(part.vertices).area for part in parts) == pytest.approx(600**2 - 200**2)
+        assert len(parts) == 4
+
+    def test_a_shallow_dent_is_surveyed_with_the_rest(self) -> None:
+        region = Region(((0.0, 0.0), (500.0, 9.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0)))
+        (part,) = parts_in_order(region, 0, 40, 145)
+        assert shapely.Polygon(part.vertices).area == pytest.approx(400_000)
+
+    @settings(max_examples=25)
+    @given(regions(), headings)
+    def test_they_cover_the_region_and_little_else(self, region: Region, heading_rad: float) -> None:
+        parts = convex_parts(region, heading_rad, lambda width_m: track_count(width_m, 40, 145))
+        union = shapely.union_all([shapely.Polygon(part.vertices) for part in parts])
+        assert region.polygon.difference(union.buffer(0.01)).area < 1
+        assert union.difference(region.polygon).buffer(-0.51 * SHALLOW_M).is_empty
+        assert {part.track_heading_rad for part in parts} == {parts[0].track_heading_rad}
+
+
+class TestOrder:
+    def test_the_nearest_way_through_all(self) -> None:
+        squares = [
+            Region(((x, 0.0), (x + 100, 0.0), (x + 100, 100.0), (x, 100.0))).about(0) for x in (400.0, 0.0, 200.0)
+        ]
+        ordered = in_order(squares, (0, 0))
+        assert [part.vertices[0][0] // 200 for part in ordered] == [0, 1, 2]
+        # From the other end each is entered, and its tracks are laid, from its east side.
+        back = in_order(squares, (500, 0))
+        assert [min(x for x, _ in part.vertices) for part in back] == [400, 200, 0]
+        assert {part.track_heading_rad for part in back} == {math.pi}
+
+    def test_many_parts_are_taken_one_after_the_other(self) -> None:
+        row = [
+            Region(((x, 0.0), (x + 90, 0.0), (x + 90, 100.0), (x, 100.0))).about(0)
+            for x in (700.0, 300.0, 500.0, 0.0, 100.0, 600.0, 200.0, 400.0)
+        ]
+        assert [min(x for x, _ in part.vertices) for part in in_order(row, (0, 0))] == [100.0 * n for n in range(8)]
+
+
+class TestBestHeading:
+    def test_of_a_rectangle_is_along_its_longer_side(self) -> None:
+        assert best_heading(RECTANGLE, 40, 145) == pytest.approx(math.pi / 2)
+        assert first_plan(RECTANGLE, math.pi / 2, 40, 145).track_count == 3
+
+    @settings(max_examples=30)
+    @given(st.lists(st.tuples(st.integers(0, 900), st.integers(0, 900)), min_size=3, max_size=8), headings)
+    def test_of_a_convex_region_no_other_needs_fewer_tracks(
+        self, points: list[tuple[int, int]], heading_rad: float
+    ) -> None:
+        hull = shapely.MultiPoint(points).convex_hull
+        if not isinstance(hull, shapely.Polygon) or hull.area < 1000:
+            return
+        region = Region(tuple((float(x), float(y)) for x, y in hull.exterior.coords[:-1]))
+        best = first_plan(region, best_heading(region, 40, 145), 40, 145)
+        other = region.about(heading_rad).width_m
+        assert best.track_count <= adapt_range(other + 1e-3, 40, 120, 145).tracks

@@ -1,0 +1,182 @@
+"""The survey agent over areas that are not convex: part by part, with what it has learned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from by_hand import PRIMARY, P_Detect, flat, fly, nav, run_info, tell_status, to_follow
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from one_node import OneNode
+from regions import regions
+
+from comms.messages import (
+    AgentState,
+    Grid,
+    Hole,
+    Hotspot,
+    HotspotState,
+    ManeuverState,
+    Mode,
+    Plan,
+    Role,
+    RunInfo,
+    Vertex,
+)
+from planner.region import Region
+from planner.spacing_planners import AdaptiveSpacing
+from vehicle_agent.config import SurveyConfig
+from vehicle_agent.survey import SurveyAgent
+
+SEES_TO_130_M = flat(0.3, 25, 130)
+L_SHAPE = Region(((0.0, 0.0), (800.0, 0.0), (800.0, 300.0), (300.0, 300.0), (300.0, 600.0), (0.0, 600.0)))
+WITH_ROCKS = Region(L_SHAPE.outline, (((100.0, 100.0), (160.0, 100.0), (160.0, 160.0), (100.0, 160.0)),))
+
+
+def announced(region: Region, heading_rad: float = 0.0, cell_m: float = 10) -> RunInfo:
+    """A run over a region."""
+    grid = region.about(heading_rad).grid(cell_m)
+    frame = grid.frame
+    return replace(
+        run_info(),
+        area=tuple(Vertex(*corner) for corner in region.outline),
+        holes=tuple(Hole(tuple(Vertex(*corner) for corner in hole)) for hole in region.holes),
+        grid=Grid(frame.origin_x_m, frame.origin_y_m, frame.heading_rad, cell_m, grid.columns, grid.rows),
+    )
+
+
+def surveyor(run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145) -> OneNode:
+    """A survey agent told of the run and of where its vehicle is."""
+    config = SurveyConfig(
+        vehicle=PRIMARY,
+        spacing=AdaptiveSpacing(nadir_gap_m, range_m),
+        nadir_gap_m=nadir_gap_m,
+        range_m=range_m,
+        threshold=0.05,
+        hotspot_risk=0.6,
+        run_in_m=20,
+        endurance_ms=36_000_000,
+    )
+    agent = OneNode(SurveyAgent(config), Role.SURVEY)
+    agent.hear("run", run, at_ms=1)
+    agent.hear(f"veh/{PRIMARY}/nav", nav())
+    return agent
+
+
+def fly_all(agent: OneNode, p_detect: P_Detect, *, most: int = 60) -> None:
+    for _ in range(most):
+        maneuver = to_follow(agent)
+        if maneuver is None:
+            return
+        fly(agent, PRIMARY, maneuver, p_detect)
+    raise AssertionError(f"the agent asks for more than {most} tracks")
+
+
+def node_of(agent: OneNode) -> SurveyAgent:
+    assert isinstance(agent.node, SurveyAgent)
+    return agent.node
+
+
+class TestPartByPart:
+    def test_each_part_is_planned_in_turn_with_what_was_learned(self) -> None:
+        agent = surveyor(announced(L_SHAPE))
+        first = agent.last(Plan)
+        assert first.note.startswith("part 1 of 2: spacing for 1")
+        # Told 145 m, 300 and 500 m take 2 and 3 tracks; all are in the plan from the beginning.
+        assert len(first.tracks) == 5
+        fly_all(agent, SEES_TO_130_M)
+        notes = [plan.note for plan in agent.all(Plan)]
+        (second,) = (note for note in notes if note.startswith("part 2 of 2"))
+        spacing_m = int(second.removeprefix("part 2 of 2: spacing for ").split(" ")[0])
+        assert second.endswith(" m, 4 tracks")  # with 130 m
+        assert 120 <= spacing_m <= 130
+        assert notes[-1] == "the survey ends, all of the area is seen"
+        assert [track.number for track in agent.last(Plan).tracks] == list(range(1, 7))
+        assert agent.last(AgentState).mode is Mode.FINISHED
+
+    def test_the_second_part_is_begun_from_the_nearer_end(self) -> None:
+        agent = surveyor(announced(L_SHAPE))
+        fly_all(agent, SEES_TO_130_M)
+        tracks = agent.last(Plan).tracks
+        for before, after in pairwise(tracks):
+            end = (before.end_x_m, before.end_y_m)
+            to_start_m = math.dist(end, (after.start_x_m, after.start_y_m))
+            assert to_start_m <= math.dist(end, (after.end_x_m, after.end_y_m))
+
+    def test_below_three_nadir_gaps_the_next_part_begins_with_single_tracks(self) -> None:
+        agent = surveyor(announced(L_SHAPE))
+        fly_all(agent, flat(0.3, 25, 100))
+        (second,) = (plan.note for plan in agent.all(Plan) if plan.note.startswith("part 2 of 2"))
+        assert second.endswith("r_eff 100 m is below 3 r_min: the fewest single tracks over all that is left")
+        layer = node_of(agent).coverage.layer.sum_levels()  # type: ignore[union-attr]
+        assert (layer[node_of(agent)._inside] > 0).all()
+
+    # With the other sonar the tracks still to come, as they would lie now, leave most of their part unseen.
+    @pytest.mark.parametrize("p_detect", [SEES_TO_130_M, flat(0.04, 25, 50)])
+    def test_hotspots_lie_in_the_area_and_none_in_a_part_still_to_come(self, p_detect: P_Detect) -> None:
+        agent = surveyor(announced(WITH_ROCKS, cell_m=5))
+        node = node_of(agent)
+        later = node._parts[-1].area
+        grid = node._grid
+        x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
+        to_come = shapely.contains_xy(shapely.Polygon(later.vertices), x_m, y_m)
+        assert node.coverage is not None
+        while not agent.last(Plan).note.startswith(f"part {len(node._parts)}"):
+            assert not (node.coverage.settled & to_come).any()
+            maneuver = to_follow(agent)
+            assert maneuver is not None
+            fly(agent, PRIMARY, maneuver, p_detect)
+        assert node.coverage.settled.any()
+        fly_all(agent, p_detect)
+        assert (node.coverage.settled == node._inside).all()
+        outside = L_SHAPE.polygon.buffer(15)  # an outline covers its notches with little to spare
+        for one in agent.all(Hotspot):
+            if one.state is HotspotState.ACTIVE:
+                assert shapely.Polygon([(corner.x_m, corner.y_m) for corner in one.outline]).within(outside)
+        assert agent.last(Plan).note.startswith("the survey ends, ")
+
+    def test_a_part_of_which_every_track_is_refused_is_left_out(self) -> None:
+        agent = surveyor(announced(L_SHAPE))
+        for _ in range(2):
+            maneuver = to_follow(agent)
+            assert maneuver is not None
+            tell_status(agent, PRIMARY, maneuver.number, ManeuverState.REFUSED, agent.now_ms + 1)
+        assert agent.last(Plan).note.startswith("part 2 of 2: spacing for 1")
+        fly_all(agent, SEES_TO_130_M)
+        share = float(agent.last(Plan).note.split(" ")[3].rstrip("%,"))
+        assert 10 < share < 60
+
+
+class TestAnyArea:
+    @settings(max_examples=15)
+    @given(regions(), st.floats(0, 6.2), st.lists(st.integers(0, 140), min_size=1, max_size=4))
+    def test_a_survey_ends_and_settles_the_area_and_nothing_else(
+        self, region: Region, heading_rad: float, reaches_m: list[int]
+    ) -> None:
+        agent = surveyor(announced(region, heading_rad, cell_m=40), nadir_gap_m=20, range_m=90)
+        for number in range(2000):
+            maneuver = to_follow(agent)
+            if maneuver is None:
+                break
+            fly(agent, PRIMARY, maneuver, flat(0.3, 10, reaches_m[number % len(reaches_m)]), looks=1)
+        node = node_of(agent)
+        assert agent.last(AgentState).mode is Mode.FINISHED
+        assert node.coverage is not None
+        assert (node.coverage.settled == node._inside).all()
+        assert all(track.flown for track in agent.last(Plan).tracks)
+
+    @settings(max_examples=15)
+    @given(regions(), st.floats(0, 6.2))
+    def test_a_sonar_that_sees_as_told_leaves_nothing_unseen(self, region: Region, heading_rad: float) -> None:
+        agent = surveyor(announced(region, heading_rad, cell_m=20))
+        fly_all(agent, flat(0.3, 40, 140))
+        node = node_of(agent)
+        assert node.coverage is not None
+        unseen = node._inside & (node.coverage.layer.sum_levels() == 0)
+        # Looks come in bins of 5 m, and places in centimetres: a few cells at the edges of what is seen may differ.
+        assert unseen.sum() <= 0.01 * node._inside.sum()

@@ -1,0 +1,94 @@
+"""The survey of one convex part of the area: where its next tracks lie, given how those flown saw."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from planner.area import SurveyArea
+from planner.settle import Reach
+from planner.spacing_planners import (
+    LENGTH_TOLERANCE_M,
+    FlownTrack,
+    SinglesPlanner,
+    SpacingDecision,
+    counted_range_m,
+    lowest_range_m,
+)
+from planner.types import Track
+from vehicle_agent.config import SurveyConfig
+
+TRACKS_A_PAIR = 2
+
+
+class PartSurvey:
+    """Asks the spacing planner and keeps what it is to be told. All offsets are in the part's own sweep frame.
+
+    `r_eff_m` is the effective range after the last track flown, in whatever part; None before the first.
+    """
+
+    def __init__(self, area: SurveyArea, config: SurveyConfig) -> None:
+        self.area = area
+        self._config = config
+        self._decision: SpacingDecision
+        self._covered_m = 0.0
+        self._looked: list[FlownTrack] = []
+        self._since: list[Track] = []
+
+    def first(self, r_eff_m: int | None) -> SpacingDecision:
+        """The tracks for the whole part."""
+        spacing, width_m = self._config.spacing, self.area.width_m
+        singles = None
+        if r_eff_m is not None and isinstance(spacing, SinglesPlanner):
+            singles = spacing.cover(width_m, (), r_eff_m)
+        self._decision = spacing.decide(width_m, 0.0, r_eff_m) if singles is None else singles
+        return self._decision
+
+    def flown(self, track: Track, r_eff_m: int) -> None:
+        """Notes a track flown and how far it saw."""
+        singles = self._decision.singles
+        counted_m = max(r_eff_m, self._decision.range_m) if singles else r_eff_m
+        self._looked.append(FlownTrack(track.across_m, counted_m, singles))
+        self._since.append(track)
+
+    def is_due(self, ahead: Sequence[Track]) -> bool:
+        """Whether it is time to decide again, `ahead` being the tracks of this part still to be flown."""
+        # Where all that a decision laid was refused there is nothing new to decide on.
+        new = len(self._since)
+        return self._decision.replans and (new >= TRACKS_A_PAIR or (new > 0 and not ahead))
+
+    def next(self, r_eff_m: int) -> SpacingDecision | None:
+        """The tracks for what is left; None where that is nothing."""
+        spacing, width_m = self._config.spacing, self.area.width_m
+        self._covered_m = max(self._covered_m, self._edge_m(self._since, r_eff_m))
+        decision = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
+        if decision is None and self._covered_m < width_m - LENGTH_TOLERANCE_M:
+            decision = spacing.decide(width_m, self._covered_m, r_eff_m)
+        if decision is None or not decision.offsets_m:
+            return None
+        self._decision, self._since = decision, []
+        return decision
+
+    def frontier_m(self, ahead: Sequence[Track], reach: Reach, r_eff_m: int | None, cell_m: float) -> float | None:
+        """The offset beyond which the next decision may still lay tracks that see; None where it will not."""
+        if not self._decision.replans or not ahead:
+            return None
+        if self._decision.singles:
+            later = ahead[max(0, TRACKS_A_PAIR - len(self._since)) :]
+            # They will not lie much nearer than they do now.
+            return min(track.across_m for track in later) - reach.far_m if later else None
+        pair = [*self._since, *ahead][:TRACKS_A_PAIR]
+        known_m = math.floor(reach.far_m) if r_eff_m is None else r_eff_m
+        edge_m = self._edge_m(pair, known_m)
+        if edge_m >= self.area.width_m - LENGTH_TOLERANCE_M:
+            return None
+        # Whatever r_eff will be, a next pair begins no nearer to this one than at twice the least range. Where the far
+        # side is near its tracks are pulled in; then they lie as they would with what is known now.
+        nearest_m = max(track.across_m for track in pair) + 2 * lowest_range_m(self._config.nadir_gap_m)
+        pulled_in_m = min(self._config.spacing.decide(self.area.width_m, edge_m, known_m).offsets_m)
+        return min(nearest_m, pulled_in_m) - reach.far_m - cell_m
+
+    def _edge_m(self, tracks: Sequence[Track], r_eff_m: int) -> float:
+        """The edge up to which pairs that end with these cover the part."""
+        counted_m = counted_range_m(r_eff_m, self._config.nadir_gap_m, self._config.range_m)
+        return max(track.across_m for track in tracks) + min(self._decision.range_m, counted_m)
