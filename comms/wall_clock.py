@@ -49,7 +49,8 @@ class _Host:
 class WallClock:
     """The clock of one run.
 
-    `hosts`: those it waits for, each with whether it only listens. `words` are to be sent to hosts, and taken away, by
+    `hosts`: those it waits for, each with whether it only listens. `taken_up`: whether it has the mission's time from
+    others. `words` are to be sent to hosts, and taken away, by
     whoever holds the clock; `notices` are for people.
     """
 
@@ -61,6 +62,7 @@ class WallClock:
         self.words: list[tuple[str, bytes]] = []
         self.notices: list[str] = []
         self.over_ms: int | None = None
+        self.taken_up = False
         self.factor = factor
         self._listens = dict(hosts)
         self._hosts = {host: _Host(heard_s=began_s - HERE_S) for host in hosts}
@@ -171,6 +173,7 @@ class WallClock:
         if not hello.welcomed:
             self.words.append((host, pack("welcome")))
         if self.phase is Phase.WAITING and hello.now_ms is not None:
+            self.taken_up = True
             self.time.hear(hello.now_ms, self.factor, now_s)
             self._run(f"the mission is under way, at {hello.now_ms / 1000:.0f} s")
         elif known.last_word is None and self.phase in (FINISHED_LISTENING if self._listens[host] else FINISHED_ACTING):

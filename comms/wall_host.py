@@ -188,7 +188,7 @@ class WallHost:
         except ControlError as error:
             self._post.intake.drop("senseless words", "clock", str(error))
 
-    def _hear_time(self, now_ms: int | None, factor: float) -> None:
+    def _hear_time(self, now_ms: int | None, factor: float, taken_up: bool) -> None:
         self._clock_heard_s = time.monotonic()
         if now_ms is None:
             self._waits_for_start = True
@@ -198,10 +198,12 @@ class WallHost:
         first = not self._time.known
         self._time.hear(now_ms, factor, time.monotonic())
         if first:
-            # Whoever was there before the start is the first of its name; later ones are told apart by when they came.
-            self._incarnation = 0 if self._waits_for_start else incarnation_at(now_ms, self._time_limit_ms)
+            # Who was there before the start is the first of its name; later ones are told apart by when they came. The
+            # wait for a clock that takes up a mission's time was no wait for the start.
+            is_first = self._waits_for_start and not taken_up
+            self._incarnation = 0 if is_first else incarnation_at(now_ms, self._time_limit_ms)
             self._seat.begin(self._incarnation, factor)
-            self._notice("the mission begins" if self._waits_for_start else f"the mission is at {now_ms / 1000:.0f} s")
+            self._notice("the mission begins" if is_first else f"the mission is at {now_ms / 1000:.0f} s")
             early, self._early = self._early, []
             for received in early:
                 self._take(received)

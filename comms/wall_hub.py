@@ -141,7 +141,8 @@ class WallHub:
     def _send_time(self, now_s: float) -> None:
         self._time_at_s = now_s + TIME_EVERY_S
         now_ms = self._clock.time.now_ms(time.monotonic()) if self._clock.time.known else None
-        self._line.say(self._keys.time, pack_time(now_ms, self._clock.factor), drop=True)
+        signal = pack_time(now_ms, self._clock.factor, taken_up=self._clock.taken_up)
+        self._line.say(self._keys.time, signal, drop=True)
 
     def _send_words(self) -> None:
         if self._clock.words:

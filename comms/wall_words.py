@@ -74,16 +74,17 @@ def unpack_hello(words: list[Any]) -> Hello:
     raise ControlError("a hello that is none")
 
 
-def pack_time(now_ms: int | None, factor: float) -> bytes:
-    """The time signal: mission time, None before the start, and its factor."""
-    return pack("time", now_ms, factor)
+def pack_time(now_ms: int | None, factor: float, *, taken_up: bool) -> bytes:
+    """The time signal: mission time, None before the start, its factor, and whether the clock has taken it up from
+    others, as one that was started anew."""
+    return pack("time", now_ms, factor, taken_up)
 
 
-def unpack_time(words: list[Any]) -> tuple[int | None, float]:
-    """Mission time and factor of a time signal; raises ControlError."""
+def unpack_time(words: list[Any]) -> tuple[int | None, float, bool]:
+    """The three words of a time signal; raises ControlError."""
     match words:
-        case ["time", None | int() as now_ms, float(factor)] if factor > 0:
-            return now_ms, factor
+        case ["time", None | int() as now_ms, float(factor), bool(taken_up)] if factor > 0:
+            return now_ms, factor, taken_up
     raise ControlError("a time signal that is none")
 
 

@@ -76,12 +76,16 @@ def test_a_wake_up_never_comes_early(bus: Callable[..., BusResult]) -> None:
 
     def ask(now_ms: int) -> Step:
         asked.append(now_ms + 137)
-        return Step(wake_ms=asked[-1])
+        return says(*[say_status("alpha")] * (len(asked) > 5), wake_ms=asked[-1])
+
+    def is_told(received: Received, now_ms: int) -> Step | None:
+        return says(say_state("alpha")) if received.vehicle else None
 
     world = Scripted(starts=ask, wakes=ask)
-    bus({"world": world, "coordinator": ends_at(LATER_MS)}, Notes())
+    coordinator = Scripted(hears=lambda received, now_ms: says(say_over()) if received.vehicle else None)
+    bus({"world": world, "alpha": Scripted(hears=is_told), "coordinator": coordinator}, Notes())
     woken = [int(str(entry[1])) for entry in world.log if entry[0] == "wake"]
-    assert len(woken) > 3
+    assert len(woken) >= 5
     assert all(time_ms >= asked_ms for asked_ms, time_ms in zip(asked, woken, strict=False))
 
 

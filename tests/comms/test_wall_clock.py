@@ -57,14 +57,14 @@ def test_the_mission_starts_when_all_are_there_and_have_heard_the_clock() -> Non
     assert (phase(told), told.missing) == (Phase.WAITING, ["observer"])
     told.hello("observer", hello(), 3.0)
     told.pass_time(3.0)
-    assert phase(told) is Phase.RUNNING
+    assert (phase(told), told.taken_up) == (Phase.RUNNING, False)
     assert told.time.now_ms(3.5) == 5_000
 
 
 def test_a_clock_started_anew_takes_up_the_time_of_whoever_knows_it() -> None:
     told = clock()
     told.hello("beta", hello(now_ms=42_000), 7.0)
-    assert phase(told) is Phase.RUNNING
+    assert (phase(told), told.taken_up) == (Phase.RUNNING, True)
     assert told.time.now_ms(8.0) == 52_000
     told.hello("alpha", hello(now_ms=90_000), 8.0)
     assert told.time.now_ms(8.0) == 52_000

@@ -125,7 +125,9 @@ def test_who_asks_is_given_what_is_kept() -> None:
 
 def test_words_are_passed_on_and_senseless_ones_dropped() -> None:
     post = post_over(FakeLine())
-    assert post.take(Mail("clock/time", pack_time(5, 2.0)), list) == [Words("clock/time", ["time", 5, 2.0])]
+    assert post.take(Mail("clock/time", pack_time(5, 2.0, taken_up=True)), list) == [
+        Words("clock/time", ["time", 5, 2.0, True])
+    ]
     for payload in (b"\xc1", pack("beat", "no number", {}), pack("beat", 0, {"state": "many"})):
         assert post.take(Mail("clock/beat/alpha", payload), list) == []
     assert post.intake.dropped == {"senseless words": 3}
