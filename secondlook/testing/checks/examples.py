@@ -60,7 +60,7 @@ class Checked:
     def against(
         self, check: Callable[..., None], examples: int, *, small: bool = True, **strategies: st.SearchStrategy[Any]
     ) -> None:
-        """Runs a check for so many examples, the same ones each time. `small`: of those that fail a small one is told,
+        """Runs a check for so many examples, drawn from a fixed seed. `small`: of those that fail a small one is told,
         which takes some time."""
         __tracebackhide__ = True
         failures: dict[str, AssertionError] = {}
