@@ -139,7 +139,7 @@ def lockstep_rate(agents: int, processes: int, seconds: float) -> float:
             for child in children:
                 child.join()
             if took_s >= seconds / 2:
-                return result.rounds / took_s
+                return (result.rounds or 0) / took_s
             limit_ms = int(limit_ms * min(20.0, 1.2 * seconds / took_s))  # a round takes 1 ms of the mission
 
 
