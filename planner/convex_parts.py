@@ -21,6 +21,8 @@ ON_A_LINE_M = 1e-6
 """Lengths that differ by no more are taken as equal."""
 BEYOND_M = 1e-3
 """So far a cut reaches beyond the boundary, so that rounding does not leave it short."""
+GRID_M = 1e-4
+"""Corners of what is cut lie on a grid as fine as this: nearer ones would keep further cuts from dividing it."""
 MOST_TO_BRANCH = 40
 """Cuts from which only the one that promises most is followed to its end; of fewer the best two are."""
 
@@ -96,7 +98,8 @@ def _hull(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def _split(polygon: shapely.Polygon, line: shapely.LineString) -> list[shapely.Polygon]:
-    return [piece for piece in split(polygon, line).geoms if isinstance(piece, shapely.Polygon)]
+    pieces = shapely.get_parts(shapely.set_precision(shapely.get_parts(split(polygon, line)), GRID_M))
+    return [piece for piece in pieces if isinstance(piece, shapely.Polygon)]
 
 
 def _is_convex(polygon: shapely.Polygon, shallow_m: float) -> bool:
@@ -137,6 +140,7 @@ def _to(frame: SweepFrame, polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def _part(frame: SweepFrame, piece: shapely.Polygon, track_heading_rad: float) -> SurveyArea:
-    across_m, along_m = np.array(piece.exterior.coords[:-1]).T
-    x_m, y_m = frame.to_mission(across_m, along_m)
-    return SurveyArea(tuple(zip(x_m.tolist(), y_m.tolist(), strict=True)), track_heading_rad)
+    x_m, y_m = frame.to_mission(*shapely.get_coordinates(piece)[:-1].T)
+    # Its corners, turned, may no longer be those of a convex polygon to the last bit.
+    corners = shapely.get_coordinates(shapely.MultiPoint(np.column_stack([x_m, y_m])).convex_hull)[:-1]
+    return SurveyArea(tuple((x, y) for x, y in corners.tolist()), track_heading_rad)
