@@ -76,7 +76,7 @@ def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
 def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook: SecondLook) -> None:
     code, out, _ = secondlook("check", "headland")
     told = re.fullmatch(
-        r"primary: (\d+) tracks along 90 degrees in (\d+) convex parts, \d\.\d km; up to 145 m all is covered",
+        r"primary: (\d+) tracks along 90 degrees in (\d+) convex parts, \d\.\d km; up to 130 m all is covered",
         out.splitlines()[1],
     )
     assert code == 0
