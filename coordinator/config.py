@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coordinator.allocation import Allocator
+from coordinator.situation import Allocator
 
 
 @dataclass(frozen=True)
 class CoordinatorConfig:
     """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
     age of a vehicle's state from which it is taken for lost. `min_strip_m`, `max_strip_m`: length of a strip.
-    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying."""
+    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying.
+    `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round."""
 
     allocator: Allocator
     deadline_factor: float
@@ -19,3 +20,4 @@ class CoordinatorConfig:
     min_strip_m: float
     max_strip_m: float
     worth_risk: float
+    switch_margin: float

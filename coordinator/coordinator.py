@@ -5,19 +5,18 @@ from __future__ import annotations
 
 import logging
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
-import shapely
 
 from comms.codec import Header
 from comms.messages import (
     AgentState,
     CoverageTile,
     Hotspot,
-    HotspotState,
     MissionOver,
     Mode,
+    Plan,
     Role,
     RunInfo,
     StripState,
@@ -29,13 +28,18 @@ from comms.messages import (
 )
 from comms.node import Publication, Received, Step
 from comms.topics import MISSION_OVER, STRIP, TASK
-from coordinator.allocation import FreeHelper, OpenStrip, checked_offers
+from coordinator.badly_seen import BadlySeen
 from coordinator.config import CoordinatorConfig
+from coordinator.growth import Growth
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
+from coordinator.offers import checked_offers
+from coordinator.service import service
+from coordinator.situation import Helper, OpenStrip, Situation
 from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
 from coordinator.vehicles import KnownVehicle
+from coordinator.worth import Supply, worth_later_m2ps
+from planner.dubins import Pose
 from planner.fleet_map import FleetMap
-from planner.groups import neighbours
 from planner.region import Region
 from planner.types import BoolArray, FloatArray, Strip
 
@@ -49,14 +53,6 @@ CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen for the map to agree that it is done
 
 
-@dataclass
-class _Hotspot:
-    revision: tuple[int, int]
-    mean_risk: float
-    growing: bool
-    cells: BoolArray
-
-
 class Coordinator:
     """See the module. All it knows of the fleet it has from the run's announcement and from the agents."""
 
@@ -65,14 +61,18 @@ class Coordinator:
         self.ledger = Ledger()
         self.vehicles: dict[str, KnownVehicle] = {}
         self.map: FleetMap | None = None
+        self._primaries: dict[str, KnownVehicle] = {}
         self._inside: BoolArray
-        self._hotspots: dict[tuple[str, int], _Hotspot] = {}
+        self._badly_seen: BadlySeen
         self._rules: CuttingRules | None = None
         self._tasks = 0
         self._outbox: list[Publication] = []
         self._to_cut = False
         self._cut_by_ms: int | None = None
         self._to_assign = False
+        self._coming: list[Cut] = []
+        self._more_to_come = 0.0  # area that is still to settle, as a multiple of what has
+        self._ripe_ms: int | None = None
         self._over = False
         self._complained_of: set[str] = set()
 
@@ -95,6 +95,8 @@ class Coordinator:
                 self._take_state(vehicle, received.header, message, now_ms)
             elif isinstance(message, TaskStatus) and vehicle is not None:
                 self._take_status(vehicle, received.header, message, now_ms)
+            elif isinstance(message, Plan) and vehicle is not None:
+                vehicle.take_plan(message)
         return self._step(now_ms)
 
     def on_wake(self, now_ms: int) -> Step:
@@ -106,7 +108,7 @@ class Coordinator:
                 self._cut_by_ms = None
                 self._cut(now_ms)
                 self._to_assign = True
-            if self._to_assign:
+            if self._to_assign or (self._ripe_ms is not None and self._ripe_ms <= now_ms):
                 self._to_assign = False
                 self._assign(now_ms)
             self._find_end(now_ms)
@@ -116,7 +118,9 @@ class Coordinator:
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
         self._inside = Region(run.outline, run.hole_outlines).inside(spec)
+        self._badly_seen = BadlySeen(spec, self._inside)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
+        self._primaries = {name: one for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY}
         helpers = [entry for entry in run.vehicles if entry.role is Role.REVISIT]
         if helpers:
             narrowest = min(helpers, key=lambda entry: entry.swath_m)
@@ -153,31 +157,8 @@ class Coordinator:
             log.warning("dropped a message from %s: %s (said once)", vehicle, why)
 
     def _take_hotspot(self, received: Received, message: Hotspot) -> None:
-        assert self.map is not None
         place = (received.vehicle, int(received.key.rsplit("/", 1)[1]))
-        revision = (received.header.incarnation, message.revision)
-        known = self._hotspots.get(place)
-        if known is not None and revision <= known.revision:
-            return
-        cells = np.zeros(self.map.grid.shape, dtype=np.bool_)
-        if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
-            cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
-        self._hotspots[place] = _Hotspot(revision, message.mean_risk, message.growing, cells)
-        self._to_cut = True
-
-    def _cells_within(self, outline: list[tuple[float, float]]) -> BoolArray:
-        assert self.map is not None
-        grid = self.map.grid
-        corners = np.asarray(outline)
-        across, along = grid.frame.to_sweep(corners[:, 0], corners[:, 1])
-        columns = np.flatnonzero((grid.across_m >= across.min()) & (grid.across_m <= across.max()))
-        rows = np.flatnonzero((grid.along_m >= along.min()) & (grid.along_m <= along.max()))
-        cells = np.zeros(grid.shape, dtype=np.bool_)
-        if columns.size and rows.size:
-            u, v = np.meshgrid(grid.across_m[columns], grid.along_m[rows])
-            shape = shapely.Polygon(np.column_stack([across, along]))
-            cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] = shapely.contains_xy(shape, u, v)
-        return cells
+        self._to_cut |= self._badly_seen.take(place, (received.header.incarnation, message.revision), message)
 
     def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost = vehicle.is_idle, vehicle.is_finished, vehicle.lost
@@ -243,7 +224,7 @@ class Coordinator:
         offered = vehicle.offered.get(record.strip.number)
         if record.state is StripState.OPEN and offered is not None:
             if record.strip != offered[0]:
-                self.ledger.revise(record, *offered, record.removable_m2)
+                self.ledger.revise(record, *offered)
                 self._publish_strip(record)
                 self._to_cut = True
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
@@ -295,96 +276,176 @@ class Coordinator:
         assert self.map is not None
         if self._rules is None:
             return
-        grid = self.map.grid
+        grid, primaries = self.map.grid, list(self._primaries)
         taken = [record.window for record in self.ledger.in_state(*WITH_A_VEHICLE)]
-        open_cells = self._still_open()
+        risk = self._badly_seen.risk(self.map, primaries)
+        open_cells = self._badly_seen.still_open(self.map, primaries)
         unmatched = self.ledger.in_state(StripState.OPEN)
-        for cut in cut_strips(grid, self._risk_to_serve(), open_cells, self._rules, taken):
+        self._coming = []
+        growth = self._growth(risk)
+        ahead = int((self._inside & ~self.map.settled_by(primaries) & (growth.settles_s == 0)).sum())
+        self._more_to_come = ahead / max(1, int(self._inside.sum()) - ahead)
+        for cut in cut_strips(grid, risk, open_cells, self._rules, taken, growth):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
-            if same is None or same.window.overlap(cut.window) < SAME_STRIP:
-                number = self.ledger.next_number
-                record = self.ledger.open(
-                    strip_of(grid, cut.window, number), cut.window, cut.removable_m2, now_ms, "badly seen"
-                )
-                self._publish_strip(record)
-            else:
+            if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
                 self._revise(same, cut)
+            elif cut.settles_s > 0:
+                self._coming.append(cut)
+            else:
+                self._open(cut, now_ms)
         for record in unmatched:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
 
-    def _still_open(self) -> BoolArray:
-        """Cells that the survey may still improve: those that tiles tell are not settled; where no tile has come, those
-        in and about hotspots that grow."""
+    def _growth(self, risk: FloatArray) -> Growth:
+        """What the primaries are about to settle on the tracks they fly."""
         assert self.map is not None
-        told_open = self.map.told_by(self._primaries)
-        for hotspot in self._hotspots.values():
-            if hotspot.growing:
-                told_open |= hotspot.cells | neighbours(hotspot.cells)
-        return self._inside & told_open & ~self.map.settled_by(self._primaries)
+        growth = Growth.none(self.map.grid)
+        for name, vehicle in self._primaries.items():
+            under_way, layer = vehicle.track_under_way, self.map.layers.get(name)
+            if under_way is not None and layer is not None:
+                growth.add(self.map.grid, self._inside, risk, layer, under_way)
+        return growth
 
-    @property
-    def _primaries(self) -> dict[str, KnownVehicle]:
-        return {name: one for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY}
+    def _open(self, cut: Cut, now_ms: int) -> StripRecord:
+        number = self.ledger.next_number
+        record = self.ledger.open(self._strip_of(cut, number), cut, now_ms, "badly seen")
+        self._publish_strip(record)
+        return record
+
+    def _strip_of(self, cut: Cut, number: int) -> Strip:
+        assert self.map is not None
+        return strip_of(self.map.grid, cut.window, number, descending=cut.descending)
+
+    def _open_what_is_ripe(self, now_ms: int) -> None:
+        """Opens a strip that is still settling when a free helper that sets out now will not overtake the survey."""
+        helpers = [self._helper(vehicle, now_ms) for vehicle in self.vehicles.values()]
+        free = [helper for helper in helpers if helper is not None and helper.task is None]
+        self._ripe_ms = None
+        for cut in [*self._coming]:
+            one = OpenStrip(self._strip_of(cut, 0), self._risk_m2(cut), cut.settles_s)
+            leaves_ms = min((math.floor(service(one, helper).leaves_s * 1000) for helper in free), default=None)
+            if leaves_ms is None:
+                continue
+            if leaves_ms <= now_ms:
+                self._coming.remove(cut)
+                self._open(cut, now_ms)
+            else:
+                self._ripe_ms = leaves_ms if self._ripe_ms is None else min(leaves_ms, self._ripe_ms)
 
     @property
     def _given_up_after_ms(self) -> int:
         return GIVEN_UP_AFTER * self.config.lost_after_ms
 
-    def _risk_to_serve(self) -> FloatArray:
-        """Residual risk where there are hotspots: the joined map's where tiles have come, else the hotspot's mean."""
-        assert self.map is not None
-        known = self.map.seen() | self.map.settled_by(self._primaries)
-        risk = np.zeros(self.map.grid.shape)
-        for hotspot in self._hotspots.values():
-            cells = hotspot.cells & self._inside
-            np.maximum(risk, np.where(known, self.map.risk, hotspot.mean_risk), out=risk, where=cells)
-        return risk
-
     def _revise(self, record: StripRecord, cut: Cut) -> None:
-        assert self.map is not None
-        same_place = record.window == cut.window
-        if same_place and abs(cut.removable_m2 - record.removable_m2) <= WORTH_SAYING * record.removable_m2:
+        change_m2 = abs(cut.removable_m2 - record.cut.removable_m2)
+        if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.removable_m2:
             return
-        strip = strip_of(self.map.grid, cut.window, record.strip.number)
-        self.ledger.revise(record, strip, cut.window, cut.removable_m2)
+        self.ledger.revise(record, self._strip_of(cut, record.strip.number), cut)
         for vehicle in self.vehicles.values():
-            vehicle.refused.discard(strip.number)
+            vehicle.refused.discard(record.strip.number)
         self._publish_strip(record)
 
     def _assign(self, now_ms: int) -> None:
-        strips = [OpenStrip(record.strip, record.removable_m2) for record in self.ledger.in_state(StripState.OPEN)]
-        helpers = [helper for name in self.vehicles if (helper := self._free_helper(name, now_ms)) is not None]
-        if not strips or not helpers:
+        self._open_what_is_ripe(now_ms)
+        situation = self._situation(now_ms)
+        if not situation.strips or not situation.helpers:
             return
-        for vehicle, number in checked_offers(self.config.allocator.assign(strips, helpers), strips, helpers):
-            record = self.ledger.get(number)
+        helpers = {helper.vehicle: helper for helper in situation.helpers}
+        for name, number in checked_offers(self.config.allocator.assign(situation), situation):
+            record, helper, vehicle = self.ledger.get(number), helpers[name], self.vehicles[name]
             assert record is not None
-            self._say(TaskAction.TAKE, record.strip, vehicle)
-            self.vehicles[vehicle].offered[number] = (record.strip, record.window)
-            self._move(record, StripState.OFFERED, now_ms, f"offered to {vehicle}", vehicle)
+            if helper.task is not None:
+                self._say(TaskAction.GIVE_BACK, helper.task.strip, name)
+                continue
+            self._say(TaskAction.TAKE, record.strip, name)
+            vehicle.offered[number] = (record.strip, record.cut)
+            vehicle.service = service(self._open_strip(record), helper)
+            self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
+
+    def _situation(self, now_ms: int) -> Situation:
+        helpers = (self._helper(vehicle, now_ms) for _, vehicle in sorted(self.vehicles.items()))
+        found = tuple(helper for helper in helpers if helper is not None)
+        deadline_s = self._expected_deadline_s()
+        under_way = (one.track_under_way for one in self._primaries.values())
+        ends_s = [one.ends_s for one in under_way if one is not None]
+        return Situation(
+            now_s=now_ms / 1000,
+            deadline_s=deadline_s,
+            strips=tuple(self._open_strip(record) for record in self.ledger.in_state(StripState.OPEN)),
+            helpers=found,
+            coming=tuple(OpenStrip(self._strip_of(cut, 0), self._risk_m2(cut), cut.settles_s) for cut in self._coming),
+            switch_margin=self.config.switch_margin,
+            later_m2ps=self._worth_later_m2ps(found, deadline_s),
+            later_s=min(ends_s, default=math.inf),
+        )
+
+    def _worth_later_m2ps(self, helpers: Sequence[Helper], deadline_s: float) -> float:
+        """Of what is open, and of what is to come if the rest of the area is like what has settled."""
+        rules = self._rules
+        if rules is None or not helpers or math.isinf(deadline_s):
+            return 0.0
+        speed_mps = sum(one.speed_mps for one in helpers) / len(helpers)
+        cell_m = self.map.grid.cell_m if self.map else 1.0
+
+        def supply(cut: Cut, count: float) -> Supply:
+            length_m = (cut.window.end_row - cut.window.first_row) * cell_m
+            return Supply(cut.removable_m2, (length_m + rules.overhead_m) / speed_mps, count)
+
+        supplies = [supply(cut, 1.0 + self._more_to_come) for cut in self._coming]
+        for record in self.ledger:
+            if record.state is not StripState.WITHDRAWN:
+                there = 1.0 if record.state is StripState.OPEN else 0.0
+                supplies.append(supply(record.cut, there + self._more_to_come))
+        return worth_later_m2ps(supplies, sum(max(0.0, deadline_s - one.free_s) for one in helpers))
+
+    def _expected_deadline_s(self) -> float:
+        ends_ms = [one.expected_end_ms for one in self._primaries.values()]
+        known_ms = [end_ms for end_ms in ends_ms if end_ms is not None]
+        if not known_ms or len(known_ms) < len(ends_ms):
+            return math.inf
+        return max(known_ms) * self.config.deadline_factor / 1000
+
+    def _open_strip(self, record: StripRecord) -> OpenStrip:
+        return OpenStrip(record.strip, self._risk_m2(record.cut), record.cut.settles_s)
+
+    def _risk_m2(self, cut: Cut) -> float:
+        assert self._rules is not None
+        return cut.removable_m2 / self._rules.p_detect
 
     def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:
         self._tasks += 1
         task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
         self._outbox.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
 
-    def _free_helper(self, name: str, now_ms: int) -> FreeHelper | None:
-        vehicle = self.vehicles[name]
+    def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
+        """A helper as an allocator sees it; None where it is lost or can be given nothing."""
         state, entry = vehicle.state, vehicle.entry
-        if entry.role is not Role.REVISIT or not vehicle.is_idle or state is None:
+        if entry.role is not Role.REVISIT or vehicle.lost or state is None or vehicle.is_finished:
             return None
-        if any(record.vehicle == name for record in self.ledger.in_state(*WITH_A_VEHICLE)):
+        records = [one for one in self.ledger.in_state(*WITH_A_VEHICLE) if one.vehicle == entry.vehicle]
+        if not records and not vehicle.is_idle:
             return None
-        return FreeHelper(
-            vehicle=name,
-            x_m=state.x_m,
-            y_m=state.y_m,
-            heading_rad=state.heading_rad,
+        pose = Pose(state.x_m, state.y_m, state.heading_rad)
+        free_at, free_ms = pose, now_ms
+        if records and vehicle.service is not None:
+            ends_ms = round(vehicle.service.free_s * 1000)
+            if state.works_on == records[0].strip.number and state.expected_end_ms > 0:
+                ends_ms = state.expected_end_ms
+            free_at, free_ms = vehicle.service.free_at, max(now_ms, ends_ms)
+        return Helper(
+            vehicle=entry.vehicle,
+            pose=pose,
+            free_at=free_at,
+            free_s=free_ms / 1000,
+            task=self._open_strip(records[0]) if records else None,
             speed_mps=entry.speed_mps,
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
-            lasts_s=state.battery * entry.endurance_ms / 1000,
+            swath_m=2 * entry.swath_m,
+            p_detect=entry.p_detect,
+            lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
+            sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
             refused=frozenset(
                 record.strip.number for record in self.ledger.in_state(StripState.OPEN) if vehicle.is_not_for_it(record)
             ),
@@ -422,7 +483,7 @@ class Coordinator:
             heading_rad=strip.heading_rad,
             length_m=strip.length_m,
             width_m=strip.width_m,
-            removable_m2=record.removable_m2,
+            removable_m2=record.cut.removable_m2,
             vehicle=record.vehicle,
             reason=record.reason[:200],
         )
@@ -440,8 +501,7 @@ class Coordinator:
             return now_ms + 1
         times = [one.heard_ms + self.config.lost_after_ms for one in self.vehicles.values() if not one.lost]
         times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
-        if self._cut_by_ms is not None:
-            times.append(self._cut_by_ms)
+        times += [one for one in (self._cut_by_ms, self._ripe_ms) if one is not None]
         surveying = [one for one in self._primaries.values() if one.finished_ms is None]
         times += [one.heard_ms + self._given_up_after_ms for one in surveying]
         if not surveying:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from comms.messages import StripState
-from coordinator.strips import Window
+from coordinator.strips import Cut, Window
 from planner.types import Strip
 
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
@@ -26,16 +26,20 @@ _ALLOWED: dict[StripState, frozenset[StripState]] = {
 
 @dataclass
 class StripRecord:
-    """One strip: where it is, what it is worth, how it stands, with whom, since when and why."""
+    """One strip: where it is, what it was cut from and is worth, how it stands, with whom, since when and why."""
 
     strip: Strip
-    window: Window
-    removable_m2: float
+    cut: Cut
     state: StripState
     revision: int
     vehicle: str
     since_ms: int
     reason: str
+
+    @property
+    def window(self) -> Window:
+        """The cells that it was cut from."""
+        return self.cut.window
 
 
 class Ledger:
@@ -43,6 +47,7 @@ class Ledger:
 
     def __init__(self) -> None:
         self._records: dict[int, StripRecord] = {}
+        self._by_state: dict[StripState, set[int]] = {state: set() for state in StripState}
 
     def __iter__(self) -> Iterator[StripRecord]:
         return iter(self._records.values())
@@ -56,27 +61,30 @@ class Ledger:
         """The number of the next new strip."""
         return len(self._records) + 1
 
-    def open(self, strip: Strip, window: Window, removable_m2: float, now_ms: int, reason: str) -> StripRecord:
+    def open(self, strip: Strip, cut: Cut, now_ms: int, reason: str) -> StripRecord:
         """Enters a new strip, which has the next number."""
         if strip.number != self.next_number:
             raise ValueError(f"strip {strip.number} cannot be opened: the next number is {self.next_number}")
-        record = StripRecord(strip, window, removable_m2, StripState.OPEN, 1, "", now_ms, reason)
+        record = StripRecord(strip, cut, StripState.OPEN, 1, "", now_ms, reason)
         self._records[strip.number] = record
+        self._by_state[record.state].add(strip.number)
         return record
 
-    def revise(self, record: StripRecord, strip: Strip, window: Window, removable_m2: float) -> None:
+    def revise(self, record: StripRecord, strip: Strip, cut: Cut) -> None:
         """Changes where an open strip is and what it is worth."""
         if record.state is not StripState.OPEN:
             raise ValueError(f"strip {record.strip.number} is {record.state.value}: only an open one can be revised")
         if strip.number != record.strip.number:
             raise ValueError(f"strip {record.strip.number} cannot be revised as strip {strip.number}")
-        record.strip, record.window, record.removable_m2 = strip, window, removable_m2
+        record.strip, record.cut = strip, cut
         record.revision += 1
 
     def move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> bool:
         """Moves a strip to a state; returns False, and changes nothing, where its present state does not allow it."""
         if state not in _ALLOWED[record.state]:
             return False
+        self._by_state[record.state].discard(record.strip.number)
+        self._by_state[state].add(record.strip.number)
         record.state, record.since_ms, record.reason = state, now_ms, reason
         record.vehicle = vehicle if state in WITH_A_VEHICLE or state in ENDED else ""
         record.revision += 1
@@ -84,4 +92,4 @@ class Ledger:
 
     def in_state(self, *states: StripState) -> list[StripRecord]:
         """Records in one of these states, by number."""
-        return [record for record in self._records.values() if record.state in states]
+        return [self._records[number] for number in sorted(set().union(*(self._by_state[state] for state in states)))]

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from coordinator.growth import Growth
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
 MOST_STRIPS_A_CUT = 100
@@ -66,14 +67,22 @@ class Window:
 
 @dataclass(frozen=True)
 class Cut:
-    """A strip's window and the risk that one look along it is expected to remove (residual risk times m2)."""
+    """A strip's window and the risk that one look along it is expected to remove (residual risk times m2).
+    `settles_s`: when all of it will have settled, 0 if it has; `descending`: whether it runs down the rows."""
 
     window: Window
     removable_m2: float
+    settles_s: float = 0.0
+    descending: bool = False
 
 
 def cut_strips(
-    grid: GridSpec, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules, taken: Sequence[Window] = ()
+    grid: GridSpec,
+    risk: FloatArray,
+    open_cells: BoolArray,
+    rules: CuttingRules,
+    taken: Sequence[Window] = (),
+    growth: Growth | None = None,
 ) -> list[Cut]:
     """The strips worth flying, best first.
 
@@ -82,7 +91,11 @@ def cut_strips(
     from `min_strip_m` to `max_strip_m` long, in whole cells. Best first: by what a run of rows removes beyond its cost.
     `taken`: strips that are being served; their cells count as looked at. No strip lies by three quarters or more on
     another one, or on one that is taken: whether a place is worth two looks is asked when it has had the first.
+    `growth`: what is about to settle counts as if it had.
     """
+    growth = growth or Growth.none(grid)
+    risk = np.where(growth.settles_s > 0, growth.risk, risk)
+    open_cells = open_cells & (growth.settles_s == 0)
     width = min(grid.columns, max(1, math.floor(rules.swath_m / grid.cell_m + TOLERANCE)))
     removable = risk * (rules.p_detect * grid.cell_area_m2)
     looked_at = list(taken)
@@ -92,11 +105,21 @@ def cut_strips(
     fixed_cost = row_cost * rules.overhead_m / grid.cell_m
     shortest = max(1, round(rules.min_strip_m / grid.cell_m))
     longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
-    profit = _window_sums(removable, width) - row_cost
-    touched = _window_sums(open_cells.astype(np.float64), width) > 0
+    windows = grid.columns - width + 1
+    profit = np.zeros((grid.rows, windows))
+    value, first_row, end_row = np.zeros(windows), np.zeros(windows, dtype=np.intp), np.zeros(windows, dtype=np.intp)
+
+    def look(columns: slice) -> None:
+        """Looks for the best run in these columns' windows."""
+        near = slice(max(0, columns.start - width + 1), min(windows, columns.stop))
+        profit[:, near] = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
+        value[near], first_row[near], end_row[near] = _best_runs(profit[:, near])
+
+    bad = np.flatnonzero(removable.any(axis=0))
+    if bad.size:
+        look(slice(int(bad[0]), int(bad[-1]) + 1))
     cuts: list[Cut] = []
     for _ in range(MOST_STRIPS_A_CUT):
-        value, first_row, end_row = _best_runs(profit)
         best = float(value.max())
         if best <= fixed_cost:
             break
@@ -104,32 +127,37 @@ def cut_strips(
         rows = (int(first_row[column]), int(end_row[column]))
         column = _centred(removable[rows[0] : rows[1]], column, width)
         run = Window(*rows, column, column + width)
-        least = longest if _touches(touched[:, column], rows) else shortest
+        beside = slice(max(0, rows[0] - 1), rows[1] + 1), slice(column, column + width)
+        least = longest if open_cells[beside].any() else shortest
         if rows[1] - rows[0] < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
             removable[run.cells] = 0.0  # the search goes on elsewhere
         else:
             for begin, end in _pieces(*rows, shortest, longest):
                 window = Window(begin, end, column, column + width)
-                cut = Cut(window, float(removable[window.cells].sum()))
+                settles_s = float(growth.settles_s[window.cells].max())
+                descending = bool(growth.descending[window.cells].any())
+                cut = Cut(window, float(removable[window.cells].sum()), settles_s, descending)
                 if cut.removable_m2 - (end - begin) * row_cost > fixed_cost:
                     cuts.append(cut)
                     looked_at.append(window)
                     removable[window.cells] *= 1.0 - rules.p_detect
                 else:
                     removable[window.cells] = 0.0
-        near = slice(max(0, column - width + 1), column + width)
-        profit[:, near] = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
+        look(slice(column, column + width))
     return cuts
 
 
-def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
-    """The rectangle of a window, with its centre line along the grid."""
+def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = False) -> Strip:
+    """The rectangle of a window, with its centre line along the grid, up or down the rows."""
     across_m = ((window.first_column + window.end_column - 1) / 2) * grid.cell_m
-    x_m, y_m = grid.frame.to_mission(across_m, window.first_row * grid.cell_m)
+    heading_rad = grid.frame.heading_rad
+    if descending:
+        heading_rad = (heading_rad + math.pi) % (2 * math.pi)
+    x_m, y_m = grid.frame.to_mission(across_m, (window.end_row if descending else window.first_row) * grid.cell_m)
     start: Point = (float(x_m), float(y_m))
     length_m = (window.end_row - window.first_row) * grid.cell_m
     width_m = (window.end_column - window.first_column) * grid.cell_m
-    return Strip(number, start, grid.frame.heading_rad, length_m, width_m)
+    return Strip(number, start, heading_rad, length_m, width_m)
 
 
 def _window_sums(values: FloatArray, width: int) -> FloatArray:
@@ -150,11 +178,6 @@ def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
     lowest = np.take_along_axis(lowest_before, end_row[np.newaxis], axis=0)
     first_row = (total == lowest).argmax(axis=0)
     return value, first_row, end_row
-
-
-def _touches(touched: BoolArray, rows: tuple[int, int]) -> bool:
-    first, end = rows
-    return bool(touched[max(0, first - 1) : min(touched.size, end + 1)].any())
 
 
 def _centred(removable: FloatArray, column: int, width: int) -> int:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from comms.codec import Header
-from comms.messages import AgentState, Mode, RosterVehicle
+from comms.messages import AgentState, Mode, Plan, RosterVehicle
+from coordinator.expected_end import expected_end_ms
+from coordinator.growth import TrackUnderWay
 from coordinator.ledger import StripRecord
-from coordinator.strips import SAME_PLACE, Window
+from coordinator.service import Service
+from coordinator.strips import SAME_PLACE, Cut, Window
 from planner.types import Strip
 
 Order = tuple[int, int]
@@ -22,7 +25,8 @@ class KnownVehicle:
 
     `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was given up; for a primary.
     `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: by number the strips
-    that it was offered, as they were then, and the windows they were cut from.
+    that it was offered, as they were then, and what they were cut from. `plan`: its newest one, for a primary.
+    `service`: of the strip that it was offered last, as expected then.
     """
 
     entry: RosterVehicle
@@ -32,7 +36,9 @@ class KnownVehicle:
     finished_ms: int | None = None
     refused: set[int] = field(default_factory=set)
     failed_at: list[Window] = field(default_factory=list)
-    offered: dict[int, tuple[Strip, Window]] = field(default_factory=dict)
+    offered: dict[int, tuple[Strip, Cut]] = field(default_factory=dict)
+    plan: Plan | None = None
+    service: Service | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
 
@@ -60,6 +66,28 @@ class KnownVehicle:
         elif self.finished_ms is None:
             self.finished_ms = now_ms
         return True
+
+    def take_plan(self, plan: Plan) -> None:
+        """Takes its plan, if it is newer than the newest."""
+        if self.plan is None or plan.revision > self.plan.revision:
+            self.plan = plan
+
+    @property
+    def expected_end_ms(self) -> int | None:
+        """When a primary has surveyed all, or is expected to have; None where nobody can tell."""
+        if self.finished_ms is not None:
+            return self.finished_ms
+        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms)
+
+    @property
+    def track_under_way(self) -> TrackUnderWay | None:
+        """The track that a primary flies; None where it flies none, or not yet, or nobody can tell."""
+        if self.lost or self.state is None or self.plan is None or self.state.mode is not Mode.SURVEY:
+            return None
+        track = next((one for one in self.plan.tracks if one.number == self.state.works_on and not one.flown), None)
+        if track is None or self.state.expected_end_ms == 0:
+            return None
+        return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; takes note of it."""

@@ -126,6 +126,62 @@ def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
     )
 
 
+def path_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -> FloatArray:
+    """Lengths of the shortest paths from every start to every end, as `shortest_path` finds them.
+
+    Args:
+        starts: shape (n, 3): x_m, y_m, heading_rad; finite.
+        ends: shape (m, 3), likewise.
+        turn_radius_m: the tightest turn, > 0.
+
+    Returns:
+        Shape (n, m).
+    """
+    turned = []
+    for poses in (starts, ends):
+        # Centres of the turns to starboard and to port, in turn radii, and the heading counterclockwise from east.
+        x, y, heading = poses[:, 0] / turn_radius_m, poses[:, 1] / turn_radius_m, poses[:, 2]
+        sin, cos = np.sin(heading), np.cos(heading)
+        turned.append((math.pi / 2 - heading, {1: (x + cos, y - sin), -1: (x - cos, y + sin)}))
+    (alpha, from_centres), (beta, to_centres) = turned
+    alpha, beta = alpha[:, np.newaxis], beta[np.newaxis]
+    best = np.full((starts.shape[0], ends.shape[0]), np.inf)
+    for side in (-1, 1):
+        for last in (side, -side):
+            x = to_centres[last][0][np.newaxis] - from_centres[side][0][:, np.newaxis]
+            y = to_centres[last][1][np.newaxis] - from_centres[side][1][:, np.newaxis]
+            square = x * x + y * y
+            direction = np.arctan2(y, x)
+            if last == side:
+                between = np.sqrt(square)
+                apart = between >= _TOLERANCE
+                first = _turns(np.where(apart, -side * (direction - alpha), 0.0))
+                second = _turns(-side * (beta - np.where(apart, direction, alpha)))
+                np.minimum(best, first + np.where(apart, between, 0.0) + second, out=best)
+                near = np.flatnonzero(apart & (between <= 4))
+                if near.size:
+                    middle = _FULL_TURN_RAD - 2 * np.arcsin(between.flat[near] / 4)
+                    rows, columns = np.divmod(near, best.shape[1])
+                    towards = -side * (direction.flat[near] - alpha[rows, 0])
+                    first = _turns(towards + middle / 2)
+                    third = _turns(-side * (beta[0, columns] - alpha[rows, 0]) - first + middle)
+                    best.flat[near] = np.minimum(best.flat[near], first + middle + third)
+            else:
+                possible = square - 4 >= -_TOLERANCE
+                straight = np.sqrt(np.maximum(square - 4, 0.0))
+                lean = -side * direction + np.arctan2(2, straight)
+                length = _turns(lean + side * alpha) + straight + _turns(lean + side * beta)
+                np.minimum(best, length, out=best, where=possible)
+    return best * turn_radius_m
+
+
+def _turns(angles_rad: FloatArray) -> FloatArray:
+    """As `_turn`, for arrays."""
+    wrapped = angles_rad % _FULL_TURN_RAD
+    wrapped[_FULL_TURN_RAD - wrapped < _ANGLE_TOLERANCE_RAD] = 0.0
+    return wrapped
+
+
 def _words(distance: float, alpha: float, beta: float) -> Iterator[tuple[float, int, int, tuple[float, float, float]]]:
     """The candidates that begin with a turn to port, for a turn radius of 1.
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 
 from planner.dubins import Pose, shortest_path
-from planner.types import Strip, SweepFrame, Track
+from planner.types import Point, Strip, SweepFrame, Track
 
 LENGTH_TOLERANCE_M = 1e-6
 
@@ -44,27 +44,33 @@ def cheapest_entry(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m
         raise ValueError("a sweep has at least one leg")
     if not (math.isfinite(run_in_m) and run_in_m >= 0):
         raise ValueError(f"the run-in must be finite and 0 or more, not {run_in_m} m")
-    turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
     best, best_m = legs, math.inf
-    for way in (legs, legs[::-1], turned, turned[::-1]):
+    for way in ways_over(legs):
         distance_m = _distance_m(way, pose, turn_radius_m, run_in_m)
         if distance_m < best_m - LENGTH_TOLERANCE_M:
             best, best_m = way, distance_m
     return [replace(leg, number=number) for number, leg in enumerate(best, start=1)], best_m
 
 
+def ways_over(legs: list[Track]) -> list[list[Track]]:
+    """The ways to fly legs in sequence: from the first or from the last, in their directions or all turned round."""
+    turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
+    return [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
+
+
 def _distance_m(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> float:
     total_m = 0.0
     for index, leg in enumerate(legs):
-        entry = _shifted(leg.start, leg.heading_rad, -run_in_m)
+        entry = shifted(leg.start, leg.heading_rad, -run_in_m)
         total_m += shortest_path(pose, entry, turn_radius_m).length_m + run_in_m + leg.length_m
         if index + 1 < len(legs):
             total_m += run_in_m
-            pose = _shifted(leg.end, leg.heading_rad, run_in_m)
+            pose = shifted(leg.end, leg.heading_rad, run_in_m)
     return total_m
 
 
-def _shifted(point: tuple[float, float], heading_rad: float, distance_m: float) -> Pose:
+def shifted(point: Point, heading_rad: float, distance_m: float) -> Pose:
+    """The pose a distance ahead of a point, negative for behind it."""
     return Pose(
         point[0] + distance_m * math.sin(heading_rad), point[1] + distance_m * math.cos(heading_rad), heading_rad
     )

@@ -221,4 +221,5 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
         worth_risk=scenario.coordinator.worth_risk,
+        switch_margin=scenario.coordinator.switch_margin,
     )

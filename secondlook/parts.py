@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from coordinator.allocation import GreedyAllocator, NoAllocator
+from coordinator.allocators import ALLOCATORS
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 
 _OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
@@ -95,8 +95,8 @@ def _import(module: str, name: str) -> Any:
 
 ALLOCATOR = PartKind(
     "an allocator",
-    methods={"assign": ("strips", "helpers")},
-    ours={"greedy": GreedyAllocator, "none": NoAllocator},
+    methods={"assign": ("situation",)},
+    ours=ALLOCATORS,
 )
 SPACING = PartKind(
     "a spacing planner",

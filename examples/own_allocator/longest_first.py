@@ -1,10 +1,10 @@
 class LongestFirst:
     """Gives every free helper the longest strip that is left and that it has not refused."""
 
-    def assign(self, strips, helpers):
-        left = sorted((one.strip for one in strips), key=lambda strip: -strip.length_m)
+    def assign(self, situation):
+        left = sorted((one.strip for one in situation.strips), key=lambda strip: -strip.length_m)
         offers = {}
-        for helper in helpers:
+        for helper in situation.free:
             strip = next((one for one in left if one.number not in helper.refused), None)
             if strip is not None:
                 left.remove(strip)

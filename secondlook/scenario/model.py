@@ -66,15 +66,16 @@ class Coordinator(Mapping):
     `allocator`: ours by name, or `package.module:Class` of your own; `node`: the same for the whole coordinator.
     `lost_after_s`: age of a vehicle's last state from which it counts as lost. `min_strip_m`, `max_strip_m`: length
     of a strip. `worth_risk`: mean residual risk over a helper's swath from which a further metre of strip is worth
-    flying.
+    flying. `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
     """
 
-    allocator: Annotated[str, part(ALLOCATOR)] = "greedy"
+    allocator: Annotated[str, part(ALLOCATOR)] = "plan"
     node: Annotated[str, part(NODE)] | None = None
     lost_after_s: Duration = 30.0
     min_strip_m: Length = 30.0
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
     worth_risk: OpenShare = 0.3
+    switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
 
     @field_validator("max_strip_m")
     @classmethod

@@ -68,7 +68,7 @@ BEGINNING = [
 def test_the_coordinator(
     allocator: GreedyAllocator | NoAllocator, run: object, sensible: bool, mail: list[Letter]
 ) -> None:
-    node = OneNode(Coordinator(CoordinatorConfig(allocator, 1.05, 30_000, 30, 150, 0.3)), Role.COORDINATOR)
+    node = OneNode(Coordinator(CoordinatorConfig(allocator, 1.05, 30_000, 30, 150, 0.3, 0.2)), Role.COORDINATOR)
     deliver(node, [Letter("run", run, 1, None, 0), *(BEGINNING if sensible else []), *mail])
     strips: dict[int, StripStatus] = {}
     for one in node.said:

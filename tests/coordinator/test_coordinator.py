@@ -27,9 +27,10 @@ from comms.messages import (
     TaskStatus,
     Vertex,
 )
-from coordinator.allocation import Allocator, GreedyAllocator, NoAllocator
+from coordinator.allocation import GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
+from coordinator.situation import Allocator
 from planner.risk import to_levels
 from planner.tiles import tiles
 
@@ -145,6 +146,7 @@ def coordinator(
         min_strip_m=30,
         max_strip_m=max_strip_m,
         worth_risk=0.3,
+        switch_margin=0.2,
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
     told.node.hear("run", run_info(400, 400, vehicles=vehicles), at_ms=1)
@@ -193,8 +195,8 @@ class TestFromHotspotToTask:
 
     def test_where_tiles_have_come_the_map_counts(self) -> None:
         told = coordinator()
-        risk = np.ones(GRID.shape)
-        risk[10:40, 20:30] = 0.1  # the southern half was seen well after all
+        risk = np.full(GRID.shape, 0.1)
+        risk[40:70, 20:30] = 1.0  # the southern half was seen well after all
         told.layer(PRIMARY, risk)
         told.hotspot(mean_risk=0.8)
         told.settle()
@@ -249,12 +251,14 @@ class TestFromHotspotToTask:
         told = coordinator()
         settled = np.zeros(GRID.shape, dtype=np.bool_)
         settled[10:70, :40] = True
-        told.layer(PRIMARY, np.ones(GRID.shape), settled)
+        risk = np.full(GRID.shape, 0.1)
+        risk[HOT_CELLS] = 1.0
+        told.layer(PRIMARY, risk, settled)
         told.hotspot()
         told.settle()
         assert told.strips() == {}
         settled[:] = True
-        told.layer(PRIMARY, np.ones(GRID.shape), settled)
+        told.layer(PRIMARY, risk, settled)
         told.hotspot(revision=2)
         told.settle()
         assert told.states() == {1: OFFERED}
@@ -367,7 +371,7 @@ class TestHowAStripGoesOn:
         told = coordinator(idle=())
         told.hotspot()
         told.settle()
-        told.layer(PRIMARY, looked())
+        told.layer(PRIMARY, np.full(GRID.shape, 0.3))
         told.keep_alive([PRIMARY], 61)
         assert told.states() == {1: WITHDRAWN}
 
@@ -531,8 +535,7 @@ class TestTheEnd:
 
     def test_it_waits_for_a_last_hotspot_that_comes_with_the_last_state(self) -> None:
         told = coordinator()
-        told.node.wait_until(9_999)
-        told.node.now_ms = 10_000
+        told.keep_alive([PRIMARY, HELPER], 3000)
         told.hotspot()
         told.state(PRIMARY, Mode.FINISHED)
         told.settle()
@@ -711,7 +714,7 @@ class TestLateRepeatedAndReordered:
         assert told.states() == {1: ACCEPTED}
 
     def test_before_the_run_is_announced_it_listens_to_nobody(self) -> None:
-        config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30, 400, 0.3)
+        config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30, 400, 0.3, 0.2)
         told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
         told.hotspot()
         told.state(HELPER, Mode.IDLE)

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 
 from comms.messages import StripState
 from coordinator.ledger import ENDED, WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.strips import Window
+from coordinator.strips import Cut, Window
 from planner.types import Strip
 
 OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN = StripState
 WINDOW = Window(0, 10, 0, 10)
+CUT = Cut(WINDOW, 100)
 ALLOWED = {
     (OPEN, OFFERED),
     (OPEN, WITHDRAWN),
@@ -47,7 +48,7 @@ def strip(number: int) -> Strip:
 
 
 def opened(ledger: Ledger) -> StripRecord:
-    return ledger.open(strip(ledger.next_number), WINDOW, 100, 5, "badly seen")
+    return ledger.open(strip(ledger.next_number), CUT, 5, "badly seen")
 
 
 @pytest.mark.parametrize(("before", "after"), list(product(StripState, StripState)))
@@ -89,18 +90,18 @@ def test_a_number_is_given_once_and_in_order(number: int) -> None:
     ledger = Ledger()
     first = opened(ledger)
     with pytest.raises(ValueError, match="the next number is 2"):
-        ledger.open(strip(number), WINDOW, 1, 5, "")
+        ledger.open(strip(number), CUT, 5, "")
     assert list(ledger) == [first]
 
 
 def test_only_an_open_strip_is_revised() -> None:
     ledger = Ledger()
     record = opened(ledger)
-    ledger.revise(record, Strip(1, (5, 5), 0, 60, 50), Window(1, 13, 0, 10), 120)
-    assert (record.strip.length_m, record.window.end_row, record.removable_m2, record.revision) == (60, 13, 120, 2)
+    ledger.revise(record, Strip(1, (5, 5), 0, 60, 50), Cut(Window(1, 13, 0, 10), 120))
+    assert (record.strip.length_m, record.window.end_row, record.cut.removable_m2, record.revision) == (60, 13, 120, 2)
     ledger.move(record, OFFERED, 10, "", "alpha")
     with pytest.raises(ValueError, match="only an open one can be revised"):
-        ledger.revise(record, strip(1), WINDOW, 1)
+        ledger.revise(record, strip(1), CUT)
     assert record.strip.length_m == 60
 
 
@@ -108,7 +109,7 @@ def test_a_revised_strip_keeps_its_number() -> None:
     ledger = Ledger()
     record = opened(ledger)
     with pytest.raises(ValueError, match="strip 1 cannot be revised as strip 2"):
-        ledger.revise(record, strip(2), WINDOW, 120)
+        ledger.revise(record, strip(2), CUT)
 
 
 @given(st.lists(st.sampled_from(StripState), max_size=30))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.dubins import Pose, shortest_path
+from planner.dubins import Pose, path_lengths_m, shortest_path
 
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -213,3 +213,14 @@ class TestPlacesBeyondTheEnds:
 def test_refuses_what_makes_no_path(end: Pose, radius_m: float) -> None:
     with pytest.raises(ValueError, match="finite poses and a turn radius above 0"):
         shortest_path(Pose(0, 0, 0), end, radius_m)
+
+
+@settings(max_examples=100)
+@given(starts=st.lists(poses, min_size=1, max_size=4), ends=st.lists(poses, min_size=1, max_size=4), radius_m=radii)
+def test_the_lengths_of_many_paths_are_those_of_each(starts: list[Pose], ends: list[Pose], radius_m: float) -> None:
+    near = [Pose(start.x_m + radius_m, start.y_m, end.heading_rad) for start, end in zip(starts, ends, strict=False)]
+    ends = [*ends, *starts, *near]
+    lengths_m = path_lengths_m(np.array(starts), np.array(ends), radius_m)
+    for row, start in zip(lengths_m, starts, strict=True):
+        for length_m, end in zip(row, ends, strict=True):
+            assert length_m == pytest.approx(shortest_path(start, end, radius_m).length_m, abs=1e-6)

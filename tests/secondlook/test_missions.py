@@ -94,7 +94,9 @@ class TestEveryMission:
                 assert serving.pop(received.vehicle) == status.strip
         assert serving == {}
 
-    def test_a_strip_that_is_published_while_a_helper_is_free_is_assigned_within_5_s(self, mission: Flown) -> None:
+    def test_a_helper_hardly_ever_waits_while_a_strip_is_open(self, mission: Flown) -> None:
+        # The plan lets a helper wait only for what is about to settle and is better.
+        before_ms, waits, waited_ms = 0, False, 0
         free_since: dict[str, int] = {}
         strips: dict[int, StripStatus] = {}
         open_since: dict[int, int] = {}
@@ -116,8 +118,10 @@ class TestEveryMission:
             busy = {strip.vehicle for strip in strips.values() if strip.state in WITH_A_VEHICLE}
             free_ms = max((ms for name, ms in free_since.items() if name not in busy), default=math.inf)
             open_ms = max(open_since.values(), default=math.inf)
-            assert now_ms - max(free_ms, open_ms) <= 5000
+            waited_ms += now_ms - before_ms if waits else 0
+            before_ms, waits = now_ms, math.isfinite(free_ms) and math.isfinite(open_ms)
         assert held > 10
+        assert waited_ms <= 0.05 * mission.result.mission_ms
         assert mission.summary["hotspots"]["first_published_s"] < 0.2 * mission.summary["primary_s"]
 
     def test_the_helper_never_makes_it_worse(self, mission: Flown) -> None:
@@ -186,7 +190,7 @@ class TestABadLink:
         assert mission.summary["risk"]["mean"] < mission.summary["risk_primary_alone"]["mean"] - 0.02
 
     def test_a_helper_cut_off_in_mid_strip_goes_on_with_it_when_it_is_heard_again(self) -> None:
-        cut_off = Faults(5, cut_offs=[CutOff("helper", 500_000, 600_000)])
+        cut_off = Faults(5, cut_offs=[CutOff("helper", 250_000, 350_000)])
         mission = fly_scenario(load_scenario("tellaro", HALF_THE_AREA, 1), cut_off)
         assert {task.action for _, task in mission.all(Task)} == {TaskAction.TAKE}
         reasons = [status.reason for _, status in mission.all(StripStatus)]

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from coordinator.allocators import ALLOCATORS
 from secondlook.scenario import load_scenario
 
 OWN = """
@@ -20,27 +21,27 @@ from sim_world.sonar import CurveSonar
 from vehicle_agent.survey import SurveyAgent
 
 class LastFirst:
-    def assign(self, strips, helpers):
-        return {helper.vehicle: strip.strip.number for helper, strip in zip(helpers, reversed(strips))}
+    def assign(self, situation):
+        return {helper.vehicle: one.strip.number for helper, one in zip(situation.free, reversed(situation.strips))}
 
-class NoHelpers:
-    def assign(self, strips):
+class OldFashioned:
+    def assign(self, strips, helpers):
         return {}
 
 class Clueless:
-    def assign(self, strips, helpers):
+    def assign(self, situation):
         raise RuntimeError("no idea")
 
 class ToThePrimary:
-    def assign(self, strips, helpers):
-        return {"primary": strips[0].strip.number}
+    def assign(self, situation):
+        return {"primary": situation.strips[0].strip.number}
 
 class Vague:
-    def assign(self, strips, helpers):
-        return {helper.vehicle: float("nan") for helper in helpers}
+    def assign(self, situation):
+        return {helper.vehicle: float("nan") for helper in situation.free}
 
 class Speechless:
-    def assign(self, strips, helpers):
+    def assign(self, situation):
         return None
 
 class Every60:
@@ -69,6 +70,8 @@ def not_a_curve():
 
 fine = "words"
 """
+
+OURS = ", ".join(ALLOCATORS)
 
 BAY = """
 name: bay
@@ -139,14 +142,17 @@ def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path) -> Non
 @pytest.mark.parametrize(
     ("setting", "allowed"),
     [
-        ("coordinator.allocator=own:NoHelpers", "an allocator must have assign(strips, helpers); too many positional"),
+        ("coordinator.allocator=own:OldFashioned", "an allocator must have assign(situation); missing a required"),
         ("coordinator.allocator=own:Missing", "must be importable; own has no Missing"),
         ("coordinator.allocator=nowhere:X", "must be importable; ModuleNotFoundError: No module named 'nowhere'"),
         (
             "coordinator.allocator=own:fine",
-            "must be greedy, none or package.module:Class of an allocator; that is a str",
+            f"must be {OURS} or package.module:Class of an allocator; that is a str",
         ),
-        ("coordinator.allocator=own:tent:x", "must be greedy, none or package.module:Class of an allocator"),
+        (
+            "coordinator.allocator=own:tent:x",
+            f"must be {OURS} or package.module:Class of an allocator",
+        ),
         ("vehicles.primary.spacing=own:LastFirst", "own:LastFirst must take (nadir_gap_m, told_range_m); "),
         ("vehicles.primary.agent=own:Every60", "own:Every60 must take (config); "),
         ("vehicles.helper.sensor.sonar=own:Every60", "own:Every60 must take (curve, seabed); "),
@@ -189,7 +195,7 @@ def test_a_part_that_fails_ends_the_mission_with_one_sentence(
         ),
         (
             "Vague",
-            "ValueError: the allocator gives strip nan to 'helper'; must give an open strip, and each once, to a fr",
+            "ValueError: the allocator gives strip nan to 'helper'; must give an open strip, and each once, to a he",
         ),
         ("Speechless", "ValueError: the allocator must answer with a mapping from vehicle to strip number, not None"),
     ],

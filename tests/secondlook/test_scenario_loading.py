@@ -110,7 +110,7 @@ def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: st
     assert (primary.spacing, primary.hotspot_risk, primary.run_in_m, primary.altitude_m) == ("adaptive", 0.55, 20, 15)
     assert isinstance(helper, RevisitVehicle)
     assert (helper.nadir_gap_m, helper.run_in_m, helper.altitude_m) == (0, 5, 5)
-    assert scenario.coordinator.allocator == "greedy"
+    assert scenario.coordinator.allocator == "plan"
 
 
 def test_noise_that_a_sensor_leaves_out_is_its_curves_or_else_the_calibrated_one(write: Write, valid_text: str) -> None:

@@ -71,8 +71,12 @@ def welcome(strips: Any, *helpers: Any) -> list[int]:
 class Doubling:
     """Gives everyone the same strip."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        return {helper.vehicle: number for number in welcome(strips, *helpers)[:1] for helper in helpers}
+    def assign(self, situation: Any) -> Any:
+        return {
+            helper.vehicle: number
+            for number in welcome(situation.strips, *situation.helpers)[:1]
+            for helper in situation.helpers
+        }
 
 
 class Faithful:
@@ -81,38 +85,42 @@ class Faithful:
     def __init__(self) -> None:
         self.known: dict[str, Any] = {}
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        gone = {name: one for name, one in self.known.items() if name not in {helper.vehicle for helper in helpers}}
-        self.known |= {helper.vehicle: helper for helper in helpers}
-        return dict.fromkeys(list(gone)[:1], strips[0].strip.number)
+    def assign(self, situation: Any) -> Any:
+        gone = {
+            name: one
+            for name, one in self.known.items()
+            if name not in {helper.vehicle for helper in situation.helpers}
+        }
+        self.known |= {helper.vehicle: helper for helper in situation.helpers}
+        return dict.fromkeys(list(gone)[:1], situation.strips[0].strip.number)
 
 
 class Stranger:
     """Gives a strip to a vehicle that nobody has told it of."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        return {"nobody": strips[0].strip.number}
+    def assign(self, situation: Any) -> Any:
+        return {"nobody": situation.strips[0].strip.number}
 
 
 class Inventive:
     """Gives a strip that there is not."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        return {helpers[0].vehicle: float("nan")}
+    def assign(self, situation: Any) -> Any:
+        return {situation.helpers[0].vehicle: float("nan")}
 
 
 class Pushy:
     """Gives a strip to one that has refused it."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        return {helpers[0].vehicle: strips[0].strip.number}
+    def assign(self, situation: Any) -> Any:
+        return {situation.helpers[0].vehicle: situation.strips[0].strip.number}
 
 
 class Dice:
     """Throws dice."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        return {} if random.random() < 0.5 else GreedyAllocator().assign(strips, helpers)
+    def assign(self, situation: Any) -> Any:
+        return {} if random.random() < 0.5 else GreedyAllocator().assign(situation)
 
 
 class Tired(GreedyAllocator):
@@ -120,25 +128,25 @@ class Tired(GreedyAllocator):
 
     asked = 0
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
+    def assign(self, situation: Any) -> Any:
         object.__setattr__(self, "asked", self.asked + 1)
-        return super().assign(strips, helpers) if self.asked == 1 else {}
+        return super().assign(situation) if self.asked == 1 else {}
 
 
 class Greedy(GreedyAllocator):
-    """Takes the strips out of the list."""
+    """Takes the strips out of the situation."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        answer = super().assign(list(strips), helpers)
-        strips.clear()
+    def assign(self, situation: Any) -> Any:
+        answer = super().assign(situation)
+        object.__setattr__(situation, "strips", ())
         return answer
 
 
 class Pairs:
     """Answers with pairs."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
-        return [(helpers[0].vehicle, strips[0].strip.number)]
+    def assign(self, situation: Any) -> Any:
+        return [(situation.helpers[0].vehicle, situation.strips[0].strip.number)]
 
 
 class Forever:
@@ -147,7 +155,7 @@ class Forever:
     def __init__(self, *_: Any, **__: Any) -> None:
         pass
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
+    def assign(self, situation: Any) -> Any:
         while True:
             pass
 
@@ -163,14 +171,14 @@ class Forever:
 class Fails:
     """Raises, whatever it is asked."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
+    def assign(self, situation: Any) -> Any:
         raise LookupError("no idea")
 
 
 class Helpless:
-    """An allocator that takes strips alone."""
+    """An allocator that takes nothing."""
 
-    def assign(self, strips: Any) -> Any:
+    def assign(self) -> Any:
         return {}
 
 
@@ -185,20 +193,23 @@ def no_allocator() -> int:
         (Doubling, r"Doubling gives strip \d to two helpers, \w+ and \w+"),
         (
             Faithful,
-            r"Faithful gives strip \d to '\w+', which is lost or busy: it was free before, and is not now; free",
+            r"Faithful gives strip \d to '\w+', which is lost: it was there before, and is not now; there",
         ),
-        (Stranger, r"Stranger gives strip \d to 'nobody', which is no free helper; free are \w+"),
+        (Stranger, r"Stranger gives strip \d to 'nobody', which is no helper; there are \w+"),
         (Inventive, r"Inventive gives \w+ strip nan, which is not open; open are \[\d\]"),
         (Pushy, r"Pushy gives strip \d to \w+, which has refused it"),
         (Dice, r"Dice answers \{.*\}, and \{.*\} when it (is asked again|was asked nothing else before)"),
         (Tired, r"Tired answers \{.*\}, and \{.*\} when it (is asked again|was asked nothing else before)"),
-        (Greedy, r"Greedy has changed the lists that it was given"),
+        (Greedy, r"Greedy has changed the situation that it was told"),
         (Pairs, r"Pairs must answer with a mapping from vehicle to strip number, not \[\('\w+', \d\)\]"),
         (Forever, r"Forever, assign, has not come back within 0.3 s"),
         (Fails, r"Fails has failed, assign: LookupError: no idea"),
-        (Helpless, r"Helpless: an allocator must have assign\(strips, helpers\); too many positional arguments"),
-        (no_allocator, r"no_allocator: an allocator must have assign\(strips, helpers\); it has no assign"),
-        (7, r"7: must be greedy, none or package.module:Class of an allocator; that is a int"),
+        (Helpless, r"Helpless: an allocator must have assign\(situation\); too many positional arguments"),
+        (no_allocator, r"no_allocator: an allocator must have assign\(situation\); it has no assign"),
+        (
+            7,
+            r"7: must be plan, auction, .* or package.module:Class of an allocator; that is a int",
+        ),
         ("nowhere:X", r"nowhere:X: must be importable; ModuleNotFoundError: No module named 'nowhere'"),
     ],
 )

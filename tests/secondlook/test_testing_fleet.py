@@ -40,9 +40,9 @@ class Moody:
 
     asked = 0
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
+    def assign(self, situation: Any) -> Any:
         Moody.asked += 1
-        return GreedyAllocator().assign(strips, helpers) if Moody.asked % 2 else {}
+        return GreedyAllocator().assign(situation) if Moody.asked % 2 else {}
 
 
 class Fruitless:
@@ -200,7 +200,7 @@ class TestSources:
             ("tellaro", "mission.rho=1", "overrides: 'mission.rho=1' is not allowed; must be a mapping or a list"),
             ("tellaro", {"mission.rho": 2}, "mission.rho: 2 is not allowed; must be at most 1"),
             ("tellaro", {"coordinator.allocator": object()}, "is not allowed in a scenario; must be plain data"),
-            ("tellaro", {"coordinator.allocator": Fruitless}, "an allocator must have assign(strips, helpers)"),
+            ("tellaro", {"coordinator.allocator": Fruitless}, "an allocator must have assign(situation)"),
             ("tellaro", {"coordinator.allocator": Heard.take}, "Heard.take is not allowed as a part"),
         ],
     )

@@ -39,7 +39,7 @@ def wait() -> None:
 class Forever:
     """An allocator that never decides."""
 
-    def assign(self, strips: Any, helpers: Any) -> Any:
+    def assign(self, situation: Any) -> Any:
         loop()
 
 

@@ -1,0 +1,22 @@
+"""Our allocators, by the names that a scenario knows them by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+from coordinator.allocation import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
+from coordinator.auction import AuctionAllocator
+from coordinator.rolling_plan import RollingPlan
+from coordinator.situation import Allocator
+
+ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
+    {
+        "plan": RollingPlan,
+        "auction": AuctionAllocator,
+        "greedy": GreedyAllocator,
+        "nearest": NearestAllocator,
+        "first_come": FirstComeAllocator,
+        "none": NoAllocator,
+    }
+)

@@ -1,0 +1,97 @@
+"""Where it was seen badly: the hotspots that stand, and the residual risk on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from comms.messages import Hotspot, HotspotState
+from planner.fleet_map import FleetMap
+from planner.groups import neighbours
+from planner.types import BoolArray, FloatArray, GridSpec
+
+Place = tuple[str, int]
+"""A hotspot's vehicle and number."""
+Revision = tuple[int, int]
+"""Incarnation of its sender, and its own revision."""
+
+
+@dataclass(frozen=True)
+class _Standing:
+    revision: Revision
+    mean_risk: float
+    growing: bool
+    window: tuple[slice, slice]
+    cells: BoolArray
+
+
+class BadlySeen:
+    """Takes hotspots as they come; of one hotspot's revisions the newest counts."""
+
+    def __init__(self, grid: GridSpec, inside: BoolArray) -> None:
+        self._grid = grid
+        self._inside = inside
+        self._hotspots: dict[Place, _Standing] = {}
+        self._is_new = False
+        self._hot: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
+        self._told_risk: FloatArray = np.zeros(grid.shape)
+
+    def take(self, place: Place, revision: Revision, message: Hotspot) -> bool:
+        """Takes a hotspot's newest word; returns whether it was news."""
+        known = self._hotspots.get(place)
+        if known is not None and revision <= known.revision:
+            return False
+        window, cells = (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
+        if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
+            window, cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
+        self._hotspots[place] = _Standing(revision, message.mean_risk, message.growing, window, cells)
+        self._is_new = True
+        return True
+
+    def risk(self, fleet: FleetMap, primaries: Iterable[str]) -> FloatArray:
+        """Residual risk that a second look may remove, 0 elsewhere: the joined map's where cells have settled, and on
+        hotspots where tiles have come; where none have, the mean that the hotspot tells."""
+        if self._is_new:
+            self._draw()
+        settled = fleet.settled_by(primaries)
+        on_hotspots = np.where(fleet.seen() | settled, fleet.risk, self._told_risk)
+        return np.where(self._inside, np.where(settled, fleet.risk, np.where(self._hot, on_hotspots, 0.0)), 0.0)
+
+    def still_open(self, fleet: FleetMap, primaries: Iterable[str]) -> BoolArray:
+        """Cells that the survey may still improve: those that tiles tell are not settled; where no tile has come, those
+        in and about hotspots that grow."""
+        primaries = list(primaries)
+        growing = np.zeros(self._grid.shape, dtype=np.bool_)
+        for one in self._hotspots.values():
+            if one.growing:
+                growing[one.window] |= one.cells
+        told_open = fleet.told_by(primaries)
+        if growing.any():
+            told_open |= growing | neighbours(growing)
+        return self._inside & told_open & ~fleet.settled_by(primaries)
+
+    def _draw(self) -> None:
+        """Draws all hotspots afresh: which cells they hold, and the worst mean told of each cell."""
+        self._is_new = False
+        self._hot[:] = False
+        self._told_risk[:] = 0.0
+        for one in self._hotspots.values():
+            self._hot[one.window] |= one.cells
+            np.maximum(self._told_risk[one.window], one.mean_risk, out=self._told_risk[one.window], where=one.cells)
+
+    def _cells_within(self, outline: list[tuple[float, float]]) -> tuple[tuple[slice, slice], BoolArray]:
+        """The cells inside the area whose centres lie in an outline, and the window of the grid that they fill."""
+        grid = self._grid
+        corners = np.asarray(outline)
+        across, along = grid.frame.to_sweep(corners[:, 0], corners[:, 1])
+        columns = np.flatnonzero((grid.across_m >= across.min()) & (grid.across_m <= across.max()))
+        rows = np.flatnonzero((grid.along_m >= along.min()) & (grid.along_m <= along.max()))
+        if not columns.size or not rows.size:
+            return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
+        window = (slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1))
+        u, v = np.meshgrid(grid.across_m[columns], grid.along_m[rows])
+        within = shapely.contains_xy(shapely.Polygon(np.column_stack([across, along])), u, v)
+        return window, within & self._inside[window]

@@ -1,0 +1,85 @@
+"""What an allocator is asked: which strips are open, where each helper is and will be, how long the mission lasts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from planner.dubins import Pose
+from planner.types import Strip
+
+
+@dataclass(frozen=True)
+class OpenStrip:
+    """A strip and the residual risk on it, summed over its cells and times their area; a sweep by a helper is expected
+    to remove its `p_detect` of that.
+
+    `settles_s`: when all of it will have settled, 0 if it has. Until then a helper must follow in the survey's wake,
+    the strip's way, and not overtake it.
+    """
+
+    strip: Strip
+    risk_m2: float
+    settles_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class Helper:
+    """A helper that is there, free or at work.
+
+    `pose`: where it is, mission frame. `free_at`, `free_s`: where and when it will be free; where it is, and now, if it
+    is free. `task`: the strip that it has, None if it is free. `swath_m`: the full width that one leg covers;
+    `p_detect`: its P_d there. `lasts_until_s`: when its battery is empty. `refused`: strips that it is not to be
+    offered. `sweeping`: whether it is on its task's strip already. Times are seconds since the mission's start.
+    """
+
+    vehicle: str
+    pose: Pose
+    free_at: Pose
+    free_s: float
+    task: OpenStrip | None
+    speed_mps: float
+    turn_radius_m: float
+    run_in_m: float
+    swath_m: float
+    p_detect: float
+    lasts_until_s: float
+    refused: frozenset[int]
+    sweeping: bool = False
+
+
+@dataclass(frozen=True)
+class Situation:
+    """All that an allocator decides on. Times are seconds since the mission's start.
+
+    `deadline_s`: when the mission is expected to be over, infinite while nobody can tell. `strips`: the open ones.
+    `coming`: what is still settling and may soon be a strip; not to be offered yet, its numbers are 0. `helpers`: those
+    that are there. `switch_margin`: share of a task's worth by which turning a helper round must be better.
+    `later_m2ps`: what a second of a helper is expected to remove from `later_s` on (residual risk times m2), when there
+    will be more strips.
+    """
+
+    now_s: float
+    deadline_s: float
+    strips: tuple[OpenStrip, ...]
+    helpers: tuple[Helper, ...]
+    coming: tuple[OpenStrip, ...] = ()
+    switch_margin: float = 0.2
+    later_m2ps: float = 0.0
+    later_s: float = 0.0
+
+    @property
+    def free(self) -> tuple[Helper, ...]:
+        """The helpers without a task."""
+        return tuple(helper for helper in self.helpers if helper.task is None)
+
+
+class Allocator(Protocol):
+    """Decides offers. Pure: the same situation gives the same answer."""
+
+    def assign(self, situation: Situation) -> Mapping[str, int]:
+        """The number of an open strip for each helper that is to be sent to one; each strip at most once.
+
+        A helper that has a task is told to give it back, which is no loss: it is offered a strip once it is free.
+        """
