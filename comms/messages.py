@@ -43,6 +43,17 @@ class Role(enum.Enum):
     COORDINATOR = "coordinator"
     RECORDER = "recorder"
     OBSERVER = "observer"
+    SURVEY_REVISIT = "survey_revisit"
+
+    @property
+    def surveys(self) -> bool:
+        """Whether it is the agent of a primary."""
+        return self in (Role.SURVEY, Role.SURVEY_REVISIT)
+
+    @property
+    def revisits(self) -> bool:
+        """Whether it takes strips: a helper's agent, or a primary's once it has surveyed all."""
+        return self in (Role.REVISIT, Role.SURVEY_REVISIT)
 
 
 class ClockMode(enum.Enum):
@@ -56,8 +67,8 @@ class ClockMode(enum.Enum):
 class RosterVehicle:
     """One vehicle of the fleet, as everyone is told at the start.
 
-    `swath_m`: half the width the sonar sees to each side; `p_detect`: its typical P_d there. Both say what a second
-    look by this vehicle is expected to be worth.
+    `swath_m`: how far the sonar sees to each side; `p_detect`: its mean P_d from the nadir gap up to there. Both say
+    what a second look by this vehicle is expected to be worth.
     """
 
     vehicle: Identifier
@@ -69,6 +80,11 @@ class RosterVehicle:
     swath_m: Metres
     p_detect: Probability
     endurance_ms: Milliseconds
+
+    @property
+    def strip_width_m(self) -> float:
+        """The widest strip that one pass covers: with both sides, or with one where there is a nadir gap between."""
+        return self.swath_m - self.nadir_gap_m if self.nadir_gap_m > 0 else 2 * self.swath_m
 
 
 @dataclass(frozen=True, slots=True)

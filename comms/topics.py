@@ -102,7 +102,9 @@ class Topic:
 
 
 _WATCHERS = {Role.RECORDER: Reach.ALL, Role.OBSERVER: Reach.ALL}
-_AGENTS_OWN = {Role.SURVEY: Reach.OWN, Role.REVISIT: Reach.OWN}
+_SURVEYORS_OWN = {role: Reach.OWN for role in Role if role.surveys}
+_HELPERS_OWN = {role: Reach.OWN for role in Role if role.revisits}
+_AGENTS_OWN = _SURVEYORS_OWN | _HELPERS_OWN
 _BODIES_OWN = {Role.WORLD: Reach.OWN, Role.BODY: Reach.OWN}
 _COORDINATOR = {Role.COORDINATOR: Reach.ALL}
 _EVERYONE = dict.fromkeys(Role, Reach.ALL)
@@ -129,11 +131,11 @@ STATE = Topic(
     crosses_water=True,
 )  # fmt: skip
 PLAN = Topic(
-    "plan", "agent/{vehicle}/plan", Plan, {Role.SURVEY: Reach.OWN}, _COORDINATOR | _WATCHERS, 150_000, 0.02,
+    "plan", "agent/{vehicle}/plan", Plan, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 150_000, 0.02,
     Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 CURVE = Topic(
-    "curve", "agent/{vehicle}/curve", Curve, {Role.SURVEY: Reach.OWN}, _COORDINATOR | _WATCHERS, 9_000, 0.01,
+    "curve", "agent/{vehicle}/curve", Curve, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 9_000, 0.01,
     Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 COVERAGE = Topic(
@@ -145,7 +147,7 @@ CONTACT = Topic(
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 HOTSPOT = Topic(
-    "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, {Role.SURVEY: Reach.OWN}, _COORDINATOR | _WATCHERS, 1_000,
+    "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 1_000,
     0.5, Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 STRIP = Topic(
@@ -153,16 +155,16 @@ STRIP = Topic(
     crosses_water=False,
 )  # fmt: skip
 TASK = Topic(
-    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, {Role.REVISIT: Reach.OWN} | _WATCHERS, 64, 0.1,
+    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _HELPERS_OWN | _WATCHERS, 64, 0.1,
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 TASK_STATUS = Topic(
-    "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, {Role.REVISIT: Reach.OWN},
+    "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
     _COORDINATOR | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
-    {Role.SURVEY: Reach.ALL, Role.REVISIT: Reach.ALL, Role.WORLD: Reach.ALL} | _WATCHERS, 400, 0.001, Keep.LATEST,
+    dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _WATCHERS, 400, 0.001, Keep.LATEST,
     crosses_water=True,
 )  # fmt: skip
 TRUTH_TARGETS = Topic(

@@ -17,7 +17,6 @@ from comms.messages import (
     MissionOver,
     Mode,
     Plan,
-    Role,
     RunInfo,
     StripState,
     StripStatus,
@@ -120,12 +119,12 @@ class Coordinator:
         self._inside = Region(run.outline, run.hole_outlines).inside(spec)
         self._badly_seen = BadlySeen(spec, self._inside)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
-        self._primaries = {name: one for name, one in self.vehicles.items() if one.entry.role is Role.SURVEY}
-        helpers = [entry for entry in run.vehicles if entry.role is Role.REVISIT]
+        self._primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
+        helpers = [entry for entry in run.vehicles if entry.role.revisits]
         if helpers:
-            narrowest = min(helpers, key=lambda entry: entry.swath_m)
+            narrowest = min(helpers, key=lambda entry: entry.strip_width_m)
             self._rules = CuttingRules(
-                swath_m=2 * narrowest.swath_m,
+                swath_m=narrowest.strip_width_m,
                 p_detect=narrowest.p_detect,
                 worth_risk=self.config.worth_risk,
                 overhead_m=math.pi * narrowest.turn_radius_m + 2 * narrowest.swath_m + 2 * narrowest.run_in_m,
@@ -168,7 +167,7 @@ class Coordinator:
             log.info("%s is heard again", vehicle.entry.vehicle)
         self._to_cut |= vehicle.is_finished and not was_finished
         self._to_assign |= vehicle.is_idle and not was_idle
-        if vehicle.entry.role is Role.REVISIT and state.mode in (Mode.TRANSIT, Mode.REVISIT):
+        if vehicle.is_at_a_strip:
             # Its state tells too that it is at a strip: the answer may be lost.
             record = self.ledger.get(state.works_on)
             if record is not None and vehicle.tells_news_of(state.works_on, header):
@@ -421,7 +420,8 @@ class Coordinator:
     def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
         """A helper as an allocator sees it; None where it is lost or can be given nothing."""
         state, entry = vehicle.state, vehicle.entry
-        if entry.role is not Role.REVISIT or vehicle.lost or state is None or vehicle.is_finished:
+        stays_away = vehicle.is_finished and not vehicle.is_idle
+        if not entry.role.revisits or vehicle.lost or state is None or stays_away:
             return None
         records = [one for one in self.ledger.in_state(*WITH_A_VEHICLE) if one.vehicle == entry.vehicle]
         if not records and not vehicle.is_idle:
@@ -442,7 +442,7 @@ class Coordinator:
             speed_mps=entry.speed_mps,
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
-            swath_m=2 * entry.swath_m,
+            swath_m=entry.strip_width_m,
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from comms.codec import Header
-from comms.messages import AgentState, Mode, Plan, RosterVehicle
+from comms.messages import AgentState, Mode, Plan, Role, RosterVehicle
 from coordinator.expected_end import expected_end_ms
 from coordinator.growth import TrackUnderWay
 from coordinator.ledger import StripRecord
@@ -39,13 +39,23 @@ class KnownVehicle:
     offered: dict[int, tuple[Strip, Cut]] = field(default_factory=dict)
     plan: Plan | None = None
     service: Service | None = None
+    _surveyed_in: int | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
 
     @property
     def is_idle(self) -> bool:
-        """Whether it is there and without work."""
-        return not self.lost and self.state is not None and self.state.mode is Mode.IDLE
+        """Whether it is there and without work; a primary that takes strips is so once it has surveyed all."""
+        free = (Mode.IDLE, Mode.FINISHED) if self.entry.role is Role.SURVEY_REVISIT else (Mode.IDLE,)
+        return not self.lost and self.state is not None and self.state.mode in free
+
+    @property
+    def is_at_a_strip(self) -> bool:
+        """Whether it is at a strip, or on its way to one."""
+        if self.state is None or not self.entry.role.revisits:
+            return False
+        on_its_way = self.state.mode is Mode.TRANSIT and (not self.entry.role.surveys or self.finished_ms is not None)
+        return on_its_way or self.state.mode is Mode.REVISIT
 
     @property
     def is_finished(self) -> bool:
@@ -61,10 +71,11 @@ class KnownVehicle:
         self.state = state
         self.heard_ms = header.sent_ms
         self.lost = False
-        if state.mode is not Mode.FINISHED:
+        if state.mode is Mode.FINISHED:
+            self._surveyed_in = header.incarnation
+            self.finished_ms = now_ms if self.finished_ms is None else self.finished_ms
+        elif self._surveyed_in != header.incarnation:  # given up too early, or started anew
             self.finished_ms = None
-        elif self.finished_ms is None:
-            self.finished_ms = now_ms
         return True
 
     def take_plan(self, plan: Plan) -> None:

@@ -74,7 +74,7 @@ class FleetMap:
         layer.largest_levels[window] = largest_levels
         layer.settled[window] = settled
         layer.told[window] = True
-        self.risk[window] = residual_risk(*self._joined(window, self.layers), self.rho)
+        self.risk[window] = residual_risk(*self._joined(window, self.layers.values()), self.rho)
         self.changes += 1
         return True
 
@@ -103,18 +103,21 @@ class FleetMap:
 
     def risk_of(self, vehicles: set[str]) -> tuple[FloatArray, BoolArray]:
         """Residual risk, and which cells are seen, from these vehicles' layers alone."""
-        chosen = {vehicle: layer for vehicle, layer in self.layers.items() if vehicle in vehicles}
+        return self.risk_of_layers(layer for vehicle, layer in self.layers.items() if vehicle in vehicles)
+
+    def risk_of_layers(self, layers: Iterable[VehicleLayer]) -> tuple[FloatArray, BoolArray]:
+        """The same from these layers, of this map or as they once were."""
         everywhere = (slice(None), slice(None))
-        sums, largest = self._joined(everywhere, chosen)
+        sums, largest = self._joined(everywhere, layers)
         return residual_risk(sums, largest, self.rho), sums > 0
 
     def _joined(
-        self, window: tuple[slice, slice], layers: dict[str, VehicleLayer]
+        self, window: tuple[slice, slice], layers: Iterable[VehicleLayer]
     ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], np.ndarray[tuple[int, ...], np.dtype[np.int64]]]:
         shape = self.risk[window].shape
         sums = np.zeros(shape, dtype=np.int64)
         largest = np.zeros(shape, dtype=np.int64)
-        for layer in layers.values():
+        for layer in layers:
             sums += layer.sum_levels[window]
             np.maximum(largest, layer.largest_levels[window], out=largest)
         return sums, largest

@@ -52,6 +52,31 @@ class Region:
         corners = shapely.get_coordinates(self.polygon.convex_hull)[:-1]
         return SurveyArea(tuple((x_m, y_m) for x_m, y_m in corners.tolist()), track_heading_rad)
 
+    def share(self, begin: float, end: float, track_heading_rad: float) -> Region:
+        """What of the region lies from one share of its width to another, in the order in which tracks are laid.
+
+        Args:
+            begin: share of the width across the tracks, 0 or more.
+            end: the same, above `begin`, 1 or less.
+            track_heading_rad: compass heading of the tracks.
+
+        Raises:
+            ValueError: the shares are not such, or what lies there is nothing or in several pieces.
+        """
+        if not 0 <= begin < end <= 1:
+            raise ValueError(f"a share runs from one part of the width to a larger one, 0 to 1, not {begin} to {end}")
+        whole = self.about(track_heading_rad)
+        u_m, v_m = (begin * whole.width_m, end * whole.width_m), (-1.0, whole.length_m + 1.0)
+        corners = [(u_m[0], v_m[0]), (u_m[1], v_m[0]), (u_m[1], v_m[1]), (u_m[0], v_m[1])]
+        band = shapely.Polygon([tuple(map(float, whole.frame.to_mission(*corner))) for corner in corners])
+        cut = band.intersection(self.polygon)
+        if not isinstance(cut, shapely.Polygon) or cut.is_empty:
+            what = "nothing of the area" if cut.is_empty else "the area, in several pieces,"
+            raise ValueError(f"{what} lies from {begin:.3g} to {end:.3g} of its width")
+        rings = [cut.exterior, *cut.interiors]
+        outline, *holes = (tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
+        return Region(outline, tuple(holes))
+
     def inside(self, grid: GridSpec) -> BoolArray:
         """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""
         x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])

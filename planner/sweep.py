@@ -1,4 +1,4 @@
-"""The revisit sweep: legs over a strip for a sensor without a nadir gap, and how to fly them from where one is."""
+"""The revisit sweep: legs over a strip, and how to fly them from where one is."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from planner.types import Point, Strip, SweepFrame, Track
 LENGTH_TOLERANCE_M = 1e-6
 
 
-def legs_over_strip(strip: Strip, swath_m: float) -> list[Track]:
+def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list[Track]:
     """The fewest parallel legs along a strip that cover its width with a swath of `swath_m`, evenly spread.
 
     Numbered from 1; `across_m` is the offset from the strip's left edge. Directions alternate, the first leg runs the
-    strip's way. Raises ValueError where the swath, or the strip's length or width, is not finite and above 0.
+    strip's way. `beside_m`: how far the legs lie to the right of what they cover, for a sensor that looks to the side;
+    less than 0 to the left. Raises ValueError where the swath, or the strip's length or width, is not finite and
+    above 0.
     """
     if not all(math.isfinite(extent_m) and extent_m > 0 for extent_m in (swath_m, strip.length_m, strip.width_m)):
         raise ValueError(
@@ -25,7 +27,7 @@ def legs_over_strip(strip: Strip, swath_m: float) -> list[Track]:
     frame = SweepFrame(*strip.start, strip.heading_rad)
     legs = []
     for index in range(count):
-        across_m = strip.width_m * (index + 0.5) / count
+        across_m = strip.width_m * (index + 0.5) / count + beside_m
         ends = [frame.to_mission(across_m - strip.width_m / 2, along_m) for along_m in (0.0, strip.length_m)]
         start, end = ((float(x_m), float(y_m)) for x_m, y_m in (ends if index % 2 == 0 else reversed(ends)))
         legs.append(Track(index + 1, across_m, start, end))

@@ -15,7 +15,7 @@ from comms.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, 
 from comms.routing import RosterNode
 from coordinator.config import CoordinatorConfig
 from planner.region import Region
-from planner.types import Point
+from planner.types import DetectionCurve, Point
 from secondlook.errors import UserError
 from secondlook.node_spec import NodeSpec
 from secondlook.parts import ALLOCATOR, SONAR, SPACING, PartError, PartKind
@@ -27,9 +27,9 @@ from secondlook.scenario import (
     body_of,
     scenario_hash,
 )
-from secondlook.survey_area import region_of, track_heading_rad
+from secondlook.survey_area import region_for, region_of, track_heading_rad
 from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
-from vehicle_agent.config import RevisitConfig, SurveyConfig
+from vehicle_agent.config import RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
@@ -60,7 +60,10 @@ def build_fleet(scenario: Scenario, *, record: bool, factor: float | None = None
 
 
 def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Fleet:
-    grid = region_of(scenario).about(track_heading_rad(scenario)).grid(scenario.area.cell_m)
+    heading_rad = track_heading_rad(scenario)
+    grid = region_of(scenario).about(heading_rad).grid(scenario.area.cell_m)
+    for primary in scenario.survey_vehicles.values():
+        region_for(scenario, primary, heading_rad)  # refuses a part that is none
     run_info = RunInfo(
         schema=SCHEMA_VERSION,
         scenario=scenario.name,
@@ -116,7 +119,9 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
 
 
 def _role(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
-    return Role.SURVEY if isinstance(vehicle, SurveyVehicle) else Role.REVISIT
+    if isinstance(vehicle, RevisitVehicle):
+        return Role.REVISIT
+    return Role.SURVEY_REVISIT if vehicle.revisits else Role.SURVEY
 
 
 def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
@@ -129,9 +134,16 @@ def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> Roste
         run_in_m=vehicle.run_in_m,
         nadir_gap_m=vehicle.nadir_gap_m,
         swath_m=vehicle.sensor.reach_m,
-        p_detect=float(np.trapezoid(curve.p_detect, curve.range_m)) / vehicle.sensor.reach_m,
+        p_detect=_mean_p_detect(curve, vehicle.nadir_gap_m, vehicle.sensor.reach_m),
         endurance_ms=_endurance_ms(vehicle),
     )
+
+
+def _mean_p_detect(curve: DetectionCurve, near_m: float, far_m: float) -> float:
+    """The mean of P(y) from one range to another."""
+    within = curve.range_m[(curve.range_m > near_m) & (curve.range_m < far_m)]
+    range_m = np.concatenate([[near_m], within, [far_m]])
+    return float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
 
 
 def _endurance_ms(vehicle: SurveyVehicle | RevisitVehicle) -> int:
@@ -139,17 +151,18 @@ def _endurance_ms(vehicle: SurveyVehicle | RevisitVehicle) -> int:
 
 
 def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
-    endurance_ms = _endurance_ms(vehicle)
+    roster = _roster_vehicle(name, vehicle)
+    revisit = RevisitConfig(
+        vehicle=name,
+        swath_m=roster.strip_width_m,
+        beside_m=(roster.nadir_gap_m + roster.swath_m) / 2 if roster.nadir_gap_m > 0 else 0.0,
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        run_in_m=vehicle.run_in_m,
+        endurance_ms=roster.endurance_ms,
+    )
     if isinstance(vehicle, RevisitVehicle):
-        config = RevisitConfig(
-            vehicle=name,
-            swath_m=2 * vehicle.sensor.reach_m,
-            speed_mps=vehicle.speed_mps,
-            turn_radius_m=vehicle.turn_radius_m,
-            run_in_m=vehicle.run_in_m,
-            endurance_ms=endurance_ms,
-        )
-        return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", config)
+        return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", revisit)
     survey = SurveyConfig(
         vehicle=name,
         spacing=_made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
@@ -158,9 +171,13 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         threshold=vehicle.threshold,
         hotspot_risk=vehicle.hotspot_risk,
         run_in_m=vehicle.run_in_m,
-        endurance_ms=endurance_ms,
+        endurance_ms=roster.endurance_ms,
         prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
+        share=vehicle.share,
     )
+    if vehicle.revisits:
+        config = SurveyRevisitConfig(survey, revisit)
+        return NodeSpec(vehicle.agent or "vehicle_agent.survey_revisit:SurveyRevisitAgent", config)
     return NodeSpec(vehicle.agent or "vehicle_agent.survey:SurveyAgent", survey)
 
 

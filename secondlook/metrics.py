@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -23,7 +24,7 @@ from comms.messages import (
     TruthTargets,
 )
 from comms.node import Received
-from planner.fleet_map import FleetMap
+from planner.fleet_map import FleetMap, VehicleLayer
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
@@ -34,7 +35,8 @@ _STILL_OPEN = (StripState.OPEN, StripState.OFFERED, StripState.ACCEPTED, StripSt
 
 @dataclass
 class VehicleFigures:
-    """One vehicle: path flown, when it ended, and for a primary what it planned and learned."""
+    """One vehicle: path flown, when it ended, and for a primary what it planned and learned. `surveyed`: its layer when
+    it had surveyed all, if it goes on to take strips."""
 
     role: Role
     path_m: float = 0.0
@@ -43,6 +45,7 @@ class VehicleFigures:
     plan: Plan | None = None
     last_nav: Nav | None = None
     finished_ms: int | None = None
+    surveyed: VehicleLayer | None = None
 
 
 @dataclass
@@ -89,6 +92,8 @@ class Metrics:
             vehicle.ended_ms = received.header.sent_ms
             if message.mode is Mode.FINISHED and vehicle.finished_ms is None:
                 vehicle.finished_ms = received.header.sent_ms
+                if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
+                    vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))
         elif isinstance(message, StripStatus):
             self._take_strip(received, message)
         elif isinstance(message, TruthTargets):
@@ -98,14 +103,14 @@ class Metrics:
 
     def primary_ms(self) -> int | None:
         """When the last primary ended its last track; None while one is still at it."""
-        ends = [one.finished_ms for one in self.vehicles.values() if one.role is Role.SURVEY]
+        ends = [one.finished_ms for one in self.vehicles.values() if one.role.surveys]
         return None if not ends or any(end is None for end in ends) else max(end for end in ends if end is not None)
 
     def share_flown(self) -> float:
         """Share of the primaries' planned track length that has been looked at."""
         planned_m = looked_m = 0.0
         for one in self.vehicles.values():
-            if one.role is Role.SURVEY and one.plan is not None:
+            if one.role.surveys and one.plan is not None:
                 looked_m += one.looked_m
                 planned_m += sum(
                     math.hypot(track.end_x_m - track.start_x_m, track.end_y_m - track.start_y_m)
@@ -120,11 +125,15 @@ class Metrics:
         return risk_statistics(self.map.risk, self.map.seen(), self.inside)
 
     def risk_primary_alone(self) -> RiskStatistics | None:
-        """The same without the helpers' layers."""
+        """The same without second looks: the primaries' layers, of one that takes strips itself as it was before."""
         if self.map is None:
             return None
-        primaries = {name for name, one in self.vehicles.items() if one.role is Role.SURVEY}
-        return risk_statistics(*self.map.risk_of(primaries), self.inside)
+        layers = [
+            one.surveyed or self.map.layers[name]
+            for name, one in self.vehicles.items()
+            if one.role.surveys and name in self.map.layers
+        ]
+        return risk_statistics(*self.map.risk_of_layers(layers), self.inside)
 
     def targets_met(self) -> tuple[FloatArray, BoolArray]:
         """Of each target the fleet's residual risk where it lies, and whether nobody has detected it; both of shape
@@ -245,7 +254,7 @@ def _vehicle_summary(vehicle: VehicleFigures) -> dict[str, Any]:
         "path_m": round(vehicle.path_m, 1),
         "ended_s": ended_ms / 1000,
     }
-    if vehicle.role is Role.SURVEY:
+    if vehicle.role.surveys:
         plan = vehicle.plan
         summary["tracks"] = sum(track.flown for track in plan.tracks) if plan else 0
         summary["r_adpt_m"] = list(plan.r_adpt_m) if plan else []

@@ -6,12 +6,19 @@ import math
 
 from planner.first_plan import FirstPlan, best_heading, first_plan
 from planner.region import Region
-from secondlook.scenario import Scenario
+from secondlook.scenario import Scenario, SurveyVehicle
+from vehicle_agent.config import WHOLE
 
 
 def region_of(scenario: Scenario) -> Region:
     """What is surveyed, mission frame. Raises ValueError as `Region` does."""
     return Region(scenario.area.polygon_m, scenario.area.holes_m)
+
+
+def region_for(scenario: Scenario, vehicle: SurveyVehicle, heading_rad: float) -> Region:
+    """What of it is surveyed by one vehicle, with tracks along a heading. Raises ValueError as `Region.share` does."""
+    region = region_of(scenario)
+    return region if vehicle.share == WHOLE else region.share(*vehicle.share, heading_rad)
 
 
 def track_heading_rad(scenario: Scenario) -> float:
@@ -25,8 +32,9 @@ def track_heading_rad(scenario: Scenario) -> float:
 
 def first_plans(scenario: Scenario, heading_rad: float) -> dict[str, FirstPlan]:
     """The tracks that Algorithm 1 lays for each survey vehicle, by its id, with the range that it is told."""
-    region = region_of(scenario)
     return {
-        name: first_plan(region, heading_rad, vehicle.nadir_gap_m, vehicle.told_range_m)
+        name: first_plan(
+            region_for(scenario, vehicle, heading_rad), heading_rad, vehicle.nadir_gap_m, vehicle.told_range_m
+        )
         for name, vehicle in scenario.survey_vehicles.items()
     }

@@ -31,7 +31,7 @@ from planner.settle import Ahead, Reach, cells_within, settled_cells
 from planner.spacing_planners import SpacingDecision
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
-from vehicle_agent.config import SurveyConfig
+from vehicle_agent.config import WHOLE, SurveyConfig
 from vehicle_agent.part_survey import PartSurvey
 
 HOTSPOTS_EVERY_MS = 30_000
@@ -68,6 +68,8 @@ class SurveyAgent(Agent):
         """Lays the first tracks and begins."""
         self._grid = run.grid.spec
         region = Region(run.outline, run.hole_outlines)
+        if self.config.share != WHOLE:
+            region = region.share(*self.config.share, self._grid.frame.heading_rad)
         self._inside = region.inside(self._grid)
         self._rho = run.rho
         self._hotspots = HotspotMap.empty(self._grid)

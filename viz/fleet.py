@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from comms.messages import AgentState, Contact, Mode, Nav, Plan, Role, RosterVehicle, RunInfo, TaskState, TaskStatus
+from comms.messages import AgentState, Contact, Mode, Nav, Plan, RosterVehicle, RunInfo, TaskState, TaskStatus
 from comms.node import Received
 from planner.types import FloatArray
 from viz import palette, paths
@@ -111,7 +111,7 @@ class Fleet:
 
     def _put_states(self, vehicle: RosterVehicle) -> None:
         self._canvas.put_static(paths.mode(vehicle.vehicle), _states(palette.MODE))
-        if vehicle.role is Role.REVISIT:
+        if vehicle.role.revisits:
             self._canvas.put_static(paths.task(vehicle.vehicle), _states(palette.TASK))
 
 

@@ -13,7 +13,6 @@ from comms.messages import (
     ManeuverStatus,
     MissionOver,
     Plan,
-    Role,
     RunInfo,
     StripState,
     StripStatus,
@@ -142,8 +141,8 @@ def number_of(received: Received) -> int:
 
 
 def _run(run: RunInfo) -> str:
-    surveyors = [vehicle.vehicle for vehicle in run.vehicles if vehicle.role is Role.SURVEY]
-    helpers = [vehicle.vehicle for vehicle in run.vehicles if vehicle.role is Role.REVISIT]
+    surveyors = [vehicle.vehicle for vehicle in run.vehicles if vehicle.role.surveys]
+    helpers = [vehicle.vehicle for vehicle in run.vehicles if vehicle.role.revisits]
     by = f" by {', '.join(surveyors)}" if surveyors else ""
     second = f", second looks by {', '.join(helpers)}" if helpers else ""
     return f"mission {run.scenario}, seed {run.seed}: a survey of {_area_km2(run):.2f} km²{by}{second}"

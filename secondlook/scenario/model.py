@@ -114,6 +114,20 @@ class Scenario(Mapping):
                 raise refused(f"must have no {body_of(key)}, as the external body of {key} is called")
         return vehicles
 
+    @field_validator("vehicles")
+    @classmethod
+    def _check_parts(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
+        parts = {one.part_of for one in vehicles.values() if isinstance(one, SurveyVehicle)}
+        counts = {count for _, count in parts}
+        if len(counts) > 1:
+            raise refused("must all survey the whole area, or each a part of as many")
+        missing = [
+            f"{part} of {count}" for count in counts for part in range(1, count + 1) if (part, count) not in parts
+        ]
+        if missing:
+            raise refused(f"must survey the whole area together, but nobody has part {', '.join(missing)}")
+        return vehicles
+
     @property
     def survey_vehicles(self) -> dict[str, SurveyVehicle]:
         """The vehicles that survey, by id, in the scenario's order."""

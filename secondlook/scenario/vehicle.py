@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
@@ -19,9 +20,11 @@ from secondlook.scenario.values import (
     Mapping,
     OpenShare,
     Speed,
-    part,
     refused,
 )
+from secondlook.scenario.values import part as named
+
+_PART = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
 RESERVED_IDS = ("clock", "coordinator", "observer", "recorder", "world")
 """Ids of the nodes that are no vehicles."""
@@ -67,7 +70,7 @@ class VehicleBase(Mapping):
     run_in_m: LengthOrZero
     nadir_gap_m: LengthOrZero
     sensor: Sensor
-    agent: Annotated[str, part(NODE)] | None = None
+    agent: Annotated[str, named(NODE)] | None = None
 
     @field_validator("sensor")
     @classmethod
@@ -84,17 +87,20 @@ class SurveyVehicle(VehicleBase):
     is told to plan with until it has flown the first pair of tracks. `threshold`: P_d from which data is admissible.
     `prior_curve`: P(y) as earlier missions have measured it, the one that holds until the first track is flown; where
     `range_m` is left out, its r_eff is what to plan with. `hotspot_risk`: residual risk from which a cell is worth a
-    second look.
+    second look. `part`: which part of the area is its own, `1 of 3` being the first of three equally wide ones, in the order
+    in which tracks are laid. `revisits`: whether it takes strips itself once it has surveyed all.
     """
 
     role: Literal["survey"]
     altitude_m: Length = 15.0
     run_in_m: LengthOrZero = 20.0
     range_m: Length | None = None
-    spacing: Annotated[str, part(SPACING)] = "adaptive"
+    spacing: Annotated[str, named(SPACING)] = "adaptive"
     threshold: OpenShare = 0.05
     prior_curve: OptionalCurve = None
     hotspot_risk: OpenShare = 0.55
+    part: str | None = None
+    revisits: bool = False
 
     @field_validator("range_m")
     @classmethod
@@ -127,6 +133,26 @@ class SurveyVehicle(VehicleBase):
             return self.range_m
         assert self.prior_curve is not None
         return effective_range_m(self.prior_curve.detection_curve, self.threshold) or 0
+
+    @field_validator("part")
+    @classmethod
+    def _check_part(cls, part: str | None) -> str | None:
+        match = None if part is None else _PART.fullmatch(part)
+        if part is not None and (match is None or not 1 <= int(match[1]) <= int(match[2])):
+            raise refused("must be such as 1 of 3: which part, and of how many, at most 99")
+        return part
+
+    @property
+    def part_of(self) -> tuple[int, int]:
+        """Which part of how many is its own, from 1; the whole is 1 of 1."""
+        match = None if self.part is None else _PART.fullmatch(self.part)
+        return (1, 1) if match is None else (int(match[1]), int(match[2]))
+
+    @property
+    def share(self) -> tuple[float, float]:
+        """From which to which share of the area's width its part is."""
+        part, parts = self.part_of
+        return (part - 1) / parts, part / parts
 
 
 class RevisitVehicle(VehicleBase):
