@@ -87,8 +87,8 @@ class SurveyVehicle(VehicleBase):
     is told to plan with until it has flown the first pair of tracks. `threshold`: P_d from which data is admissible.
     `prior_curve`: P(y) as earlier missions have measured it, the one that holds until the first track is flown; where
     `range_m` is left out, its r_eff is what to plan with. `hotspot_risk`: residual risk from which a cell is worth a
-    second look. `part`: which part of the area is its own, `1 of 3` being the first of three equally wide ones, in the order
-    in which tracks are laid. `revisits`: whether it takes strips itself once it has surveyed all.
+    second look. `part`: which part of the area is its own, `1 of 3` being the first of three equally wide ones, in the
+    order in which tracks are laid. `revisits`: whether it takes strips itself once it has surveyed all.
     """
 
     role: Literal["survey"]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from regions import regions
 
@@ -56,3 +56,42 @@ def test_cells_inside_are_those_of_the_polygon(region: Region, heading_rad: floa
 def test_what_is_no_region_is_refused(outline: object, holes: object, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Region(outline, holes)  # type: ignore[arg-type]
+
+
+class TestShare:
+    def test_the_second_of_three_of_a_square_by_hand(self) -> None:
+        share = Region(SQUARE).share(0.25, 0.5, 0.0)
+        assert np.array(sorted(share.outline)) == pytest.approx(np.array([(25, 0), (25, 100), (50, 0), (50, 100)]))
+
+    def test_tracks_to_the_east_are_laid_from_north_to_south(self) -> None:
+        first = Region(SQUARE).share(0, 0.3, math.pi / 2)
+        assert min(y_m for _, y_m in first.outline) == pytest.approx(70)
+
+    def test_a_hole_on_the_border_is_a_notch_and_one_inside_stays(self) -> None:
+        region = Region(SQUARE, (MIDDLE,))
+        assert region.share(0, 0.5, 0).holes == ()
+        assert region.share(0, 0.5, 0).polygon.area == pytest.approx(5000 - 200)
+        assert len(region.share(0, 0.7, 0).holes) == 1
+
+    @pytest.mark.parametrize(("begin", "end"), [(0.5, 0.5), (0.6, 0.4), (-0.1, 0.5), (0, 1.1), (math.nan, 1)])
+    def test_what_is_no_share_is_refused(self, begin: float, end: float) -> None:
+        with pytest.raises(ValueError, match="a share runs from"):
+            Region(SQUARE).share(begin, end, 0)
+
+    def test_what_would_be_in_pieces_is_refused(self) -> None:
+        horseshoe = Region(((0, 0), (100, 0), (100, 20), (20, 20), (20, 80), (100, 80), (100, 100), (0, 100)))
+        with pytest.raises(ValueError, match=r"in several pieces, lies from 0.5 to 1 of its width"):
+            horseshoe.share(0.5, 1, 0)
+
+    @given(st.data(), st.integers(1, 4), st.floats(0, math.pi))
+    def test_shares_are_the_whole_together_and_share_nothing(
+        self, data: st.DataObject, count: int, heading_rad: float
+    ) -> None:
+        whole = data.draw(regions())
+        try:
+            shares = [whole.share(one / count, (one + 1) / count, heading_rad).polygon for one in range(count)]
+        except ValueError:  # in pieces
+            assume(False)
+        assert sum(share.area for share in shares) == pytest.approx(whole.polygon.area, rel=1e-6)
+        together = shapely.union_all([share.buffer(1e-6) for share in shares])
+        assert whole.polygon.difference(together.buffer(1e-6)).area == pytest.approx(0, abs=1e-6 * whole.polygon.area)

@@ -34,6 +34,13 @@ class TestLegsOverStrip:
         assert np.array([leg.start for leg in legs]) == pytest.approx(np.array([(80, 50), (100, 250), (120, 50)]))
         assert np.array([leg.end for leg in legs]) == pytest.approx(np.array([(80, 250), (100, 50), (120, 250)]))
 
+    def test_for_a_sensor_that_looks_to_the_side_they_lie_beside_the_strip(self) -> None:
+        strip = Strip(7, (100, 50), NORTH, 200, 60)
+        (right,) = legs_over_strip(strip, 60, beside_m=85)
+        assert (*right.start, *right.end) == pytest.approx((185, 50, 185, 250))
+        (left,) = legs_over_strip(strip, 60, beside_m=-85)
+        assert left.start == pytest.approx((15, 50))
+
     def test_by_hand_to_the_east(self) -> None:
         legs = legs_over_strip(Strip(7, (0, 0), EAST, 100, 40), 20)
         # Port is north.

@@ -56,6 +56,27 @@ MISTAKES = {
         "speed_mps: 1e999",
         ["bad.yaml:8: vehicles.primary.speed_mps: Infinity is not allowed; must be a finite number"],
     ),
+    "a part of no number": (
+        "range_m: 145",
+        "range_m: 145\n    part: first",
+        [
+            'bad.yaml:13: vehicles.primary.part: "first" is not allowed; '
+            "must be such as 1 of 3: which part, and of how many, at most 99"
+        ],
+    ),
+    "a part beyond the last": (
+        "range_m: 145",
+        "range_m: 145\n    part: 4 of 3",
+        [
+            'bad.yaml:13: vehicles.primary.part: "4 of 3" is not allowed; '
+            "must be such as 1 of 3: which part, and of how many, at most 99"
+        ],
+    ),
+    "a helper that has a part": (
+        "turn_radius_m: 6",
+        "turn_radius_m: 6\n    part: 1 of 1",
+        ['bad.yaml:19: vehicles.helper.part: "1 of 1" is not allowed; only a survey vehicle has this key'],
+    ),
     "fraction of a target": (
         "name: trial",
         "name: trial\ntargets: {count: 1.5}",
@@ -434,6 +455,20 @@ def test_a_mistake_is_told_by_line(write: Write, valid_text: str, old: str, new:
     assert lines_of(write(valid_text.replace(old, new, 1))) == expected
 
 
+def test_parts_that_nobody_has_are_told(write: Write, valid_text: str) -> None:
+    (line,) = lines_of(write(valid_text.replace("range_m: 145", "range_m: 145\n    part: 2 of 4")))
+    assert line.endswith("must survey the whole area together, but nobody has part 1 of 4, 3 of 4, 4 of 4")
+    assert line.startswith("bad.yaml:4: vehicles: ")
+
+
+def test_parts_of_different_counts_are_told(write: Write, valid_text: str) -> None:
+    primary = valid_text[valid_text.index("  primary:") : valid_text.index("  helper:")]
+    second = primary.replace("primary", "second").replace("range_m: 145", "range_m: 145\n    part: 1 of 1")
+    third = primary.replace("primary", "third").replace("range_m: 145", "range_m: 145\n    part: 1 of 2")
+    (line,) = lines_of(write(valid_text + second + third))
+    assert line.endswith("must all survey the whole area, or each a part of as many")
+
+
 FILES = {
     "empty": (b"", "bad.yaml:1: the file is empty; must be a mapping of keys to values"),
     "comments alone": (b"# nothing\n", "bad.yaml:1: the file is empty; must be a mapping of keys to values"),
@@ -462,10 +497,9 @@ def test_a_file_that_is_no_scenario_is_told(write: Write, content: bytes, expect
 
 
 def test_a_name_that_is_not_bundled_is_told_with_those_that_are() -> None:
-    assert lines_of("telaro") == [
-        "telaro: no such scenario, did you mean tellaro? (there are headland, paper, patchy, tellaro)"
-    ]
-    assert lines_of("xyz") == ["xyz: no such scenario (there are headland, paper, patchy, tellaro)"]
+    there_are = "there are five-helpers, headland, paper, patchy, tellaro, two-helpers, wide"
+    assert lines_of("telaro") == [f"telaro: no such scenario, did you mean tellaro? ({there_are})"]
+    assert lines_of("xyz") == [f"xyz: no such scenario ({there_are})"]
 
 
 def test_paths_that_are_no_readable_file_are_told(tmp_path: Path) -> None:
