@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.check import check
+from secondlook.commands.compare import compare
 from secondlook.commands.geojson import geojson
 from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
@@ -49,7 +50,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, paper, replay, view, report, geojson):
+for command in (run, scenarios, check, plan, compare, paper, replay, view, report, geojson):
     app.command()(command)
 
 

@@ -17,7 +17,6 @@ from comms.messages import (
     Message,
     Nav,
     Plan,
-    Role,
     RunInfo,
     StripStatus,
     TruthLook,
@@ -96,12 +95,12 @@ class RecordedMission:
     @property
     def primaries(self) -> list[str]:
         """The vehicles that survey."""
-        return [one.vehicle for one in self.run.vehicles if one.role is Role.SURVEY]
+        return [one.vehicle for one in self.run.vehicles if one.role.surveys]
 
     @property
     def helpers(self) -> list[str]:
         """The vehicles that revisit."""
-        return [one.vehicle for one in self.run.vehicles if one.role is Role.REVISIT]
+        return [one.vehicle for one in self.run.vehicles if one.role.revisits]
 
     @cached_property
     def end_s(self) -> float:

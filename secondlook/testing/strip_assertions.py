@@ -203,7 +203,7 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
     idle_since: dict[str, int] = {}
     not_for: set[tuple[int, str]] = set()
     serving: dict[int, str] = {}
-    helpers = {one.vehicle for one in flight.run_info.vehicles if one.role is Role.REVISIT}
+    helpers = {one.vehicle for one in flight.run_info.vehicles if one.role.revisits}
     told: set[int] = set()
     for one in flight.heard:
         now_ms, message = one.header.sent_ms, one.message

@@ -1,0 +1,126 @@
+"""`secondlook compare`: which allocator leaves the least risk?"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from concurrent.futures.process import BrokenProcessPool
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from secondlook.compare.batch import Flown, fly_all
+from secondlook.compare.contenders import Contender, contenders
+from secondlook.compare.standings import as_json as comparison_as_json
+from secondlook.compare.standings import failures, standings
+from secondlook.compare.table import table
+from secondlook.errors import UserError
+from secondlook.fleet import build_fleet
+from secondlook.scenario import load_scenario
+from secondlook.signals import signals_interrupt
+
+FAILED = 1
+MOST_SEEDS = 10_000
+WIDEST = 500  # characters
+
+
+def compare(
+    scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")] = "tellaro",
+    allocators: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,...",
+            help="Allocators; self and self-longer: no helper, primaries revisit themselves. All, if left out.",
+        ),
+    ] = "",
+    seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Each flies with seeds 1 to N.")] = 10,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for compare.json and the plot risk.png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+) -> None:
+    """Fly the same seeds with several allocators, and compare what they leave."""
+    if out is not None:
+        _prepare(out)
+    mission = load_scenario(scenario, set_ or ())
+    chosen = contenders(mission, [name.strip() for name in allocators.split(",")] if allocators else ())
+    for contender in chosen:
+        build_fleet(contender.scenario, record=False)
+    flown: Flown = {}
+    failure = _fly(chosen, seeds, jobs or os.cpu_count() or 1, flown, shown=sys.stderr.isatty() and not as_json)
+    title = f"{mission.name}, seeds 1 to {seeds}"
+    if as_json:
+        typer.echo(json.dumps(comparison_as_json(flown, mission.name), indent=2))
+    elif standings(flown):
+        told = table(standings(flown), title)
+        console = Console(soft_wrap=True, highlight=False)
+        console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off
+        console.print(told)
+    if out is not None and standings(flown):
+        _write(flown, mission.name, title, out)
+        if not as_json:
+            typer.echo(f"Files: {out / 'compare.json'}, {out / 'risk.png'}")
+    sentences = [*failures(flown), *([failure] if failure else [])]
+    if sentences:
+        sys.stderr.write("".join(f"{sentence}\n" for sentence in sentences))
+        raise typer.Exit(FAILED)
+
+
+def _fly(chosen: list[Contender], seeds: int, jobs: int, flown: Flown, *, shown: bool) -> str:
+    """Flies all; what went wrong with the comparison itself, in a sentence, or nothing."""
+    total = seeds * len(chosen)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("missions{task.fields[told]}"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
+        task = progress.add_task("compare", total=total, told="")
+
+        def tell(flown: Flown) -> None:
+            failed = len(failures(flown))
+            progress.update(task, completed=_count(flown), told=f", {failed} failed" if failed else "")
+
+        try:
+            with signals_interrupt():
+                fly_all(chosen, range(1, seeds + 1), jobs, flown, tell)
+        except KeyboardInterrupt:
+            return f"interrupted after {_count(flown)} of {total} missions"
+        except BrokenProcessPool:
+            return f"a process that flew missions has died, after {_count(flown)} of {total} missions"
+    return ""
+
+
+def _count(flown: Flown) -> int:
+    return sum(len(by_seed) for by_seed in flown.values())
+
+
+def _prepare(folder: Path) -> None:
+    if find_spec("matplotlib") is None:
+        raise UserError("--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+
+
+def _write(flown: Flown, name: str, title: str, folder: Path) -> None:
+    content = json.dumps(comparison_as_json(flown, name), indent=2)
+    try:
+        (folder / "compare.json").write_text(content + "\n", encoding="utf-8")
+        # Only who draws needs matplotlib.
+        import_module("secondlook.compare.plot").draw(flown, title, folder / "risk.png")
+    except OSError as error:
+        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error

@@ -1,0 +1,109 @@
+"""What the missions of a comparison come to: mean and spread over the seeds, and who did better than the first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from secondlook.compare.batch import Flown
+from secondlook.compare.flight import FailedFlight, Flight
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean and standard deviation over seeds; the latter is 0 for a single one."""
+
+    mean: float
+    deviation: float
+
+
+@dataclass(frozen=True)
+class Standing:
+    """One contender over all seeds that it has flown to the end.
+
+    Residual risk, mean over the area and over the worst 30 % of it, when the last primary had surveyed all, at 1.05
+    times that, and at the mission's end, which is `ends_at` times that. `served`: strips done. `removed_m2`: see
+    `Flight`. `wins`, `losses`: on how many seeds its mean risk at the end is lower or higher than the first
+    contender's, of those that both have flown. `failed`: missions that failed.
+    """
+
+    name: str
+    flown: int
+    failed: int
+    primary_s: Spread
+    mean: Spread
+    worst30_mean: Spread
+    mean_105: Spread
+    worst30_mean_105: Spread
+    ends_at: Spread
+    mean_end: Spread
+    worst30_mean_end: Spread
+    served: Spread
+    removed_m2: Spread
+    wins: int
+    losses: int
+
+
+def standings(flown: Flown) -> list[Standing]:
+    """Those with at least one mission flown, in their order."""
+    done = {
+        name: {seed: one for seed, one in by_seed.items() if isinstance(one, Flight)} for name, by_seed in flown.items()
+    }
+    first = next(iter(done.values()), {})
+    return [
+        _standing(name, list(by_seed.values()), len(flown[name]) - len(by_seed), first)
+        for name, by_seed in done.items()
+        if by_seed
+    ]
+
+
+def failures(flown: Flown) -> list[str]:
+    """A sentence for each mission that failed."""
+    return [
+        f"{name}, seed {seed}: {one.failure}"
+        for name, by_seed in flown.items()
+        for seed, one in sorted(by_seed.items())
+        if isinstance(one, FailedFlight)
+    ]
+
+
+def as_json(flown: Flown, scenario: str) -> dict[str, Any]:
+    """For programs: the standings, and every flight without its course."""
+    flights = [
+        {"contender": name, **{key: value for key, value in asdict(one).items() if key != "over_time"}}
+        for name, by_seed in flown.items()
+        for _, one in sorted(by_seed.items())
+    ]
+    return {
+        "scenario": scenario,
+        "contenders": [asdict(standing) for standing in standings(flown)],
+        "missions": flights,
+    }
+
+
+def _standing(name: str, flights: Sequence[Flight], failed: int, first: dict[int, Flight]) -> Standing:
+    def spread(what: Callable[[Flight], float]) -> Spread:
+        values = np.array([what(one) for one in flights], dtype=np.float64)
+        return Spread(float(values.mean()), float(values.std(ddof=1)) if values.size > 1 else 0.0)
+
+    both = [(one.at_end.mean, first[one.seed].at_end.mean) for one in flights if one.seed in first]
+    return Standing(
+        name=name,
+        flown=len(flights),
+        failed=failed,
+        primary_s=spread(lambda one: one.primary_s),
+        mean=spread(lambda one: one.at_primary_s.mean),
+        worst30_mean=spread(lambda one: one.at_primary_s.worst30_mean),
+        mean_105=spread(lambda one: one.at_105.mean),
+        worst30_mean_105=spread(lambda one: one.at_105.worst30_mean),
+        ends_at=spread(lambda one: one.at_end.t_s / one.primary_s),
+        mean_end=spread(lambda one: one.at_end.mean),
+        worst30_mean_end=spread(lambda one: one.at_end.worst30_mean),
+        served=spread(lambda one: float(one.served)),
+        removed_m2=spread(lambda one: one.removed_m2),
+        wins=sum(own < other for own, other in both),
+        losses=sum(own > other for own, other in both),
+    )
