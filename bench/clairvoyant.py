@@ -1,0 +1,201 @@
+"""How near an allocator comes to who knows everything beforehand.
+
+python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--seconds S] [--jobs J] [--set KEY=VALUE]
+python -m bench.clairvoyant --run RUN [--seconds S]      a recorded run; --json for programs, with either
+
+For each seed: what each allocator's second looks removed (residual risk times m2, as measured), the bound that no
+schedule exceeds (`clairvoyant_bound` says why), and the best schedule that was found (`clairvoyant_schedule`); then the
+ratios. S is the wall time of the search for the schedule; the bound takes some seconds more.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from concurrent.futures import as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import secondlook
+from bench.clairvoyant_bound import upper_bound
+from bench.clairvoyant_schedule import best_schedule
+from bench.removable import Clairvoyance, Removable, watched
+from secondlook.compare.contenders import contenders
+from secondlook.compare.flight import FailedFlight, fly
+from secondlook.errors import UserError
+from secondlook.mission import RunOptions, run_mission
+from secondlook.processes import RunFailedError
+from secondlook.scenario import Scenario, load_scenario
+from secondlook.side_by_side import worker_pool
+from secondlook.signals import signals_interrupt
+
+BOUND_S = 60.0
+LARGEST_GRID_CELLS = 60_000
+
+
+@dataclass(frozen=True)
+class Row:
+    """One seed. `removed_m2`: by allocator, None for a mission that failed. `there_m2`: all the risk that the survey
+    alone left. `search_s`: how long the search for a schedule took."""
+
+    seed: int
+    removed_m2: dict[str, float | None]
+    there_m2: float
+    bound_m2: float
+    best_m2: float
+    routed_m2: float
+    legs: int
+    bound_s: float
+    search_s: float
+
+
+def solve(mission: Removable, seed: int, removed_m2: dict[str, float | None], seconds: float) -> Row:
+    """Bound and best schedule of one mission."""
+    if mission.risk.size > LARGEST_GRID_CELLS:
+        raise ValueError(f"a map of {mission.risk.size} cells is too large; must have at most {LARGEST_GRID_CELLS}")
+    began_s = time.monotonic()
+    bound = upper_bound(mission, BOUND_S)
+    bounded_s = time.monotonic()
+    best = best_schedule(mission, bound, seconds, seed)
+    return Row(
+        seed=seed,
+        removed_m2=removed_m2,
+        there_m2=mission.total_m2,
+        bound_m2=bound.removed_m2,
+        best_m2=best.removed_m2,
+        routed_m2=best.routed_m2,
+        legs=sum(len(legs) for legs in best.schedule),
+        bound_s=bounded_s - began_s,
+        search_s=time.monotonic() - bounded_s,
+    )
+
+
+def one_seed(scenario: Scenario, allocators: list[str], seconds: float) -> Row:
+    """Flies the seed with each allocator, and solves it. The survey is the same with all of them."""
+    removed: dict[str, float | None] = {}
+    for contender in contenders(scenario, allocators):
+        flight = fly(contender.with_seed(scenario.seed))
+        removed[contender.name] = None if isinstance(flight, FailedFlight) else flight.removed_m2
+    clairvoyance = Clairvoyance(contenders(scenario, ["none"])[0].scenario)
+    with tempfile.TemporaryDirectory(prefix="secondlook-clairvoyant-") as folder:
+        run_mission(clairvoyance.scenario, RunOptions(Path(folder), "local", record=False, watch=clairvoyance.take))
+    return solve(clairvoyance.removable(), scenario.seed, removed, seconds)
+
+
+def one_run(folder: Path, seconds: float) -> Row:
+    """Solves a recorded run."""
+    scenario = load_scenario(str(folder / "scenario.yaml"))
+    clairvoyance = watched(scenario, secondlook.load(folder).received())
+    alone, fleet = clairvoyance.metrics.risk_primary_alone(), clairvoyance.metrics.risk()
+    if alone is None or fleet is None:
+        raise UserError(f"{folder}: the run ended before the mission began")
+    removed_m2 = (alone.mean - fleet.mean) * alone.cells * scenario.area.cell_m**2
+    return solve(clairvoyance.removable(), scenario.seed, {scenario.coordinator.allocator: removed_m2}, seconds)
+
+
+def summary(rows: list[Row]) -> dict[str, Any]:
+    """Means and worst cases of the ratios."""
+    told: dict[str, Any] = {"best_to_bound": _ratios([row.best_m2 / row.bound_m2 for row in rows])}
+    for name in rows[0].removed_m2:
+        flown = [(removed, row) for row in rows if (removed := row.removed_m2[name]) is not None]
+        if flown:
+            told[name] = {
+                "missions": len(flown),
+                "to_best": _ratios([removed / row.best_m2 for removed, row in flown]),
+                "to_bound": _ratios([removed / row.bound_m2 for removed, row in flown]),
+            }
+    return told
+
+
+def _ratios(values: list[float]) -> dict[str, float]:
+    return {"mean": float(np.mean(values)), "least": min(values), "deviation": float(np.std(values))}
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m bench.clairvoyant", description=__doc__.split("\n")[0])
+    parser.add_argument("scenario", nargs="?", default="tellaro")
+    parser.add_argument("--allocators", default="", help="as for secondlook compare; the scenario's own if left out")
+    parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--run", type=Path)
+    parser.add_argument("--json", action="store_true")
+    return parser.parse_args()
+
+
+def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
+    scenario = load_scenario(arguments.scenario, arguments.set)
+    if not scenario.revisit_vehicles:
+        raise UserError(f"{arguments.scenario}: has no helper whose schedule could be compared")
+    allocators = arguments.allocators.split(",") if arguments.allocators else [scenario.coordinator.allocator]
+    contenders(scenario, allocators)  # refuses unknown names before anything flies
+    columns = (TextColumn("clairvoyant"), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with (
+        signals_interrupt(),
+        Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress,
+        worker_pool(min(arguments.jobs, arguments.seeds)) as pool,
+    ):
+        task = progress.add_task("", total=arguments.seeds)
+        seeds = (scenario.model_copy(update={"seed": seed}) for seed in range(1, arguments.seeds + 1))
+        for job in as_completed([pool.submit(one_seed, one, allocators, arguments.seconds) for one in seeds]):
+            rows.append(job.result())
+            progress.update(task, completed=len(rows))
+
+
+def _print(rows: list[Row]) -> None:
+    names = list(rows[0].removed_m2)
+    width = max(12, *(len(name) for name in names))
+    print(f"{'seed':>5} {'there':>8} {'bound':>8} {'best':>8} {'legs':>5}", *(f"{name:>{width}}" for name in names))
+    for row in sorted(rows, key=lambda row: row.seed):
+        removed = (f"{'failed' if m2 is None else f'{m2:.0f}':>{width}}" for m2 in row.removed_m2.values())
+        print(f"{row.seed:5} {row.there_m2:8.0f} {row.bound_m2:8.0f} {row.best_m2:8.0f} {row.legs:5}", *removed)
+    for name, ratios in summary(rows).items():
+        if name == "best_to_bound":
+            print(f"best schedule found, of the bound: mean {ratios['mean']:.3f}, least {ratios['least']:.3f}")
+        else:
+            best, bound = ratios["to_best"], ratios["to_bound"]
+            print(
+                f"{name}: of the best schedule mean {best['mean']:.3f}, least {best['least']:.3f}; "
+                f"of the bound mean {bound['mean']:.3f}, least {bound['least']:.3f}"
+            )
+    search_s, bound_s = np.mean([row.search_s for row in rows]), np.mean([row.bound_s for row in rows])
+    print(f"m2 of residual risk; {search_s:.0f} s of search a seed, {bound_s:.0f} s for the bound")
+
+
+def main() -> None:
+    """The command."""
+    arguments = _arguments()
+    rows: list[Row] = []
+    failure = ""
+    try:
+        if arguments.run:
+            rows.append(one_run(arguments.run, arguments.seconds))
+        else:
+            _solve_all(arguments, rows)
+    except UserError as error:
+        sys.exit(f"{error}")
+    except (RunFailedError, ValueError) as error:
+        failure = f"{error}"
+    except KeyboardInterrupt:
+        failure = "interrupted"
+    if rows and arguments.json:
+        print(json.dumps({"seeds": [asdict(row) for row in rows], "ratios": summary(rows)}, indent=2))
+    elif rows:
+        _print(rows)
+    if failure:
+        sys.exit(failure)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,183 @@
+"""What second looks could have removed in a mission that was flown: where, from when on, by which helper."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from comms.messages import CoverageTile, Look
+from comms.node import Received
+from planner.dubins import Pose
+from planner.footprint import LookGeometry, look_on_grid
+from planner.types import BoolArray, FloatArray, GridSpec
+from secondlook.fleet import build_fleet
+from secondlook.metrics import Metrics
+from secondlook.scenario import Scenario
+from sim_world.config import VehicleConfig, WorldConfig
+from sim_world.seabed import make_seabed
+from sim_world.sonar import CurveSonar
+
+EDGE_M = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class LegSensor:
+    """What one look from a leg along the grid does.
+
+    `reach`: how many columns to either side of its own a leg covers. `p_detect`: true P_d of a look at each cell, by
+    the column's distance from the leg (0 to `reach`), shape (reach + 1, rows, columns); 0 outside the area.
+    """
+
+    reach: int
+    p_detect: FloatArray
+
+    @property
+    def best(self) -> FloatArray:
+        """The P_d of each cell at its best distance, grid shape."""
+        best: FloatArray = self.p_detect.max(axis=0)
+        return best
+
+
+@dataclass(frozen=True, eq=False)
+class LegHelper:
+    """One helper, with what it flies legs with; `lasts_s`: its endurance."""
+
+    name: str
+    start: Pose
+    speed_mps: float
+    turn_radius_m: float
+    run_in_m: float
+    lasts_s: float
+    sensor: LegSensor
+
+
+@dataclass(frozen=True, eq=False)
+class Removable:
+    """A mission as a clairvoyant sees it.
+
+    `risk`: the residual risk that the survey alone leaves, grid shape, 0 outside the area. `released_s`: when each cell
+    had its last look by a primary; where none ever looked, when a primary said that none would. `ends_s`: the mission's
+    deadline; `primary_s`: when the last primary had surveyed all.
+    """
+
+    grid: GridSpec
+    inside: BoolArray
+    risk: FloatArray
+    released_s: FloatArray
+    primary_s: float
+    ends_s: float
+    helpers: tuple[LegHelper, ...]
+
+    @property
+    def total_m2(self) -> float:
+        """All the risk that is there, times the area."""
+        return float(self.risk.sum()) * self.grid.cell_area_m2
+
+
+@dataclass
+class Clairvoyance:
+    """Told every message of a mission, it knows afterwards what there was to remove."""
+
+    scenario: Scenario
+    metrics: Metrics = field(default_factory=Metrics)
+    _looked_s: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    _settled_s: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def take(self, received: Received) -> None:
+        """Takes one message, in the order of sending."""
+        self.metrics.take(received)
+        message, now_s = received.message, received.header.sent_ms / 1000
+        if self.metrics.map is None or received.vehicle not in self.scenario.survey_vehicles:
+            return
+        if not self._looked_s.size:
+            self._looked_s = np.full(self.metrics.map.grid.shape, -np.inf)
+            self._settled_s = np.full(self.metrics.map.grid.shape, np.inf)
+        # A primary's second looks come after its survey and do not count as its last.
+        surveying = self.metrics.vehicles[received.vehicle].finished_ms is None
+        if isinstance(message, Look) and message.valid and surveying:
+            rows, columns, p_detect = look_on_grid(self.metrics.map.grid, geometry(message), message.p_detect)
+            self._looked_s[rows, columns][p_detect > 0] = now_s
+        elif isinstance(message, CoverageTile):
+            window = np.s_[
+                message.first_row : message.first_row + message.settled.shape[0],
+                message.first_column : message.first_column + message.settled.shape[1],
+            ]
+            self._settled_s[window] = np.minimum(self._settled_s[window], np.where(message.settled, now_s, np.inf))
+
+    def removable(self) -> Removable:
+        """What the messages told; raises ValueError where the survey was not finished."""
+        metrics = self.metrics
+        primary_ms = metrics.primary_ms()
+        if metrics.map is None or primary_ms is None:
+            raise ValueError("the mission was over before the survey")
+        layers = [
+            one.surveyed or metrics.map.layers[name]
+            for name, one in metrics.vehicles.items()
+            if one.role.surveys and name in metrics.map.layers
+        ]
+        risk, _ = metrics.map.risk_of_layers(layers)
+        return Removable(
+            grid=metrics.map.grid,
+            inside=metrics.inside,
+            risk=np.where(metrics.inside, risk, 0.0),
+            released_s=np.where(self._looked_s >= 0, self._looked_s, self._settled_s),
+            primary_s=primary_ms / 1000,
+            ends_s=primary_ms / 1000 * self.scenario.mission.deadline_factor,
+            helpers=leg_helpers(self.scenario, metrics.map.grid, metrics.inside),
+        )
+
+
+def watched(scenario: Scenario, messages: Iterable[Received]) -> Clairvoyance:
+    """One that was told all of these."""
+    made = Clairvoyance(scenario)
+    for one in messages:
+        made.take(one)
+    return made
+
+
+def leg_helpers(scenario: Scenario, grid: GridSpec, inside: BoolArray) -> tuple[LegHelper, ...]:
+    """The scenario's helpers with the truth of what their sensors would see."""
+    fleet = build_fleet(scenario, record=False)
+    world: WorldConfig = fleet.specs["world"].config
+    bodies = {body.vehicle: body for body in world.vehicles}
+    return tuple(
+        LegHelper(
+            name=name,
+            start=Pose(body.start_x_m, body.start_y_m, body.start_heading_rad),
+            speed_mps=body.speed_mps,
+            turn_radius_m=body.turn_radius_m,
+            run_in_m=vehicle.run_in_m,
+            lasts_s=vehicle.endurance_s,
+            sensor=_leg_sensor(world, body, grid, inside),
+        )
+        for name, vehicle in scenario.revisit_vehicles.items()
+        for body in (bodies[name],)
+    )
+
+
+def _leg_sensor(world: WorldConfig, body: VehicleConfig, grid: GridSpec, inside: BoolArray) -> LegSensor:
+    curve = body.sensor.curve
+    reach = math.floor((float(curve.range_m[-1]) + EDGE_M) / grid.cell_m)
+    sonar = (body.sensor.sonar or CurveSonar)(curve=curve, seabed=make_seabed(world.seabed, world.area, world.seed))
+    x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
+    # Either side looks across the same crests: a leg there and a leg back see alike.
+    bearing_rad = grid.frame.heading_rad + math.pi / 2
+    by_distance = [
+        np.where(
+            inside, sonar.p_detect(np.full(grid.shape, distance_m), bearing_rad, body.altitude_m, (x_m, y_m), 0.0), 0.0
+        )
+        for distance_m in np.arange(reach + 1) * grid.cell_m
+    ]
+    return LegSensor(reach, np.array(by_distance))
+
+
+def geometry(look: Look) -> LookGeometry:
+    """Where a look lies."""
+    _, along_bins, range_bins = look.p_detect.shape
+    return LookGeometry(
+        (look.origin_x_m, look.origin_y_m), look.heading_rad, look.first_along_m, look.along_bin_m, look.range_bin_m,
+        along_bins, range_bins,
+    )  # fmt: skip
