@@ -38,7 +38,7 @@ class Verdict:
         self._lost = self._lost or (host, at_ms, now_s)
 
     def ends(self, host: str, fate: Fate, now_s: float) -> None:
-        """A process has ended; with exit code 0 that is no failure by itself, except the hub's."""
+        """A process has ended; with exit code 0 that is no failure by itself, except of a hub without a result."""
         self._ended.setdefault(host, (fate, now_s))
 
     def sentence(self, now_s: float) -> str | None:
@@ -52,7 +52,8 @@ class Verdict:
                 return _obituary(host, self._ended[host][0], when)
             return f"{host} has fallen silent {when}" if now_s - lost_s >= BETTER_WORDS_S else None
         for host, (fate, ended_s) in self._ended.items():
-            if host == self._hub or (fate.exit_code != 0 and now_s - ended_s >= BETTER_WORDS_S):
+            waited, failed, is_hub = now_s - ended_s >= BETTER_WORDS_S, fate.exit_code != 0, host == self._hub
+            if (waited and failed) or (waited and is_hub) or (failed and is_hub):
                 return _obituary(host, fate, "")
         return None
 

@@ -64,8 +64,14 @@ def test_an_end_waits_for_better_words_except_the_hubs(verdict: Verdict) -> None
     assert verdict.sentence(5.0 + BETTER_WORDS_S) == "alpha was killed by SIGKILL"
 
 
-@pytest.mark.parametrize("fate", [KILLED, BROKEN, DONE])
-def test_the_hubs_end_is_told_at_once(verdict: Verdict, fate: Fate) -> None:
+def test_the_hubs_good_end_waits_for_the_result(verdict: Verdict) -> None:
+    verdict.ends("world", DONE, 5.0)
+    assert verdict.sentence(5.0 + BETTER_WORDS_S - 0.01) is None
+    assert verdict.sentence(5.0 + BETTER_WORDS_S) == "world has ended with exit code 0"
+
+
+@pytest.mark.parametrize("fate", [KILLED, BROKEN])
+def test_the_hubs_bad_end_is_told_at_once(verdict: Verdict, fate: Fate) -> None:
     verdict.ends("world", fate, 5.0)
     sentence = verdict.sentence(5.0)
     assert sentence is not None
