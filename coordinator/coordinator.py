@@ -30,11 +30,12 @@ from comms.topics import MISSION_OVER, STRIP, TASK
 from coordinator.badly_seen import BadlySeen
 from coordinator.config import CoordinatorConfig
 from coordinator.growth import Growth
+from coordinator.last_cut import LastCut
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.offers import checked_offers
 from coordinator.service import service
 from coordinator.situation import Helper, OpenStrip, Situation
-from coordinator.strips import Cut, CuttingRules, cut_strips, strip_of
+from coordinator.strips import Cut, CuttingRules, Window, cut_strips, strip_of
 from coordinator.vehicles import KnownVehicle
 from coordinator.worth import Supply, worth_later_m2ps
 from planner.dubins import Pose
@@ -64,6 +65,7 @@ class Coordinator:
         self._inside: BoolArray
         self._badly_seen: BadlySeen
         self._rules: CuttingRules | None = None
+        self._last_cut: LastCut
         self._tasks = 0
         self._outbox: list[Publication] = []
         self._to_cut = False
@@ -118,6 +120,7 @@ class Coordinator:
         self.map = FleetMap(spec, run.rho)
         self._inside = Region(run.outline, run.hole_outlines).inside(spec)
         self._badly_seen = BadlySeen(spec, self._inside)
+        self._last_cut = LastCut(spec)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
         self._primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
         helpers = [entry for entry in run.vehicles if entry.role.revisits]
@@ -276,15 +279,18 @@ class Coordinator:
         if self._rules is None:
             return
         grid, primaries = self.map.grid, list(self._primaries)
-        taken = [record.window for record in self.ledger.in_state(*WITH_A_VEHICLE)]
         risk = self._badly_seen.risk(self.map, primaries)
         open_cells = self._badly_seen.still_open(self.map, primaries)
-        unmatched = self.ledger.in_state(StripState.OPEN)
-        self._coming = []
         growth = self._growth(risk)
         ahead = int((self._inside & ~self.map.settled_by(primaries) & (growth.settles_s == 0)).sum())
         self._more_to_come = ahead / max(1, int(self._inside.sum()) - ahead)
-        for cut in cut_strips(grid, risk, open_cells, self._rules, taken, growth):
+        reach = 2 * self._rules.columns(grid)
+        columns = self._last_cut.changed_columns(risk, open_cells, growth, self._looked_at(), reach)
+        unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
+        self._coming = [cut for cut in self._coming if not columns[cut.window.columns].any()]
+        to_cut = {record.window for record in unmatched}
+        looked_at = [window for window in self._looked_at() if window not in to_cut]
+        for cut in cut_strips(grid, risk, open_cells, self._rules, looked_at, growth, columns):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
@@ -295,6 +301,12 @@ class Coordinator:
                 self._open(cut, now_ms)
         for record in unmatched:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
+        self._last_cut.remember(self._looked_at())
+
+    def _looked_at(self) -> list[Window]:
+        """What is a strip's that is open or with a vehicle, or will be one's."""
+        records = self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
+        return [*(record.window for record in records), *(cut.window for cut in self._coming)]
 
     def _growth(self, risk: FloatArray) -> Growth:
         """What the primaries are about to settle on the tracks they fly."""

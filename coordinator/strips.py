@@ -33,6 +33,10 @@ class CuttingRules:
     min_strip_m: float
     max_strip_m: float
 
+    def columns(self, grid: GridSpec) -> int:
+        """Whole columns of cells that the swath covers, at least one."""
+        return min(grid.columns, max(1, math.floor(self.swath_m / grid.cell_m + TOLERANCE)))
+
 
 @dataclass(frozen=True)
 class Window:
@@ -64,6 +68,11 @@ class Window:
         """Number of cells."""
         return (self.end_row - self.first_row) * (self.end_column - self.first_column)
 
+    @property
+    def columns(self) -> slice:
+        """Its columns of the grid's arrays."""
+        return slice(self.first_column, self.end_column)
+
 
 @dataclass(frozen=True)
 class Cut:
@@ -83,6 +92,7 @@ def cut_strips(
     rules: CuttingRules,
     taken: Sequence[Window] = (),
     growth: Growth | None = None,
+    columns: BoolArray | None = None,
 ) -> list[Cut]:
     """The strips worth flying, best first.
 
@@ -91,12 +101,13 @@ def cut_strips(
     from `min_strip_m` to `max_strip_m` long, in whole cells. Best first: by what a run of rows removes beyond its cost.
     `taken`: strips that are being served; their cells count as looked at. No strip lies by three quarters or more on
     another one, or on one that is taken: whether a place is worth two looks is asked when it has had the first.
-    `growth`: what is about to settle counts as if it had.
+    `growth`: what is about to settle counts as if it had. `columns`: where to look, shape (columns,); windows that hold
+    none of them are left out; None for everywhere.
     """
     growth = growth or Growth.none(grid)
     risk = np.where(growth.settles_s > 0, growth.risk, risk)
     open_cells = open_cells & (growth.settles_s == 0)
-    width = min(grid.columns, max(1, math.floor(rules.swath_m / grid.cell_m + TOLERANCE)))
+    width = rules.columns(grid)
     removable = risk * (rules.p_detect * grid.cell_area_m2)
     looked_at = list(taken)
     for window in taken:
@@ -115,9 +126,9 @@ def cut_strips(
         profit[:, near] = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
         value[near], first_row[near], end_row[near] = _best_runs(profit[:, near])
 
-    bad = np.flatnonzero(removable.any(axis=0))
-    if bad.size:
-        look(slice(int(bad[0]), int(bad[-1]) + 1))
+    to_look_at = np.ones(grid.columns, dtype=np.bool_) if columns is None else columns
+    for stretch in stretches(removable.any(axis=0) & to_look_at):
+        look(stretch)
     cuts: list[Cut] = []
     for _ in range(MOST_STRIPS_A_CUT):
         best = float(value.max())
@@ -158,6 +169,12 @@ def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = 
     length_m = (window.end_row - window.first_row) * grid.cell_m
     width_m = (window.end_column - window.first_column) * grid.cell_m
     return Strip(number, start, heading_rad, length_m, width_m)
+
+
+def stretches(columns: BoolArray) -> list[slice]:
+    """The stretches of neighbouring columns that are set."""
+    edges = np.flatnonzero(np.diff(columns, prepend=False, append=False)).tolist()
+    return [slice(first, end) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _window_sums(values: FloatArray, width: int) -> FloatArray:

@@ -237,3 +237,14 @@ class TestStripOf:
         expected = np.zeros(grid.shape, dtype=np.bool_)
         expected[window.cells] = True
         assert (within == expected).all()
+
+
+class TestWhereToLook:
+    def test_what_lies_elsewhere_is_left_out(self) -> None:
+        risk = np.zeros(GRID.shape)
+        risk[10:40, 0:10] = risk[10:40, 23:33] = 0.8
+        columns = np.zeros(GRID.columns, dtype=np.bool_)
+        columns[28] = True
+        cuts = cut_strips(GRID, risk, NONE_OPEN, RULES, columns=columns)
+        assert [one.window for one in cuts] == [Window(10, 40, 23, 33)]
+        assert cut_strips(GRID, risk, NONE_OPEN, RULES, columns=np.zeros_like(columns)) == []

@@ -1,0 +1,69 @@
+"""What counts as changed since strips were last cut."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coordinator.growth import Growth
+from coordinator.last_cut import LastCut
+from coordinator.strips import Window
+from planner.types import FloatArray, GridSpec, SweepFrame
+
+GRID = GridSpec(SweepFrame(0, 0, 0), 5, 40, 30)
+RISK = np.full(GRID.shape, 0.5)
+ALL_SETTLED = np.zeros(GRID.shape, dtype=np.bool_)
+STRIP = Window(5, 20, 30, 36)
+
+
+@pytest.fixture
+def last() -> LastCut:
+    """A cut of an area that has settled, from which one strip came."""
+    last = LastCut(GRID)
+    assert changed(last) == [*range(40)]  # before the first cut all has changed
+    last.remember([STRIP])
+    return last
+
+
+def changed(
+    last: LastCut, risk: FloatArray = RISK, reach: int = 0, windows: tuple[Window, ...] = (STRIP,)
+) -> list[int]:
+    growth = Growth.none(GRID)
+    columns = last.changed_columns(risk, ALL_SETTLED, growth, windows, reach)
+    return np.flatnonzero(columns).tolist()
+
+
+def with_risk(row: int, column: int) -> FloatArray:
+    risk = RISK.copy()
+    risk[row, column] = 0.6
+    return risk
+
+
+def test_nothing_has_where_all_is_as_it_was(last: LastCut) -> None:
+    assert changed(last) == []
+
+
+def test_the_column_of_a_cell_has_and_those_beside_within_the_grid(last: LastCut) -> None:
+    assert changed(last, with_risk(3, 10)) == [10]
+    assert changed(last, with_risk(3, 1), reach=2) == [0, 1, 2, 3, 8, 9, 10, 11, 12]  # the cell before is back, too
+    assert changed(last, with_risk(3, 39), reach=2) == [0, 1, 2, 3, 37, 38, 39]
+
+
+def test_what_has_changed_once_is_known_the_next_time(last: LastCut) -> None:
+    assert changed(last, with_risk(3, 10)) == [10]
+    assert changed(last, with_risk(3, 10)) == []
+
+
+def test_where_a_strip_has_gone_the_cells_have(last: LastCut) -> None:
+    assert changed(last, windows=()) == [*range(30, 36)]
+
+
+def test_where_one_has_come_they_have_not(last: LastCut) -> None:
+    assert changed(last, windows=(STRIP, Window(0, 9, 3, 9))) == []
+
+
+def test_what_settles_has(last: LastCut) -> None:
+    open_cells, growth = ALL_SETTLED.copy(), Growth.none(GRID)
+    open_cells[7, 4] = True
+    growth.settles_s[0, 20] = 99.0
+    assert np.flatnonzero(last.changed_columns(RISK, open_cells, growth, [STRIP], 0)).tolist() == [4, 20]
