@@ -107,7 +107,8 @@ def test_check_tells_all_mistakes_without_a_traceback(
 def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
     code, out, err = secondlook("scenarios")
     assert (code, err) == (0, "")
-    assert [line.split()[0] for line in out.splitlines()] == ["headland", "paper", "patchy", "tellaro"]
+    names = [line.split()[0] for line in out.splitlines()]
+    assert names == ["five-helpers", "headland", "paper", "patchy", "tellaro", "two-helpers", "wide"]
 
 
 def test_live_without_a_display_is_told_before_anything_flies(

@@ -198,9 +198,7 @@ class TestCommand:
     def test_a_part_that_raises_fails_its_missions_alone(
         self, command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        (tmp_path / "mine.py").write_text(
-            "class Fails:\n    def assign(self, strips, helpers):\n        raise ValueError\n"
-        )
+        (tmp_path / "mine.py").write_text("class Fails:\n    def assign(self, situation):\n        raise ValueError\n")
         monkeypatch.chdir(tmp_path)
         code, out, err = command(str(BRIEF), "--allocators", "none,mine:Fails", "--seeds", "1", "--jobs", "1")
         assert code == 1

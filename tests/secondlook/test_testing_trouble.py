@@ -80,9 +80,11 @@ class TestMessages:
     def test_what_is_lost_changes_the_mission(self, brief: MakeFleet) -> None:
         fleet = brief()
         fleet.drop("agent/*/hotspot/*")
+        fleet.drop("agent/*/coverage/*")
         flight = fleet.run()
         assert flight.messages("coord/strip/*") == []
-        assert flight.summary["dropped"] == {"lost by a fault": len(flight.messages("agent/*/hotspot/*"))}
+        lost = [*flight.messages("agent/*/hotspot/*"), *flight.messages("agent/*/coverage/*")]
+        assert flight.summary["dropped"] == {"lost by a fault": len(lost)}
 
     @pytest.mark.parametrize(
         ("schedule", "later_ms"),

@@ -56,7 +56,7 @@ def situations(draw: st.DrawFn, most_strips: int = 7) -> Situation:
         return OpenStrip(one, draw(st.integers(0, 9)) * 1000.0, draw(st.sampled_from([0.0, 0.0, 500.0])))
 
     strips = [any_strip(number) for number in range(1, draw(st.integers(0, most_strips)) + 1)]
-    helpers = []
+    helpers: list[Helper] = []
     for name in draw(st.sampled_from([[], ["a"], ["a", "b"], ["a", "b", "c"]])):
         one = helper(
             name,
