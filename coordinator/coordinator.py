@@ -29,6 +29,7 @@ from comms.node import Publication, Received, Step
 from comms.topics import MISSION_OVER, STRIP, TASK
 from coordinator.badly_seen import BadlySeen
 from coordinator.config import CoordinatorConfig
+from coordinator.expected_looks import ExpectedLooks
 from coordinator.growth import Growth
 from coordinator.last_cut import LastCut
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
@@ -41,6 +42,7 @@ from coordinator.worth import Supply, worth_later_m2ps
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.region import Region
+from planner.risk import NATS_PER_LEVEL
 from planner.types import BoolArray, FloatArray, Strip
 
 log = logging.getLogger("secondlook.coordinator")
@@ -66,6 +68,7 @@ class Coordinator:
         self._badly_seen: BadlySeen
         self._rules: CuttingRules | None = None
         self._last_cut: LastCut
+        self._expected_looks: ExpectedLooks
         self._tasks = 0
         self._outbox: list[Publication] = []
         self._to_cut = False
@@ -121,6 +124,7 @@ class Coordinator:
         self._inside = Region(run.outline, run.hole_outlines).inside(spec)
         self._badly_seen = BadlySeen(spec, self._inside)
         self._last_cut = LastCut(spec)
+        self._expected_looks = ExpectedLooks(spec)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
         self._primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
         helpers = [entry for entry in run.vehicles if entry.role.revisits]
@@ -242,12 +246,22 @@ class Coordinator:
         """The map decides whether a strip is done, not the word; what is left is cut anew."""
         name = vehicle.entry.vehicle
         share = self._seen_share(record, name)
+        self._learn(record, vehicle)
         if share >= COVERED_SHARE:
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         else:
             vehicle.failed_at.append(record.window)
             self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
         self._to_cut = True
+
+    def _learn(self, record: StripRecord, vehicle: KnownVehicle) -> None:
+        """Learns from a strip that a vehicle has swept what second looks find."""
+        assert self.map is not None
+        layer = self.map.layers.get(vehicle.entry.vehicle)
+        if layer is not None:
+            levels = layer.largest_levels[record.window.cells].astype(np.float64)
+            p_detect = -np.expm1(-NATS_PER_LEVEL * levels)
+            self._expected_looks.learn(record.window, p_detect, vehicle.entry.p_detect)
 
     def _seen_share(self, record: StripRecord, vehicle: str) -> float:
         assert self.map is not None
@@ -280,6 +294,7 @@ class Coordinator:
             return
         grid, primaries = self.map.grid, list(self._primaries)
         risk = self._badly_seen.risk(self.map, primaries)
+        risk = risk * self._expected_looks.factor(risk)
         open_cells = self._badly_seen.still_open(self.map, primaries)
         growth = self._growth(risk)
         ahead = int((self._inside & ~self.map.settled_by(primaries) & (growth.settles_s == 0)).sum())
