@@ -4,7 +4,8 @@ python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--seconds
 python -m bench.clairvoyant --run RUN [--seconds S]      a recorded run; --json for programs, with either
 
 For each seed: what each allocator's second looks removed (residual risk times m2, as measured), the bound that no
-schedule exceeds (`clairvoyant_bound` says why), and the best schedule that was found (`clairvoyant_schedule`); then the
+schedule exceeds (`clairvoyant_bound` says why), and the best schedule that was found (`clairvoyant_schedule`, which
+begins with what the scenario's own allocator flew, or a better one); then the
 ratios. S is the wall time of the search for the schedule; the bound takes some seconds more.
 """
 
@@ -16,6 +17,7 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -28,6 +30,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import secondlook
 from bench.clairvoyant_bound import upper_bound
 from bench.clairvoyant_schedule import best_schedule
+from bench.flown_legs import FlownLegs
 from bench.removable import Clairvoyance, Removable, watched
 from secondlook.compare.contenders import contenders
 from secondlook.compare.flight import FailedFlight, fly
@@ -52,27 +55,31 @@ class Row:
     there_m2: float
     bound_m2: float
     best_m2: float
-    routed_m2: float
+    started_m2: float
     legs: int
     bound_s: float
     search_s: float
 
 
-def solve(mission: Removable, seed: int, removed_m2: dict[str, float | None], seconds: float) -> Row:
-    """Bound and best schedule of one mission."""
+def solve(
+    mission: Removable, seed: int, removed_m2: dict[str, float | None], seconds: float, flown: Sequence[FlownLegs]
+) -> Row:
+    """Bound and best schedule of one mission; the search knows what was flown."""
     if mission.risk.size > LARGEST_GRID_CELLS:
         raise ValueError(f"a map of {mission.risk.size} cells is too large; must have at most {LARGEST_GRID_CELLS}")
     began_s = time.monotonic()
     bound = upper_bound(mission, BOUND_S)
     bounded_s = time.monotonic()
-    best = best_schedule(mission, bound, seconds, seed)
+    helpers = [helper.name for helper in mission.helpers]
+    known = [legs.schedule(mission.grid, helpers) for legs in flown]
+    best = best_schedule(mission, bound, seconds, seed, known)
     return Row(
         seed=seed,
         removed_m2=removed_m2,
         there_m2=mission.total_m2,
         bound_m2=bound.removed_m2,
         best_m2=best.removed_m2,
-        routed_m2=best.routed_m2,
+        started_m2=best.started_m2,
         legs=sum(len(legs) for legs in best.schedule),
         bound_s=bounded_s - began_s,
         search_s=time.monotonic() - bounded_s,
@@ -85,21 +92,27 @@ def one_seed(scenario: Scenario, allocators: list[str], seconds: float) -> Row:
     for contender in contenders(scenario, allocators):
         flight = fly(contender.with_seed(scenario.seed))
         removed[contender.name] = None if isinstance(flight, FailedFlight) else flight.removed_m2
-    clairvoyance = Clairvoyance(contenders(scenario, ["none"])[0].scenario)
-    with tempfile.TemporaryDirectory(prefix="secondlook-clairvoyant-") as folder:
-        run_mission(clairvoyance.scenario, RunOptions(Path(folder), "local", record=False, watch=clairvoyance.take))
-    return solve(clairvoyance.removable(), scenario.seed, removed, seconds)
+    clairvoyance, flown = Clairvoyance(contenders(scenario, ["none"])[0].scenario), FlownLegs()
+    for watched_scenario, watch in ((clairvoyance.scenario, clairvoyance.take), (scenario, flown.take)):
+        with tempfile.TemporaryDirectory(prefix="secondlook-clairvoyant-") as folder:
+            run_mission(watched_scenario, RunOptions(Path(folder), "local", record=False, watch=watch))
+    return solve(clairvoyance.removable(), scenario.seed, removed, seconds, [flown])
 
 
 def one_run(folder: Path, seconds: float) -> Row:
     """Solves a recorded run."""
     scenario = load_scenario(str(folder / "scenario.yaml"))
-    clairvoyance = watched(scenario, secondlook.load(folder).received())
+    received = list(secondlook.load(folder).received())
+    clairvoyance, flown = watched(scenario, received), FlownLegs()
+    for one in received:
+        flown.take(one)
     alone, fleet = clairvoyance.metrics.risk_primary_alone(), clairvoyance.metrics.risk()
     if alone is None or fleet is None:
         raise UserError(f"{folder}: the run ended before the mission began")
     removed_m2 = (alone.mean - fleet.mean) * alone.cells * scenario.area.cell_m**2
-    return solve(clairvoyance.removable(), scenario.seed, {scenario.coordinator.allocator: removed_m2}, seconds)
+    return solve(
+        clairvoyance.removable(), scenario.seed, {scenario.coordinator.allocator: removed_m2}, seconds, [flown]
+    )
 
 
 def summary(rows: list[Row]) -> dict[str, Any]:

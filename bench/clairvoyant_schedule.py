@@ -37,16 +37,18 @@ HOTTEST, COLDEST = 1e-3, 1e-5  # of what is removed: the temperatures of anneali
 
 @dataclass(frozen=True)
 class Solution:
-    """The best schedule found; `routed_m2`: what it was before annealing."""
+    """The best schedule found; `started_m2`: what the search began with."""
 
     removed_m2: float
-    routed_m2: float
+    started_m2: float
     schedule: Schedule
 
 
-def best_schedule(mission: Removable, bound: Bound, seconds: float, seed: int) -> Solution:
+def best_schedule(
+    mission: Removable, bound: Bound, seconds: float, seed: int, known: Sequence[Schedule] = ()
+) -> Solution:
     """Searches for about so many seconds of wall time; with more time the result is at least as good, but for the
-    solver's own chances."""
+    solver's own chances. `known`: schedules to begin with, if they are better than those that routing finds."""
     began_s = time.monotonic()
     simulator = Simulator(mission)
     price = bound.price_m2ps
@@ -56,9 +58,11 @@ def best_schedule(mission: Removable, bound: Bound, seconds: float, seed: int) -
     each_s = ROUTING_SHARE * seconds / max(1, len(sets))
     routed = [_routed(simulator, legs, each_s) for legs in sets]
     routed.append(tuple(() for _ in mission.helpers))
+    routed += known
     by_worth = sorted(((simulator.removed_m2(one), index) for index, one in enumerate(routed)), reverse=True)
     start_m2, start = by_worth[0]
     candidates = [leg for legs in sets for leg in legs]
+    candidates += [leg for schedule in known for legs in schedule for leg in legs]
     left_s = seconds - (time.monotonic() - began_s)
     best_m2, best = _annealed(
         simulator, simulator.in_time(routed[start]), candidates, left_s, np.random.default_rng(seed)

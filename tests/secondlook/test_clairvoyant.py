@@ -15,10 +15,11 @@ from hypothesis import strategies as st
 from bench.clairvoyant import one_seed
 from bench.clairvoyant_bound import Relaxation, upper_bound
 from bench.clairvoyant_schedule import best_schedule
+from bench.flown_legs import FlownLegs
 from bench.legs import Leg, Simulator
 from bench.removable import Clairvoyance, LegHelper, LegSensor, Removable, geometry
 from bench.row_packing import RowPacking
-from comms.messages import Look
+from comms.messages import Look, StripState, StripStatus
 from comms.node import Received
 from planner.dubins import Pose
 from planner.footprint import look_on_grid
@@ -207,3 +208,29 @@ class TestAFlownMission:
         assert none == 0
         assert 0 < greedy < row.bound_m2 < row.there_m2
         assert row.best_m2 <= row.bound_m2
+
+
+class TestFlownLegs:
+    def test_they_are_what_the_helpers_swept_in_order_and_direction(self, tmp_path: Path) -> None:
+        flown, strips = FlownLegs(), []
+
+        def watch(received: Received) -> None:
+            flown.take(received)
+            if isinstance(received.message, StripStatus) and received.message.state is StripState.UNDER_WAY:
+                strips.append(received.message)
+
+        run_mission(load_scenario(str(BRIEF), (), 1), RunOptions(tmp_path, "local", record=False, watch=watch))
+        grid = GridSpec(SweepFrame(0, 0, 0), 5, 61, 20)
+        (legs,) = flown.schedule(grid, ["helper"])
+        assert len(legs) == len(strips) > 0
+        for leg, strip in zip(legs, strips, strict=True):
+            assert abs(leg.column * 5 - strip.start_x_m) <= 2.5
+            assert (leg.end - leg.first) * 5 == strip.length_m
+            assert leg.first * 5 in (strip.start_y_m, strip.start_y_m - strip.length_m)
+        assert {leg.up for leg in legs} == {True, False}
+
+    def test_a_search_that_knows_them_finds_nothing_worse(self) -> None:
+        row = one_seed(load_scenario(str(BRIEF), (), 1), ["plan"], 0.3)
+        removed_m2 = row.removed_m2["plan"]
+        assert removed_m2 is not None
+        assert row.best_m2 >= row.started_m2 > 0.9 * removed_m2
