@@ -377,15 +377,16 @@ class StripStatus:
 
 
 class TaskAction(enum.Enum):
-    """What a task message asks."""
+    """What a task message asks. To stand aside is to go to its start point and wait there, without a strip."""
 
     TAKE = "take"
     GIVE_BACK = "give_back"
+    STAND_ASIDE = "stand_aside"
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """The coordinator's word to one vehicle: take this strip, or give it back. It suffices by itself."""
+    """The coordinator's word to one vehicle: take this strip, give it back, or stand aside. It suffices by itself."""
 
     action: TaskAction
     strip: Count

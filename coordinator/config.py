@@ -12,7 +12,8 @@ class CoordinatorConfig:
     """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
     age of a vehicle's state from which it is taken for lost. `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying.
-    `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round."""
+    `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
+    `separation_m`: how near to each other vehicles may come, 0 for as near as it happens."""
 
     allocator: Allocator
     deadline_factor: float
@@ -21,3 +22,4 @@ class CoordinatorConfig:
     max_strip_m: float
     worth_risk: float
     switch_margin: float
+    separation_m: float = 0.0

@@ -33,7 +33,8 @@ from coordinator.expected_looks import ExpectedLooks
 from coordinator.growth import Growth
 from coordinator.last_cut import LastCut
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.offers import checked_offers
+from coordinator.offers import checked_offers, offers_let_through
+from coordinator.right_of_way import Order, RightOfWay, Underway
 from coordinator.service import service
 from coordinator.situation import Helper, OpenStrip, Situation
 from coordinator.strips import Cut, CuttingRules, Window, cut_strips, strip_of
@@ -43,7 +44,7 @@ from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.risk import NATS_PER_LEVEL
-from planner.types import BoolArray, FloatArray, Strip
+from planner.types import BoolArray, FloatArray, Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
@@ -79,6 +80,10 @@ class Coordinator:
         self._ripe_ms: int | None = None
         self._over = False
         self._complained_of: set[str] = set()
+        self._right_of_way: RightOfWay | None = None
+        self._gave_way: dict[str, set[int]] = {}  # strips that helpers gave back to give way: they may be offered again
+        self._to_look = False
+        self._clear_ms: int | None = None  # when to try again with offers that had to wait
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
@@ -112,9 +117,13 @@ class Coordinator:
                 self._cut_by_ms = None
                 self._cut(now_ms)
                 self._to_assign = True
-            if self._to_assign or (self._ripe_ms is not None and self._ripe_ms <= now_ms):
+            due_ms = [one for one in (self._ripe_ms, self._clear_ms) if one is not None]
+            if self._to_assign or min(due_ms, default=now_ms + 1) <= now_ms:
                 self._to_assign = False
                 self._assign(now_ms)
+            if self._to_look:
+                self._to_look = False
+                self._keep_apart(now_ms)
             self._find_end(now_ms)
         return self._step(now_ms)
 
@@ -125,6 +134,8 @@ class Coordinator:
         self._badly_seen = BadlySeen(spec, self._inside)
         self._last_cut = LastCut(spec)
         self._expected_looks = ExpectedLooks(spec)
+        if self.config.separation_m > 0:
+            self._right_of_way = RightOfWay(self.config.separation_m, self._is_inside)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
         self._primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
         helpers = [entry for entry in run.vehicles if entry.role.revisits]
@@ -172,6 +183,7 @@ class Coordinator:
             return
         if was_lost:
             log.info("%s is heard again", vehicle.entry.vehicle)
+        self._to_look |= self._right_of_way is not None and now_ms >= self._right_of_way.look_s * 1000
         self._to_cut |= vehicle.is_finished and not was_finished
         self._to_assign |= vehicle.is_idle and not was_idle
         if vehicle.is_at_a_strip:
@@ -374,11 +386,14 @@ class Coordinator:
 
     def _assign(self, now_ms: int) -> None:
         self._open_what_is_ripe(now_ms)
+        self._clear_ms = None
+        for name, numbers in self._gave_way.items():
+            self.vehicles[name].refused -= numbers
         situation = self._situation(now_ms)
         if not situation.strips or not situation.helpers:
             return
         helpers = {helper.vehicle: helper for helper in situation.helpers}
-        for name, number in checked_offers(self.config.allocator.assign(situation), situation):
+        for name, number in self._offers(situation, now_ms):
             record, helper, vehicle = self.ledger.get(number), helpers[name], self.vehicles[name]
             assert record is not None
             if helper.task is not None:
@@ -388,6 +403,45 @@ class Coordinator:
             vehicle.offered[number] = (record.strip, record.cut)
             vehicle.service = service(self._open_strip(record), helper)
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
+
+    def _offers(self, situation: Situation, now_ms: int) -> list[tuple[str, int]]:
+        """The allocator's offers, less those that must wait for others to be out of the way."""
+        right, allocator = self._right_of_way, self.config.allocator
+        if right is None:
+            return checked_offers(allocator.assign(situation), situation)
+        departures = right.departures(self._under_way(), now_ms / 1000)
+        offers, again_s = offers_let_through(allocator, situation, departures)
+        for name, number in offers:
+            right.offered(name, number, departures)
+        if math.isfinite(again_s):
+            self._clear_ms = now_ms + round(again_s * 1000)
+        for order in right.make_room(departures):
+            self._tell(order)
+        return offers
+
+    def _under_way(self) -> list[Underway]:
+        records = {record.vehicle: record for record in self.ledger.in_state(*WITH_A_VEHICLE)}
+        return [Underway(one, records[name].strip if name in records else None) for name, one in self.vehicles.items()]
+
+    def _keep_apart(self, now_ms: int) -> None:
+        """Tells helpers to give way to whom they would come too close."""
+        assert self._right_of_way is not None
+        for order in self._right_of_way.look(self._under_way(), now_ms / 1000):
+            self._tell(order)
+
+    def _tell(self, order: Order) -> None:
+        if order.gives_back is not None:
+            self._gave_way.setdefault(order.name, set()).add(order.gives_back.number)
+            self._say(TaskAction.GIVE_BACK, order.gives_back, order.name)
+        if order.place is not None:
+            self._say(TaskAction.STAND_ASIDE, Strip(0, order.place, 0.0, 0.0, 0.0), order.name)
+
+    def _is_inside(self, place: Point) -> bool:
+        assert self.map is not None
+        grid = self.map.grid
+        across_m, along_m = (float(one) for one in grid.frame.to_sweep(*place))
+        column, row = round(across_m / grid.cell_m), math.floor(along_m / grid.cell_m)
+        return 0 <= column < grid.columns and 0 <= row < grid.rows and bool(self._inside[row, column])
 
     def _situation(self, now_ms: int) -> Situation:
         helpers = (self._helper(vehicle, now_ms) for _, vehicle in sorted(self.vehicles.items()))
@@ -524,11 +578,11 @@ class Coordinator:
     def _next_wake_ms(self, now_ms: int) -> int | None:
         if self.map is None or self._over:
             return None
-        if self._to_cut or self._to_assign:
+        if self._to_cut or self._to_assign or self._to_look:
             return now_ms + 1
         times = [one.heard_ms + self.config.lost_after_ms for one in self.vehicles.values() if not one.lost]
         times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
-        times += [one for one in (self._cut_by_ms, self._ripe_ms) if one is not None]
+        times += [one for one in (self._cut_by_ms, self._ripe_ms, self._clear_ms) if one is not None]
         surveying = [one for one in self._primaries.values() if one.finished_ms is None]
         times += [one.heard_ms + self._given_up_after_ms for one in surveying]
         if not surveying:

@@ -22,12 +22,12 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
     at_ms, pose = heard_ms, Pose(state.x_m, state.y_m, state.heading_rad)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)
-        pose = _run(ahead[0], entry.run_in_m)[1]
+        pose = run_of(ahead[0], entry.run_in_m)[1]
         ahead = ahead[1:]
         at_ms += round(entry.run_in_m / entry.speed_mps * 1000) if ahead else 0
     way_m = 0.0
     for track in ahead:
-        begin, end = _run(track, entry.run_in_m)
+        begin, end = run_of(track, entry.run_in_m)
         way_m += shortest_path(pose, begin, entry.turn_radius_m).length_m
         way_m += math.dist(begin[:2], end[:2])
         pose = end
@@ -36,8 +36,8 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
     return at_ms + round(way_m / entry.speed_mps * 1000)
 
 
-def _run(track: PlannedTrack, run_in_m: float) -> tuple[Pose, Pose]:
-    """A track's ends with run-in and run-out."""
+def run_of(track: PlannedTrack, run_in_m: float) -> tuple[Pose, Pose]:
+    """Where a track's run-in begins and where its run-out ends."""
     heading_rad = math.atan2(track.end_x_m - track.start_x_m, track.end_y_m - track.start_y_m) % (2 * math.pi)
     begin = shifted((track.start_x_m, track.start_y_m), heading_rad, -run_in_m)
     return begin, shifted((track.end_x_m, track.end_y_m), heading_rad, run_in_m)

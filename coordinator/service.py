@@ -16,12 +16,14 @@ from planner.types import Strip
 @dataclass(frozen=True)
 class Sweep:
     """A way to fly a strip's legs: from `entry`, where the first run-in begins, to `leave`, where the last run-out
-    ends. `length_m`: of all that, turns from leg to leg included. `follows`: it is one leg, the strip's way."""
+    ends. `length_m`: of all that, turns from leg to leg included. `follows`: it is one leg, the strip's way. `legs`:
+    where each leg's run-in begins and where its run-out ends."""
 
     entry: Pose
     leave: Pose
     length_m: float
     follows: bool
+    legs: tuple[tuple[Pose, Pose], ...]
 
 
 @dataclass(frozen=True)
@@ -46,15 +48,22 @@ def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
 
 
 def service(one: OpenStrip, helper: Helper) -> Service:
-    """The service of a strip from where and when a helper is free, flown the way its agent takes: the shortest one, of
-    equals the strip's own. Where the strip is still settling the helper sets out as late as it must."""
+    """The service of a strip from where and when a helper is free, flown the way its agent takes: see
+    `cheapest_sweep`. Where the strip is still settling the helper sets out as late as it must."""
+    sweep, way_m = cheapest_sweep(one.strip, helper)
+    return timed(one, sweep, way_m, helper)
+
+
+def cheapest_sweep(strip: Strip, helper: Helper) -> tuple[Sweep, float]:
+    """The sweep that is shortest with the way there from where a helper is free, of equals the strip's own, and the
+    length of that way in metres."""
     best, best_m = None, math.inf
-    for sweep in sweeps(one.strip, helper):
+    for sweep in sweeps(strip, helper):
         way_m = shortest_path(helper.free_at, sweep.entry, helper.turn_radius_m).length_m
         if way_m + sweep.length_m < best_m - LENGTH_TOLERANCE_M:
             best, best_m = sweep, way_m + sweep.length_m
     assert best is not None
-    return timed(one, best, best_m - best.length_m, helper)
+    return best, best_m - best.length_m
 
 
 def timed(one: OpenStrip, sweep: Sweep, way_m: float, helper: Helper) -> Service:
@@ -92,5 +101,5 @@ def _sweeps(strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float)
         flown_m = sum(leg.length_m + 2 * run_in_m for leg in way)
         turns_m = sum(shortest_path(one[1], other[0], turn_radius_m).length_m for one, other in pairwise(legs))
         follows = len(way) == 1 and way[0].start == strip.start
-        found.append(Sweep(legs[0][0], legs[-1][1], flown_m + turns_m, follows))
+        found.append(Sweep(legs[0][0], legs[-1][1], flown_m + turns_m, follows, tuple(legs)))
     return tuple(found)

@@ -239,4 +239,5 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         max_strip_m=scenario.coordinator.max_strip_m,
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
+        separation_m=scenario.mission.separation_m,
     )

@@ -21,6 +21,7 @@ from comms.messages import (
     StripState,
     StripStatus,
     TruthLook,
+    TruthPose,
     TruthTargets,
 )
 from comms.node import Received
@@ -28,6 +29,7 @@ from planner.fleet_map import FleetMap, VehicleLayer
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
+from secondlook.closest import ClosestApproaches
 
 RISK_AT_FACTORS = (1.0, 1.05)
 _STILL_OPEN = (StripState.OPEN, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
@@ -70,6 +72,7 @@ class Metrics:
     targets: TruthTargets | None = None
     detected: set[int] = field(default_factory=set)
     risk_at: list[dict[str, float]] = field(default_factory=list)
+    approaches: ClosestApproaches = field(default_factory=lambda: ClosestApproaches({}))
     misfits: int = 0
 
     def take(self, received: Received) -> None:
@@ -82,6 +85,9 @@ class Metrics:
             self._begin(message)
         elif isinstance(message, Nav) and vehicle is not None:
             self._take_nav(vehicle, message)
+            self.approaches.take(received)
+        elif isinstance(message, TruthPose) and vehicle is not None:
+            self.approaches.take(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
             vehicle.looked_m += message.p_detect.shape[1] * message.along_bin_m
         elif isinstance(message, CoverageTile):
@@ -168,6 +174,10 @@ class Metrics:
             "risk_at": self.risk_at,
             "truth": self._truth_summary(),
             "hotspots": self._strip_summary(),
+            "closest": [
+                {"vehicles": list(one.vehicles), "closest_m": round(one.closest_m, 2), "t_s": round(one.t_s, 3)}
+                for one in self.approaches.found()
+            ],
         }
 
     def _begin(self, run: RunInfo) -> None:
@@ -176,6 +186,7 @@ class Metrics:
         self.map = FleetMap(spec, run.rho)
         self.inside = Region(run.outline, run.hole_outlines).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role) for entry in run.vehicles}
+        self.approaches = ClosestApproaches({entry.vehicle: entry.speed_mps for entry in run.vehicles})
 
     def _pass_time(self, sent_ms: int) -> None:
         primary_ms = self.primary_ms()

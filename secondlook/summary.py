@@ -33,6 +33,7 @@ def summarise(
     the run failed with. `wall_s`: start-up included. `factor`: of a run by the wall clock; None for lockstep.
     """
     told = observer.metrics.summary()
+    closest = told.pop("closest")
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
     dropped = {} if result is None else dict(result.dropped)
     if observer.metrics.misfits:
@@ -59,6 +60,11 @@ def summarise(
             "real_time_factor": round(mission_s / wall_s, 1),
         },
         **told,
+        "separation": {
+            "least_m": scenario.mission.separation_m,
+            "pairs_closer": sum(pair["closest_m"] < scenario.mission.separation_m for pair in closest),
+            "closest": closest,
+        },
         "latency_ms": {
             "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
         },

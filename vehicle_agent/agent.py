@@ -121,6 +121,11 @@ class Agent:
         """Commands the vehicle to fly a track with the sonar on."""
         self._command(ManeuverKind.FOLLOW, track.start, track.end, run_in_m)
 
+    def go_to(self, place: Point) -> None:
+        """Commands the vehicle to a place, to wait there."""
+        here = (self.nav.x_m, self.nav.y_m) if self.nav else place
+        self._command(ManeuverKind.GOTO, here, place, 0.0)
+
     def hold(self) -> None:
         """Commands the vehicle to stay where it is."""
         here = (self.nav.x_m, self.nav.y_m) if self.nav else (0.0, 0.0)  # a hold needs no place

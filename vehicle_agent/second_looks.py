@@ -37,6 +37,9 @@ class SecondLooks:
         known, answer = self._answers.get(task.strip, (None, None))
         if task.action is TaskAction.GIVE_BACK:
             self._give_back(task.strip, now_ms)
+        elif task.action is TaskAction.STAND_ASIDE:
+            if self.strip is None and not busy and all(abs(place_m) <= FARTHEST_M for place_m in strip.start):
+                agent.go_to(strip.start)
         elif self.strip is not None and self.strip.number == task.strip:
             under_way = agent.mode is Mode.REVISIT
             self._tell(task.strip, TaskState.UNDER_WAY if under_way else TaskState.ACCEPTED, agent.expected_end_ms)

@@ -83,6 +83,8 @@ class Story:
                 self._note_hotspot(received, hotspot)
             case StripStatus() as strip:
                 return self._strip(received, strip)
+            case Task(action=TaskAction.STAND_ASIDE):
+                return f"{received.vehicle}, stand aside", False
             case Task() as task:
                 what = "take" if task.action is TaskAction.TAKE else "give back"
                 return f"{received.vehicle}, {what} strip {task.strip}", False

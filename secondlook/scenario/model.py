@@ -21,11 +21,13 @@ class Mission(Mapping):
 
     `deadline_factor`: times the last survey vehicle's end. `time_limit_s`: the run fails if it is not over by then.
     `rho`: the correlation of looks in the residual risk, from 0 (independent, the paper's) to 1 (only the best counts).
+    `separation_m`: no helper is sent on a way that comes nearer to another vehicle; 0 for any.
     """
 
     deadline_factor: Annotated[float, Field(ge=1, le=100)] = 1.05
     time_limit_s: Duration = 20_000.0
     rho: Share = 0.0
+    separation_m: Annotated[float, Field(ge=0, le=1000)] = 20.0
 
 
 class UniformSeabed(Mapping):

@@ -16,7 +16,12 @@ from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError
 from secondlook.testing.flight import Flight
 from secondlook.testing.heard import Heard
 from secondlook.testing.map_assertions import assert_maps_converged, assert_risk_at_most
-from secondlook.testing.mission_assertions import assert_all_finished, assert_no_message_dropped, assert_repeats
+from secondlook.testing.mission_assertions import (
+    assert_all_finished,
+    assert_kept_apart,
+    assert_no_message_dropped,
+    assert_repeats,
+)
 from secondlook.testing.sources import scenario_from
 from secondlook.testing.strip_assertions import (
     assert_never_assigned_to_lost,
@@ -44,6 +49,7 @@ __all__ = [
     "NotRepeatedError",
     "RunFailedError",
     "assert_all_finished",
+    "assert_kept_apart",
     "assert_maps_converged",
     "assert_never_assigned_to_lost",
     "assert_no_message_dropped",

@@ -14,6 +14,7 @@ from comms.node import Received
 from comms.routing import Routing
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray
+from secondlook.closest import Closest
 from secondlook.metrics import Metrics
 from secondlook.mission import Bus
 from secondlook.scenario import Scenario
@@ -68,6 +69,11 @@ class Flight:
     def inside(self) -> BoolArray:
         """Which of the map's cells lie in the survey area."""
         return self._figures.inside
+
+    @property
+    def closest(self) -> list[Closest]:
+        """How near each two vehicles came to each other while both were under way, the nearest first."""
+        return self._figures.approaches.found()
 
     @cached_property
     def _figures(self) -> Metrics:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from comms.group import LOST
@@ -48,6 +49,23 @@ def assert_no_message_dropped(flight: Flight) -> None:
     dropped = {reason: count for reason, count in flight.summary["dropped"].items() if reason != LOST}
     where = f"; which, is told in {flight.folder / 'logs'}" if (flight.folder / "logs").exists() else ""
     fail_if([f"{count}: {reason}{where}" for reason, count in dropped.items()], "messages were dropped")
+
+
+def assert_kept_apart(flight: Flight, separation_m: float | None = None) -> None:
+    """No two vehicles came nearer to each other than this; `mission.separation_m` of the scenario if left out.
+
+    True positions count where they are told; a vehicle counts from when it is first under way.
+    """
+    __tracebackhide__ = True
+    least_m = flight.scenario.mission.separation_m if separation_m is None else separation_m
+    if not (math.isfinite(least_m) and least_m >= 0):
+        raise UserError(f"separation_m: {least_m} is not allowed; must be a length in metres, 0 or more")
+    problems = [
+        f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other at {one.t_s:.3f} s"
+        for one in flight.closest
+        if one.closest_m < least_m
+    ]
+    fail_if(problems, f"vehicles came nearer to each other than {least_m:g} m")
 
 
 def assert_repeats(fleet: Fleet, buses: Sequence[Bus] = ("local", "local")) -> Flight:

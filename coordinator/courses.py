@@ -1,0 +1,117 @@
+"""Where a vehicle will be: paths sailed one after another, and a circle to starboard after the last."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from comms.messages import AgentState, Mode, Plan, RosterVehicle
+from coordinator.expected_end import run_of
+from coordinator.service import Sweep
+from planner.dubins import DubinsPath, Pose, shortest_path
+from planner.sweep import shifted
+from planner.types import FloatArray
+
+STEP_S = 2.0
+"""Courses are sampled at the whole multiples of this, so that any two are at the same times."""
+AHEAD_S = 900.0
+"""A course is laid so far ahead."""
+ON_TRACK_M = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """`poses[k]`, shape (n, 3), is where the vehicle is `first + k` steps after the mission's start: x_m, y_m,
+    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle."""
+
+    first: int
+    poses: FloatArray
+    arrives_s: float
+
+    @property
+    def end(self) -> int:
+        """The first step that it does not tell of any more."""
+        return self.first + len(self.poses)
+
+    def at(self, time_s: float) -> tuple[Pose, float]:
+        """Where the vehicle is at the first step from a time on, and that step's time; before its first step and after
+        its last as then."""
+        step = min(max(math.ceil(time_s / STEP_S), self.first), self.end - 1)
+        return Pose(*self.poses[step - self.first].tolist()), step * STEP_S
+
+    def later(self, steps: int) -> Course:
+        """The same, so many steps later; until then the vehicle is where it begins."""
+        waiting = np.repeat(self.poses[:1], steps, axis=0)
+        return Course(self.first, np.concatenate([waiting, self.poses]), self.arrives_s + steps * STEP_S)
+
+
+def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, paths: Iterable[DubinsPath]) -> Course:
+    """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard."""
+    first = math.ceil(start_s / STEP_S)
+    times_s = STEP_S * np.arange(first, first + math.ceil(AHEAD_S / STEP_S), dtype=np.float64)
+    way_m: FloatArray = speed_mps * (times_s - start_s)
+    parts, done, done_m, pose = [], 0, 0.0, start
+    for path in paths:
+        to = int(np.searchsorted(way_m, done_m + path.length_m))
+        parts.append(path.poses_at(way_m[done:to] - done_m))
+        pose, done, done_m = path.pose_at(path.length_m), to, done_m + path.length_m
+    circle = DubinsPath(pose, turn_radius_m, (1, 0, 0), (speed_mps * AHEAD_S, 0.0, 0.0))
+    parts.append(circle.poses_at(way_m[done:] - done_m))
+    return Course(first, np.concatenate(parts), start_s + done_m / speed_mps)
+
+
+def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, heard_s: float) -> Course:
+    """The course of a primary along the tracks that it has planned, from what it said at `heard_s`."""
+    pose, radius_m = Pose(state.x_m, state.y_m, state.heading_rad), entry.turn_radius_m
+    tracks = plan.tracks if plan is not None else ()
+    ahead = [track for track in tracks if not track.flown] if state.mode is not Mode.FINISHED else []
+    if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
+        # When the track ends is known more exactly than where the vehicle was last.
+        _, end = run_of(ahead.pop(0), entry.run_in_m)
+        left_m = max(0.0, state.expected_end_ms / 1000 - heard_s) * entry.speed_mps + entry.run_in_m
+        pose = shifted(end[:2], end.heading_rad, -left_m)
+    else:
+        flown = [track for track in tracks if track.flown]
+        left_m = run_out_left_m(run_of(flown[-1], entry.run_in_m)[1], pose, entry.run_in_m) if flown else 0.0
+        end = shifted(pose[:2], pose.heading_rad, left_m)
+    paths, here, length_m = [straight(pose, left_m, radius_m)], end, left_m
+    for track in ahead:
+        begin, end = run_of(track, entry.run_in_m)
+        paths += [shortest_path(here, begin, radius_m), straight(begin, math.dist(begin[:2], end[:2]), radius_m)]
+        here = end
+        length_m += paths[-1].length_m + paths[-2].length_m
+        if length_m > entry.speed_mps * AHEAD_S:
+            break
+    return course(pose, heard_s, entry.speed_mps, radius_m, paths)
+
+
+def sweep_course(
+    pose: Pose, start_s: float, speed_mps: float, turn_radius_m: float, sweep: Sweep, *, entered: bool = False
+) -> Course:
+    """The course over a strip's legs from a pose at a time; `entered`: the first leg's run-in lies behind it, the pose
+    on the leg."""
+    paths, here = [], pose
+    for place, (begin, end) in enumerate(sweep.legs):
+        if not (entered and place == 0):
+            paths.append(shortest_path(here, begin, turn_radius_m))
+            here = begin
+        paths.append(straight(here, math.dist(here[:2], end[:2]), turn_radius_m))
+        here = end
+    return course(pose, start_s, speed_mps, turn_radius_m, paths)
+
+
+def straight(start: Pose, length_m: float, turn_radius_m: float) -> DubinsPath:
+    """A path straight ahead."""
+    return DubinsPath(start, turn_radius_m, (0, 0, 0), (length_m, 0.0, 0.0))
+
+
+def run_out_left_m(end: Pose, pose: Pose, run_in_m: float) -> float:
+    """What a vehicle has still to sail straight to a run-out's end; 0 where it is not on the run-out."""
+    sin, cos = math.sin(end.heading_rad), math.cos(end.heading_rad)
+    dx_m, dy_m = end.x_m - pose.x_m, end.y_m - pose.y_m
+    ahead_m, beside_m = dx_m * sin + dy_m * cos, dx_m * cos - dy_m * sin
+    on_it = abs(beside_m) <= ON_TRACK_M and 0 < ahead_m <= run_in_m + ON_TRACK_M
+    return ahead_m if on_it and math.cos(pose.heading_rad - end.heading_rad) > 0.99 else 0.0

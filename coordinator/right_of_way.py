@@ -1,0 +1,287 @@
+"""Who gives way to whom, so that no two vehicles come too close: which offers wait, who gives a strip back or stands
+aside.
+
+A primary is never held up. Of helpers one at work comes before one that is free, and who was sent earlier before who
+was sent later.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from coordinator.courses import STEP_S, Course
+from coordinator.separation import Approach, too_close
+from coordinator.service import Sweep
+from coordinator.situation import Helper, OpenStrip
+from coordinator.traffic import Traffic
+from coordinator.vehicles import KnownVehicle
+from planner.types import Point, Strip
+
+log = logging.getLogger("secondlook.coordinator")
+
+OFFER_MARGIN_M = 8.0
+"""A way that is offered keeps so much farther off: courses are known to a few metres."""
+MARGIN_M = 3.0
+"""A helper gives way where it would come nearer than the separation and this."""
+DELAYS_S = (0.0, 10.0, 20.0, 30.0)
+"""An offer that is clear so much later waits; else another is asked for."""
+RESTS_S = 20.0
+"""A way must be clear so long after its end, too."""
+STANDS_ASIDE_S = 60.0
+"""So long a helper that is free needs at most to stand aside."""
+LOOK_AHEAD_S = 90.0
+"""A helper that is free stands aside, and one that sets out must have a clear way, for so long."""
+GIVES_BACK_S = 50.0
+"""So long before it would come too close a helper gives its strip back: until then the other's plan may change. So
+long before it begins to sweep, the whole sweep must be clear."""
+TOLD_AGAIN_S = 20.0
+BEARINGS = 8
+
+
+@dataclass(frozen=True)
+class Underway:
+    """A vehicle and the strip that it has."""
+
+    vehicle: KnownVehicle
+    strip: Strip | None
+
+    @property
+    def name(self) -> str:
+        """The vehicle's id."""
+        return self.vehicle.entry.vehicle
+
+    @property
+    def gives_way(self) -> bool:
+        """Whether it can be told to."""
+        role = self.vehicle.entry.role
+        return role.revisits and (not role.surveys or self.vehicle.finished_ms is not None)
+
+
+@dataclass(frozen=True)
+class Order:
+    """What a helper is told: to give back its strip, if it has one, and to wait at a place, if one is named."""
+
+    name: str
+    gives_back: Strip | None
+    place: Point | None
+
+
+class RightOfWay:
+    """`separation_m` > 0: how near two vehicles may come. `is_inside`: whether a place lies in the area."""
+
+    def __init__(self, separation_m: float, is_inside: Callable[[Point], bool]) -> None:
+        self.separation_m = separation_m
+        self.look_s = 0.0
+        """When to look next."""
+        self._is_inside = is_inside
+        self._traffic = Traffic()
+        self._due_s: dict[tuple[str, str], float] = {}
+        self._sent_s: dict[str, float] = {}
+        self._told_s: dict[str, float] = {}
+        self._to_sweep: dict[str, float] = {}
+        """When a helper on its way begins to sweep, until that was looked at."""
+        self._complained_of: set[tuple[str, str]] = set()
+
+    def departures(self, fleet: Sequence[Underway], now_s: float) -> Departures:
+        """To judge the offers of one moment."""
+        return Departures(self.separation_m + OFFER_MARGIN_M, self._traffic, fleet, now_s)
+
+    def offered(self, name: str, number: int, departures: Departures) -> None:
+        """A helper is sent to a strip."""
+        way = departures.ways.get((name, number))
+        if way is not None:
+            self._traffic.offered(name, *way)
+            self._sent_s[name] = departures.now_s
+            self._to_sweep[name] = departures.sweeps_s[name, number]
+            self._due_s = {pair: due_s for pair, due_s in self._due_s.items() if name not in pair}
+            self.look_s = 0.0
+
+    def make_room(self, departures: Departures) -> list[Order]:
+        """Sends those aside that are free and keep others from setting out."""
+        orders = []
+        for one in departures.fleet:
+            wanted = [course for name, course in departures.in_the_way if name == one.name]
+            order = self._order(one, [], wanted, departures.fleet, departures.now_s) if wanted else None
+            orders += [] if order is None else [order]
+        return orders
+
+    def look(self, fleet: Sequence[Underway], now_s: float) -> list[Order]:
+        """Whom to tell what, so that nobody comes too close to one that goes first."""
+        orders = []
+        ranked = sorted((one for one in fleet if not one.vehicle.lost), key=self._rank)
+        next_s = now_s + LOOK_AHEAD_S
+        for place, one in enumerate(ranked):
+            if not one.gives_way:
+                continue
+            approaches = []
+            begins = self._to_sweep.get(one.name, math.inf) - GIVES_BACK_S <= now_s
+            for other in ranked[:place]:
+                pair = (one.name, other.name)
+                if self._due_s.get(pair, 0.0) <= now_s or begins:
+                    self._due_s[pair] = self._next_look_s(one, other, now_s)
+                    if self._due_s[pair] <= now_s or begins:
+                        self._due_s[pair] = max(self._due_s[pair], now_s + 1.0)
+                        approach = self._approach(one, other, now_s, begins=begins)
+                        if approach is not None:
+                            approaches.append((approach, other))
+                next_s = min(next_s, self._due_s[pair])
+            if begins:
+                del self._to_sweep[one.name]
+            next_s = min(next_s, self._to_sweep.get(one.name, math.inf) - GIVES_BACK_S)
+            order = self._order(one, approaches, [], fleet, now_s) if approaches else None
+            orders += [] if order is None else [order]
+        self.look_s = next_s
+        return orders
+
+    def _rank(self, one: Underway) -> tuple[int, float, str]:
+        """The lower goes first."""
+        if not one.gives_way:
+            return 0, 0.0, one.name
+        return (2, 0.0, one.name) if one.strip is None else (1, self._sent_s.get(one.name, 0.0), one.name)
+
+    def _approach(self, one: Underway, other: Underway, now_s: float, *, begins: bool) -> Approach | None:
+        """How one comes too close to another before long; `begins`: in the sweep that it is about to begin, too."""
+        mine, its = (self._traffic.course(each.vehicle, each.strip, now_s) for each in (one, other))
+        if mine is None or its is None:
+            return None
+        until_s = now_s + (LOOK_AHEAD_S if one.strip is None else GIVES_BACK_S)
+        if begins and one.strip is not None:
+            until_s = max(until_s, mine.arrives_s + RESTS_S)
+        return too_close(mine, its, self.separation_m + MARGIN_M, now_s, until_s)
+
+    def _next_look_s(self, one: Underway, other: Underway, now_s: float) -> float:
+        """Until when one cannot come near enough to the other, whatever both do, to be told anything."""
+        mine, its = one.vehicle, other.vehicle
+        if mine.state is None or its.state is None:
+            return now_s + LOOK_AHEAD_S
+        closing_mps = mine.entry.speed_mps + its.entry.speed_mps
+        apart_m = math.dist((mine.state.x_m, mine.state.y_m), (its.state.x_m, its.state.y_m))
+        apart_m -= mine.entry.speed_mps * (now_s - mine.heard_ms / 1000)
+        apart_m -= its.entry.speed_mps * (now_s - its.heard_ms / 1000)
+        if one.strip is None:  # it circles
+            near_m = its.entry.speed_mps * LOOK_AHEAD_S + 2 * mine.entry.turn_radius_m
+        else:
+            near_m = closing_mps * GIVES_BACK_S
+        return now_s + (apart_m - near_m - self.separation_m - MARGIN_M) / closing_mps
+
+    def _order(
+        self,
+        one: Underway,
+        approaches: list[tuple[Approach, Underway]],
+        wanted: list[Course],
+        fleet: Sequence[Underway],
+        now_s: float,
+    ) -> Order | None:
+        if now_s - self._told_s.get(one.name, -math.inf) < TOLD_AGAIN_S:
+            return None
+        if one.strip is not None and one.vehicle.state is not None and one.vehicle.state.works_on != one.strip.number:
+            return None  # its answer is under way
+        others = [self._traffic.course(other.vehicle, other.strip, now_s) for other in fleet if other is not one]
+        courses = [*wanted, *(course for course in others if course is not None)]
+        self._told_s[one.name] = now_s
+        if one.strip is not None and self._is_clear(
+            self._traffic.holding(one.vehicle, one.strip, now_s), courses, now_s, STANDS_ASIDE_S
+        ):
+            return Order(one.name, one.strip, None)
+        place = self._place_aside(one, courses, now_s)
+        if place is None:
+            for approach, other in approaches:
+                self._complain(one, other, approach)
+            return None
+        self._traffic.sent_aside(one.vehicle, one.strip, place, now_s)
+        return Order(one.name, one.strip, place)
+
+    def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
+        """The nearest place in the area at which it can wait; None where there is none."""
+        here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)[0]
+        for step in (1.5, 2.5, 4.0):
+            for number in range(BEARINGS):
+                bearing_rad = here.heading_rad + 2 * math.pi * number / BEARINGS
+                far_m = step * self.separation_m
+                place = (here.x_m + far_m * math.sin(bearing_rad), here.y_m + far_m * math.cos(bearing_rad))
+                if self._is_inside(place):
+                    laid = self._traffic.aside(one.vehicle, one.strip, place, now_s)
+                    if self._is_clear(laid, courses, now_s, 2 * LOOK_AHEAD_S):
+                        return place
+        return None
+
+    def _is_clear(self, course: Course, others: list[Course], now_s: float, for_s: float) -> bool:
+        least_m = self.separation_m + MARGIN_M
+        return all(too_close(course, other, least_m, now_s, now_s + for_s) is None for other in others)
+
+    def _complain(self, one: Underway, other: Underway, approach: Approach) -> None:
+        if (one.name, other.name) not in self._complained_of:
+            self._complained_of.add((one.name, other.name))
+            log.warning(
+                "%s will come within %.0f m of %s at %.0f s and has nowhere to go (said once)",
+                *(one.name, approach.distance_m, other.name, approach.time_s),
+            )
+
+
+class Departures:
+    """Judges the offers of one moment, one after the other: an offer agreed on is in the next one's way.
+
+    `ways`: by helper and strip the strip, the course there and the sweep; `sweeps_s`: when that begins. `in_the_way`:
+    free helpers that keep another from setting out, and its course.
+    """
+
+    def __init__(self, least_m: float, traffic: Traffic, fleet: Sequence[Underway], now_s: float) -> None:
+        self.fleet = fleet
+        self.now_s = now_s
+        self.ways: dict[tuple[str, int], tuple[Strip, Course, Sweep]] = {}
+        self.sweeps_s: dict[tuple[str, int], float] = {}
+        self.in_the_way: list[tuple[str, Course]] = []
+        self._least_m = least_m
+        self._traffic = traffic
+        self._agreed: dict[str, Course] = {}
+
+    def begin(self) -> None:
+        """All offers are judged anew."""
+        self._agreed.clear()
+        self.in_the_way.clear()
+
+    def wait_s(self, helper: Helper, one: OpenStrip) -> float:
+        """How long the helper has to wait before it may set out to a strip; 0 for not at all, infinite for long.
+
+        One that may set out at once is in the way of those judged after it.
+        """
+        name, now_s = helper.vehicle, self.now_s
+        vehicle = next(other.vehicle for other in self.fleet if other.name == name)
+        course, sweep = self._traffic.to_strip(vehicle, one.strip, now_s)
+        self.ways[name, one.strip.number] = one.strip, course, sweep
+        begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
+        self.sweeps_s[name, one.strip.number] = begins_s
+        # What it would meet later on its way it is told when it is nearer, if it still is so then.
+        soon_s = now_s + LOOK_AHEAD_S
+        until_s = course.arrives_s + RESTS_S if begins_s <= soon_s else soon_s
+        free, busy = self._others(name)
+        for delay_s in DELAYS_S:
+            later = course.later(round(delay_s / STEP_S)) if delay_s else course
+            if any(too_close(later, its, self._least_m, now_s, until_s + delay_s) for its in busy):
+                continue
+            blocking = [
+                who for who, its in free.items() if too_close(later, its, self._least_m, now_s, now_s + STANDS_ASIDE_S)
+            ]
+            self.in_the_way += [(who, course) for who in blocking]
+            if blocking:
+                return DELAYS_S[1]
+            if not delay_s:
+                self._agreed[name] = course
+            return delay_s
+        return math.inf
+
+    def _others(self, name: str) -> tuple[dict[str, Course], list[Course]]:
+        """The courses of the other vehicles: of those that can stand aside, by name, and of those that cannot."""
+        free, busy = {}, []
+        for other in self.fleet:
+            its = self._agreed.get(other.name) or self._traffic.course(other.vehicle, other.strip, self.now_s)
+            if its is None or other.name == name:
+                continue
+            if other.gives_way and other.strip is None and other.name not in self._agreed:
+                free[other.name] = its
+            else:
+                busy.append(its)
+        return free, busy

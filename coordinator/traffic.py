@@ -1,0 +1,158 @@
+"""Where each vehicle of the fleet is expected to be, from what it has said and what it was told."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from comms.messages import Mode
+from coordinator.courses import Course, course, run_out_left_m, straight, survey_course, sweep_course
+from coordinator.service import Sweep, cheapest_sweep
+from coordinator.situation import Helper
+from coordinator.vehicles import KnownVehicle
+from planner.dubins import Pose, shortest_path
+from planner.types import Point, Strip
+
+LAID_ANEW_S = 600.0
+"""A survey's course is laid anew at the latest after this time, so that it reaches far enough ahead."""
+
+
+@dataclass(frozen=True)
+class _Sweeping:
+    """A helper's work on a strip: how far it is known to have come, 0 offered, 1 on its way, 2 on the first leg."""
+
+    strip: Strip
+    stage: int
+    sweep: Sweep
+    course: Course
+
+
+class Traffic:
+    """Courses are laid when asked for, and kept until something is heard that changes them."""
+
+    def __init__(self) -> None:
+        self._surveys: dict[str, tuple[object, float, Course]] = {}
+        self._sweeps: dict[str, _Sweeping] = {}
+        self._errands: dict[str, Course] = {}
+        self._rests: dict[str, tuple[int, Course]] = {}
+
+    def course(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course | None:
+        """Where a vehicle will be; None for one that is lost or has not been under way yet.
+
+        `strip`: what it has of the coordinator.
+        """
+        state = vehicle.state
+        if vehicle.lost or state is None:
+            return None
+        if vehicle.entry.role.surveys and vehicle.finished_ms is None:
+            return self._survey(vehicle, now_s)
+        if strip is not None:
+            return self._sweep(vehicle, strip)
+        errand = self._errands.get(vehicle.entry.vehicle)
+        if errand is not None and now_s < errand.arrives_s:
+            return errand
+        if vehicle.entry.role.surveys or vehicle.offered or errand is not None:
+            return self._rest(vehicle)
+        return None
+
+    def to_strip(self, vehicle: KnownVehicle, strip: Strip, now_s: float) -> tuple[Course, Sweep]:
+        """The course of a free helper that sets out to a strip now, and how it sweeps it."""
+        pose, start_s = self._here(vehicle, now_s)
+        entry = vehicle.entry
+        sweep = cheapest_sweep(strip, _helper_at(vehicle, pose))[0]
+        return sweep_course(pose, start_s, entry.speed_mps, entry.turn_radius_m, sweep), sweep
+
+    def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
+        """The course of a helper that leaves what it does and waits at a place."""
+        pose, start_s = self._here(vehicle, now_s, strip)
+        entry = vehicle.entry
+        way = shortest_path(pose, _arrival(pose, place), entry.turn_radius_m)
+        return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [way])
+
+    def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
+        """The course of a helper that leaves what it does and circles where it is."""
+        pose, start_s = self._here(vehicle, now_s, strip)
+        return course(pose, start_s, vehicle.entry.speed_mps, vehicle.entry.turn_radius_m, [])
+
+    def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
+        """A helper was sent to a strip."""
+        self._errands.pop(name, None)
+        self._sweeps[name] = _Sweeping(strip, 0, sweep, laid)
+
+    def sent_aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> None:
+        """A helper was told to wait at a place."""
+        self._errands[vehicle.entry.vehicle] = self.aside(vehicle, strip, place, now_s)
+
+    def _here(self, vehicle: KnownVehicle, now_s: float, strip: Strip | None = None) -> tuple[Pose, float]:
+        state = vehicle.state
+        assert state is not None
+        laid = self.course(vehicle, strip, now_s)
+        return (Pose(state.x_m, state.y_m, state.heading_rad), now_s) if laid is None else laid.at(now_s)
+
+    def _survey(self, vehicle: KnownVehicle, now_s: float) -> Course:
+        state, plan, name = vehicle.state, vehicle.plan, vehicle.entry.vehicle
+        assert state is not None
+        ends_ms = state.expected_end_ms if state.mode is Mode.SURVEY else 0
+        told = (plan.revision if plan else 0, state.mode, state.works_on, ends_ms)
+        known = self._surveys.get(name)
+        if known is None or known[0] != told or now_s - known[1] > LAID_ANEW_S:
+            laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000)
+            known = self._surveys[name] = told, now_s, laid
+        return known[2]
+
+    def _sweep(self, vehicle: KnownVehicle, strip: Strip) -> Course:
+        state, entry = vehicle.state, vehicle.entry
+        assert state is not None
+        stage = 0 if state.works_on != strip.number else 2 if state.mode is Mode.REVISIT else 1
+        known = self._sweeps.get(entry.vehicle)
+        if known is None or known.strip != strip or known.stage < stage:
+            pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
+            same = known is not None and known.strip == strip and stage == 2
+            sweep = known.sweep if known and same else cheapest_sweep(strip, _helper_at(vehicle, pose))[0]
+            laid = sweep_course(
+                pose, heard_s, entry.speed_mps, entry.turn_radius_m, sweep, entered=known is not None and same
+            )
+            known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
+        return known.course
+
+    def _rest(self, vehicle: KnownVehicle) -> Course:
+        """It circles, from where it was last."""
+        state, entry = vehicle.state, vehicle.entry
+        assert state is not None
+        known = self._rests.get(entry.vehicle)
+        if known is None or known[0] != vehicle.heard_ms:
+            heard_s = vehicle.heard_ms / 1000
+            if entry.role.surveys and not entry.role.revisits:
+                laid = survey_course(entry, state, vehicle.plan, heard_s)
+            else:
+                pose = Pose(state.x_m, state.y_m, state.heading_rad)
+                swept = self._sweeps.get(entry.vehicle)
+                left_m = run_out_left_m(swept.sweep.leave, pose, entry.run_in_m) if swept else 0.0
+                way = straight(pose, left_m, entry.turn_radius_m)
+                laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [way])
+            known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
+        return known[1]
+
+
+def _arrival(pose: Pose, place: Point) -> Pose:
+    """How a vehicle that is sent to a place comes there: the way it lies."""
+    return Pose(*place, math.atan2(place[0] - pose.x_m, place[1] - pose.y_m) % (2 * math.pi))
+
+
+def _helper_at(vehicle: KnownVehicle, pose: Pose) -> Helper:
+    """A helper as far as its ways over a strip hang on it."""
+    entry = vehicle.entry
+    return Helper(
+        vehicle=entry.vehicle,
+        pose=pose,
+        free_at=pose,
+        free_s=0.0,
+        task=None,
+        speed_mps=entry.speed_mps,
+        turn_radius_m=entry.turn_radius_m,
+        run_in_m=entry.run_in_m,
+        swath_m=entry.strip_width_m,
+        p_detect=entry.p_detect,
+        lasts_until_s=math.inf,
+        refused=frozenset(),
+    )
