@@ -179,11 +179,15 @@ class Coordinator:
 
     def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost = vehicle.is_idle, vehicle.is_finished, vehicle.lost
+        did = (vehicle.state.mode, vehicle.state.works_on) if vehicle.state is not None else None
         if not vehicle.take_state(header, state, now_ms):
             return
         if was_lost:
             log.info("%s is heard again", vehicle.entry.vehicle)
-        self._to_look |= self._right_of_way is not None and now_ms >= self._right_of_way.look_s * 1000
+        if self._right_of_way is not None:
+            if did != (state.mode, state.works_on):
+                self._right_of_way.changed(vehicle.entry.vehicle)
+            self._to_look |= now_ms >= self._right_of_way.look_s * 1000
         self._to_cut |= vehicle.is_finished and not was_finished
         self._to_assign |= vehicle.is_idle and not was_idle
         if vehicle.is_at_a_strip:
@@ -392,8 +396,22 @@ class Coordinator:
         situation = self._situation(now_ms)
         if not situation.strips or not situation.helpers:
             return
+        right, allocator = self._right_of_way, self.config.allocator
+        if right is None:
+            self._offer(checked_offers(allocator.assign(situation), situation), situation, now_ms)
+            return
+        departures = right.departures(self._under_way(), now_ms / 1000)
+        offers, again_s = offers_let_through(allocator, situation, departures)
+        for name, number in offers:
+            right.offered(name, number, departures)
+        self._offer(offers, situation, now_ms)
+        self._clear_ms = now_ms + round(again_s * 1000) if math.isfinite(again_s) else None
+        for order in right.make_room(departures, self._under_way()):
+            self._tell(order)
+
+    def _offer(self, offers: list[tuple[str, int]], situation: Situation, now_ms: int) -> None:
         helpers = {helper.vehicle: helper for helper in situation.helpers}
-        for name, number in self._offers(situation, now_ms):
+        for name, number in offers:
             record, helper, vehicle = self.ledger.get(number), helpers[name], self.vehicles[name]
             assert record is not None
             if helper.task is not None:
@@ -403,21 +421,6 @@ class Coordinator:
             vehicle.offered[number] = (record.strip, record.cut)
             vehicle.service = service(self._open_strip(record), helper)
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
-
-    def _offers(self, situation: Situation, now_ms: int) -> list[tuple[str, int]]:
-        """The allocator's offers, less those that must wait for others to be out of the way."""
-        right, allocator = self._right_of_way, self.config.allocator
-        if right is None:
-            return checked_offers(allocator.assign(situation), situation)
-        departures = right.departures(self._under_way(), now_ms / 1000)
-        offers, again_s = offers_let_through(allocator, situation, departures)
-        for name, number in offers:
-            right.offered(name, number, departures)
-        if math.isfinite(again_s):
-            self._clear_ms = now_ms + round(again_s * 1000)
-        for order in right.make_room(departures):
-            self._tell(order)
-        return offers
 
     def _under_way(self) -> list[Underway]:
         records = {record.vehicle: record for record in self.ledger.in_state(*WITH_A_VEHICLE)}

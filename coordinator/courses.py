@@ -63,6 +63,12 @@ def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, 
     return Course(first, np.concatenate(parts), start_s + done_m / speed_mps)
 
 
+def lying_still(pose: Pose, from_s: float) -> Course:
+    """The course of a vehicle that has not been under way yet."""
+    first = math.ceil(from_s / STEP_S)
+    return Course(first, np.tile(np.array(pose, dtype=np.float64), (math.ceil(AHEAD_S / STEP_S), 1)), from_s)
+
+
 def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, heard_s: float) -> Course:
     """The course of a primary along the tracks that it has planned, from what it said at `heard_s`."""
     pose, radius_m = Pose(state.x_m, state.y_m, state.heading_rad), entry.turn_radius_m

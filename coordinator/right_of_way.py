@@ -11,6 +11,7 @@ import logging
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 from coordinator.courses import STEP_S, Course
 from coordinator.separation import Approach, too_close
@@ -22,9 +23,9 @@ from planner.types import Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
-OFFER_MARGIN_M = 8.0
-"""A way that is offered keeps so much farther off: courses are known to a few metres."""
-MARGIN_M = 3.0
+OFFER_MARGIN_M = 13.0
+"""A way that is offered, or to stand aside, keeps so much farther off: courses are known to a few metres."""
+MARGIN_M = 8.0
 """A helper gives way where it would come nearer than the separation and this."""
 DELAYS_S = (0.0, 10.0, 20.0, 30.0)
 """An offer that is clear so much later waits; else another is asked for."""
@@ -37,7 +38,7 @@ LOOK_AHEAD_S = 90.0
 GIVES_BACK_S = 50.0
 """So long before it would come too close a helper gives its strip back: until then the other's plan may change. So
 long before it begins to sweep, the whole sweep must be clear."""
-TOLD_AGAIN_S = 20.0
+TOLD_AGAIN_S = 10.0
 BEARINGS = 8
 
 
@@ -96,15 +97,19 @@ class RightOfWay:
             self._traffic.offered(name, *way)
             self._sent_s[name] = departures.now_s
             self._to_sweep[name] = departures.sweeps_s[name, number]
-            self._due_s = {pair: due_s for pair, due_s in self._due_s.items() if name not in pair}
-            self.look_s = 0.0
+            self.changed(name)
 
-    def make_room(self, departures: Departures) -> list[Order]:
-        """Sends those aside that are free and keep others from setting out."""
+    def changed(self, name: str) -> None:
+        """What a vehicle does is another now: to be looked at soon."""
+        self._due_s = {pair: due_s for pair, due_s in self._due_s.items() if name not in pair}
+        self.look_s = 0.0
+
+    def make_room(self, departures: Departures, fleet: Sequence[Underway]) -> list[Order]:
+        """Sends those aside that are free and keep others from setting out. `fleet`: as it is with the offers made."""
         orders = []
-        for one in departures.fleet:
-            wanted = [course for name, course in departures.in_the_way if name == one.name]
-            order = self._order(one, [], wanted, departures.fleet, departures.now_s) if wanted else None
+        for one in fleet:
+            wanted = [course for name, course in departures.in_the_way if name == one.name and one.strip is None]
+            order = self._order(one, [], wanted, fleet, departures.now_s) if wanted else None
             orders += [] if order is None else [order]
         return orders
 
@@ -181,35 +186,38 @@ class RightOfWay:
             return None  # its answer is under way
         others = [self._traffic.course(other.vehicle, other.strip, now_s) for other in fleet if other is not one]
         courses = [*wanted, *(course for course in others if course is not None)]
-        self._told_s[one.name] = now_s
         if one.strip is not None and self._is_clear(
             self._traffic.holding(one.vehicle, one.strip, now_s), courses, now_s, STANDS_ASIDE_S
         ):
+            self._told_s[one.name] = now_s
             return Order(one.name, one.strip, None)
         place = self._place_aside(one, courses, now_s)
         if place is None:
             for approach, other in approaches:
                 self._complain(one, other, approach)
             return None
+        self._told_s[one.name] = now_s
         self._traffic.sent_aside(one.vehicle, one.strip, place, now_s)
         return Order(one.name, one.strip, place)
 
     def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
         """The nearest place in the area at which it can wait; None where there is none."""
         here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)[0]
-        for step in (1.5, 2.5, 4.0):
-            for number in range(BEARINGS):
+        for for_s in (2 * LOOK_AHEAD_S, STANDS_ASIDE_S):
+            for share, number in product((2.0, 3.5, 5.0), range(BEARINGS)):
                 bearing_rad = here.heading_rad + 2 * math.pi * number / BEARINGS
-                far_m = step * self.separation_m
+                far_m = share * self.separation_m
                 place = (here.x_m + far_m * math.sin(bearing_rad), here.y_m + far_m * math.cos(bearing_rad))
                 if self._is_inside(place):
                     laid = self._traffic.aside(one.vehicle, one.strip, place, now_s)
-                    if self._is_clear(laid, courses, now_s, 2 * LOOK_AHEAD_S):
+                    if self._is_clear(laid, courses, now_s, for_s, OFFER_MARGIN_M):
                         return place
         return None
 
-    def _is_clear(self, course: Course, others: list[Course], now_s: float, for_s: float) -> bool:
-        least_m = self.separation_m + MARGIN_M
+    def _is_clear(
+        self, course: Course, others: list[Course], now_s: float, for_s: float, margin_m: float = MARGIN_M
+    ) -> bool:
+        least_m = self.separation_m + margin_m
         return all(too_close(course, other, least_m, now_s, now_s + for_s) is None for other in others)
 
     def _complain(self, one: Underway, other: Underway, approach: Approach) -> None:

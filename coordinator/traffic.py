@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from comms.messages import Mode
-from coordinator.courses import Course, course, run_out_left_m, straight, survey_course, sweep_course
+from coordinator.courses import Course, course, lying_still, run_out_left_m, straight, survey_course, sweep_course
 from coordinator.service import Sweep, cheapest_sweep
 from coordinator.situation import Helper
 from coordinator.vehicles import KnownVehicle
@@ -37,7 +37,7 @@ class Traffic:
         self._rests: dict[str, tuple[int, Course]] = {}
 
     def course(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course | None:
-        """Where a vehicle will be; None for one that is lost or has not been under way yet.
+        """Where a vehicle will be; None for one that is lost or was never heard.
 
         `strip`: what it has of the coordinator.
         """
@@ -51,9 +51,7 @@ class Traffic:
         errand = self._errands.get(vehicle.entry.vehicle)
         if errand is not None and now_s < errand.arrives_s:
             return errand
-        if vehicle.entry.role.surveys or vehicle.offered or errand is not None:
-            return self._rest(vehicle)
-        return None
+        return self._rest(vehicle)
 
     def to_strip(self, vehicle: KnownVehicle, strip: Strip, now_s: float) -> tuple[Course, Sweep]:
         """The course of a free helper that sets out to a strip now, and how it sweeps it."""
@@ -116,16 +114,18 @@ class Traffic:
         return known.course
 
     def _rest(self, vehicle: KnownVehicle) -> Course:
-        """It circles, from where it was last."""
+        """It circles from where it was last, if it has ever been under way."""
         state, entry = vehicle.state, vehicle.entry
         assert state is not None
         known = self._rests.get(entry.vehicle)
         if known is None or known[0] != vehicle.heard_ms:
             heard_s = vehicle.heard_ms / 1000
+            pose = Pose(state.x_m, state.y_m, state.heading_rad)
             if entry.role.surveys and not entry.role.revisits:
                 laid = survey_course(entry, state, vehicle.plan, heard_s)
+            elif not (entry.role.surveys or vehicle.offered or entry.vehicle in self._errands):
+                laid = lying_still(pose, heard_s)
             else:
-                pose = Pose(state.x_m, state.y_m, state.heading_rad)
                 swept = self._sweeps.get(entry.vehicle)
                 left_m = run_out_left_m(swept.sweep.leave, pose, entry.run_in_m) if swept else 0.0
                 way = straight(pose, left_m, entry.turn_radius_m)

@@ -57,6 +57,26 @@ def give_back(strip: int = STRIP.strip) -> Task:
     return replace(STRIP, action=TaskAction.GIVE_BACK, strip=strip)
 
 
+class TestStandingAside:
+    aside = Task(TaskAction.STAND_ASIDE, 0, 130, 40, 0, 0, 0)
+
+    def test_a_free_helper_goes_there_and_is_free_for_a_strip_all_the_while(self) -> None:
+        agent = revisit()
+        assert agent.all(TaskStatus, tell(agent, self.aside)) == []
+        assert agent.last(Maneuver) == Maneuver(1, ManeuverKind.GOTO, 100, 0, 130, 40, 0)
+        assert answer(agent, STRIP).state is TaskState.ACCEPTED
+
+    def test_one_at_work_goes_on(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        tell(agent, self.aside)
+        assert agent.last(Maneuver).kind is ManeuverKind.FOLLOW
+
+    def test_nobody_goes_to_the_end_of_the_world(self) -> None:
+        agent = revisit()
+        assert tell(agent, replace(self.aside, start_x_m=2e6)) == []
+
+
 class TestAnOffer:
     def test_a_free_helper_takes_it_and_sets_out_along_the_strip(self) -> None:
         agent = revisit()

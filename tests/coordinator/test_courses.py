@@ -1,0 +1,136 @@
+"""Where vehicles are expected to be, and whether two come too close."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from by_hand import vehicle
+from hypothesis import given
+from hypothesis import strategies as st
+from situations import helper, strip
+
+from comms.messages import AgentState, Mode, Plan, PlannedTrack, Role
+from coordinator.courses import STEP_S, Course, course, straight, survey_course, sweep_course
+from coordinator.separation import too_close
+from coordinator.service import cheapest_sweep, service
+from coordinator.situation import OpenStrip
+from planner.dubins import Pose
+
+EAST, NORTH, SOUTH = math.pi / 2, 0.0, math.pi
+
+
+def ahead(x_m: float, y_m: float, heading_rad: float, speed_mps: float, length_m: float = 2000) -> Course:
+    """Straight on from time 0."""
+    start = Pose(x_m, y_m, heading_rad)
+    return course(start, 0, speed_mps, 10, [straight(start, length_m, 10)])
+
+
+class TestCourses:
+    def test_it_is_where_its_speed_takes_it_and_then_circles(self) -> None:
+        laid = course(Pose(0, 0, EAST), 5, 2, 10, [straight(Pose(0, 0, EAST), 100, 10)])
+        pose, at_s = laid.at(25)
+        assert at_s == 26
+        assert pose == pytest.approx((42, 0, EAST))  # 21 s at 2 m/s
+        assert laid.arrives_s == 55
+        later = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 55]
+        assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
+
+    def test_a_sweep_ends_when_and_where_its_service_does(self) -> None:
+        one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
+        sweep, _ = cheapest_sweep(one, free)
+        laid = sweep_course(free.pose, 0, free.speed_mps, free.turn_radius_m, sweep)
+        served = service(OpenStrip(one, 1), free)
+        assert laid.arrives_s == pytest.approx(served.free_s)
+        there, at_s = laid.at(served.free_s)
+        assert math.dist(there[:2], served.free_at[:2]) <= free.speed_mps * (at_s - served.free_s) + 1e-6
+
+    def test_a_track_under_way_ends_when_the_primary_says(self) -> None:
+        entry = vehicle("primary", Role.SURVEY)
+        tracks = (PlannedTrack(1, 0, 0, 0, 0, 400, False), PlannedTrack(2, 100, 100, 400, 100, 0, False))
+        state = AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0)
+        laid = survey_course(entry, state, Plan(1, tracks, (), (), ""), 0)
+        assert laid.at(100)[0][:2] == pytest.approx((0, 400))
+        on_second = laid.poses[np.abs(laid.poses[:, 2] - SOUTH) < 1e-6]
+        assert on_second[:, 0] == pytest.approx(100)
+        assert on_second[:, 1].min() < 10
+
+    def test_a_run_out_is_sailed_to_its_end(self) -> None:
+        entry = vehicle("primary", Role.SURVEY)
+        plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 400, True),), (), (), "")
+        laid = survey_course(entry, AgentState(Mode.FINISHED, 0, 1, 0, 0, 401, 0), plan, 0)
+        assert laid.poses[:, 1].max() == pytest.approx(400 + entry.run_in_m + entry.turn_radius_m, abs=1)
+
+    @given(
+        st.tuples(st.floats(-200, 200), st.floats(-200, 200), st.floats(0, 6.3)),
+        st.tuples(st.floats(0.5, 3), st.floats(3, 20), st.floats(0, 100)),
+    )
+    def test_no_step_is_longer_than_the_vehicle_goes(
+        self, place: tuple[float, float, float], moves: tuple[float, float, float]
+    ) -> None:
+        speed_mps, radius_m, start_s = moves
+        free = helper(x_m=place[0], y_m=place[1], heading_rad=place[2], speed_mps=speed_mps, turn_radius_m=radius_m)
+        laid = sweep_course(free.pose, start_s, speed_mps, radius_m, cheapest_sweep(strip(1), free)[0])
+        steps = [math.dist(one[:2], other[:2]) for one, other in pairwise(laid.poses.tolist())]
+        assert max(steps) <= speed_mps * STEP_S + 1e-6
+
+
+class TestTooClose:
+    def test_two_that_meet_head_on(self) -> None:
+        north, south = ahead(0, 0, NORTH, 2), ahead(5, 400, SOUTH, 2)
+        found = too_close(north, south, 20, 0, 600)
+        assert found is not None
+        assert found.distance_m == pytest.approx(5)  # between two samples, too
+        # 4 m/s closing: nearer than 20 m from (400 - sqrt(400 - 25)) / 4 = 95.2 s on.
+        assert found.time_s == 94
+
+    def test_between_two_steps(self) -> None:
+        # Both pass the crossing at 5 s, half way between two samples.
+        found = too_close(ahead(0, -25, NORTH, 5), ahead(-25, 0, EAST, 5), 1, 0, 60)
+        assert found is not None
+        assert found.distance_m == pytest.approx(0, abs=1e-6)
+
+    def test_one_that_passes_later(self) -> None:
+        assert too_close(ahead(0, -100, NORTH, 2), ahead(-400, 0, EAST, 2), 20, 0, 600) is None
+
+    def test_only_as_long_as_it_is_asked_for(self) -> None:
+        north, south = ahead(0, 0, NORTH, 2), ahead(5, 400, SOUTH, 2)
+        assert too_close(north, south, 20, 0, 90) is None
+        assert too_close(north, south, 20, 120, 600) is None
+
+    def test_two_that_begin_near_may_part(self) -> None:
+        assert too_close(ahead(0, 0, NORTH, 2), ahead(10, 0, SOUTH, 2), 20, 0, 300) is None
+
+    def test_but_come_no_nearer(self) -> None:
+        found = too_close(ahead(0, 0, NORTH, 2), ahead(4, 15, SOUTH, 2), 20, 0, 300)
+        assert found is not None
+        assert found.distance_m == pytest.approx(4)
+
+    def test_nor_meet_again(self) -> None:
+        # One sails away and circles back past where the other lies still.
+        away = course(Pose(0, 0, NORTH), 0, 2, 40, [])
+        still = course(Pose(-10, 0, NORTH), 0, 1e-9, 10, [])
+        found = too_close(away, still, 20, 0, 300)
+        assert found is not None
+        assert found.time_s == pytest.approx(2 * math.pi * 40 / 2, abs=15)
+
+    @given(*[st.tuples(st.floats(-100, 100), st.floats(-100, 100), st.floats(0, 6.3), st.floats(1, 3))] * 2)
+    def test_as_a_fine_search_finds(
+        self, one: tuple[float, float, float, float], other: tuple[float, float, float, float]
+    ) -> None:
+        first, second = ahead(*one), ahead(*other)
+        times_s = np.arange(0, 120, 0.05)[:, np.newaxis]
+        at = [
+            np.array([[x_m, y_m]]) + times_s * speed_mps * np.array([[math.sin(heading), math.cos(heading)]])
+            for x_m, y_m, heading, speed_mps in (one, other)
+        ]
+        apart_m = np.hypot(*(at[0] - at[1]).T)
+        found = too_close(first, second, 20, 0, 118)
+        if apart_m[0] >= 20 and apart_m.min() < 19.5:
+            assert found is not None
+            assert found.distance_m == pytest.approx(apart_m.min(), abs=0.5)
+            assert found.time_s == pytest.approx(times_s[int((apart_m < 20).argmax()), 0], abs=STEP_S + 0.2)
+        elif apart_m.min() > 20.5:
+            assert found is None

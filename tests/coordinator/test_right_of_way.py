@@ -1,0 +1,148 @@
+"""Who gives way: offers that wait, strips given back, helpers that stand aside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from by_hand import vehicle
+from situations import helper, open_strip, situation, strip
+
+from comms.messages import AgentState, Mode, Plan, PlannedTrack, Role
+from coordinator.allocation import GreedyAllocator, NearestAllocator
+from coordinator.offers import ASKED_LATER_S, offers_let_through
+from coordinator.right_of_way import RightOfWay, Underway
+from coordinator.separation import too_close
+from coordinator.situation import Allocator, Helper, OpenStrip
+from coordinator.vehicles import KnownVehicle
+from planner.types import Strip
+
+NORTH = 0.0
+
+
+def known(name: str, role: Role, mode: Mode, x_m: float, y_m: float, works_on: int = 0, **other: int) -> KnownVehicle:
+    """A vehicle heard at time 0, heading north."""
+    state = AgentState(mode, works_on, 1, other.get("expected_end_ms", 0), x_m, y_m, NORTH)
+    return KnownVehicle(vehicle(name, role), 0, state)
+
+
+def primary(x_m: float, y_m: float = 0) -> KnownVehicle:
+    """On a track northwards at 1.5 m/s, 300 m of it left."""
+    found = known("primary", Role.SURVEY, Mode.SURVEY, x_m, y_m, 1, expected_end_ms=200_000)
+    found.plan = Plan(1, (PlannedTrack(1, 0, x_m, y_m, x_m, y_m + 300, False),), (), (), "")
+    return found
+
+
+def right_of_way() -> RightOfWay:
+    return RightOfWay(15, lambda place: abs(place[0]) <= 500 and abs(place[1]) <= 500)
+
+
+class Waits:
+    """Lets these strips through, and the others only after so many seconds."""
+
+    def __init__(self, through: set[int], wait_s: float) -> None:
+        self.through, self.seconds = through, wait_s
+
+    def begin(self) -> None:
+        pass
+
+    def wait_s(self, helper: Helper, one: OpenStrip) -> float:
+        return 0.0 if one.strip.number in self.through else self.seconds
+
+
+class TestOffers:
+    near, far = open_strip(strip(1, 0, 50)), open_strip(strip(2, 300, 50))
+
+    @pytest.mark.parametrize("allocator", [GreedyAllocator(), NearestAllocator()])
+    def test_another_strip_is_taken_where_one_must_wait_long(self, allocator: Allocator) -> None:
+        asked = situation([self.near, self.far], [helper()])
+        assert offers_let_through(allocator, asked, Waits({1, 2}, 0)) == ([("alpha", 1)], math.inf)
+        assert offers_let_through(allocator, asked, Waits({2}, math.inf)) == ([("alpha", 2)], ASKED_LATER_S)
+
+    def test_an_offer_that_is_clear_soon_waits(self) -> None:
+        asked = situation([self.near, self.far], [helper()])
+        assert offers_let_through(GreedyAllocator(), asked, Waits({2}, 10)) == ([], 10)
+
+    def test_an_allocator_that_insists_gets_nothing(self) -> None:
+        class Insists:
+            def assign(self, asked: object) -> dict[str, int]:
+                return {"alpha": 1}
+
+        asked = situation([self.near], [helper()])
+        assert offers_let_through(Insists(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
+
+    def test_a_helper_that_is_to_give_its_task_back_need_not_wait(self) -> None:
+        class TurnsRound:
+            def assign(self, asked: object) -> dict[str, int]:
+                return {"alpha": 1}
+
+        busy = replace(helper(), task=self.far)
+        asked = situation([self.near], [busy])
+        assert offers_let_through(TurnsRound(), asked, Waits(set(), math.inf)) == ([("alpha", 1)], math.inf)
+
+
+class TestDepartures:
+    def wait_s(self, right: RightOfWay, fleet: list[KnownVehicle], to: Strip) -> float:
+        departures = right.departures([Underway(one, None) for one in fleet], 0.0)
+        return departures.wait_s(helper("helper"), open_strip(to))
+
+    def test_towards_a_primary(self) -> None:
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 140)
+        to = strip(1, 0, 20, length_m=100)
+        assert self.wait_s(right_of_way(), [primary(200), me], to) == 0
+        # Southwards over the strip it would meet the primary at about 40 s.
+        assert self.wait_s(right_of_way(), [primary(0), me], to) > 0
+
+    def test_a_free_helper_in_the_way_makes_room(self) -> None:
+        right = right_of_way()
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        other = known("second", Role.REVISIT, Mode.IDLE, 0, 60)
+        fleet = [Underway(one, None) for one in (me, other)]
+        departures = right.departures(fleet, 0.0)
+        assert departures.wait_s(helper("helper"), open_strip(strip(1, 0, 50))) == 10
+        (order,) = right.make_room(departures, fleet)
+        assert (order.name, order.gives_back) == ("second", None)
+        # It lies elsewhere once it is there, and the way is clear.
+        assert order.place is not None
+        other.state = AgentState(Mode.IDLE, 0, 1, 0, *order.place, NORTH)
+        assert self.wait_s(right_of_way(), [me, other], strip(1, 0, 50)) == 0
+
+
+class TestLooking:
+    def test_a_free_helper_stands_aside_for_a_primary(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        right = right_of_way()
+        (order,) = right.look(fleet, 0.0)
+        assert (order.name, order.gives_back) == ("helper", None)
+        assert order.place is not None
+        its = right._traffic.course(fleet[0].vehicle, None, 0.0)
+        mine = right._traffic.course(fleet[1].vehicle, None, 0.0)
+        assert its is not None
+        assert mine is not None
+        assert too_close(mine, its, 15, 0, 180) is None
+
+    def test_one_that_is_far_does_not(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]
+        assert right_of_way().look(fleet, 0.0) == []
+
+    def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
+        to = strip(7, 0, 20, length_m=100)
+        at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, 140, 7)
+        (order,) = right_of_way().look([Underway(primary(0), None), Underway(at_work, to)], 0.0)
+        assert (order.name, order.gives_back) == ("helper", to)
+
+    def test_of_two_at_work_the_one_sent_later(self) -> None:
+        right = right_of_way()
+        first = known("helper", Role.REVISIT, Mode.IDLE, -60, 0)
+        second = known("second", Role.REVISIT, Mode.IDLE, 60, 300)
+        to = {"helper": strip(1, 0, 60), "second": strip(2, 0, 61)}
+        for now_s, one in ((0.0, second), (1.0, first)):
+            name = one.entry.vehicle
+            departures = right.departures([Underway(one, None)], now_s)
+            departures.wait_s(helper(name), open_strip(to[name]))
+            right.offered(name, to[name].number, departures)
+            assert one.state is not None
+            one.state = replace(one.state, mode=Mode.TRANSIT, works_on=to[name].number)
+        orders = right.look([Underway(one, to[one.entry.vehicle]) for one in (first, second)], 1.0)
+        assert [order.name for order in orders] == ["helper"]
