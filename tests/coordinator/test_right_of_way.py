@@ -136,7 +136,7 @@ class TestLooking:
         right = right_of_way()
         first = known("helper", Role.REVISIT, Mode.IDLE, -60, 0)
         second = known("second", Role.REVISIT, Mode.IDLE, 60, 300)
-        to = {"helper": strip(1, 0, 60), "second": strip(2, 0, 61)}
+        to = {"helper": replace(strip(1, 0, 60), width_m=40), "second": replace(strip(2, 0, 61), width_m=40)}
         for now_s, one in ((0.0, second), (1.0, first)):
             name = one.entry.vehicle
             departures = right.departures([Underway(one, None)], now_s)
