@@ -11,7 +11,8 @@ from coordinator.situation import Allocator
 class CoordinatorConfig:
     """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
     age of a vehicle's state from which it is taken for lost. `min_strip_m`, `max_strip_m`: length of a strip.
-    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying.
+    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, at most:
+    it falls where helpers have time for more.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens."""
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -39,7 +40,7 @@ from coordinator.service import service
 from coordinator.situation import Helper, OpenStrip, Situation
 from coordinator.strips import Cut, CuttingRules, Window, cut_strips, strip_of
 from coordinator.vehicles import KnownVehicle
-from coordinator.worth import Supply, worth_later_m2ps
+from coordinator.worth import Supply, worth_later_m2ps, worth_risk
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.region import Region
@@ -53,6 +54,7 @@ WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is
 ANSWER_WITHIN_MS = 10_000
 GIVEN_UP_AFTER = 10  # times as long as for a lost vehicle must a primary be silent before the mission ends without it
 CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
+SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on the way
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen for the map to agree that it is done
 
 
@@ -315,6 +317,7 @@ class Coordinator:
         growth = self._growth(risk)
         ahead = int((self._inside & ~self.map.settled_by(primaries) & (growth.settles_s == 0)).sum())
         self._more_to_come = ahead / max(1, int(self._inside.sum()) - ahead)
+        self._set_worth_risk(risk, now_ms)
         reach = 2 * self._rules.columns(grid)
         columns = self._last_cut.changed_columns(risk, open_cells, growth, self._looked_at(), reach)
         unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
@@ -333,6 +336,25 @@ class Coordinator:
         for record in unmatched:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
         self._last_cut.remember(self._looked_at())
+
+    def _set_worth_risk(self, risk: FloatArray, now_ms: int) -> None:
+        """Where helpers have time for more than is badly seen, what is seen less badly is worth a second look, too."""
+        assert self.map is not None
+        assert self._rules is not None
+        deadline_s = self._expected_deadline_s()
+        if math.isinf(deadline_s):
+            return
+        helpers = [self._helper(vehicle, now_ms) for vehicle in self.vehicles.values()]
+        swept_m2 = sum(
+            SWEEPING_SHARE * max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m
+            for one in helpers
+            if one is not None
+        )
+        cells = swept_m2 / self.map.grid.cell_area_m2 / (1.0 + self._more_to_come)
+        worth = min(self.config.worth_risk, worth_risk(risk[risk > 0], cells))
+        if worth != self._rules.worth_risk:
+            self._rules = replace(self._rules, worth_risk=worth)
+            self._last_cut = LastCut(self.map.grid)
 
     def _looked_at(self) -> list[Window]:
         """What is a strip's that is open or with a vehicle, or will be one's."""

@@ -19,7 +19,7 @@ from planner.types import FloatArray
 
 HORIZON_S = 4 * 3600.0
 """How far ahead is planned while nobody can tell when the mission ends."""
-LEAST_WORTH = 0.5
+LEAST_WORTH = 0.8
 """A second left counts at least for so much of what a second brings at the best strip, where strips are left."""
 TOLERANCE_M2 = 1e-6
 

@@ -1,10 +1,16 @@
-"""What a second of a helper is worth later: the risk removed per second at the least of the strips that helpers will
-still have time for."""
+"""What a helper's time is worth: from all that helpers will still have time for, the least of it."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
+
+from planner.types import FloatArray
+
+RISK_STEP = 0.05
+"""Worth is told in steps, so that it does not change with every look."""
 
 
 @dataclass(frozen=True)
@@ -25,3 +31,13 @@ def worth_later_m2ps(supplies: Iterable[Supply], helpers_s: float) -> float:
         if left_s < 0:
             return supply.removed_m2 / supply.service_s
     return 0.0
+
+
+def worth_risk(risk: FloatArray, cells: float) -> float:
+    """Residual risk from which a cell is worth a second look, if helpers have time for so many: rounded down to a step,
+    at least one. `risk`: of the cells that may be looked at."""
+    count = int(cells)
+    if count >= risk.size:
+        return RISK_STEP
+    least = float(np.partition(risk, risk.size - 1 - count)[risk.size - 1 - count])
+    return max(RISK_STEP, int(least / RISK_STEP + 1e-9) * RISK_STEP)

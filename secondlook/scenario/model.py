@@ -68,7 +68,8 @@ class Coordinator(Mapping):
     `allocator`: ours by name, or `package.module:Class` of your own; `node`: the same for the whole coordinator.
     `lost_after_s`: age of a vehicle's last state from which it counts as lost. `min_strip_m`, `max_strip_m`: length
     of a strip. `worth_risk`: mean residual risk over a helper's swath from which a further metre of strip is worth
-    flying. `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
+    flying, at most; it falls where helpers have time for more. `switch_margin`: share by which the fleet's plan must
+    get better for a helper to be turned round.
     """
 
     allocator: Annotated[str, part(ALLOCATOR)] = "plan"
