@@ -4,6 +4,7 @@ A message sent at t is due at t + its topic's delay. The clock grants the earlie
 delivery that is due, to every node that has either then; it goes on when all of them have answered. What is due of a
 topic that wakes nobody comes along with the next grant. Nothing happens in between, so there is no tick.
 
+Once the mission is over the run goes on for last words, and until every agent that is there rests: see `_last_ms`.
 Planned events of nodes (`comms.events`) happen between grants: who is absent or frozen is granted nothing.
 """
 
@@ -19,6 +20,7 @@ from comms.routing import Routing
 from comms.topics import MISSION_OVER
 
 WRAP_UP_MS = 100  # simulated time in which the fleet's last words are delivered after the mission is over
+LATE_WORDS_MS = 10_000  # simulated time in which an agent may still learn that it is over
 MOST_ROUNDS_A_SECOND = 10_000
 MOST_MESSAGES_A_SECOND = 200_000
 
@@ -86,6 +88,8 @@ class LockstepClock:
         }
         acting = [node.node_id for node in routing.roster if not node.listens_only and node.role.value != "clock"]
         self._wakes: dict[str, int | None] = {node: None if node in self._absent else 0 for node in acting}
+        self._agents = [node.node_id for node in routing.roster if node.role.surveys or node.role.revisits]
+        self._all_rest_ms: int | None = None  # since when no agent wants to be woken, once the mission is over
         self._to_start = set(acting) - self._absent
         self._waiting: set[str] = set()
         self._due: dict[int, set[str]] = {}
@@ -144,6 +148,9 @@ class LockstepClock:
             raise ValueError(f"{node_id} asks at {self.now_ms} ms to be woken at {wake_ms} ms, which is not later")
         self._wakes[node_id] = wake_ms
         self.publish(node_id, sent)
+        if self.over_ms is not None:
+            resting = all(self._wakes[agent] is None for agent in self._agents)
+            self._all_rest_ms = (self._all_rest_ms or self.now_ms) if resting else None
 
     def next_round(self) -> Round | None:
         """The next grants, or None when the mission is over, nothing is left to happen, or the time limit has passed.
@@ -224,7 +231,12 @@ class LockstepClock:
         return Grant(node_id, wake_ms is not None and wake_ms <= now_ms, grown, start)
 
     def _last_ms(self) -> int:
-        return self._time_limit_ms if self.over_ms is None else self.over_ms + WRAP_UP_MS
+        """The last time at which anything happens; an agent that has heard of the end asks for no wake-up any more."""
+        if self.over_ms is None:
+            return self._time_limit_ms
+        if self._all_rest_ms is None:
+            return self.over_ms + LATE_WORDS_MS
+        return min(self._all_rest_ms + WRAP_UP_MS, self.over_ms + LATE_WORDS_MS)
 
     def _count_round(self, now_ms: int) -> None:
         self.rounds += 1

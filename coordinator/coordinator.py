@@ -39,12 +39,12 @@ from coordinator.right_of_way import Order, RightOfWay, Underway
 from coordinator.service import service
 from coordinator.situation import Helper, OpenStrip, Situation
 from coordinator.strips import Cut, CuttingRules, Window, cut_strips, strip_of
-from coordinator.vehicles import KnownVehicle
+from coordinator.vehicles import KnownVehicle, Offer
 from coordinator.worth import Supply, worth_later_m2ps, worth_risk
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.region import Region
-from planner.risk import NATS_PER_LEVEL
+from planner.risk import NATS_PER_LEVEL, LevelArray
 from planner.types import BoolArray, FloatArray, Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
@@ -55,7 +55,12 @@ ANSWER_WITHIN_MS = 10_000
 GIVEN_UP_AFTER = 10  # times as long as for a lost vehicle must a primary be silent before the mission ends without it
 CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
 SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on the way
-COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen for the map to agree that it is done
+COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen anew for the map to agree that it is done
+LATE_SHARE = 0.5  # of the time that a service was expected to take, that it may take longer
+LATE_MS = 60_000  # and so much more
+NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
+SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))  # that the mission is over
+FULL_LEVEL = 255  # a cell that has it cannot show another look
 
 
 class Coordinator:
@@ -80,7 +85,9 @@ class Coordinator:
         self._coming: list[Cut] = []
         self._more_to_come = 0.0  # area that is still to settle, as a multiple of what has
         self._ripe_ms: int | None = None
-        self._over = False
+        self._over: MissionOver | None = None
+        self._over_ms = 0
+        self._say_again_ms: int | None = None
         self._complained_of: set[str] = set()
         self._right_of_way: RightOfWay | None = None
         self._gave_way: dict[str, set[int]] = {}  # strips that helpers gave back to give way: they may be offered again
@@ -89,6 +96,7 @@ class Coordinator:
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
+        self.ledger = Ledger(1 + NUMBERS_A_SECOND * (now_ms // 1000))
         return Step()
 
     def on_message(self, received: Received, now_ms: int) -> Step:
@@ -96,7 +104,7 @@ class Coordinator:
         message = received.message
         if isinstance(message, RunInfo) and self.map is None:
             self._begin(message, now_ms)
-        elif self.map is not None and not self._over:
+        elif self.map is not None and self._over is None:
             vehicle = self.vehicles.get(received.vehicle)
             if isinstance(message, CoverageTile):
                 self._take_tile(received, message, now_ms)
@@ -107,13 +115,18 @@ class Coordinator:
             elif isinstance(message, TaskStatus) and vehicle is not None:
                 self._take_status(vehicle, received.header, message, now_ms)
             elif isinstance(message, Plan) and vehicle is not None:
-                vehicle.take_plan(message)
+                vehicle.take_plan(received.header, message)
+        elif self._over is not None:
+            vehicle = self.vehicles.get(received.vehicle)
+            if isinstance(message, AgentState) and vehicle is not None:
+                vehicle.take_state(received.header, message, now_ms)
         return self._step(now_ms)
 
     def on_wake(self, now_ms: int) -> Step:
         """Cuts, assigns and looks whether anyone is lost and whether the mission is over."""
-        if self.map is not None and not self._over:
+        if self.map is not None and self._over is None:
             self._find_lost(now_ms)
+            self._find_late(now_ms)
             if self._to_cut or (self._cut_by_ms is not None and self._cut_by_ms <= now_ms):
                 self._to_cut = False
                 self._cut_by_ms = None
@@ -127,6 +140,8 @@ class Coordinator:
                 self._to_look = False
                 self._keep_apart(now_ms)
             self._find_end(now_ms)
+        elif self._over is not None:
+            self._say_over_again(self._over, now_ms)
         return self._step(now_ms)
 
     def _begin(self, run: RunInfo, now_ms: int) -> None:
@@ -167,6 +182,8 @@ class Coordinator:
         except ValueError as error:
             self._drop(received.vehicle, error)
             return
+        if received.vehicle in self.vehicles:
+            self.vehicles[received.vehicle].note_tile(received.header.incarnation, tile.version)
         if news and self._cut_by_ms is None:
             self._cut_by_ms = now_ms + CUT_WITHIN_MS
 
@@ -194,9 +211,8 @@ class Coordinator:
         self._to_assign |= vehicle.is_idle and not was_idle
         if vehicle.is_at_a_strip:
             # Its state tells too that it is at a strip: the answer may be lost.
-            record = self.ledger.get(state.works_on)
-            if record is not None and vehicle.tells_news_of(state.works_on, header):
-                self._take_at_work(record, vehicle, now_ms, under_way=state.mode is Mode.REVISIT)
+            if vehicle.tells_news_of(state.works_on, header):
+                self._take_at_work(state.works_on, vehicle, now_ms, under_way=state.mode is Mode.REVISIT)
         elif was_idle and vehicle.is_idle:
             self._take_idle(vehicle, header, now_ms)
 
@@ -205,21 +221,23 @@ class Coordinator:
         name = vehicle.entry.vehicle
         for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
             if record.vehicle == name and vehicle.tells_news_of(record.strip.number, header):
-                if self._seen_share(record, name) >= COVERED_SHARE:
+                if self._seen_share(record, vehicle) >= COVERED_SHARE:
+                    vehicle.failures = 0
                     self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)
                 else:
+                    self._note_failure(vehicle)
                     self._move(record, StripState.OPEN, now_ms, f"{name} has no work, its word on it was lost")
                 self._to_cut = True
 
     def _take_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:
-        record = self.ledger.get(status.strip)
-        if record is None or not vehicle.tells_news_of(status.strip, header):
+        if not vehicle.tells_news_of(status.strip, header):
             return
+        vehicle.unanswered = 0
         if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
-            self._take_at_work(record, vehicle, now_ms, under_way=status.state is TaskState.UNDER_WAY)
+            self._take_at_work(status.strip, vehicle, now_ms, under_way=status.state is TaskState.UNDER_WAY)
             return
-        name = vehicle.entry.vehicle
-        if record.vehicle != name or record.state not in WITH_A_VEHICLE:
+        record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
+        if record is None or record.vehicle != name or record.state not in WITH_A_VEHICLE:
             self._to_cut |= status.state is TaskState.DONE  # by one that was taken for lost: the map tells what is left
             return
         match status.state:
@@ -229,46 +247,60 @@ class Coordinator:
                 self._to_assign = True
             case TaskState.GIVEN_BACK:
                 vehicle.refused.add(status.strip)
+                if vehicle.asked_back != status.strip:
+                    self._note_failure(vehicle)
                 self._move(record, StripState.OPEN, now_ms, f"given back by {name}")
                 self._to_cut = True
             case TaskState.FAILED:
-                vehicle.failed_at.append(record.window)
+                self._note_failure(vehicle, record)
                 self._move(record, StripState.FAILED, now_ms, f"{name} failed: {status.reason}", name)
                 self._to_cut = True
             case TaskState.DONE:
                 self._take_done(record, vehicle, now_ms)
 
-    def _take_at_work(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
+    def _take_at_work(self, number: int, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
         """A vehicle says that it is at a strip.
 
         Where the strip is not with it, because it was taken for lost, it gets the strip back, as it was, if nobody else
-        has it. Else the vehicle is to give it back, so that no two are at one strip.
+        has it. Else the vehicle is to give it back, so that no two are at one place: also where it was asked to before,
+        and where the strip is of a coordinator that is no more.
         """
-        name = vehicle.entry.vehicle
-        offered = vehicle.offered.get(record.strip.number)
-        if record.state is StripState.OPEN and offered is not None:
-            if record.strip != offered[0]:
-                self.ledger.revise(record, *offered)
+        record, name = self.ledger.get(number), vehicle.entry.vehicle
+        if record is None:
+            if number > 0:
+                self._say(TaskAction.GIVE_BACK, Strip(number, (0.0, 0.0), 0.0, 0.0, 0.0), name)
+            return
+        offer = vehicle.offers.get(number)
+        if record.state is StripState.OPEN and offer is not None and vehicle.asked_back != number:
+            if record.strip != offer.strip:
+                self.ledger.revise(record, offer.strip, offer.cut)
                 self._publish_strip(record)
                 self._to_cut = True
+            vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + LATE_MS))
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
         if record.vehicle == name and record.state in WITH_A_VEHICLE:
+            vehicle.unanswered = 0
             if under_way:
                 self._move(record, StripState.UNDER_WAY, now_ms, "under way", name)
             else:
                 self._move(record, StripState.ACCEPTED, now_ms, "accepted", name)
         else:
-            self._say(TaskAction.GIVE_BACK, record.strip, name)
+            self._ask_back(record.strip, vehicle)
+
+    def _ask_back(self, strip: Strip, vehicle: KnownVehicle) -> None:
+        vehicle.asked_back = strip.number
+        self._say(TaskAction.GIVE_BACK, strip, vehicle.entry.vehicle)
 
     def _take_done(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int) -> None:
         """The map decides whether a strip is done, not the word; what is left is cut anew."""
         name = vehicle.entry.vehicle
-        share = self._seen_share(record, name)
-        self._learn(record, vehicle)
+        share = self._seen_share(record, vehicle)
         if share >= COVERED_SHARE:
+            vehicle.failures = 0
+            self._learn(record, vehicle)
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         else:
-            vehicle.failed_at.append(record.window)
+            self._note_failure(vehicle, record)
             self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
         self._to_cut = True
 
@@ -281,12 +313,46 @@ class Coordinator:
             p_detect = -np.expm1(-NATS_PER_LEVEL * levels)
             self._expected_looks.learn(record.window, p_detect, vehicle.entry.p_detect)
 
-    def _seen_share(self, record: StripRecord, vehicle: str) -> float:
-        assert self.map is not None
-        layer = self.map.layers.get(vehicle)
+    def _note_failure(self, vehicle: KnownVehicle, record: StripRecord | None = None) -> None:
+        """It has not served what it accepted; where `record` is given, it is not to be sent there again."""
+        if record is not None:
+            vehicle.failed_at.append(record.window)
+        was_trusted = vehicle.is_trusted
+        vehicle.failures += 1
+        self._tell_if_given_up(vehicle, was_trusted, f"it has not served {vehicle.failures} strips in a row")
+
+    def _tell_if_given_up(self, vehicle: KnownVehicle, was_trusted: bool, why: str) -> None:
+        if was_trusted and not vehicle.is_trusted:
+            log.warning("%s is offered nothing more: %s", vehicle.entry.vehicle, why)
+
+    def _seen_share(self, record: StripRecord, vehicle: KnownVehicle) -> float:
+        """Share of a strip's cells that the vehicle has seen since it was offered the strip."""
         cells = self._inside[record.window.cells]
-        seen = layer.sum_levels[record.window.cells] > 0 if layer is not None else np.zeros_like(cells)
-        return float(seen[cells].mean()) if cells.any() else 1.0
+        if not cells.any():
+            return 1.0
+        levels, before = self._levels(vehicle, record.window), vehicle.offers[record.strip.number].levels_before
+        return float(((levels > before) | (levels == FULL_LEVEL))[cells].mean())
+
+    def _levels(self, vehicle: KnownVehicle, window: Window) -> LevelArray:
+        """What a vehicle's own layer tells of a window's cells: the sum over its looks."""
+        assert self.map is not None
+        layer = self.map.layers.get(vehicle.entry.vehicle)
+        if layer is None:
+            return np.zeros(self._inside[window.cells].shape, dtype=np.uint8)
+        return layer.sum_levels[window.cells].copy()
+
+    def _find_late(self, now_ms: int) -> None:
+        """Takes back what a vehicle has not served well after it was expected to have."""
+        for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
+            vehicle, number = self.vehicles[record.vehicle], record.strip.number
+            offer = vehicle.offers[number]
+            if now_ms < offer.due_ms:
+                continue
+            late = f"{record.vehicle} has not served it, which was expected by {offer.service.ends_s:.0f} s"
+            self._ask_back(record.strip, vehicle)
+            self._note_failure(vehicle, record)
+            self._move(record, StripState.OPEN, now_ms, late)
+            self._to_cut = True
 
     def _find_lost(self, now_ms: int) -> None:
         for name, vehicle in self.vehicles.items():
@@ -303,6 +369,10 @@ class Coordinator:
                 vehicle.finished_ms = now_ms
         for record in self.ledger.in_state(StripState.OFFERED):
             if now_ms - record.since_ms >= ANSWER_WITHIN_MS:
+                vehicle = self.vehicles[record.vehicle]
+                was_trusted = vehicle.is_trusted
+                vehicle.unanswered += 1
+                self._tell_if_given_up(vehicle, was_trusted, f"{vehicle.unanswered} offers in a row are not answered")
                 self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
                 self._to_assign = True
 
@@ -437,12 +507,18 @@ class Coordinator:
             record, helper, vehicle = self.ledger.get(number), helpers[name], self.vehicles[name]
             assert record is not None
             if helper.task is not None:
-                self._say(TaskAction.GIVE_BACK, helper.task.strip, name)
+                self._ask_back(helper.task.strip, vehicle)
                 continue
             self._say(TaskAction.TAKE, record.strip, name)
-            vehicle.offered[number] = (record.strip, record.cut)
-            vehicle.service = service(self._open_strip(record), helper)
+            vehicle.asked_back = 0
+            vehicle.offers[number] = self._offer(record, helper, vehicle, now_ms)
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
+
+    def _offer(self, record: StripRecord, helper: Helper, vehicle: KnownVehicle, now_ms: int) -> Offer:
+        expected = service(self._open_strip(record), helper)
+        ends_ms = round(expected.ends_s * 1000)
+        due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
+        return Offer(record.strip, record.cut, expected, due_ms, self._levels(vehicle, record.window))
 
     def _under_way(self) -> list[Underway]:
         records = {record.vehicle: record for record in self.ledger.in_state(*WITH_A_VEHICLE)}
@@ -457,7 +533,7 @@ class Coordinator:
     def _tell(self, order: Order) -> None:
         if order.gives_back is not None:
             self._gave_way.setdefault(order.name, set()).add(order.gives_back.number)
-            self._say(TaskAction.GIVE_BACK, order.gives_back, order.name)
+            self._ask_back(order.gives_back, self.vehicles[order.name])
         if order.place is not None:
             self._say(TaskAction.STAND_ASIDE, Strip(0, order.place, 0.0, 0.0, 0.0), order.name)
 
@@ -527,18 +603,19 @@ class Coordinator:
         """A helper as an allocator sees it; None where it is lost or can be given nothing."""
         state, entry = vehicle.state, vehicle.entry
         stays_away = vehicle.is_finished and not vehicle.is_idle
-        if not entry.role.revisits or vehicle.lost or state is None or stays_away:
+        if not entry.role.revisits or vehicle.lost or state is None or stays_away or not vehicle.is_trusted:
             return None
         records = [one for one in self.ledger.in_state(*WITH_A_VEHICLE) if one.vehicle == entry.vehicle]
         if not records and not vehicle.is_idle:
             return None
         pose = Pose(state.x_m, state.y_m, state.heading_rad)
         free_at, free_ms = pose, now_ms
-        if records and vehicle.service is not None:
-            ends_ms = round(vehicle.service.free_s * 1000)
+        if records:
+            expected = vehicle.offers[records[0].strip.number].service
+            ends_ms = round(expected.free_s * 1000)
             if state.works_on == records[0].strip.number and state.expected_end_ms > 0:
                 ends_ms = state.expected_end_ms
-            free_at, free_ms = vehicle.service.free_at, max(now_ms, ends_ms)
+            free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
         return Helper(
             vehicle=entry.vehicle,
             pose=pose,
@@ -561,15 +638,32 @@ class Coordinator:
         ends = [one.finished_ms for one in self._primaries.values()]
         if any(end is None for end in ends):
             return
-        left = len(self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE))
-        if left == 0:
+        left = self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
+        if not left:
             reason = "every primary has finished and no strip is left"
         elif now_ms >= self._deadline_ms():
-            reason = f"{self.config.deadline_factor:g} times the last primary's end is reached, {left} strips are left"
+            end = f"{self.config.deadline_factor:g} times the last primary's end"
+            reason = f"{end} is reached, {len(left)} strips are left"
         else:
             return
-        self._over = True
-        self._outbox.append(Publication(MISSION_OVER.key(), MissionOver(reason)))
+        for record in left:
+            who = f"{record.vehicle} has not ended it" if record.vehicle else "nobody has served it"
+            self.ledger.leave(record, now_ms, f"left when the mission was over: {who}")
+            self._publish_strip(record)
+        self._over, self._over_ms = MissionOver(reason), now_ms
+        self._outbox.append(Publication(MISSION_OVER.key(), self._over))
+        self._say_again_ms = now_ms + SAY_AGAIN_AFTER_MS[0]
+
+    def _say_over_again(self, over: MissionOver, now_ms: int) -> None:
+        """Says again that the mission is over, where a vehicle has not answered, or some of its tiles were lost: the
+        answer to that are its tiles, too."""
+        unheard = any(one.heard_ms <= self._over_ms or not one.is_finished for one in self.vehicles.values())
+        if unheard or any(one.has_missed_tiles for one in self.vehicles.values()):
+            self._outbox.append(Publication(MISSION_OVER.key(), over))
+            to_come = (self._over_ms + after_ms for after_ms in SAY_AGAIN_AFTER_MS)
+            self._say_again_ms = next((again_ms for again_ms in to_come if again_ms > now_ms), None)
+        else:
+            self._say_again_ms = None
 
     def _deadline_ms(self) -> int:
         ends = [one.finished_ms or 0 for one in self._primaries.values()]
@@ -601,12 +695,16 @@ class Coordinator:
         return Step(published, self._next_wake_ms(now_ms))
 
     def _next_wake_ms(self, now_ms: int) -> int | None:
-        if self.map is None or self._over:
+        if self._over is not None:
+            return self._say_again_ms
+        if self.map is None:
             return None
         if self._to_cut or self._to_assign or self._to_look:
             return now_ms + 1
         times = [one.heard_ms + self.config.lost_after_ms for one in self.vehicles.values() if not one.lost]
         times += [record.since_ms + ANSWER_WITHIN_MS for record in self.ledger.in_state(StripState.OFFERED)]
+        at_work = self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY)
+        times += [self.vehicles[one.vehicle].offers[one.strip.number].due_ms for one in at_work]
         times += [one for one in (self._cut_by_ms, self._ripe_ms, self._clear_ms) if one is not None]
         surveying = [one for one in self._primaries.values() if one.finished_ms is None]
         times += [one.heard_ms + self._given_up_after_ms for one in surveying]

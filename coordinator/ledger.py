@@ -43,9 +43,10 @@ class StripRecord:
 
 
 class Ledger:
-    """All strips of a mission by number, counted from 1."""
+    """All strips by number, counted from `first_number`, 1 or more."""
 
-    def __init__(self) -> None:
+    def __init__(self, first_number: int = 1) -> None:
+        self._first_number = first_number
         self._records: dict[int, StripRecord] = {}
         self._by_state: dict[StripState, set[int]] = {state: set() for state in StripState}
 
@@ -59,7 +60,7 @@ class Ledger:
     @property
     def next_number(self) -> int:
         """The number of the next new strip."""
-        return len(self._records) + 1
+        return self._first_number + len(self._records)
 
     def open(self, strip: Strip, cut: Cut, now_ms: int, reason: str) -> StripRecord:
         """Enters a new strip, which has the next number."""
@@ -89,6 +90,14 @@ class Ledger:
         record.vehicle = vehicle if state in WITH_A_VEHICLE or state in ENDED else ""
         record.revision += 1
         return True
+
+    def leave(self, record: StripRecord, now_ms: int, reason: str) -> None:
+        """Leaves a strip that has not ended open for good, with nobody."""
+        if record.state is not StripState.OPEN:
+            self.move(record, StripState.OPEN, now_ms, reason)
+        else:
+            record.since_ms, record.reason = now_ms, reason
+            record.revision += 1
 
     def in_state(self, *states: StripState) -> list[StripRecord]:
         """Records in one of these states, by number."""

@@ -11,6 +11,7 @@ from coordinator.growth import TrackUnderWay
 from coordinator.ledger import StripRecord
 from coordinator.service import Service
 from coordinator.strips import SAME_PLACE, Cut, Window
+from planner.risk import LevelArray
 from planner.types import Strip
 
 Order = tuple[int, int]
@@ -18,15 +19,31 @@ Order = tuple[int, int]
 
 _NONE_YET: Order = (-1, -1)
 
+MOST_FAILURES = 3  # in a row, after which a vehicle is offered nothing more
+MOST_UNANSWERED = 10  # offers in a row, of which under bad water some are lost
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A strip as a vehicle was offered it: what it was cut from, how the service is expected to go, until when it is
+    waited for, and what the vehicle's own layer told then of the cells that the strip was cut from."""
+
+    strip: Strip
+    cut: Cut
+    service: Service
+    due_ms: int
+    levels_before: LevelArray
+
 
 @dataclass
 class KnownVehicle:
     """One vehicle of the fleet.
 
     `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was given up; for a primary.
-    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offered`: by number the strips
-    that it was offered, as they were then, and what they were cut from. `plan`: its newest one, for a primary.
-    `service`: of the strip that it was offered last, as expected then.
+    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offers`: by number the newest
+    offer of each strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in
+    a row that it has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its
+    newest one, for a primary.
     """
 
     entry: RosterVehicle
@@ -36,12 +53,17 @@ class KnownVehicle:
     finished_ms: int | None = None
     refused: set[int] = field(default_factory=set)
     failed_at: list[Window] = field(default_factory=list)
-    offered: dict[int, tuple[Strip, Cut]] = field(default_factory=dict)
+    offers: dict[int, Offer] = field(default_factory=dict)
+    asked_back: int = 0
+    failures: int = 0
+    unanswered: int = 0
     plan: Plan | None = None
-    service: Service | None = None
+    _plan_order: Order = _NONE_YET
     _surveyed_in: int | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
+    _tiles_of: int = 0
+    _tile_versions: set[int] = field(default_factory=set)
 
     @property
     def is_idle(self) -> bool:
@@ -67,6 +89,8 @@ class KnownVehicle:
         order = (header.incarnation, header.sequence)
         if order <= self._state_order:
             return False
+        if header.incarnation > self._state_order[0]:  # started anew: it may do better
+            self.failures = self.unanswered = 0
         self._state_order = order
         self.state = state
         self.heard_ms = header.sent_ms
@@ -78,10 +102,29 @@ class KnownVehicle:
             self.finished_ms = None
         return True
 
-    def take_plan(self, plan: Plan) -> None:
+    def take_plan(self, header: Header, plan: Plan) -> None:
         """Takes its plan, if it is newer than the newest."""
-        if self.plan is None or plan.revision > self.plan.revision:
+        order = (header.incarnation, plan.revision)
+        if order > self._plan_order:
+            self._plan_order = order
             self.plan = plan
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether it may be offered a strip: it has not failed, nor been silent, too often in a row."""
+        return self.failures < MOST_FAILURES and self.unanswered < MOST_UNANSWERED
+
+    def note_tile(self, incarnation: int, version: int) -> None:
+        """Takes note that a tile of it has come."""
+        if incarnation > self._tiles_of:
+            self._tiles_of, self._tile_versions = incarnation, set()
+        if incarnation == self._tiles_of:
+            self._tile_versions.add(version)
+
+    @property
+    def has_missed_tiles(self) -> bool:
+        """Whether tiles were lost on the way: an agent counts its versions from 1."""
+        return len(self._tile_versions) < max(self._tile_versions, default=0)
 
     @property
     def expected_end_ms(self) -> int | None:

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from planner.area import SurveyArea
-from planner.types import BoolArray, GridSpec, Point
+from planner.types import BoolArray, GridSpec, Point, Strip
 
 ON_BOUNDARY_M = 1e-6
 """A cell whose centre is as near to the boundary as this is inside."""
@@ -76,6 +76,10 @@ class Region:
         rings = [cut.exterior, *cut.interiors]
         outline, *holes = (tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
         return Region(outline, tuple(holes))
+
+    def meets(self, strip: Strip) -> bool:
+        """Whether any of a strip, whose numbers are finite, lies in the region."""
+        return bool(shapely.intersects(self.polygon, shapely.Polygon(strip.corners)))
 
     def inside(self, grid: GridSpec) -> BoolArray:
         """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""

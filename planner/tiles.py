@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from planner.types import GridSpec
+import numpy as np
+
+from planner.types import FloatArray, GridSpec, Point
 
 TILE_CELLS = 20  # 20 x 20 cells in two channels and a mask stay under 1 kB
 
@@ -49,6 +53,19 @@ def tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, colum
         for row in range(rows.start // TILE_CELLS, (rows.stop - 1) // TILE_CELLS + 1)
         for column in range(columns.start // TILE_CELLS, (columns.stop - 1) // TILE_CELLS + 1)
     ]
+
+
+def tiles_about(grid: GridSpec, all_tiles: tuple[Tile, ...], points: Sequence[Point]) -> list[Tile]:
+    """The tiles, out of all of the grid's, that share a cell with the rectangle about some points, mission frame."""
+    x_m, y_m = np.asarray(points).T
+    across_m, along_m = grid.frame.to_sweep(x_m, y_m)
+    columns = _cells(across_m / grid.cell_m + 0.5, grid.columns)
+    return tiles_within(grid, all_tiles, _cells(along_m / grid.cell_m, grid.rows), columns)
+
+
+def _cells(places: FloatArray, count: int) -> slice:
+    """The cells, out of `count`, from the smallest to the largest of these places, counted in cells."""
+    return slice(max(0, math.floor(places.min())), min(count, math.ceil(places.max())))
 
 
 def tile_shape(grid: GridSpec, first_row: int, first_column: int) -> tuple[int, int]:

@@ -124,6 +124,19 @@ class Strip:
             self.start[1] + self.length_m * math.cos(self.heading_rad),
         )
 
+    @property
+    def corners(self) -> tuple[Point, Point, Point, Point]:
+        """The corners in order, mission frame."""
+        east_m = self.width_m / 2 * math.cos(self.heading_rad)
+        north_m = -self.width_m / 2 * math.sin(self.heading_rad)
+        (x0_m, y0_m), (x1_m, y1_m) = self.start, self.end
+        return (
+            (x0_m - east_m, y0_m - north_m),
+            (x0_m + east_m, y0_m + north_m),
+            (x1_m + east_m, y1_m + north_m),
+            (x1_m - east_m, y1_m - north_m),
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class DetectionCurve:

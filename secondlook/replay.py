@@ -66,7 +66,7 @@ def replay_node(
             if one.topic.wakes:
                 due_times.add(one.header.sent_ms + one.topic.delay_ms)
     overs = [one.header.sent_ms for one in messages if one.topic is MISSION_OVER]
-    end_ms = overs[0] + WRAP_UP_MS if overs else last_ms
+    end_ms = max(overs[0] + WRAP_UP_MS, last_ms) if overs else last_ms
     agreed = 0
     now_ms: int | None = 0
     times = sorted(due_times, reverse=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 
+from comms.codec import Header
 from comms.messages import (
     AgentState,
     Contact,
@@ -20,12 +21,14 @@ from comms.messages import (
 )
 from comms.node import Publication, Received, Step
 from comms.topics import CONTACT, MANEUVER, STATE
-from planner.types import Point, SweepFrame, Track
+from planner.region import Region
+from planner.types import Point, Strip, SweepFrame, Track
 from vehicle_agent.coverage import CoverageLayer
 
 log = logging.getLogger("secondlook.agent")
 
 REPORT_EVERY_MS = 10_000
+REPORTS_A_TILE = 2  # with every so many reports a tile goes out that has not changed, as it may have been lost
 FARTHEST_M = 1e6  # a look farther away is none: what follows from its places would not fit the wire's metres
 FARTHEST_RANGE_M = 1e4
 
@@ -44,6 +47,7 @@ class Agent:
         self.expected_end_ms = 0
         self.nav: Nav | None = None
         self.coverage: CoverageLayer | None = None
+        self.region: Region
         self.maneuver: Maneuver | None = None
         self._word_due_ms: int | None = None  # when the vehicle should have said more of the present manoeuvre
         self._looks_taken: set[tuple[int, int]] = set()
@@ -51,11 +55,13 @@ class Agent:
         self._now_ms = 0
         self._endurance_ms = endurance_ms
         self._maneuvers = 0
+        self._reports = 0
         self._contacts = 0
         self._outbox: list[Publication] = []
         self._wake_ms: int | None = None
         self._over = False
         self._complained = False
+        self._task_order = (-1, -1)
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
@@ -70,6 +76,7 @@ class Agent:
             self._take_nav(message, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
             self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
+            self.region = Region(message.outline, message.hole_outlines)
             self._wake_ms = now_ms + REPORT_EVERY_MS
             self.on_run(message, now_ms)
         elif self.coverage is not None and not self._over:
@@ -80,13 +87,16 @@ class Agent:
                     self._word_due_ms = _next_word_due_ms(message)
                     self.on_maneuver(message, now_ms)
             elif isinstance(message, Task):
-                if received.header.sent_ms >= self._started_ms:  # else it was for who was here before
+                if self._is_for_now(received.header):
                     self.on_task(message, now_ms)
             elif isinstance(message, MissionOver):
                 self._over = True
                 self._wake_ms = None
                 self.on_over(now_ms)
                 self.report(now_ms)
+        elif self.coverage is not None and isinstance(message, MissionOver):  # said again: of the answer some was lost
+            self._outbox.extend(self.coverage.all_again())
+            self.report_state(now_ms)
         return self._step()
 
     def on_wake(self, now_ms: int) -> Step:
@@ -96,6 +106,10 @@ class Agent:
         if self._word_due_ms is not None and now_ms >= self._word_due_ms:
             self._send_maneuver()
         self.report(now_ms)
+        self._reports += 1
+        if self._reports % REPORTS_A_TILE == 0:
+            assert self.coverage is not None
+            self._outbox.extend(self.coverage.one_again())
         return self._step()
 
     def on_run(self, run: RunInfo, now_ms: int) -> None:
@@ -137,6 +151,11 @@ class Agent:
         self._outbox.extend(self.coverage.changed_tiles())
         self.report_state(now_ms)
 
+    def report_again(self, strip: Strip) -> None:
+        """Publishes once more the tiles about a strip, of which some may have been lost."""
+        assert self.coverage is not None
+        self._outbox.extend(self.coverage.again_at(strip))
+
     def report_state(self, now_ms: int) -> None:
         """Publishes the state alone, once the vehicle has said where it is."""
         if self.nav is None:
@@ -161,6 +180,14 @@ class Agent:
         self.nav = nav
         if first and self.coverage is not None and not self._over:
             self.report_state(now_ms)
+
+    def _is_for_now(self, header: Header) -> bool:
+        """Whether a task is for who is here now, and newer than all that were; takes note of it."""
+        order = (header.incarnation, header.sequence)
+        if header.sent_ms < self._started_ms or order <= self._task_order:
+            return False
+        self._task_order = order
+        return True
 
     def _command(self, kind: ManeuverKind, start: Point, end: Point, run_in_m: float) -> None:
         self._maneuvers += 1

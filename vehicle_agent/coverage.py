@@ -1,4 +1,4 @@
-"""A vehicle's own coverage layer: looks in, tiles that changed out."""
+"""A vehicle's own coverage layer: looks in, tiles out: those that changed, and some again, as words may be lost."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from comms.node import Publication
 from comms.topics import COVERAGE
 from planner.footprint import LookGeometry, look_on_grid
 from planner.risk import RiskLayer
-from planner.tiles import Tile, tiles, tiles_within
-from planner.types import BoolArray, GridSpec
+from planner.tiles import Tile, tiles, tiles_about, tiles_within
+from planner.types import BoolArray, GridSpec, Strip
+
+OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is lost, 3 of 1,000,000 tiles stay unheard
 
 
 class CoverageLayer:
@@ -24,6 +26,7 @@ class CoverageLayer:
         self._version = 0
         self._tiles = tiles(grid)
         self._touched: set[Tile] = set()
+        self._said: dict[Tile, tuple[int, int]] = {}  # of each tile its version, and how often that was said
         self._published_sum = np.zeros(grid.shape, dtype=np.uint8)
         self._published_largest = np.zeros(grid.shape, dtype=np.uint8)
         self._published_settled = np.zeros(grid.shape, dtype=np.bool_)
@@ -62,17 +65,36 @@ class CoverageLayer:
             if not changed:
                 continue
             self._version += 1
-            message = CoverageTile(
-                version=self._version,
-                first_row=tile.first_row,
-                first_column=tile.first_column,
-                sum_levels=sums[window],
-                largest_levels=largest[window],
-                settled=self.settled[window],
-            )
-            published.append(Publication(COVERAGE.key(vehicle=self._vehicle, tile=tile.name), message))
+            self._said[tile] = (self._version, 0)
             self._published_sum[window] = sums[window]
             self._published_largest[window] = largest[window]
             self._published_settled[window] = self.settled[window]
+            published.append(self._say(tile))
         self._touched.clear()
         return published
+
+    def one_again(self) -> list[Publication]:
+        """A tile of those that were said the fewest times since they changed, as it was said last: the oldest."""
+        return [self._say(min(self._said, key=lambda tile: self._said[tile][::-1]))] if self._said else []
+
+    def again_at(self, strip: Strip) -> list[Publication]:
+        """The tiles about a strip, as they were said last."""
+        return [self._say(tile) for tile in tiles_about(self.grid, self._tiles, strip.corners) if tile in self._said]
+
+    def all_again(self) -> list[Publication]:
+        """All tiles, as they were said last, but for those that were said often enough since they changed."""
+        return [self._say(tile) for tile, (_, times) in self._said.items() if times < OFTEN_ENOUGH]
+
+    def _say(self, tile: Tile) -> Publication:
+        version, times = self._said[tile]
+        self._said[tile] = (version, times + 1)
+        window = tile.window
+        message = CoverageTile(
+            version=version,
+            first_row=tile.first_row,
+            first_column=tile.first_column,
+            sum_levels=self._published_sum[window].copy(),
+            largest_levels=self._published_largest[window].copy(),
+            settled=self._published_settled[window].copy(),
+        )
+        return Publication(COVERAGE.key(vehicle=self._vehicle, tile=tile.name), message)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from comms.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
 from comms.topics import TASK_STATUS
 from planner.dubins import Pose
@@ -44,6 +46,7 @@ class SecondLooks:
             under_way = agent.mode is Mode.REVISIT
             self._tell(task.strip, TaskState.UNDER_WAY if under_way else TaskState.ACCEPTED, agent.expected_end_ms)
         elif known == strip and answer is TaskState.DONE:
+            agent.report_again(strip)  # whoever offers it again does not know what was seen there
             self._tell(task.strip, TaskState.DONE, now_ms)
         elif busy:
             self._tell(task.strip, TaskState.REFUSED, 0, busy)
@@ -95,6 +98,9 @@ class SecondLooks:
         if not _makes_sense(strip):
             self._tell(strip.number, TaskState.REFUSED, 0, "that is no strip")
             return
+        if not agent.region.meets(strip):
+            self._tell(strip.number, TaskState.REFUSED, 0, "it lies outside the area")
+            return
         least_ms = round((strip.length_m + strip.width_m - config.swath_m) / config.speed_mps * 1000)
         if agent.battery(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
@@ -139,6 +145,8 @@ class SecondLooks:
         self.strip = None
         self._legs = []
         agent.report(now_ms)
+        if state is TaskState.DONE:
+            agent.report_again(strip)
         self._answers[strip.number] = (strip, state)
         self._tell(strip.number, state, now_ms, reason)
 
@@ -152,5 +160,5 @@ class SecondLooks:
 
 
 def _makes_sense(strip: Strip) -> bool:
-    near_enough = all(abs(place_m) <= FARTHEST_M for place_m in strip.start)
+    near_enough = all(abs(place_m) <= FARTHEST_M for place_m in strip.start) and math.isfinite(strip.heading_rad)
     return near_enough and 0 < strip.length_m <= FARTHEST_M and 0 < strip.width_m <= FARTHEST_M

@@ -25,7 +25,6 @@ from planner.curve import RangeTally, effective_range_m
 from planner.first_plan import parts_in_order
 from planner.hotspots import HotspotMap, update_hotspots
 from planner.lawnmower import lawnmower
-from planner.region import Region
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Ahead, Reach, cells_within, settled_cells
 from planner.spacing_planners import SpacingDecision
@@ -67,7 +66,7 @@ class SurveyAgent(Agent):
     def on_run(self, run: RunInfo, now_ms: int) -> None:
         """Lays the first tracks and begins."""
         self._grid = run.grid.spec
-        region = Region(run.outline, run.hole_outlines)
+        region = self.region
         if self.config.share != WHOLE:
             region = region.share(*self.config.share, self._grid.frame.heading_rad)
         self._inside = region.inside(self._grid)

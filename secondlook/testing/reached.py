@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from comms.clock import WRAP_UP_MS
+from comms.clock import LATE_WORDS_MS, WRAP_UP_MS
 from comms.events import JOINER_DELAY_MS, Freeze, Join, Kill, absent_at_start
 from comms.kept_messages import KeptMessages
 from comms.node import Received
@@ -41,7 +41,8 @@ def lives(flight: Flight, node_id: str) -> list[Life]:
 def _end_ms(flight: Flight) -> int:
     """Until when messages are delivered: after the mission's end that of the last words, too."""
     overs_ms = [one.header.sent_ms for one in flight.heard if one.topic is MISSION_OVER]
-    return overs_ms[0] + WRAP_UP_MS if overs_ms else flight.heard.now_ms
+    now_ms = flight.heard.now_ms
+    return min(now_ms + WRAP_UP_MS, overs_ms[0] + LATE_WORDS_MS) if overs_ms else now_ms
 
 
 def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Received]]:

@@ -75,27 +75,44 @@ def test_a_topic_that_nobody_who_acts_reads_makes_no_round() -> None:
     assert clock.watched_bytes["observer"] == 7
 
 
-def test_after_the_end_there_are_100_ms_for_last_words() -> None:
+def test_after_the_end_there_are_100_ms_for_last_words_once_all_agents_rest() -> None:
     clock = started()
-    answer_all(clock, coordinator=(2000, []), alpha=(2100, []), beta=(2101, []))
+    answer_all(clock, coordinator=(2000, []), alpha=(9000, []), beta=(9000, []))
     assert clock.next_round() == Round(2000, (Grant("coordinator", True, {}),))
     clock.answer("coordinator", None, [OVER])
     assert clock.over_ms == 2000
     hearing = ("world", "alpha", "beta")
     assert clock.next_round() == Round(2001, tuple(Grant(node, False, {"coordinator": 1}) for node in hearing))
-    clock.answer("world", 3000, [])
-    clock.answer("alpha", 2100, [STATE])
-    clock.answer("beta", 2101, [])
+    clock.answer("world", 9000, [])
+    clock.answer("alpha", None, [STATE])
+    clock.answer("beta", 2300, [])  # it has not heard
     assert clock.next_round() == Round(2002, (Grant("coordinator", False, {"alpha": 1}),))
     clock.answer("coordinator", None, [OVER])  # a second end changes nothing
     assert clock.over_ms == 2000
     turn = clock.next_round()
     assert turn is not None
     assert turn.now_ms == 2003
-    for node in hearing:
-        clock.answer(node, 2100 if node == "alpha" else 2101, [])
-    assert clock.next_round() == Round(2100, (Grant("alpha", True, {}),))
+    clock.answer("world", 2400, [])
     clock.answer("alpha", None, [])
+    clock.answer("beta", 2300, [])
+    assert clock.next_round() == Round(2300, (Grant("beta", True, {}),))
+    clock.answer("beta", None, [])
+    assert clock.next_round() == Round(2400, (Grant("world", True, {}),))
+    clock.answer("world", 2401, [])
+    assert clock.next_round() is None
+    assert not clock.timed_out
+
+
+def test_an_agent_that_does_not_rest_is_waited_for_10_s() -> None:
+    clock = started()
+    answer_all(clock, coordinator=(2000, []), alpha=(12_000, []))
+    clock.next_round()
+    clock.answer("coordinator", None, [OVER])
+    clock.next_round()
+    for node, wake_ms in (("world", None), ("alpha", 12_000), ("beta", None)):
+        clock.answer(node, wake_ms, [])
+    assert clock.next_round() == Round(12_000, (Grant("alpha", True, {}),))
+    clock.answer("alpha", 12_001, [])
     assert clock.next_round() is None
     assert not clock.timed_out
 

@@ -75,7 +75,7 @@ def test_a_frozen_node_gets_its_mail_and_its_wake_up_when_it_is_thawed(bus: Bus)
     world = every_ten(say_status("alpha", 3), say_nav("alpha"))
     alpha = Scripted(
         starts=lambda now_ms: Step(wake_ms=25),
-        wakes=lambda now_ms: says(say_state("alpha"), wake_ms=200),
+        wakes=lambda now_ms: says(say_state("alpha")),
     )
     coordinator = ends(at_ms=60)
     bus({"world": world, "alpha": alpha, "coordinator": coordinator}, Notes(), events=(Freeze("alpha", 15, 45),))

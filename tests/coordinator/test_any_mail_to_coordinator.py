@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
 from deliver import deliver
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from one_node import OneNode
+from one_node import OneNode, received
 
 from comms.messages import (
     AgentState,
@@ -21,6 +23,7 @@ from comms.messages import (
     TaskAction,
     Vertex,
 )
+from comms.node import Received
 from comms.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TASK_STATUS
 from coordinator.allocation import GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
@@ -84,6 +87,41 @@ def test_the_coordinator(
             assert message.vehicle or message.state not in WITH_A_VEHICLE
             strips[one.number] = message
     assert sorted(strips) == list(range(1, len(strips) + 1))
-    assert len(node.all(MissionOver)) <= 1
-    if node.all(MissionOver):
-        assert isinstance(node.said[-1].message, MissionOver)
+    overs = [place for place, one in enumerate(node.said) if isinstance(one.message, MissionOver)]
+    assert overs == list(range(len(node.said)))[len(node.said) - len(overs) :]  # nothing else is said after the first
+    assert len({one.reason for one in node.all(MissionOver)}) <= 1
+
+
+def dated(mail: list[Letter]) -> list[tuple[int, Received]]:
+    """The letters as they are received, and when: each number of a sender is given once."""
+    found: list[tuple[int, Received]] = []
+    sent: Counter[str] = Counter()
+    now_ms = 0
+    for letter in mail:
+        now_ms += letter.after_ms
+        sender = letter.key.split("/")[1] if "/" in letter.key else "clock"
+        mark = {"sequence": sent[sender], "incarnation": letter.incarnation, "sent_ms": max(0, now_ms - 1)}
+        sent[sender] += 1
+        found.append((now_ms, received(letter.key, letter.message, sender=sender, **mark)))
+    return found
+
+
+@settings(max_examples=60, deadline=None)
+@given(mail=letters(MAIL, 20), again=st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), max_size=12))
+def test_a_repeated_or_late_word_changes_nothing(mail: list[Letter], again: list[tuple[int, int]]) -> None:
+    """What was told once may be told any number of times, at once or later than all that followed."""
+    post = dated([Letter("run", RUNS[0], 1, None, 0), *BEGINNING, *mail])
+    said = []
+    for with_repeats in (False, True):
+        config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30, 150, 0.3, 0.2)
+        node = OneNode(Coordinator(config), Role.COORDINATOR)
+        for place, (at_ms, one) in enumerate(post):
+            node.wait_until(at_ms - 1)
+            node.now_ms = at_ms
+            node.hear_again(one)
+            for what, later in again if with_repeats else ():
+                if min(len(post) - 1, what % len(post) + later) == place:
+                    node.hear_again(post[what % len(post)][1])
+        node.wait(60)
+        said.append([(one.at_ms, one.key, one.message) for one in node.said])
+    assert said[0] == said[1]

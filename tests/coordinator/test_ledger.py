@@ -85,6 +85,24 @@ def test_strips_are_numbered_from_1_and_never_taken_out() -> None:
     assert ledger.in_state(OPEN) == [records[0], records[2]]
 
 
+def test_numbers_may_begin_anywhere() -> None:
+    ledger = Ledger(first_number=900_001)
+    assert [opened(ledger).strip.number for _ in range(2)] == [900_001, 900_002]
+    assert ledger.get(1) is None
+
+
+@pytest.mark.parametrize("before", [OPEN, OFFERED, ACCEPTED, UNDER_WAY])
+def test_what_is_left_is_open_with_nobody_and_says_why(before: StripState) -> None:
+    ledger = Ledger()
+    record = opened(ledger)
+    for state in WAYS_TO[before]:
+        ledger.move(record, state, 10, "on the way", "alpha")
+    revision = record.revision
+    ledger.leave(record, 20, "it is over")
+    left = (record.state, record.revision, record.vehicle, record.since_ms, record.reason)
+    assert left == (OPEN, revision + 1, "", 20, "it is over")
+
+
 @pytest.mark.parametrize("number", [1, 3, 0])
 def test_a_number_is_given_once_and_in_order(number: int) -> None:
     ledger = Ledger()

@@ -23,9 +23,10 @@ RUNS = [run_info(300, 200, cell_m=10), run_info(77, 55, cell_m=3, heading_rad=2.
 
 
 def said_soundly(node: OneNode) -> None:
-    """Versions rise, and after FINISHED an agent does nothing else."""
-    versions = [tile.version for tile in node.all(CoverageTile)]
+    """Versions rise, each is of one tile, and after FINISHED an agent does nothing else."""
+    versions = list(dict.fromkeys(tile.version for tile in node.all(CoverageTile)))
     assert versions == list(range(1, len(versions) + 1))
+    assert len({(tile.version, tile.first_row, tile.first_column) for tile in node.all(CoverageTile)}) == len(versions)
     modes = [state.mode for state in node.all(AgentState)]
     if Mode.FINISHED in modes:
         assert set(modes[modes.index(Mode.FINISHED) :]) == {Mode.FINISHED}

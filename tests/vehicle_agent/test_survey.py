@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -549,25 +550,49 @@ class TestTiles:
         # -ln(1 - 0.3) is 0.357: 18 levels of 0.02 for one look, 36 for two, 54 for three.
         assert set(np.unique(fleet.layers[PRIMARY].sum_levels)) == {0, 18, 36, 54}
 
-    def test_they_are_published_when_they_have_changed_and_at_most_every_10_s(self, experiment_1: OneNode) -> None:
+    def test_a_version_is_a_change_and_is_said_again_as_it_was(self, experiment_1: OneNode) -> None:
         last: dict[str, CoverageTile] = {}
         versions = []
+        repeats = 0
         for one in experiment_1.said:
             if isinstance(one.message, CoverageTile):
                 tile, old = one.message, last.get(one.key)
-                assert old is None or not all(
+                same = old is not None and all(
                     np.array_equal(getattr(tile, name), getattr(old, name))
                     for name in ("sum_levels", "largest_levels", "settled")
                 )
+                assert same is (old is not None and tile.version == old.version)
                 last[one.key] = tile
-                versions.append(tile.version)
+                repeats += same
+                if not same:
+                    versions.append(tile.version)
         assert versions == list(range(1, len(versions) + 1))
+        assert repeats > 50
 
-    def test_an_agent_that_sees_nothing_new_publishes_none(self) -> None:
+    def test_with_every_other_report_one_goes_out_again_those_first_that_were_said_least(self) -> None:
         agent = on_its_way()
         fly_all(agent, SEES_TO_130_M)
         agent.wait(40)
-        assert agent.all(CoverageTile, agent.wait(120)) == []
+        said = Counter(tile.version for tile in agent.all(CoverageTile))
+        standing = {one.key: one.message.version for one in agent.said if isinstance(one.message, CoverageTile)}
+        for _ in range(2 * len(standing)):
+            again = agent.all(CoverageTile, agent.wait(20))
+            assert len(again) == 1
+            assert (said[again[0].version], again[0].version) == min((said[one], one) for one in standing.values())
+            said[again[0].version] += 1
+
+    def test_who_hears_again_that_the_mission_is_over_says_all_again_up_to_eight_times(self) -> None:
+        agent = on_its_way()
+        fly_all(agent, SEES_TO_130_M)
+        over = MissionOver("enough")
+        agent.hear("coord/mission_over", over)
+        for _ in range(10):
+            agent.hear("coord/mission_over", over)
+            assert agent.last(AgentState).mode is Mode.FINISHED
+            assert agent.wake_ms is None
+        standing = {one.key: one.message.version for one in agent.said if isinstance(one.message, CoverageTile)}
+        said = Counter(tile.version for tile in agent.all(CoverageTile))
+        assert {said[version] for version in standing.values()} == {8}
 
     def test_the_last_ones_go_out_before_the_agent_says_that_it_has_finished(self, experiment_1: OneNode) -> None:
         kinds = [type(one.message) for one in experiment_1.said]
