@@ -218,6 +218,8 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
         speed_mps=vehicle.speed_mps,
         turn_radius_m=vehicle.turn_radius_m,
         altitude_m=vehicle.altitude_m,
+        position_error_m=vehicle.position_error_m,
+        position_drift_mps=vehicle.position_drift_m_per_h / 3600,
         sensor=SensorConfig(
             curve=sensor.detection_curve(vehicle.nadir_gap_m),
             along_bin_m=sensor.along_bin_m,

@@ -22,7 +22,6 @@ class Body:
         curve = config.sensor.curve
         self._looks = Looks(
             config,
-            offset_m=self._vehicle.offset_m,
             sonar=(config.sensor.sonar or CurveSonar)(curve=curve, seabed=seabed),
             targets=targets,
             recogniser=Recogniser(curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
@@ -30,7 +29,7 @@ class Body:
         )
         self._told: tuple[Maneuver, int] | None = None
         self._said: ManeuverStatus | None = None
-        self._truth_differs = config.position_error_m > 0.0
+        self._truth_differs = config.position_error_m > 0.0 or config.position_drift_mps > 0.0
         self._nav_key = NAV.key(vehicle=config.vehicle)
         self._status_key = MANEUVER_STATUS.key(vehicle=config.vehicle)
         self._look_key = LOOK.key(vehicle=config.vehicle)
@@ -65,7 +64,8 @@ class Body:
             if self._told is not None and event.number == self._told[0].number:
                 self._said = event
             return [Publication(self._status_key, event)]
-        look, truth = self._looks.look(event, time_ms / 1000.0)
+        offset_m, sigma_m = self._vehicle.offset_at(time_ms), self._vehicle.sigma_at(time_ms)
+        look, truth = self._looks.look(event, time_ms / 1000.0, offset_m, sigma_m)
         publish = [Publication(self._look_key, look)]
         if truth is not None:
             publish.append(Publication(self._truth_look_key, truth))

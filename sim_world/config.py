@@ -110,7 +110,8 @@ class VehicleConfig:
     """A simulated vehicle and where it waits for its first manoeuvre.
 
     `position_error_m`: the constant distance, in a random direction, between where the vehicle is and where it
-    believes it is. The start pose is the believed one.
+    believes it is. `position_drift_mps`: what comes to that, growing with the mission's time, in a random direction of
+    its own. The start pose is the believed one.
     """
 
     vehicle: str
@@ -122,6 +123,7 @@ class VehicleConfig:
     altitude_m: float
     sensor: SensorConfig
     position_error_m: float = 0.0
+    position_drift_mps: float = 0.0
 
     def __post_init__(self) -> None:
         _require(bool(IDENTIFIER.fullmatch(self.vehicle)), "vehicle", self.vehicle, f"a match of {IDENTIFIER.pattern}")
@@ -133,6 +135,7 @@ class VehicleConfig:
             ("turn_radius_m", 0.01, 1e4),
             ("altitude_m", -1e4, 1e4),
             ("position_error_m", 0.0, 1e4),
+            ("position_drift_mps", 0.0, 1.0),
         ):
             _require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from comms.messages import Look, LookContact, TruthLook
 from comms.node import random_stream
-from planner.types import FloatArray
+from planner.types import FloatArray, Point
 from sim_world.config import VehicleConfig
 from sim_world.estimate import PDetectEstimate
 from sim_world.recogniser import Recogniser
@@ -24,21 +24,19 @@ class Looks:
 
     What is drawn for a look depends on the seed, the vehicle and the look's number (a track's error: on the number of
     tracks the vehicle has looked at so far), never on times or other vehicles. A look's cells are where the vehicle
-    believes them, and hold what the sonar made of the places where they truly are, `offset_m` (x, y) beside.
+    believes them, and hold what the sonar made of the places where they truly are.
     """
 
     def __init__(
         self,
         config: VehicleConfig,
         *,
-        offset_m: tuple[float, float],
         sonar: SonarModel,
         targets: Targets,
         recogniser: Recogniser,
         seed: int,
     ) -> None:
         self._config = config
-        self._offset_m = offset_m
         self._sonar = sonar
         self._targets = targets
         self._recogniser = recogniser
@@ -48,16 +46,20 @@ class Looks:
         self._looks = 0
         self._track_error = 0.0
 
-    def look(self, stretch: Stretch, time_s: float) -> tuple[Look, TruthLook | None]:
-        """The next look, at a stretch just passed; the truth is None where no target could be seen."""
+    def look(self, stretch: Stretch, time_s: float, offset_m: Point, sigma_m: float) -> tuple[Look, TruthLook | None]:
+        """The next look, at a stretch just passed; the truth is None where no target could be seen.
+
+        `offset_m`: how far the true position lies east and north of the believed one; `sigma_m`: what the vehicle
+        tells of that.
+        """
         self._looks += 1
         if stretch.first_along_m == 0.0:
             self._tracks += 1
             self._track_error = self._estimate.track_error(self._stream("track_noise", self._tracks))
         config, sensor, maneuver = self._config, self._config.sensor, stretch.maneuver
         swath = Swath(
-            origin_x_m=maneuver.start_x_m + self._offset_m[0],
-            origin_y_m=maneuver.start_y_m + self._offset_m[1],
+            origin_x_m=maneuver.start_x_m + offset_m[0],
+            origin_y_m=maneuver.start_y_m + offset_m[1],
             heading_rad=stretch.heading_rad,
             first_along_m=stretch.first_along_m,
             along_bin_m=sensor.along_bin_m,
@@ -81,7 +83,7 @@ class Looks:
             range_bin_m=sensor.range_bin_m,
             p_detect=self._estimate.estimate(truly, self._track_error, self._stream("noise", self._looks)),
             altitude_m=config.altitude_m,
-            position_sigma_m=config.position_error_m,
+            position_sigma_m=sigma_m,
             valid=True,
             contacts=tuple(contacts),
         )

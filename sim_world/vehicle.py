@@ -31,7 +31,7 @@ Event = ManeuverStatus | Stretch
 
 
 class SimulatedVehicle:
-    """One vehicle's body. It steers by its believed pose; the true one lies a constant `offset_m` (x, y) beside it.
+    """One vehicle's body. It steers by its believed pose; the true one lies beside it, see `offset_at`.
 
     A vehicle does what it was told last. Of a manoeuvre that is replaced nothing more is heard, and the stretch of
     track it was on is not looked at.
@@ -39,8 +39,10 @@ class SimulatedVehicle:
 
     def __init__(self, config: VehicleConfig, seed: int) -> None:
         self.config = config
-        direction = random_stream(seed, "world", config.vehicle, "position_error").uniform(0.0, 2 * math.pi)
-        self.offset_m = (config.position_error_m * math.sin(direction), config.position_error_m * math.cos(direction))
+        self._error_rad, self._drift_rad = (
+            random_stream(seed, "world", config.vehicle, name).uniform(0.0, 2 * math.pi)
+            for name in ("position_error", "position_drift")
+        )
         self._motion = Motion(
             Pose(config.start_x_m, config.start_y_m, config.start_heading_rad),
             speed_mps=config.speed_mps,
@@ -49,15 +51,31 @@ class SimulatedVehicle:
         self._to_come: Iterator[tuple[int, Event]] = iter(())
         self._next: tuple[int, Event] | None = None
 
+    def offset_at(self, now_ms: int) -> Point:
+        """How far the true position lies east and north of the believed one."""
+        error_m, drift_m = self.config.position_error_m, self._drift_m(now_ms)
+        return (
+            error_m * math.sin(self._error_rad) + drift_m * math.sin(self._drift_rad),
+            error_m * math.cos(self._error_rad) + drift_m * math.cos(self._drift_rad),
+        )
+
+    def sigma_at(self, now_ms: int) -> float:
+        """What it gives as its position's sigma: what it may be off at most."""
+        return self.config.position_error_m + self._drift_m(now_ms)
+
+    def _drift_m(self, now_ms: int) -> float:
+        return self.config.position_drift_mps * now_ms / 1000
+
     def nav(self, now_ms: int) -> Nav:
-        """Where it believes it is; the error's length is what it gives as the position's sigma."""
-        pose, config = self._motion.pose_at(now_ms), self.config
-        return Nav(*pose, self._motion.speed_mps, config.altitude_m, config.position_error_m)
+        """Where it believes it is."""
+        pose = self._motion.pose_at(now_ms)
+        return Nav(*pose, self._motion.speed_mps, self.config.altitude_m, self.sigma_at(now_ms))
 
     def truth(self, now_ms: int) -> TruthPose:
         """Where it is."""
         x_m, y_m, heading_rad = self._motion.pose_at(now_ms)
-        return TruthPose(x_m + self.offset_m[0], y_m + self.offset_m[1], heading_rad)
+        east_m, north_m = self.offset_at(now_ms)
+        return TruthPose(x_m + east_m, y_m + north_m, heading_rad)
 
     def command(self, maneuver: Maneuver, now_ms: int) -> ManeuverStatus:
         """Begins a manoeuvre, or refuses it and goes on with what it does.

@@ -57,7 +57,9 @@ class VehicleBase(Mapping):
 
     `body`: what moves it, the simulated world or a program of your own. `endurance_s`: how long its battery lasts.
     `run_in_m`: straight run before and after each track. `nadir_gap_m`: what it does not see beside its track, per
-    side. `agent`: `package.module:Class` of a node of your own in its back seat.
+    side. `position_error_m`: how far it is from where it believes it is, in a random direction;
+    `position_drift_m_per_h`: by how much it drifts from there, in another. `agent`: `package.module:Class` of a node of
+    your own in its back seat.
     """
 
     role: str
@@ -70,6 +72,8 @@ class VehicleBase(Mapping):
     run_in_m: LengthOrZero
     nadir_gap_m: LengthOrZero
     sensor: Sensor
+    position_error_m: LengthOrZero = 0.0
+    position_drift_m_per_h: LengthOrZero = 0.0
     agent: Annotated[str, named(NODE)] | None = None
 
     @field_validator("sensor")

@@ -20,7 +20,7 @@ from comms.messages import (
     TaskStatus,
 )
 from comms.node import Received
-from coordinator.coordinator import ANSWER_WITHIN_MS
+from coordinator.coordinator import ANSWER_WITHIN_MS, NUMBERS_A_SECOND
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
 from secondlook.testing.fail import fail_if
 from secondlook.testing.flight import Flight
@@ -32,7 +32,8 @@ _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
 
 def assert_no_strip_lost(flight: Flight) -> None:
     """Every strip that was ever published is accounted for: numbers and revisions have no gaps, an ended strip stays
-    as it is, and at the end each is done, failed, withdrawn, open, or with a vehicle that is at it.
+    as it is, and at the end each is done, failed, withdrawn, open, or with a vehicle that is at it. Of a coordinator
+    that was started anew only what it has published itself counts.
 
     Open ones are left only where the deadline has ended the mission. A strip that is with a vehicle counts as lost when
     that vehicle has not said for `coordinator.lost_after_s` and 10 s more that it is at it.
@@ -40,15 +41,15 @@ def assert_no_strip_lost(flight: Flight) -> None:
     __tracebackhide__ = True
     problems = []
     strips: dict[int, tuple[Received, StripStatus]] = {}
-    incarnation = 0
+    incarnation, first = 0, None
     for one, status in _all(flight, StripStatus):
-        if one.header.incarnation != incarnation:  # the coordinator has started anew, and its numbers with it
-            incarnation, strips = one.header.incarnation, {}
         number = number_of(one)
+        if first is None or one.header.incarnation != incarnation:  # started anew it gives numbers of its own
+            incarnation, strips, first = one.header.incarnation, {}, _first_number(number)
         before = strips.get(number)
         at = f"at {_s(one)} s"
-        if before is None and number != len(strips) + 1:
-            problems.append(f"strip {number} is published {at}, but strip {len(strips) + 1} never was")
+        if before is None and number != first + len(strips):
+            problems.append(f"strip {number} is published {at}, but strip {first + len(strips)} never was")
         expected = 1 if before is None else before[1].revision + 1
         if status.revision != expected:
             problems.append(f"strip {number} comes in revision {status.revision} {at}, where {expected} was due")
@@ -59,6 +60,11 @@ def assert_no_strip_lost(flight: Flight) -> None:
     problems += [word for number, last in strips.items() if (word := _lost(flight, number, *last))]
     problems += _left_too_early(flight, strips)
     fail_if(problems, "strips are lost")
+
+
+def _first_number(number: int) -> int:
+    """The first number of the coordinator that gives this one to the first strip that is heard of."""
+    return number - (number - 1) % NUMBERS_A_SECOND
 
 
 def _lost(flight: Flight, number: int, said: Received, status: StripStatus) -> str | None:
@@ -106,8 +112,7 @@ class _Service:
 def assert_no_strip_served_twice(flight: Flight) -> None:
     """No strip is worked on by two vehicles at the same time, and none is swept to its end twice.
 
-    A coordinator that is started anew numbers its strips from 1 again; what vehicles go on saying of the work they had
-    from the one before is left out.
+    What vehicles go on saying of the work they had from a coordinator before one that was started anew is left out.
     """
     __tracebackhide__ = True
     problems = []

@@ -1,0 +1,261 @@
+"""Whole missions in which helpers, links and coordinators fail: each ends in a stated outcome, nothing is served twice,
+and in the end each strip is accounted for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import bad_helpers
+import odd_coordinators
+import pytest
+import yaml
+from flights import BRIEF
+
+from comms.messages import (
+    MissionOver,
+    StripState,
+    StripStatus,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+from coordinator.allocation import NearestAllocator
+from coordinator.ledger import ENDED
+from secondlook.testing import (
+    Fleet,
+    Flight,
+    Heard,
+    RunFailedError,
+    assert_all_finished,
+    assert_maps_converged,
+    assert_never_assigned_to_lost,
+    assert_no_strip_lost,
+    assert_no_strip_served_twice,
+    assert_one_strip_at_a_time,
+    number_of,
+)
+
+MakeFleet = Callable[..., Fleet]
+FAILED, DONE = StripState.FAILED, StripState.DONE
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> MakeFleet:
+    """Makes a fleet of the brief mission at a walking pace, with one helper, or two, of which the first is bad."""
+
+    def make(agent: type | None = None, *, helpers: int = 2, deadline_factor: float = 1.5, **settings: Any) -> Fleet:
+        scenario = yaml.safe_load(BRIEF.read_text())
+        scenario["mission"]["deadline_factor"] = deadline_factor
+        vehicles = scenario["vehicles"]
+        vehicles["primary"] |= {"speed_mps": 1.5}
+        vehicles["helper"] |= {"speed_mps": 2}
+        if helpers > 1:
+            vehicles["second"] = {**vehicles["helper"], "start": {"x_m": 310, "y_m": 120}}
+        if agent is not None:
+            vehicles["helper"]["agent"] = f"{agent.__module__}:{agent.__name__}"
+        vehicles["helper"] |= settings
+        return Fleet(scenario, folder=tmp_path / "flown")
+
+    return make
+
+
+def check(flight: Flight, *, but_served_twice: bool = False) -> dict[int, StripStatus]:
+    """What holds of every mission; returns the last word on each strip."""
+    assert_no_strip_lost(flight)
+    assert_one_strip_at_a_time(flight)
+    assert_never_assigned_to_lost(flight)
+    if not but_served_twice:
+        assert_no_strip_served_twice(flight)
+    last: dict[int, StripStatus] = {}
+    for one in flight.messages("coord/strip/*"):
+        assert isinstance(one.message, StripStatus)
+        assert one.message.reason
+        last[number_of(one)] = one.message
+    for status in last.values():
+        assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
+    assert any(isinstance(one.message, MissionOver) for one in flight.heard)
+    return last
+
+
+def said_of_tasks(flight: Flight, vehicle: str) -> list[TaskState]:
+    return [one.message.state for one in flight.heard if isinstance(one.message, TaskStatus) and one.vehicle == vehicle]
+
+
+def told(flight: Flight, vehicle: str, action: TaskAction) -> list[int]:
+    tasks = [one.message for one in flight.messages(f"coord/task/{vehicle}/*")]
+    return [one.strip for one in tasks if isinstance(one, Task) and one.action is action]
+
+
+def served_by(last: dict[int, StripStatus]) -> set[str]:
+    return {one.vehicle for one in last.values() if one.state is DONE}
+
+
+class TestBadHelpers:
+    def test_what_one_refuses_another_serves(self, slow: MakeFleet) -> None:
+        flight = slow(bad_helpers.RefusesAll).run()
+        assert served_by(check(flight)) == {"second"}
+        assert set(said_of_tasks(flight, "helper")) == {TaskState.REFUSED}
+
+    def test_one_that_never_moves_is_given_three_strips_and_another_serves(
+        self, slow: MakeFleet, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        flight = slow(bad_helpers.NeverMoves).run()
+        assert served_by(check(flight)) == {"second"}
+        assert 1 <= len(told(flight, "helper", TaskAction.TAKE)) <= 3
+        assert told(flight, "helper", TaskAction.GIVE_BACK)
+
+    def test_one_that_never_moves_nor_gives_back_keeps_nobody_from_its_strip(self, slow: MakeFleet) -> None:
+        flight = slow(bad_helpers.NeverGivesBack).run()
+        assert served_by(check(flight, but_served_twice=True)) == {"second"}
+        assert len(told(flight, "helper", TaskAction.TAKE)) == 1
+
+    def test_one_that_says_done_is_not_believed_and_soon_offered_nothing_more(
+        self, slow: MakeFleet, caplog: pytest.LogCaptureFixture
+    ) -> None:
+        flight = slow(bad_helpers.SaysDone).run()
+        last = check(flight)
+        assert served_by(last) == {"second"}
+        lies = [one for one in last.values() if one.state is FAILED]
+        assert {one.reason for one in lies} == {"helper says done, but saw 0% of it"}
+        assert len(told(flight, "helper", TaskAction.TAKE)) == len(lies) <= 3
+        if len(lies) == 3:
+            assert "helper is offered nothing more: it has not served 3 strips in a row" in caplog.messages
+
+    def test_a_battery_too_small_for_the_nearest_strip_gets_none_and_all_are_left(self, slow: MakeFleet) -> None:
+        flight = slow(helpers=1, endurance_s=10).run()
+        last = check(flight)
+        assert told(flight, "helper", TaskAction.TAKE) == []
+        assert last
+        assert {one.reason for one in last.values() if one.state is StripState.OPEN} == {
+            "left when the mission was over: nobody has served it"
+        }
+
+    @pytest.mark.parametrize("back_after_s", [5, 60])
+    def test_one_that_vanishes_half_way_and_comes_back(self, slow: MakeFleet, back_after_s: float) -> None:
+        def half_way(heard: Heard) -> bool:
+            status = heard.last("agent/helper/task_status/*")
+            return status is not None and isinstance(status.message, TaskStatus) and status.message.progress > 0.3
+
+        fleet = slow(helpers=1)
+        fleet.run_until(half_way, timeout_s=5000)
+        fleet.kill("helper")
+        fleet.join("helper", at_s=fleet.now_s + back_after_s)
+        flight = fleet.run()
+        last = check(flight)
+        assert served_by(last) == {"helper"}
+        lost = [one for one in flight.messages("coord/strip/*") if "is lost: nothing" in one.message.reason]
+        assert bool(lost) is (back_after_s > 30)
+        assert_maps_converged(flight)
+
+
+class TestStripsThatAreNone:
+    def test_a_helper_refuses_them_and_takes_the_next(self, slow: MakeFleet) -> None:
+        fleet = slow(helpers=1)
+        fleet = Fleet(fleet.scenario, folder=fleet.folder, overrides={"coordinator.node": odd_coordinators.GivesStrips})
+        flight = fleet.run()
+        answers = [one.message for one in flight.heard if isinstance(one.message, TaskStatus)]
+        refused = {one.strip: one.reason for one in answers if one.state is TaskState.REFUSED}
+        none, outside = "that is no strip", "it lies outside the area"
+        assert refused == {1: none, 2: none, 3: none, 4: outside, 5: none, 6: outside}
+        assert {one.strip for one in answers if one.state is TaskState.ACCEPTED} == {7}
+        assert_all_finished(flight)
+
+    def test_what_is_no_number_ends_the_mission_with_a_sentence(self, slow: MakeFleet) -> None:
+        fleet = slow(helpers=1)
+        fleet = Fleet(fleet.scenario, folder=fleet.folder, overrides={"coordinator.node": odd_coordinators.GivesNan})
+        with pytest.raises(RunFailedError, match=r"^coordinator has published a message that does not fit: .* nan m"):
+            fleet.run()
+
+    @pytest.mark.parametrize("number", [math.nan, 0, -1, 10**9, "1", None])
+    def test_an_allocator_that_gives_what_is_no_open_strip_ends_it_with_a_sentence(
+        self, slow: MakeFleet, number: Any, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(NearestAllocator, "assign", lambda self, situation: {"helper": number})
+        fleet = slow(helpers=1)
+        fleet = Fleet(fleet.scenario, folder=fleet.folder, overrides={"coordinator.allocator": "nearest"})
+        with pytest.raises(RunFailedError, match="must give an open strip, and each once, to a helper that is there"):
+            fleet.run()
+
+
+class TestACoordinatorThatIsKilled:
+    @pytest.mark.parametrize("away_s", [0.5, 45])
+    def test_the_one_that_comes_after_goes_on_with_numbers_of_its_own(self, slow: MakeFleet, away_s: float) -> None:
+        fleet = slow()
+        fleet.run_until(lambda heard: len(heard.messages("coord/task/*")) >= 3, timeout_s=5000)
+        fleet.kill("coordinator")
+        fleet.join("coordinator", at_s=fleet.now_s + away_s)
+        flight = fleet.run()
+        check_of_last(flight)
+        assert_no_strip_served_twice(flight)
+        numbers: dict[int, set[int]] = {}
+        for one in flight.messages("coord/strip/*"):
+            numbers.setdefault(one.header.incarnation, set()).add(number_of(one))
+        assert not numbers[0] & numbers[1]
+        assert min(numbers[1]) % 1000 == 1
+        done = {
+            one.message.strip
+            for one in flight.heard
+            if isinstance(one.message, TaskStatus) and one.message.state is TaskState.DONE
+        }
+        assert done & numbers[1]
+        assert_all_finished(flight)
+
+
+def check_of_last(flight: Flight) -> None:
+    """What holds of the strips of a coordinator that was started anew."""
+    assert_no_strip_lost(flight)
+    assert_never_assigned_to_lost(flight)
+    last: dict[int, StripStatus] = {}
+    for one in flight.messages("coord/strip/*"):
+        if isinstance(one.message, StripStatus) and one.header.incarnation == 1:
+            last[number_of(one)] = one.message
+    assert last
+    for status in last.values():
+        assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
+
+
+class TestBadLinks:
+    @pytest.mark.parametrize("name", ["tellaro", "patchy"])
+    def test_of_a_fifth_of_all_words_lost_maps_converge_and_all_finish(self, tmp_path: Path, name: str) -> None:
+        fleet = Fleet(name, folder=tmp_path)
+        fleet.drop("*", probability=0.2)
+        flight = fleet.run()
+        assert_maps_converged(flight)
+        assert_all_finished(flight)
+        check(flight)
+
+    @pytest.mark.parametrize("by_s", [0.2, 8])
+    def test_who_hears_late_that_the_mission_is_over_finishes_and_says_so(self, slow: MakeFleet, by_s: float) -> None:
+        fleet = slow()
+        fleet.delay("coord/mission_over", by_s=by_s, to="helper")
+        flight = fleet.run()
+        assert_all_finished(flight)
+        check(flight)
+
+    def test_who_never_hears_it_is_left_after_10_s(self, slow: MakeFleet) -> None:
+        fleet = slow()
+        fleet.drop("coord/mission_over", to="helper")
+        flight = fleet.run()
+        with pytest.raises(AssertionError, match="not everyone has finished:\n  helper was last heard at"):
+            assert_all_finished(flight)
+        over_ms = flight.messages("coord/mission_over")[0].header.sent_ms
+        assert 9000 <= flight.heard.now_ms - over_ms <= 10_000
+
+    def test_a_strip_that_was_swept_while_cut_off_is_not_swept_again(self, slow: MakeFleet) -> None:
+        def at_work(heard: Heard) -> bool:
+            status = heard.last("agent/helper/task_status/*")
+            return status is not None and isinstance(status.message, TaskStatus) and status.message.progress > 0.3
+
+        fleet = slow(helpers=1)
+        fleet.run_until(at_work, timeout_s=5000)
+        fleet.cut_off("helper", for_s=100)
+        flight = fleet.run()
+        check(flight)
+        assert_maps_converged(flight)
+        done = [one.message.strip for one in flight.heard if isinstance(one.message, TaskStatus)
+                and one.message.state is TaskState.DONE]  # fmt: skip
+        assert done
