@@ -16,6 +16,12 @@ ON_BOUNDARY_M = 1e-6
 """A cell whose centre is as near to the boundary as this is inside."""
 
 
+def share_within(strip: Strip, other: Strip) -> float:
+    """Share of a strip's area that lies in another one; numbers are finite, and both have an area."""
+    polygon = shapely.Polygon(strip.corners)
+    return float(polygon.intersection(shapely.Polygon(other.corners)).area / polygon.area)
+
+
 @dataclass(frozen=True)
 class Region:
     """A simple polygon and the holes in it, which are not to be surveyed; mission frame, corners not repeated.

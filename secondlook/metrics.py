@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,7 @@ from planner.types import BoolArray, FloatArray
 from secondlook.closest import ClosestApproaches
 
 RISK_AT_FACTORS = (1.0, 1.05)
+CUT_ANEW = "its coordinator was started anew"
 _STILL_OPEN = (StripState.OPEN, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
 
 
@@ -61,7 +62,8 @@ class StripFigures:
 
 @dataclass
 class Metrics:
-    """Take the messages in order; ask at any time."""
+    """Take the messages in order; ask at any time. `coordinators`: the newest incarnation that has told of strips; what
+    those before have left counts as withdrawn."""
 
     now_ms: int = 0
     run: RunInfo | None = None
@@ -74,6 +76,7 @@ class Metrics:
     risk_at: list[dict[str, float]] = field(default_factory=list)
     approaches: ClosestApproaches = field(default_factory=lambda: ClosestApproaches({}))
     misfits: int = 0
+    coordinators: int = 0
 
     def take(self, received: Received) -> None:
         """Folds one message in. What contradicts the run's announcement is counted in `misfits`."""
@@ -225,6 +228,11 @@ class Metrics:
             self.misfits += 1
 
     def _take_strip(self, received: Received, status: StripStatus) -> None:
+        if received.header.incarnation > self.coordinators:  # it was started anew, and cuts strips of its own
+            self.coordinators = received.header.incarnation
+            for left in self.strips.values():
+                if left.status.state in _STILL_OPEN:
+                    left.status = replace(left.status, state=StripState.WITHDRAWN, vehicle="", reason=CUT_ANEW)
         number = received.key.rsplit("/", 1)[1]
         strip = self.strips.get(number)
         if strip is None:

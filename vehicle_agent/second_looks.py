@@ -7,11 +7,13 @@ import math
 from comms.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
 from comms.topics import TASK_STATUS
 from planner.dubins import Pose
+from planner.region import share_within
 from planner.sweep import cheapest_entry, legs_over_strip
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
 
+SWEPT_SHARE = 0.5
 BATTERY_TOO_LOW = "the battery does not last"
 
 
@@ -45,8 +47,8 @@ class SecondLooks:
         elif self.strip is not None and self.strip.number == task.strip:
             under_way = agent.mode is Mode.REVISIT
             self._tell(task.strip, TaskState.UNDER_WAY if under_way else TaskState.ACCEPTED, agent.expected_end_ms)
-        elif known == strip and answer is TaskState.DONE:
-            agent.report_again(strip)  # whoever offers it again does not know what was seen there
+        elif known is not None and answer is TaskState.DONE and _is_done_with(known, strip):
+            agent.report_again(known)  # whoever offers it again does not know what was seen there
             self._tell(task.strip, TaskState.DONE, now_ms)
         elif busy:
             self._tell(task.strip, TaskState.REFUSED, 0, busy)
@@ -157,6 +159,11 @@ class SecondLooks:
         self._status_number += 1
         key = TASK_STATUS.key(vehicle=self._agent.vehicle, number=self._status_number)
         self._agent.publish(key, TaskStatus(number, state, progress, ends_ms, reason))
+
+
+def _is_done_with(known: Strip, strip: Strip) -> bool:
+    """Whether who has swept the one has swept at least half of the other."""
+    return _makes_sense(strip) and share_within(strip, known) >= SWEPT_SHARE
 
 
 def _makes_sense(strip: Strip) -> bool:

@@ -147,7 +147,8 @@ class TestBadHelpers:
         flight = fleet.run()
         last = check(flight)
         assert served_by(last) == {"helper"}
-        lost = [one for one in flight.messages("coord/strip/*") if "is lost: nothing" in one.message.reason]
+        reasons = [one.message.reason for one in flight.heard if isinstance(one.message, StripStatus)]
+        lost = [reason for reason in reasons if "is lost: nothing" in reason]
         assert bool(lost) is (back_after_s > 30)
         assert_maps_converged(flight)
 
@@ -214,6 +215,9 @@ def check_of_last(flight: Flight) -> None:
         if isinstance(one.message, StripStatus) and one.header.incarnation == 1:
             last[number_of(one)] = one.message
     assert last
+    figures = flight.summary["hotspots"]
+    assert figures["open"] == sum(status.state is StripState.OPEN for status in last.values())
+    assert figures["published"] == sum(figures[one] for one in ("revisited", "open", "withdrawn", "failed"))
     for status in last.values():
         assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
 

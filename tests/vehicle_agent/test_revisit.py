@@ -172,6 +172,43 @@ class TestAWordRepeated:
         fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
         assert answer(agent, replace(STRIP, start_x_m=150)).state is TaskState.ACCEPTED
 
+    @pytest.mark.parametrize(("further_m", "is_done"), [(20, True), (30, False)])
+    def test_one_of_which_half_is_done_is_told_done_with_all_that_was_seen(
+        self, further_m: float, is_done: bool
+    ) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        said = tell(agent, replace(STRIP, start_x_m=100 + further_m))
+        assert agent.all(TaskStatus, said)[0].state is (TaskState.DONE if is_done else TaskState.ACCEPTED)
+        tiles = agent.all(CoverageTile, said)
+        assert bool(tiles) is is_done
+        # 100 m wide tiles; the strip reaches from x = 75 to 125 and from y = 50 to 250.
+        assert {(one.first_row, one.first_column) for one in tiles} == (
+            {(row, column) for row in (0, 20, 40) for column in (0, 20)} if is_done else set()
+        )
+
+    def test_an_offer_that_comes_after_a_newer_word_changes_nothing(self) -> None:
+        agent = revisit()
+        agent.hear(f"coord/task/{HELPER}/2", give_back(), sequence=12)
+        for sequence in (10, 12):
+            assert agent.hear(f"coord/task/{HELPER}/1", STRIP, sequence=sequence) == []
+        assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/3", STRIP, sequence=13)) != []
+
+    @pytest.mark.parametrize(
+        ("task", "reason"),
+        [
+            (replace(STRIP, length_m=0), "that is no strip"),
+            (replace(STRIP, width_m=-1), "that is no strip"),
+            (replace(STRIP, start_x_m=-2e6), "that is no strip"),
+            (replace(STRIP, start_x_m=430), "it lies outside the area"),
+            (replace(STRIP, start_y_m=-10, heading_rad=math.pi), "it lies outside the area"),
+        ],
+    )
+    def test_what_is_no_strip_or_lies_outside_is_refused(self, task: Task, reason: str) -> None:
+        status = answer(revisit(), task)
+        assert (status.state, status.reason) == (TaskState.REFUSED, reason)
+
     def test_statuses_are_numbered_on(self) -> None:
         agent = revisit()
         for _ in range(3):
