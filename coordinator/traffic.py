@@ -123,7 +123,7 @@ class Traffic:
             pose = Pose(state.x_m, state.y_m, state.heading_rad)
             if entry.role.surveys and not entry.role.revisits:
                 laid = survey_course(entry, state, vehicle.plan, heard_s)
-            elif not (entry.role.surveys or vehicle.offered or entry.vehicle in self._errands):
+            elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
                 laid = lying_still(pose, heard_s)
             else:
                 swept = self._sweeps.get(entry.vehicle)

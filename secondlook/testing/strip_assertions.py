@@ -161,7 +161,10 @@ def assert_one_strip_at_a_time(flight: Flight) -> None:
     __tracebackhide__ = True
     problems = []
     strip_of: dict[str, int] = {}
+    incarnation = 0
     for one, status in _all(flight, StripStatus):
+        if one.header.incarnation != incarnation:  # started anew it has books of its own
+            incarnation, strip_of = one.header.incarnation, {}
         number = number_of(one)
         strip_of = {vehicle: its for vehicle, its in strip_of.items() if its != number}
         if status.state not in WITH_A_VEHICLE:

@@ -398,6 +398,25 @@ def test_with_a_position_error_it_truly_sails_beside_where_it_believes_it_is() -
     assert found > 5
 
 
+def test_with_a_drift_it_is_farther_off_the_longer_it_is_under_way() -> None:
+    config = replace(QUIET, vehicles=(replace(A, position_error_m=3.0, position_drift_mps=0.01),))
+    sea = Sea(config).order("a", NORTH_400).until(300_000)
+    truths = dict(sea.said(TruthPose))
+    offsets = {}
+    for at_ms, nav in sea.said(Nav):
+        truth = truths[at_ms]
+        assert isinstance(nav, Nav)
+        assert isinstance(truth, TruthPose)
+        assert nav.position_sigma_m == pytest.approx(3.0 + at_ms / 100_000, abs=0.01)
+        offsets[at_ms] = (truth.x_m - nav.x_m, truth.y_m - nav.y_m)
+    assert math.hypot(*offsets[0]) == pytest.approx(3.0, abs=0.02)
+    for at_ms, (dx_m, dy_m) in offsets.items():
+        drifted_m = math.dist((dx_m, dy_m), offsets[0])
+        assert drifted_m == pytest.approx(at_ms / 100_000, abs=0.05)
+    last = sea.looks()[-1]
+    assert 3.0 < last.position_sigma_m <= 6.0
+
+
 def test_the_seabed_is_seen_from_the_true_position() -> None:
     seabed = SeabedConfig("patchy", 10, 10)
     believed = replace(QUIET, seabed=seabed, vehicles=(replace(A, position_error_m=30.0),))
