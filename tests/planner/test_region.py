@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from regions import regions
 
 from planner.area import SurveyArea
-from planner.region import Region
+from planner.region import Region, share_within
+from planner.types import Strip
 
 SQUARE = ((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0))
 MIDDLE = ((40.0, 40.0), (60.0, 40.0), (60.0, 60.0), (40.0, 60.0))
@@ -95,3 +96,25 @@ class TestShare:
         assert sum(share.area for share in shares) == pytest.approx(whole.polygon.area, rel=1e-6)
         together = shapely.union_all([share.buffer(1e-6) for share in shares])
         assert whole.polygon.difference(together.buffer(1e-6)).area == pytest.approx(0, abs=1e-6 * whole.polygon.area)
+
+
+@pytest.mark.parametrize(
+    ("strip", "meets"),
+    [
+        (Strip(1, (50, 10), 0, 20, 10), True),
+        (Strip(1, (104, -20), 0, 200, 10), True),
+        (Strip(1, (106, -20), 0, 200, 10), False),
+        (Strip(1, (50, -1), math.pi, 20, 10), False),
+        (Strip(1, (50, 45), 0, 10, 5), False),  # in the hole
+    ],
+)
+def test_a_strip_meets_a_region_where_they_share_a_point(strip: Strip, meets: bool) -> None:
+    assert Region(SQUARE, (MIDDLE,)).meets(strip) is meets
+
+
+def test_the_share_of_a_strip_within_another() -> None:
+    strip = Strip(1, (0, 0), 0, 100, 20)
+    assert strip.corners == ((-10, 0), (10, 0), (10, 100), (-10, 100))
+    assert share_within(strip, Strip(2, (5, 0), 0, 100, 20)) == pytest.approx(0.75)
+    assert share_within(strip, Strip(2, (0, 150), math.pi, 100, 40)) == pytest.approx(0.5)
+    assert share_within(strip, Strip(2, (500, 0), 0, 100, 20)) == 0

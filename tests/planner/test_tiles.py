@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.tiles import TILE_CELLS, tile_shape, tiles, tiles_within
+from planner.tiles import TILE_CELLS, tile_shape, tiles, tiles_about, tiles_within
 from planner.types import GridSpec, SweepFrame
 
 
@@ -66,3 +66,22 @@ def test_tiles_within_a_window_are_those_that_share_a_cell(grid: GridSpec, data:
 def test_no_tile_begins_elsewhere(place: tuple[int, int]) -> None:
     with pytest.raises(ValueError, match="no tile"):
         tile_shape(grid_of(80, 243), *place)
+
+
+@pytest.mark.parametrize(
+    ("corners", "names"),
+    [
+        # Cells of 5 m, columns centred at 0, 5 and so on: column 20 begins at 97.5 m, row 20 at 100 m.
+        ([(10, 10), (97, 99)], ["0-0"]),
+        ([(10, 10), (98, 99)], ["0-0", "0-1"]),
+        ([(10, 10), (97, 101)], ["0-0", "1-0"]),
+        ([(110, 110), (300, 130)], ["1-1", "1-2"]),
+        ([(-50, -50), (-10, -10)], []),
+        ([(500, 500), (600, 600)], []),
+    ],
+)
+def test_tiles_about_points_share_a_cell_with_the_rectangle_about_them(
+    corners: list[tuple[float, float]], names: list[str]
+) -> None:
+    grid = grid_of(40, 60)
+    assert [tile.name for tile in tiles_about(grid, tiles(grid), corners)] == names
