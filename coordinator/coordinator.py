@@ -511,10 +511,10 @@ class Coordinator:
                 continue
             self._say(TaskAction.TAKE, record.strip, name)
             vehicle.asked_back = 0
-            vehicle.offers[number] = self._offer(record, helper, vehicle, now_ms)
+            vehicle.offers[number] = self._offer_of(record, helper, vehicle, now_ms)
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
 
-    def _offer(self, record: StripRecord, helper: Helper, vehicle: KnownVehicle, now_ms: int) -> Offer:
+    def _offer_of(self, record: StripRecord, helper: Helper, vehicle: KnownVehicle, now_ms: int) -> Offer:
         expected = service(self._open_strip(record), helper)
         ends_ms = round(expected.ends_s * 1000)
         due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
