@@ -101,12 +101,13 @@ class _Local:
             received = self.group.receive(one.key, one.payload) if one.route.readers else None
             for kept in self.kept.values():
                 kept.take(one.key, one.payload)
-            watchers = [name for name in one.route.watchers if name in self.listeners]
-            if watchers:
+            for name in one.route.watchers:
+                listener = self.listeners.get(name)
+                if listener is None:
+                    continue
                 received = received or self.opened.open(one.key, one.payload)
-            if received is not None:
-                for name in watchers:
-                    self.listeners[name].on_message(received)
+                if received is not None:
+                    listener.on_message(received)
 
 
 def ending_of(clock: LockstepClock) -> Ending:

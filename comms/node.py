@@ -6,8 +6,7 @@ A node never reads a clock, a socket or a global random generator; `random_strea
 from __future__ import annotations
 
 import zlib
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -16,8 +15,7 @@ from comms.messages import Message
 from comms.topics import Topic
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
+class Received(NamedTuple):
     """A message as a node gets it: what the key says, who sent it and when, what it says, and its payload's bytes."""
 
     key: str
@@ -28,16 +26,14 @@ class Received:
     payload: bytes = b""
 
 
-@dataclass(frozen=True, slots=True)
-class Publication:
+class Publication(NamedTuple):
     """A message to be published under a key (below the run id)."""
 
     key: str
     message: Message
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):
     """What a node wants after it was told something: publications, in order, and its next wake-up.
 
     `wake_ms` replaces the wake-up asked for before; None asks for none. A wake-up lies in the future, except that a

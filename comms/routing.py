@@ -26,9 +26,11 @@ class RosterNode:
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """What becomes of one key: its topic, its only writer, and the nodes that read it (the writer left out)."""
+    """What becomes of one key: its topic, the vehicle it names ("" for none), its only writer, and the nodes that read
+    it (the writer left out)."""
 
     topic: Topic
+    vehicle: str
     writer: str
     readers: tuple[str, ...]
     watchers: tuple[str, ...]
@@ -47,6 +49,7 @@ class Routing:
         if len(self.nodes) != len(roster):
             raise ValueError("two nodes have the same id")
         self._routes: dict[str, Route] = {}
+        self._routes_of: dict[tuple[Topic, str], Route] = {}
         for topic in TOPICS:
             for vehicle in {v for node in roster for v in node.vehicles} if topic.has_vehicle else {""}:
                 writers = self._who(topic, topic.writers, vehicle)
@@ -75,13 +78,21 @@ class Routing:
         found = topic_of(key)
         if found is None:
             return None
-        topic, vehicle = found
+        route = self._routes_of.get(found)
+        if route is None:
+            route = self._route_of(*found)
+            if route is not None:
+                self._routes_of[found] = route
+        return route
+
+    def _route_of(self, topic: Topic, vehicle: str) -> Route | None:
         writers = self._who(topic, topic.writers, vehicle)
         if not writers:
             return None
         everyone = [n for n in self._who(topic, topic.readers, vehicle) if n != writers[0]]
         return Route(
             topic=topic,
+            vehicle=vehicle,
             writer=writers[0],
             readers=tuple(n for n in everyone if not self.nodes[n].listens_only),
             watchers=tuple(n for n in everyone if self.nodes[n].listens_only),

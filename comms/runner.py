@@ -7,6 +7,7 @@ import hashlib
 import logging
 from collections import Counter
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from comms.codec import CLOCK, Header, decode, encode
 from comms.messages import Message
@@ -28,8 +29,7 @@ def failure_of(node_id: str, error: Exception, *, at_ms: int | None = None) -> N
     return NodeError(" ".join(f"{node_id} has failed{when}: {type(error).__name__}: {error}".split()))
 
 
-@dataclass(frozen=True, slots=True)
-class Outgoing:
+class Outgoing(NamedTuple):
     """A message on its way: key below the run id, route, the message and its payload."""
 
     key: str
@@ -106,11 +106,7 @@ class Intake:
         if header.sender != route.writer:
             self.drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
             return None
-        vehicle = ""
-        if route.topic.has_vehicle:
-            match = route.topic.regex.fullmatch(key)
-            vehicle = match.group("vehicle") if match else ""
-        return Received(key, route.topic, vehicle, header, message, payload)
+        return Received(key, route.topic, route.vehicle, header, message, payload)
 
     def drop(self, reason: str, sender: str, detail: str) -> None:
         """Counts what is not taken, and says why once for each sender and reason."""
@@ -159,7 +155,10 @@ class NodeRunner:
                 self._take(self._node.start(now_ms), published)
             else:
                 for due in sorted(due for due in self._mail if due <= now_ms):
-                    for received in sorted(self._mail.pop(due), key=lambda one: one.header.order):
+                    mail = self._mail.pop(due)
+                    if len(mail) > 1:
+                        mail.sort(key=lambda one: one.header.order)
+                    for received in mail:
                         self._take(self._node.on_message(received, now_ms), published)
                 if self._wake_ms is not None and self._wake_ms <= now_ms:
                     self._take(self._node.on_wake(now_ms), published)

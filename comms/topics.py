@@ -52,9 +52,9 @@ class Keep(enum.Enum):
     NOTHING = "nothing"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Topic:
-    """One row of the table.
+    """One row of the table; another topic with the same entries is another one.
 
     `pattern`: the key below the run id; `{vehicle}`, `{number}` and `{tile}` stand for one chunk each.
     `delay_ms`: from sending to delivery in lockstep, >= 1. `wakes`: whether a message that is due lets its reader act;

@@ -296,13 +296,13 @@ def test_the_largest_message_is_within_its_topics_limit(topic: Topic) -> None:
 @given(data=st.data(), header=headers)
 def test_a_task_never_takes_more_than_64_bytes(data: st.DataObject, header: Header) -> None:
     message = data.draw(st.one_of(st.just(largest_message(Task, tile_cells=0)), any_message(Task)))
-    assert len(encode(replace(header, sender="coordinator"), message)) <= 64
+    assert len(encode(header._replace(sender="coordinator"), message)) <= 64
 
 
 def test_the_largest_task_and_a_full_tile_over_water_have_the_size_worked_out_by_hand() -> None:
     # Array and version 2, sender 1 + 11, incarnation 3, sequence 5, send time 9; array 1, action 1, six numbers 30.
     task = largest_message(Task, tile_cells=0)
-    assert len(encode(replace(LONGEST_HEADER, sender="coordinator"), task)) == 63
+    assert len(encode(LONGEST_HEADER._replace(sender="coordinator"), task)) == 63
     # Levels of 400 bytes each with 1 + 1 + 1 + 3 before them, the mask of 50 with 1 + 1 + 1 + 2, three numbers, header.
     tile = largest_message(CoverageTile, tile_cells=20)
     assert len(encode(LONGEST_HEADER, tile)) == 2 * 406 + 55 + 1 + 15 + 2 + 42 + 3 + 5 + 9

@@ -138,14 +138,14 @@ def with_more(flight: Flight, after: Received, *more: Received) -> Flight:
 
     def insert(heard: list[Received]) -> list[Received]:
         place = heard.index(after) + 1
-        here = [replace(one, header=replace(one.header, sent_ms=after.header.sent_ms)) for one in more]
+        here = [one._replace(header=one.header._replace(sent_ms=after.header.sent_ms)) for one in more]
         return [*heard[:place], *here, *heard[place:]]
 
     return doctored(flight, insert)
 
 
 def _changed(one: Received, **fields: Any) -> Received:
-    return replace(one, message=replace(one.message, **fields))
+    return one._replace(message=replace(one.message, **fields))
 
 
 def strips(flight: Flight, number: int) -> list[Received]:
@@ -220,7 +220,7 @@ class TestNoStripServedTwice:
     def test_two_vehicles_at_one_strip(self, two: Flight) -> None:
         accepted = first(two, TaskStatus, state=TaskState.ACCEPTED)
         one, other = accepted.vehicle, {"helper": "second", "second": "helper"}[accepted.vehicle]
-        intruder = replace(accepted, vehicle=other, header=replace(accepted.header, sender=other))
+        intruder = accepted._replace(vehicle=other, header=accepted.header._replace(sender=other))
         said = f"was taken by {other} at {at(accepted)} while {one} was at it too, since {at(accepted)}"
         with pytest.raises(AssertionError, match=rf"^strips are served twice:\n  strip \d+ {said}"):
             assert_no_strip_served_twice(with_more(two, accepted, intruder))
@@ -239,7 +239,7 @@ class TestNoStripServedTwice:
     def test_who_takes_over_from_one_that_was_killed_does_not_serve_twice(self, two: Flight) -> None:
         accepted = first(two, TaskStatus, state=TaskState.ACCEPTED)
         one, other = accepted.vehicle, {"helper": "second", "second": "helper"}[accepted.vehicle]
-        heir = replace(accepted, vehicle=other, header=replace(accepted.header, sender=other))
+        heir = accepted._replace(vehicle=other, header=accepted.header._replace(sender=other))
         later = next(said for said in two.heard if said.header.sent_ms > accepted.header.sent_ms)
         ended = without(
             with_more(two, later, heir),
@@ -254,7 +254,7 @@ class TestOneStripAtATime:
     def test_a_vehicle_with_two(self, two: Flight) -> None:
         offered = first(two, StripStatus, state=StripState.OFFERED)
         number = number_of(offered)
-        other = replace(_changed(offered, revision=1), key=f"coord/strip/{number + 50}")
+        other = _changed(offered, revision=1)._replace(key=f"coord/strip/{number + 50}")
         vehicle = offered.message.vehicle  # type: ignore[union-attr]
         said = f"strip {number + 50} is offered with {vehicle} at {at(offered)}, which has strip {number} as well"
         with pytest.raises(AssertionError, match=rf"^vehicles have two strips:\n  {said}"):
@@ -300,7 +300,7 @@ def with_changed_header(flight: Flight, which: Callable[[Received], bool]) -> Fl
     """The flight with some messages by a next incarnation."""
 
     def renew(one: Received) -> Received:
-        return replace(one, header=replace(one.header, incarnation=1)) if which(one) else one
+        return one._replace(header=one.header._replace(incarnation=1)) if which(one) else one
 
     return doctored(flight, lambda heard: [renew(one) for one in heard])
 

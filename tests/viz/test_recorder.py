@@ -100,7 +100,7 @@ def test_cells_outside_the_area_look_like_the_background(
     run = next(one for one in messages if isinstance(one.message, RunInfo))
     assert isinstance(run.message, RunInfo)
     hole = Hole((Vertex(300, 100), Vertex(400, 100), Vertex(400, 200), Vertex(300, 200)))
-    with_hole = replace(run, message=replace(run.message, holes=(hole,)))
+    with_hole = run._replace(message=replace(run.message, holes=(hole,)))
     drawn = record([with_hole if one is run else one for one in messages], tmp_path / "hole.rrd")
     cover = image(rows(drawn, "/area/unseen", "GridMap:data")[-1][1]).reshape(ROWS, COLUMNS, 4)[::-1]
     outside = (cover == [*palette.BACKGROUND, 255]).all(axis=2)
