@@ -120,7 +120,8 @@ def update_hotspots(
     numbers = lookup[labels]
 
     moved = np.flatnonzero(numbers != previous.numbers)
-    reshaped = {*np.unique(numbers.ravel()[moved]).tolist(), *np.unique(previous.numbers.ravel()[moved]).tolist()}
+    now_and_before = np.concatenate([numbers.ravel()[moved], previous.numbers.ravel()[moved]])
+    reshaped = set(np.flatnonzero(np.bincount(now_and_before)).tolist())
     risk_sums = np.bincount(labels_there, weights=risk.ravel()[occupied], minlength=count + 1)
     growing = np.bincount(labels_there[neighbours(unsettled).ravel()[occupied]], minlength=count + 1)
 

@@ -44,22 +44,26 @@ def _boundary(cells: BoolArray) -> list[Corner]:
     Follows the sides of cells with the patch on the left, from the first cell of the lowest row. Where the patch
     touches itself at a corner only, it turns right: what the patch encloses there is a hole, and left out.
     """
-    patch = np.pad(cells, 1).tolist()
-    row = next(row for row, occupied in enumerate(patch) if any(occupied))
-    start = (patch[row].index(True), row)
-    (x, y), dx, dy = start, 1, 0
-    corners: list[Corner] = []
+    rows, columns = cells.shape
+    wide = columns + 2
+    padded = np.zeros((rows + 2, wide), dtype=np.bool_)
+    padded[1:-1, 1:-1] = cells
+    patch = padded.tobytes()  # cell (i, j) is at j * wide + i, and so is the lattice point (i, j)
+    ways = (1, wide, -1, -wide)  # right, up, left, down
+    ahead = (-wide, 0, -1, -wide - 1)  # the cell to the right of a point and ahead; the next one is to the left
+    start = place = patch.index(1)
+    way = 0
+    turns: list[int] = []
     while True:
-        x, y = x + dx, y + dy
-        # The cells ahead to the right and to the left.
-        if patch[y + (dy - dx - 1) // 2][x + (dx + dy - 1) // 2]:
-            corners.append((x - 1, y - 1))
-            dx, dy = dy, -dx
-        elif not patch[y + (dx + dy - 1) // 2][x + (dx - dy - 1) // 2]:
-            corners.append((x - 1, y - 1))
-            dx, dy = -dy, dx
-        if (x, y) == start:
-            return corners
+        place += ways[way]
+        if patch[place + ahead[way]]:
+            turns.append(place)
+            way = (way - 1) % 4
+        elif not patch[place + ahead[(way + 1) % 4]]:
+            turns.append(place)
+            way = (way + 1) % 4
+        if place == start:
+            return [(place % wide - 1, place // wide - 1) for place in turns]
 
 
 def _without_notches(corners: list[Corner], most_vertices: int) -> list[Corner]:
@@ -69,21 +73,13 @@ def _without_notches(corners: list[Corner], most_vertices: int) -> list[Corner]:
     triangle with its neighbours, which the polygon gains, holds no other vertex. Corners counterclockwise; no corner
     twice.
     """
-    following = dict(zip(corners, corners[1:] + corners[:1], strict=True))
-    preceding = {after: before for before, after in following.items()}
-    areas: dict[Corner, int] = {}
-    queue: list[tuple[int, Corner]] = []
-
-    def queue_if_notch(corner: Corner) -> None:
-        turn = _turn(preceding[corner], corner, following[corner])
-        if turn > 0:
-            areas.pop(corner, None)
-        else:
-            areas[corner] = -turn
-            heapq.heappush(queue, (-turn, corner))
-
-    for corner in corners:
-        queue_if_notch(corner)
+    before_each, after_each = corners[-1:] + corners[:-1], corners[1:] + corners[:1]
+    preceding = dict(zip(corners, before_each, strict=True))
+    following = dict(zip(corners, after_each, strict=True))
+    turns = map(_turn, before_each, corners, after_each)
+    queue = [(-turn, corner) for turn, corner in zip(turns, corners, strict=True) if turn <= 0]
+    areas = {corner: area for area, corner in queue}
+    heapq.heapify(queue)
     while queue and len(following) > most_vertices:
         area, corner = heapq.heappop(queue)
         if areas.get(corner) != area:
@@ -94,8 +90,13 @@ def _without_notches(corners: list[Corner], most_vertices: int) -> list[Corner]:
             continue  # what blocks it is part of the polygon, until a neighbour is left out, which queues it anew
         following[before], preceding[after] = after, before
         del following[corner], preceding[corner], areas[corner]
-        queue_if_notch(before)
-        queue_if_notch(after)
+        for beside in (before, after):
+            turn = _turn(preceding[beside], beside, following[beside])
+            if turn > 0:
+                areas.pop(beside, None)
+            else:
+                areas[beside] = -turn
+                heapq.heappush(queue, (-turn, beside))
     return list(_ring(following))
 
 
@@ -106,7 +107,8 @@ def _turn(a: Corner, b: Corner, c: Corner) -> int:
 
 def _any_in_triangle(a: Corner, b: Corner, c: Corner, vertices: dict[Corner, Corner]) -> bool:
     """Whether any vertex but its own lies in or on a triangle that bends right."""
-    (x0, x1), (y0, y1) = ((min(axis), max(axis)) for axis in zip(a, b, c, strict=True))
+    x0, x1 = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
+    y0, y1 = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
     near: Iterable[Corner]
     if (x1 - x0 + 1) * (y1 - y0 + 1) < len(vertices):
         near = [p for p in product(range(x0, x1 + 1), range(y0, y1 + 1)) if p in vertices]
