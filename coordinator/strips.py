@@ -117,14 +117,13 @@ def cut_strips(
     shortest = max(1, round(rules.min_strip_m / grid.cell_m))
     longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
     windows = grid.columns - width + 1
-    profit = np.zeros((grid.rows, windows))
     value, first_row, end_row = np.zeros(windows), np.zeros(windows, dtype=np.intp), np.zeros(windows, dtype=np.intp)
 
     def look(columns: slice) -> None:
         """Looks for the best run in these columns' windows."""
         near = slice(max(0, columns.start - width + 1), min(windows, columns.stop))
-        profit[:, near] = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
-        value[near], first_row[near], end_row[near] = _best_runs(profit[:, near])
+        profit = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
+        value[near], first_row[near], end_row[near] = _best_runs(profit)
 
     to_look_at = np.ones(grid.columns, dtype=np.bool_) if columns is None else columns
     for stretch in stretches(removable.any(axis=0) & to_look_at):
@@ -180,22 +179,24 @@ def stretches(columns: BoolArray) -> list[slice]:
 
 def _window_sums(values: FloatArray, width: int) -> FloatArray:
     """Sums over `width` neighbouring columns, shape (rows, columns - width + 1)."""
-    total = np.zeros((values.shape[0], values.shape[1] + 1))
-    np.cumsum(values, axis=1, out=total[:, 1:])
-    return total[:, width:] - total[:, :-width]
+    windows = values.shape[1] - width + 1
+    sums = values[:, :windows].copy()
+    for column in range(1, width):
+        sums += values[:, column : column + windows]
+    return sums
 
 
 def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
     """For each window the run of rows with the largest sum: the sum, its first row, the row behind its last."""
-    total = np.zeros((profit.shape[0] + 1, profit.shape[1]))
-    np.cumsum(profit, axis=0, out=total[1:])
+    rows, windows = profit.shape
+    total = np.zeros((rows + 1, windows))
+    profit.cumsum(axis=0, out=total[1:])
     lowest_before = np.minimum.accumulate(total, axis=0)
     gain = total - lowest_before
     end_row = gain.argmax(axis=0)
-    value = np.take_along_axis(gain, end_row[np.newaxis], axis=0)[0]
-    lowest = np.take_along_axis(lowest_before, end_row[np.newaxis], axis=0)
-    first_row = (total == lowest).argmax(axis=0)
-    return value, first_row, end_row
+    best = end_row, np.arange(windows)
+    first_row = (total == lowest_before[best]).argmax(axis=0)
+    return gain[best], first_row, end_row
 
 
 def _centred(removable: FloatArray, column: int, width: int) -> int:
@@ -212,5 +213,5 @@ def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int
     if end - first < count * shortest:
         edges = list(range(first, end + 1, longest))
     else:
-        edges = np.linspace(first, end, count + 1).round().astype(int).tolist()
+        edges = [round(first + (end - first) * piece / count) for piece in range(count + 1)]
     return list(pairwise(edges))
