@@ -84,11 +84,12 @@ class Metrics:
         if received.header.sent_ms > self.now_ms:
             self._pass_time(received.header.sent_ms)
         vehicle = self.vehicles.get(received.vehicle)
-        if isinstance(message, RunInfo) and self.run is None:
+        if isinstance(message, Nav):  # most are
+            if vehicle is not None:
+                self._take_nav(vehicle, message)
+                self.approaches.take(received)
+        elif isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
-        elif isinstance(message, Nav) and vehicle is not None:
-            self._take_nav(vehicle, message)
-            self.approaches.take(received)
         elif isinstance(message, TruthPose) and vehicle is not None:
             self.approaches.take(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
@@ -112,8 +113,13 @@ class Metrics:
 
     def primary_ms(self) -> int | None:
         """When the last primary ended its last track; None while one is still at it."""
-        ends = [one.finished_ms for one in self.vehicles.values() if one.role.surveys]
-        return None if not ends or any(end is None for end in ends) else max(end for end in ends if end is not None)
+        last_ms = None
+        for one in self.vehicles.values():
+            if one.role.surveys:
+                if one.finished_ms is None:
+                    return None
+                last_ms = one.finished_ms if last_ms is None else max(last_ms, one.finished_ms)
+        return last_ms
 
     def share_flown(self) -> float:
         """Share of the primaries' planned track length that has been looked at."""
@@ -192,8 +198,10 @@ class Metrics:
         self.approaches = ClosestApproaches({entry.vehicle: entry.speed_mps for entry in run.vehicles})
 
     def _pass_time(self, sent_ms: int) -> None:
-        primary_ms = self.primary_ms()
-        while primary_ms is not None and len(self.risk_at) < len(RISK_AT_FACTORS):
+        while len(self.risk_at) < len(RISK_AT_FACTORS):
+            primary_ms = self.primary_ms()
+            if primary_ms is None:
+                break
             at_ms = round(primary_ms * RISK_AT_FACTORS[len(self.risk_at)])
             if sent_ms <= at_ms:
                 break
