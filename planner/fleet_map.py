@@ -35,8 +35,19 @@ class FleetMap:
         self.grid = grid
         self.rho = rho
         self.layers: dict[str, VehicleLayer] = {}
-        self.risk: FloatArray = np.ones(grid.shape)
         self.changes = 0
+        self._risk: FloatArray = np.ones(grid.shape)
+        self._changed: dict[
+            tuple[int, int], tuple[slice, slice]
+        ] = {}  # windows that changed since _risk was worked out
+
+    @property
+    def risk(self) -> FloatArray:
+        """The fleet's residual risk, 1 where nobody has looked; shape `grid.shape`."""
+        for window in self._changed.values():
+            self._risk[window] = residual_risk(*self._joined(window, self.layers.values()), self.rho)
+        self._changed.clear()
+        return self._risk
 
     def take(
         self,
@@ -74,7 +85,7 @@ class FleetMap:
         layer.largest_levels[window] = largest_levels
         layer.settled[window] = settled
         layer.told[window] = True
-        self.risk[window] = residual_risk(*self._joined(window, self.layers.values()), self.rho)
+        self._changed[place] = window
         self.changes += 1
         return True
 
@@ -114,7 +125,7 @@ class FleetMap:
     def _joined(
         self, window: tuple[slice, slice], layers: Iterable[VehicleLayer]
     ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], np.ndarray[tuple[int, ...], np.dtype[np.int64]]]:
-        shape = self.risk[window].shape
+        shape = self._risk[window].shape
         sums = np.zeros(shape, dtype=np.int64)
         largest = np.zeros(shape, dtype=np.int64)
         for layer in layers:

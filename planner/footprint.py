@@ -58,8 +58,8 @@ def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -
     range_bin = np.floor((np.abs(lateral_m) + EDGE_TOLERANCE_M) / geometry.range_bin_m + 0.5).astype(np.intp)
     side = (lateral_m >= -EDGE_TOLERANCE_M).astype(np.intp)
     seen = (along_m >= begin_m) & (along_m < end_m) & (range_bin < geometry.range_bins)
-    np.clip(along_bin, 0, geometry.along_bins - 1, out=along_bin)
-    np.minimum(range_bin, geometry.range_bins - 1, out=range_bin)
+    along_bin = np.minimum(np.maximum(along_bin, 0), geometry.along_bins - 1)  # clip takes longer with whole numbers
+    range_bin = np.minimum(range_bin, geometry.range_bins - 1)
     return rows, columns, np.where(seen, p_detect[side, along_bin, range_bin], 0.0)
 
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
-from planner.types import BoolArray, GridSpec, SweepFrame
+from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,13 @@ def cells_within(
     grid: GridSpec, frame: SweepFrame, across_m: tuple[float, float], along_m: tuple[float, float]
 ) -> BoolArray:
     """Cells with their centre in a rectangle of another sweep frame, without its sides; shape grid.shape."""
-    x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
-    u_m, v_m = frame.to_sweep(x_m, y_m)
+    u_m, v_m = _centres_in(frame, grid)
     within: BoolArray = (u_m > across_m[0]) & (u_m < across_m[1]) & (v_m > along_m[0]) & (v_m < along_m[1])
     return within
+
+
+@lru_cache(maxsize=16)
+def _centres_in(frame: SweepFrame, grid: GridSpec) -> tuple[FloatArray, FloatArray]:
+    """The cells' centres in another sweep frame, each of shape grid.shape."""
+    x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
+    return frame.to_sweep(x_m, y_m)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.types import FloatArray, GridSpec, Point
+from planner.types import BoolArray, FloatArray, GridSpec, Point
 
 TILE_CELLS = 20  # 20 x 20 cells in two channels and a mask stay under 1 kB
 
@@ -43,7 +43,23 @@ def tiles(grid: GridSpec) -> tuple[Tile, ...]:
     )
 
 
-def tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, columns: slice) -> list[Tile]:
+def tiles_holding(grid: GridSpec, all_tiles: tuple[Tile, ...], cells: BoolArray) -> list[Tile]:
+    """The tiles, out of all of the grid's, that hold one of these cells; `cells`: shape grid.shape."""
+    a_row = -(-grid.columns // TILE_CELLS)
+    rows, columns = np.divmod(np.flatnonzero(cells), grid.columns)
+    held = np.bincount(rows // TILE_CELLS * a_row + columns // TILE_CELLS)
+    return [all_tiles[place] for place in np.flatnonzero(held)]
+
+
+def tiles_about(grid: GridSpec, all_tiles: tuple[Tile, ...], points: Sequence[Point]) -> list[Tile]:
+    """The tiles, out of all of the grid's, that share a cell with the rectangle about some points, mission frame."""
+    x_m, y_m = np.asarray(points).T
+    across_m, along_m = grid.frame.to_sweep(x_m, y_m)
+    columns = _cells(across_m / grid.cell_m + 0.5, grid.columns)
+    return _tiles_within(grid, all_tiles, _cells(along_m / grid.cell_m, grid.rows), columns)
+
+
+def _tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, columns: slice) -> list[Tile]:
     """The tiles, out of all of the grid's, that share a cell with a window."""
     if rows.start >= rows.stop or columns.start >= columns.stop:
         return []
@@ -53,14 +69,6 @@ def tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, colum
         for row in range(rows.start // TILE_CELLS, (rows.stop - 1) // TILE_CELLS + 1)
         for column in range(columns.start // TILE_CELLS, (columns.stop - 1) // TILE_CELLS + 1)
     ]
-
-
-def tiles_about(grid: GridSpec, all_tiles: tuple[Tile, ...], points: Sequence[Point]) -> list[Tile]:
-    """The tiles, out of all of the grid's, that share a cell with the rectangle about some points, mission frame."""
-    x_m, y_m = np.asarray(points).T
-    across_m, along_m = grid.frame.to_sweep(x_m, y_m)
-    columns = _cells(across_m / grid.cell_m + 0.5, grid.columns)
-    return tiles_within(grid, all_tiles, _cells(along_m / grid.cell_m, grid.rows), columns)
 
 
 def _cells(places: FloatArray, count: int) -> slice:

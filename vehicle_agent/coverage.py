@@ -9,7 +9,7 @@ from comms.node import Publication
 from comms.topics import COVERAGE
 from planner.footprint import LookGeometry, look_on_grid
 from planner.risk import RiskLayer
-from planner.tiles import Tile, tiles, tiles_about, tiles_within
+from planner.tiles import Tile, tiles, tiles_about, tiles_holding
 from planner.types import BoolArray, GridSpec, Strip
 
 OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is lost, 3 of 1,000,000 tiles stay unheard
@@ -25,7 +25,6 @@ class CoverageLayer:
         self._vehicle = vehicle
         self._version = 0
         self._tiles = tiles(grid)
-        self._touched: set[Tile] = set()
         self._said: dict[Tile, tuple[int, int]] = {}  # of each tile its version, and how often that was said
         self._published_sum = np.zeros(grid.shape, dtype=np.uint8)
         self._published_largest = np.zeros(grid.shape, dtype=np.uint8)
@@ -45,32 +44,19 @@ class CoverageLayer:
         )
         rows, columns, p_detect = look_on_grid(self.grid, geometry, look.p_detect)
         self.layer.add_look(rows, columns, p_detect)
-        self._touched.update(tiles_within(self.grid, self._tiles, rows, columns))
 
     def changed_tiles(self) -> list[Publication]:
         """The tiles that differ from what was last published."""
         sums, largest = self.layer.sum_levels(), self.layer.largest_levels()
-        resettled = self.settled != self._published_settled
-        some_resettled = bool(resettled.any())
+        changed = (sums != self._published_sum) | (largest != self._published_largest)
+        changed |= self.settled != self._published_settled
+        self._published_sum, self._published_largest = sums, largest
+        self._published_settled = self.settled.copy()
         published = []
-        for tile in self._tiles:
-            window = tile.window
-            changed = (some_resettled and resettled[window].any()) or (
-                tile in self._touched
-                and (
-                    (sums[window] != self._published_sum[window]).any()
-                    or (largest[window] != self._published_largest[window]).any()
-                )
-            )
-            if not changed:
-                continue
+        for tile in tiles_holding(self.grid, self._tiles, changed) if changed.any() else ():
             self._version += 1
             self._said[tile] = (self._version, 0)
-            self._published_sum[window] = sums[window]
-            self._published_largest[window] = largest[window]
-            self._published_settled[window] = self.settled[window]
             published.append(self._say(tile))
-        self._touched.clear()
         return published
 
     def one_again(self) -> list[Publication]:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.tiles import TILE_CELLS, tile_shape, tiles, tiles_about, tiles_within
+from planner.tiles import TILE_CELLS, tile_shape, tiles, tiles_about, tiles_holding
 from planner.types import GridSpec, SweepFrame
 
 
@@ -46,20 +46,14 @@ def test_the_tiles_of_the_papers_grid() -> None:
     assert last.window == (slice(60, 80), slice(240, 243))
 
 
-@st.composite
-def windows(draw: st.DrawFn, count: int) -> slice:
-    """Of so many cells; often from a tile's border, or to one."""
-    place = st.integers(0, count) | st.integers(0, count // TILE_CELLS).map(lambda tile: tile * TILE_CELLS)
-    return slice(*sorted((draw(place), draw(place))))
-
-
 @given(grids, st.data())
-def test_tiles_within_a_window_are_those_that_share_a_cell(grid: GridSpec, data: st.DataObject) -> None:
-    window = data.draw(windows(grid.rows)), data.draw(windows(grid.columns))
+def test_tiles_that_hold_cells_are_told_row_by_row(grid: GridSpec, data: st.DataObject) -> None:
+    cells = st.tuples(st.integers(0, grid.rows - 1), st.integers(0, grid.columns - 1))
     marked = np.zeros(grid.shape, dtype=bool)
-    marked[window] = True
+    for cell in data.draw(st.lists(cells, max_size=8)):
+        marked[cell] = True
     every = tiles(grid)
-    assert tiles_within(grid, every, *window) == [tile for tile in every if marked[tile.window].any()]
+    assert tiles_holding(grid, every, marked) == [tile for tile in every if marked[tile.window].any()]
 
 
 @pytest.mark.parametrize("place", [(-20, 0), (0, -20), (80, 0), (0, 260), (10, 0), (0, 241), (10**12, 0), (0, 2**70)])
