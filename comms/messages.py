@@ -2,9 +2,9 @@
 
 Positions are in the mission frame (ENU metres), headings are compass radians. Messages are values: frozen, compared
 by what they hold where they hold no arrays. Which key carries which message, and who may say it, is in `topics`.
-"""
 
-from __future__ import annotations
+Annotations are not postponed here: the wire's codecs read them, and would have to compile each from its text.
+"""
 
 import enum
 from dataclasses import dataclass

@@ -6,11 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import shapely
 
 from comms.messages import Hotspot, HotspotState
 from planner.fleet_map import FleetMap
 from planner.groups import neighbours
+from planner.lattice import points_inside
 from planner.types import BoolArray, FloatArray, GridSpec
 
 Place = tuple[str, int]
@@ -92,6 +92,5 @@ class BadlySeen:
         if not columns.size or not rows.size:
             return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
         window = (slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1))
-        u, v = np.meshgrid(grid.across_m[columns], grid.along_m[rows])
-        within = shapely.contains_xy(shapely.Polygon(np.column_stack([across, along])), u, v)
+        within = points_inside(across, along, grid.across_m[columns], grid.along_m[rows])
         return window, within & self._inside[window]

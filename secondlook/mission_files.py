@@ -33,7 +33,7 @@ class MissionFiles:
         self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
         self._messages: BinaryIO | None = (folder / "messages.mpk").open("wb") if with_messages else None
         self._pack = msgpack.Packer().pack
-        self._json = json.JSONEncoder(separators=(", ", ": "), check_circular=False).encode
+        self._json = json.JSONEncoder(separators=(", ", ": "), check_circular=False, default=_plain).encode
         if self._messages is not None:
             self._messages.write(self._pack([FILE_FORMAT, SCHEMA_VERSION]))
 
@@ -92,15 +92,7 @@ def _field_names(kind: type[Any]) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Any:
-    kind = type(value)
-    if kind is float or kind is int or kind is str or kind is bool:  # by far the most
-        return value
-    if kind is tuple:
-        return [_plain(one) for one in value]
-    if is_dataclass(kind):
-        return {name: _plain(getattr(value, name)) for name in _field_names(kind)}
-    if isinstance(value, enum.Enum):
-        return value.value
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    return value
+    """What JSON has no word for: a message or a part of one, an enumeration's member, an array."""
+    if is_dataclass(value):
+        return {name: getattr(value, name) for name in _field_names(type(value))}
+    return value.value if isinstance(value, enum.Enum) else value.tolist()

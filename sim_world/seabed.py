@@ -35,7 +35,7 @@ class UniformSeabed:
 
     def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
         """1 everywhere, in the arguments' common shape."""
-        return np.ones(np.broadcast_shapes(np.shape(x_m), np.shape(y_m), np.shape(bearing_rad)))
+        return np.ones(np.broadcast(x_m, y_m, bearing_rad).shape)
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class PatchySeabed:
 
     def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
         """The factors, in the arguments' common shape."""
-        factor = np.ones(np.broadcast_shapes(np.shape(x_m), np.shape(y_m), np.shape(bearing_rad)))
+        factor = np.ones(np.broadcast(x_m, y_m, bearing_rad).shape)
         if factor.size:
             for number in self._near(x_m, y_m):
                 patch = self.patches[number]

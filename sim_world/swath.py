@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class Swath:
         """Range of the outermost cells' centres."""
         return (self.range_bins - 1) * self.range_bin_m
 
-    @property
+    @cached_property
     def ranges_m(self) -> FloatArray:
         """Lateral ranges of the cells' centres, shape (range_bins,)."""
         return np.arange(self.range_bins, dtype=np.float64) * self.range_bin_m
