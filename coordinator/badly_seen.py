@@ -57,8 +57,8 @@ class BadlySeen:
         if self._is_new:
             self._draw()
         settled = fleet.settled_by(primaries)
-        on_hotspots = np.where(fleet.seen() | settled, fleet.risk, self._told_risk)
-        return np.where(self._inside, np.where(settled, fleet.risk, np.where(self._hot, on_hotspots, 0.0)), 0.0)
+        risk = np.where(fleet.seen() | settled, fleet.risk, self._told_risk)
+        return np.where(self._inside & (settled | self._hot), risk, 0.0)
 
     def still_open(self, fleet: FleetMap, primaries: Iterable[str]) -> BoolArray:
         """Cells that the survey may still improve: those that tiles tell are not settled; where no tile has come, those

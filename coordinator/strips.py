@@ -123,7 +123,11 @@ def cut_strips(
         """Looks for the best run in these columns' windows."""
         near = slice(max(0, columns.start - width + 1), min(windows, columns.stop))
         profit = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
-        value[near], first_row[near], end_row[near] = _best_runs(profit)
+        # No run brings more than all rows that bring anything.
+        promising = np.flatnonzero(np.maximum(profit, 0.0).sum(axis=0) > fixed_cost * (1 - TOLERANCE))
+        value[near] = 0.0
+        places = near.start + promising
+        value[places], first_row[places], end_row[places] = _best_runs(profit[:, promising])
 
     to_look_at = np.ones(grid.columns, dtype=np.bool_) if columns is None else columns
     for stretch in stretches(removable.any(axis=0) & to_look_at):

@@ -34,8 +34,9 @@ def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach) -> BoolA
     for one in ahead:
         distance_m = np.abs(grid.across_m - one.across_m)
         columns = (distance_m >= reach.near_m - grid.cell_m) & (distance_m <= reach.far_m + grid.cell_m)
-        rows = (grid.along_m > one.from_m - grid.cell_m) & (grid.along_m < one.to_m + grid.cell_m)
-        settled[np.ix_(rows, columns)] = False
+        first = np.searchsorted(grid.along_m, one.from_m - grid.cell_m, side="right")
+        behind_last = np.searchsorted(grid.along_m, one.to_m + grid.cell_m)
+        settled[first:behind_last, columns] = False
     return settled
 
 

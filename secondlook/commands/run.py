@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 from enum import StrEnum
@@ -63,6 +64,7 @@ def run(
         check_factor(REAL_TIME, real_time)
     mission = load_scenario(scenario, set_ or (), seed)
     check_bodies(mission)
+    gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
             options = RunOptions(
