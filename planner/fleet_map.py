@@ -37,9 +37,7 @@ class FleetMap:
         self.layers: dict[str, VehicleLayer] = {}
         self.changes = 0
         self._risk: FloatArray = np.ones(grid.shape)
-        self._changed: dict[
-            tuple[int, int], tuple[slice, slice]
-        ] = {}  # windows that changed since _risk was worked out
+        self._changed: dict[tuple[int, int], tuple[slice, slice]] = {}  # windows of tiles that _risk does not tell yet
 
     @property
     def risk(self) -> FloatArray:

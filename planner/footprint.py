@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planner.types import FloatArray, GridSpec, Point, SweepFrame
+from planner.types import FloatArray, GridSpec, Point
 
 EDGE_TOLERANCE_M = 1e-3
 """A cell centre this close before a bin's edge counts as on it: positions travel in centimetres, headings in
@@ -38,20 +38,18 @@ def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -
     centre on the edge between two bins belongs to the one that begins there, which of two range bins is the outer; one
     right under the track belongs to starboard. Of consecutive looks of one track exactly one sees a cell.
     """
-    track = SweepFrame(*geometry.origin, geometry.heading_rad)
     # Rounded, so that one look's end is the next one's begin to the last bit, however each was computed.
     begin_m = round(geometry.first_along_m, 6)
     end_m = round(geometry.first_along_m + geometry.along_bins * geometry.along_bin_m, 6)
     reach_m = (geometry.range_bins - 0.5) * geometry.range_bin_m
-    corners = track.to_mission(np.array([-reach_m, reach_m, -reach_m, reach_m]), np.repeat([begin_m, end_m], 2))
-    across, along = grid.frame.to_sweep(*corners)
-    columns = _window(across, grid.across_m)
-    rows = _window(along, grid.along_m)
     turn_rad = geometry.heading_rad - grid.frame.heading_rad
-    origin_across, origin_along = grid.frame.to_sweep(*geometry.origin)
+    sin, cos = math.sin(turn_rad), math.cos(turn_rad)
+    origin_across, origin_along = map(float, grid.frame.to_sweep(*geometry.origin))
+    corners = [(lateral_m, along_m) for lateral_m in (-reach_m, reach_m) for along_m in (begin_m, end_m)]
+    columns = _window([origin_across + u_m * cos + v_m * sin for u_m, v_m in corners], grid.across_m)
+    rows = _window([origin_along - u_m * sin + v_m * cos for u_m, v_m in corners], grid.along_m)
     du = (grid.across_m[columns] - origin_across)[np.newaxis, :]
     dv = (grid.along_m[rows] - origin_along)[:, np.newaxis]
-    sin, cos = math.sin(turn_rad), math.cos(turn_rad)
     lateral_m = du * cos - dv * sin
     along_m = du * sin + dv * cos + EDGE_TOLERANCE_M
     along_bin = np.floor((along_m - begin_m) / geometry.along_bin_m).astype(np.intp)
@@ -63,9 +61,9 @@ def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -
     return rows, columns, np.where(seen, p_detect[side, along_bin, range_bin], 0.0)
 
 
-def _window(corners_m: FloatArray, centres_m: FloatArray) -> slice:
+def _window(corners_m: list[float], centres_m: FloatArray) -> slice:
     """The cells along one axis of the grid with their centres between a look's corners, all in the sweep frame."""
     margin_m = 2 * EDGE_TOLERANCE_M  # one that a bin may begin early, one for rounding
-    ends_m = float(corners_m.min()) - margin_m, float(corners_m.max()) + margin_m
+    ends_m = min(corners_m) - margin_m, max(corners_m) + margin_m
     first, behind_last = np.searchsorted(centres_m, ends_m).tolist()
     return slice(first, behind_last)

@@ -45,9 +45,8 @@ def tiles(grid: GridSpec) -> tuple[Tile, ...]:
 
 def tiles_holding(grid: GridSpec, all_tiles: tuple[Tile, ...], cells: BoolArray) -> list[Tile]:
     """The tiles, out of all of the grid's, that hold one of these cells; `cells`: shape grid.shape."""
-    a_row = -(-grid.columns // TILE_CELLS)
-    rows, columns = np.divmod(np.flatnonzero(cells), grid.columns)
-    held = np.bincount(rows // TILE_CELLS * a_row + columns // TILE_CELLS)
+    in_rows = np.logical_or.reduceat(cells, range(0, grid.rows, TILE_CELLS), axis=0)
+    held = np.logical_or.reduceat(in_rows, range(0, grid.columns, TILE_CELLS), axis=1)
     return [all_tiles[place] for place in np.flatnonzero(held)]
 
 

@@ -11,7 +11,6 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self, TextIO
 
 import msgpack
-import numpy as np
 
 from comms.codec import SCHEMA_VERSION
 from comms.node import Received
