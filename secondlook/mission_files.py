@@ -92,6 +92,7 @@ def _field_names(kind: type[Any]) -> tuple[str, ...]:
 
 def _plain(value: Any) -> Any:
     """What JSON has no word for: a message or a part of one, an enumeration's member, an array."""
-    if is_dataclass(value):
-        return {name: getattr(value, name) for name in _field_names(type(value))}
+    kind: type[Any] = type(value)
+    if is_dataclass(kind):
+        return {name: getattr(value, name) for name in _field_names(kind)}
     return value.value if isinstance(value, enum.Enum) else value.tolist()
