@@ -77,7 +77,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     timeline(options.events, Routing(fleet.roster))  # refuses what does not fit
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
-    run = _Run(fleet, observer, options)
+    run = _Run(scenario, fleet, observer, options)
     result, failure = None, None
     try:
         with signals_interrupt(), log_to_file(options.folder / LOGS / "launcher.txt"):
@@ -119,12 +119,14 @@ def check_bodies(scenario: Scenario) -> None:
 
 
 class _Run:
-    def __init__(self, fleet: Fleet, observer: Observer, options: RunOptions) -> None:
+    def __init__(self, scenario: Scenario, fleet: Fleet, observer: Observer, options: RunOptions) -> None:
         self.processes = 1
         self._fleet = fleet
         self._observer = observer
         self._options = options
-        config = RecorderConfig(options.folder / "mission.rrd", live_pipe=options.live_pipe)
+        config = RecorderConfig(
+            options.folder / "mission.rrd", live_pipe=options.live_pipe, thresholds=scenario.thresholds
+        )
         self._recorder = {RECORDER: NodeSpec("viz.recorder:Recorder", config)} if options.record else {}
 
     def on_local(self) -> BusResult:

@@ -116,7 +116,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     fleet = build_fleet(scenario, record=True, factor=1.0)
     (folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(folder, with_messages=True)
-    recorder = NodeSpec("viz.recorder:Recorder", RecorderConfig(folder / "mission.rrd"))
+    recorder = NodeSpec("viz.recorder:Recorder", RecorderConfig(folder / "mission.rrd", thresholds=scenario.thresholds))
     part = _Part()
     try:
         listeners = {OBSERVER: observer, **make_nodes({RECORDER: recorder})}

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import rerun.blueprint as rrb
 
+from comms.messages import RunInfo
 from viz import palette, paths
 from viz.shapes import Extent
 
@@ -15,20 +16,30 @@ MARGIN = 1.18  # room around the area for turns and the colour scale
 WIDE_VIEW, TALL_VIEW = 3.0, 0.9  # width over height of the map's view in either layout
 
 
-def mission_blueprint(extent: Extent, vehicles: Sequence[str]) -> rrb.Blueprint:
+def mission_blueprint(extent: Extent, run: RunInfo) -> rrb.Blueprint:
     """The blueprint for an area: a wide one lies above the other views, a tall one beside them."""
     wide = extent.width_m > 1.5 * extent.height_m
-    area = _map_view(extent, vehicles, WIDE_VIEW if wide else TALL_VIEW)
+    area = _map_view(extent, [one.vehicle for one in run.vehicles], WIDE_VIEW if wide else TALL_VIEW)
+    curves = _curve_views([one.vehicle for one in run.vehicles if one.role.surveys])
     log = _log_view()
     if wide:
         layout: rrb.Container = rrb.Vertical(
             area,
-            rrb.Horizontal(_metrics_view(), _curve_view(), _activity_view(), log, column_shares=[4, 3, 4, 6]),
-            row_shares=[5, 4],
+            rrb.Horizontal(
+                rrb.Vertical(_metrics_view(), _ranges_view(), row_shares=[4, 3]),
+                curves,
+                rrb.Vertical(_activity_view(), _tasks_view()),
+                log,
+                column_shares=[5, 4, 5, 6],
+            ),
+            row_shares=[9, 8],
         )
     else:
         beside = rrb.Vertical(
-            rrb.Horizontal(_metrics_view(), _curve_view()), _activity_view(), log, row_shares=[4, 3, 4]
+            rrb.Horizontal(rrb.Vertical(_metrics_view(), _ranges_view(), row_shares=[4, 3]), curves),
+            rrb.Horizontal(_activity_view(), _tasks_view()),
+            log,
+            row_shares=[5, 4, 4],
         )
         layout = rrb.Horizontal(area, beside, column_shares=[1, 1])
     return rrb.Blueprint(
@@ -56,7 +67,12 @@ def _map_view(extent: Extent, vehicles: Sequence[str], aspect: float) -> rrb.Spa
         contents=[f"+ {root}/**" for root in (
             "/area", paths.PLAN, paths.FLOWN, paths.HOTSPOTS, paths.STRIPS, paths.CONTACTS, paths.FLEET, paths.TRUTH
         )],
-        overrides={paths.TRUTH: rrb.EntityBehavior(visible=False), **dict.fromkeys(adding, so_far)},
+        overrides={
+            paths.TRUTH: rrb.EntityBehavior(visible=False),
+            # What is under the pointer is the risk.
+            paths.UNSEEN: rrb.EntityBehavior(interactive=False),
+            **dict.fromkeys(adding, so_far),
+        },
         background=rrb.Background(kind=rrb.BackgroundKind.SolidColor, color=palette.BACKGROUND),
         line_grid=rrb.LineGrid3D(visible=False),
         # Not quite straight down: the camera needs to know which way is up.
@@ -87,8 +103,29 @@ def _log_view() -> rrb.TextLogView:
     return rrb.TextLogView(origin=paths.LOG, name="Log", columns=rrb.TextLogColumns(text_log_columns=[body]))
 
 
-def _curve_view() -> rrb.BarChartView:
-    return rrb.BarChartView(origin=paths.CURVE, name="P(y) of the latest track")
+def _ranges_view() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=paths.RANGES,
+        name="Range in metres: r_eff, and what is planned for",
+        axis_x=_whole_mission(),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+    )
+
+
+def _curve_views(surveyors: Sequence[str]) -> rrb.BarChartView | rrb.Tabs:
+    views = [
+        rrb.BarChartView(
+            origin=f"{paths.CURVE}/{vehicle}",
+            name=f"P(y) of {vehicle}'s latest track",
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+        )
+        for vehicle in surveyors
+    ]
+    return views[0] if len(views) == 1 else rrb.Tabs(*views)
+
+
+def _tasks_view() -> rrb.TextDocumentView:
+    return rrb.TextDocumentView(origin=paths.TASKS, name="Tasks")
 
 
 def _activity_view() -> rrb.StateTimelineView:

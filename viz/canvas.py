@@ -15,6 +15,8 @@ from viz.paths import TIMELINE
 
 Build = Callable[[FloatArray], Iterable[rr.ComponentColumn]]
 
+TOGETHER_S = 1.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
+
 
 class Column:
     """Rows of numbers of one entity, held until the canvas sends them: a call a row would cost far more."""
@@ -49,7 +51,7 @@ class Canvas:
     """
 
     def __init__(self, path: Path, recording_id: str, piece_ms: int, live_pipe: Path | None) -> None:
-        self._file = new_stream(recording_id)
+        self._file = new_stream(recording_id, rr.ChunkBatcherConfig(flush_tick=TOGETHER_S))
         self._file.save(path)
         self._live = LiveFeed(live_pipe, recording_id) if live_pipe else None
         # Two streams of one id: in one stream, a viewer that stalls would hold up the file too.

@@ -14,6 +14,7 @@ from viz.shapes import FLOWN_Z_M, PLAN_Z_M, POINT_Z_M, VEHICLE_Z_M, Extent, body
 
 GLYPH_SHARE = 0.022  # of the area's longer side
 TRAIL_STEP_MS = 5_000
+MANY = 6  # vehicles whose flown tracks would hide the map
 SONAR_ON = (Mode.SURVEY, Mode.REVISIT)
 
 
@@ -25,9 +26,11 @@ class Fleet:
         self._roster = {vehicle.vehicle: vehicle for vehicle in run.vehicles}
         self._colours = palette.vehicle_colours(run.vehicles)
         self._glyph_m = GLYPH_SHARE * max(extent.width_m, extent.height_m)
+        self._trail_points = 0.9 if len(run.vehicles) <= MANY else 0.45
         self._poses: dict[str, Column] = {}
         self._trails: dict[str, Trail] = {}
         self._modes: dict[str, Mode] = {}
+        self._doing: dict[str, tuple[Mode, int]] = {}
         self._tasks: dict[str, TaskState] = {}
         for vehicle in run.vehicles:
             self._put_states(vehicle)
@@ -53,12 +56,24 @@ class Fleet:
                 labels=[str(track.number) for track in ahead],
                 show_labels=True,
             ),
+            rr.AnyValues(
+                revision=plan.revision,
+                spaced_for_m=plan.r_adpt_m[-1] if plan.r_adpt_m else 0,
+                r_eff_m=plan.r_eff_m[-1] if plan.r_eff_m else 0,
+                note=plan.note,
+            ),
         )
 
     def on_state(self, received: Received, state: AgentState) -> None:
         """Notes what the agent does when that changes; the swath shows while the sonar is on."""
         vehicle, time_ms = received.vehicle, received.header.sent_ms
         before = self._modes.get(vehicle)
+        if (state.mode, state.works_on) != self._doing.get(vehicle):
+            self._doing[vehicle] = (state.mode, state.works_on)
+            what = "strip" if state.mode is Mode.REVISIT else "track"
+            doing = f"{state.mode.value}{f' of {what} {state.works_on}' if state.works_on else ''}"
+            told = rr.AnyValues(doing=doing, battery_share=round(state.battery, 3))
+            self._canvas.put(time_ms, f"{paths.pose(vehicle)}/glyph", told)
         if state.mode is before:
             return
         self._modes[vehicle] = state.mode
@@ -105,7 +120,9 @@ class Fleet:
             ),
         )
         flown = f"{paths.FLOWN}/{vehicle}"
-        self._canvas.put_static(flown, rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(0.9)))
+        self._canvas.put_static(
+            flown, rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(self._trail_points))
+        )
         self._poses[vehicle] = self._canvas.column(here, _poses)
         self._trails[vehicle] = Trail(self._canvas.column(flown, _segments))
 

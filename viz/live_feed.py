@@ -19,9 +19,12 @@ HELD_BYTES = 32 << 20  # kept for a viewer that is behind; a whole mission takes
 REST_WITHIN_S = 1.0  # at the end, for what is still held
 
 
-def new_stream(recording_id: str) -> rr.RecordingStream:
-    """A stream of the recording, without the wall clock: that has no place in a recording of simulated time."""
-    stream = rr.RecordingStream("secondlook", recording_id=recording_id, send_properties=False)
+def new_stream(recording_id: str, batches: rr.ChunkBatcherConfig | None = None) -> rr.RecordingStream:
+    """A stream of the recording, without the wall clock: that has no place in a recording of simulated time.
+
+    `batches`: when it sends what it holds; soon, if left out.
+    """
+    stream = rr.RecordingStream("secondlook", recording_id=recording_id, send_properties=False, batcher_config=batches)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     return stream

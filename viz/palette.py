@@ -17,6 +17,7 @@ HOTSPOT: Colour = (10, 10, 14)  # dark: a hotspot is bright, until a second look
 CONTACT: Colour = (255, 255, 255)
 WITHIN_R_EFF: Colour = (74, 176, 140)
 BEYOND_R_EFF: Colour = (98, 104, 114)
+THRESHOLD: Colour = (255, 176, 0)
 MEAN_RISK: Colour = (255, 176, 0)
 WORST_RISK: Colour = (255, 92, 56)
 COVERED: Colour = (100, 180, 255)

@@ -24,7 +24,9 @@ METRICS = "/metrics"
 MEAN_RISK = f"{METRICS}/mean_risk"
 WORST_RISK = f"{METRICS}/worst30_mean"
 COVERED_SHARE = f"{METRICS}/covered_share"
+RANGES = "/ranges"
 ACTIVITY = "/activity"
+TASKS = "/tasks"
 LOG = "/log"
 
 
@@ -35,7 +37,22 @@ def pose(vehicle: str) -> str:
 
 def curve(vehicle: str) -> tuple[str, str]:
     """The two parts of a P(y) curve: up to r_eff, and beyond it."""
-    return f"{CURVE}/{vehicle}/up_to_r_eff", f"{CURVE}/{vehicle}/beyond"
+    return f"{CURVE}/{vehicle}/up_to_r_eff", f"{CURVE}/{vehicle}/beyond_r_eff"
+
+
+def threshold(vehicle: str) -> str:
+    """From which P_d on data is admissible."""
+    return f"{CURVE}/{vehicle}/below_threshold"
+
+
+def r_eff(vehicle: str) -> str:
+    """How far a vehicle sees well enough, after each of its tracks."""
+    return f"{RANGES}/{vehicle}/r_eff"
+
+
+def planned_range(vehicle: str) -> str:
+    """The range that a vehicle's next tracks are spaced for."""
+    return f"{RANGES}/{vehicle}/planned"
 
 
 def mode(vehicle: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import rerun as rr
@@ -34,6 +34,7 @@ from viz.risk_map import RiskMap
 from viz.second_looks import SecondLooks
 from viz.shapes import extent_of
 from viz.story import Line, Story
+from viz.task_table import TaskTable
 from viz.truth import Truth
 
 
@@ -48,6 +49,7 @@ class Recorder:
         recording_id = config.recording_id or config.path.absolute().parent.name
         self._canvas = Canvas(config.path, recording_id, round(config.piece_s * 1000), config.live_pipe)
         self._draw_every_ms = round(config.draw_every_s * 1000)
+        self._thresholds = config.thresholds
         self._mission: _Mission | None = None
         self._early: list[Received] = []
 
@@ -56,7 +58,7 @@ class Recorder:
         if self._mission is not None:
             self._mission.draw(received)
         elif isinstance(received.message, RunInfo):
-            self._mission = _Mission(self._canvas, received.message, self._draw_every_ms)
+            self._mission = _Mission(self._canvas, received.message, self._draw_every_ms, self._thresholds)
             self._mission.draw(received)
             for early in self._early:
                 self._mission.draw(early)
@@ -74,52 +76,56 @@ class Recorder:
 class _Mission:
     """Everything that is drawn of one mission, once area, grid and roster are known."""
 
-    def __init__(self, canvas: Canvas, run: RunInfo, draw_every_ms: int) -> None:
+    def __init__(self, canvas: Canvas, run: RunInfo, draw_every_ms: int, thresholds: Mapping[str, float]) -> None:
         self._canvas = canvas
         extent = extent_of(run)
-        vehicles = tuple(vehicle.vehicle for vehicle in run.vehicles)
         told = rr.AnyValues(scenario=run.scenario, seed=run.seed)
-        canvas.present(run.scenario, mission_blueprint(extent, vehicles), told)
+        canvas.present(run.scenario, mission_blueprint(extent, run), told)
         self._map = RiskMap(canvas, run, extent, draw_every_ms)
         self._story = Story()
+        self._table = TaskTable(canvas, run)
         fleet, second_looks, curves, truth = (
             Fleet(canvas, run, extent),
-            SecondLooks(canvas),
-            Curves(canvas),
+            SecondLooks(canvas, extent),
+            Curves(canvas, run, thresholds),
             Truth(canvas),
         )
-        self._draw: dict[type[Message], Callable[[Received, Any], None]] = {
-            CoverageTile: self._map.on_tile,
-            Nav: fleet.on_nav,
-            Plan: fleet.on_plan,
-            AgentState: fleet.on_state,
-            TaskStatus: fleet.on_task_status,
-            Contact: fleet.on_contact,
-            Hotspot: second_looks.on_hotspot,
-            StripStatus: second_looks.on_strip,
-            Curve: curves.on_curve,
-            TruthTargets: truth.on_targets,
-            TruthLook: truth.on_look,
-            TruthPose: truth.on_pose,
+        self._draw: dict[type[Message], tuple[Callable[[Received, Any], None], ...]] = {
+            CoverageTile: (self._map.on_tile,),
+            Nav: (fleet.on_nav,),
+            Plan: (fleet.on_plan, curves.on_plan),
+            AgentState: (fleet.on_state,),
+            TaskStatus: (fleet.on_task_status, self._table.on_task_status),
+            Contact: (fleet.on_contact,),
+            Hotspot: (second_looks.on_hotspot,),
+            StripStatus: (second_looks.on_strip, self._table.on_strip),
+            Curve: (curves.on_curve,),
+            TruthTargets: (truth.on_targets,),
+            TruthLook: (truth.on_look,),
+            TruthPose: (truth.on_pose,),
         }
 
     def draw(self, received: Received) -> None:
         time_ms = received.header.sent_ms
         self._map.advance(time_ms)
+        self._table.advance(time_ms)
         self._canvas.advance(time_ms)
-        draw = self._draw.get(type(received.message))
-        if draw is not None:
+        for draw in self._draw.get(type(received.message), ()):
             draw(received, received.message)
         self._put_lines(self._story.tell(received))
 
     def finish(self) -> None:
         self._map.finish()
+        self._table.finish()
         self._put_lines(self._story.rest())
 
     def _put_lines(self, lines: Iterable[Line]) -> None:
         for line in lines:
-            level, colour = (
-                (rr.TextLogLevel.WARN, palette.WARNING) if line.warns else (rr.TextLogLevel.INFO, palette.TEXT)
+            text = f"{line.sender}: {line.text}"
+            # Plain lines have no colour of their own, so that they are legible in a light viewer and in a dark one.
+            words = (
+                rr.TextLog(text, level=rr.TextLogLevel.WARN, color=palette.WARNING)
+                if line.warns
+                else rr.TextLog(text, level=rr.TextLogLevel.INFO)
             )
-            words = rr.TextLog(f"{line.sender}: {line.text}", level=level, color=colour)
             self._canvas.put(line.time_ms, f"{paths.LOG}/{line.sender}", words)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 
@@ -13,7 +14,8 @@ class RecorderConfig:
     `recording_id`: recordings of one id open as one; the name of the file's folder, the run's, if not given.
     `live_pipe`: the named pipe of a LiveServer, to show the mission while it runs; None: the file alone.
     `draw_every_s`: the risk map is drawn at most once in so much simulated time. `piece_s`: positions and statistics
-    are held back for so much simulated time and written together.
+    are held back for so much simulated time and written together. `thresholds`: each survey vehicle's P_d from which
+    data is admissible, drawn with its P(y) where it is told.
     """
 
     path: Path
@@ -21,3 +23,4 @@ class RecorderConfig:
     live_pipe: Path | None = None
     draw_every_s: float = 10.0
     piece_s: float = 60.0
+    thresholds: Mapping[str, float] = field(default_factory=dict)

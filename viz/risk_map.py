@@ -9,13 +9,15 @@ from comms.messages import CoverageTile, RunInfo
 from comms.node import Received
 from planner.fleet_map import FleetMap
 from planner.region import Region
-from planner.risk import risk_statistics
 from planner.types import BoolArray
 from viz import palette, paths
+from viz.blocks import Block, Blocks
 from viz.canvas import Canvas
+from viz.risk_tally import RiskTally
 from viz.shapes import OUTLINE_Z_M, UNSEEN_Z_M, Extent, ring
 
 SCALE_CELLS = 64
+DEPTH_SHARE = 0.001  # how far the map lies below what covers it, of the area's longer side
 RISK_OPACITY = 0.8  # over the dark background, so that lines stand out on the brightest cells
 COVER_OPACITY = 0.999  # the viewer ignores transparent cells in a map that is fully opaque
 
@@ -29,16 +31,19 @@ METRICS = {
 class RiskMap:
     """Joins tiles and draws the map at most once per `draw_every_ms` of simulated time, and only where it changed.
 
-    `/area/risk` is one byte a cell: the residual risk times 255, the row farthest along first. Cells that nobody has
-    seen and those outside the area are covered by `/area/unseen`.
+    It is drawn in blocks, each under its own entity. `/area/risk/BLOCK` is one byte a cell: the residual risk times
+    255, the row farthest along first, from the first look at the block on. Cells that nobody has seen and those outside
+    the area are covered by `/area/unseen/BLOCK`.
     """
 
     def __init__(self, canvas: Canvas, run: RunInfo, extent: Extent, draw_every_ms: int) -> None:
         self._canvas = canvas
         self._map = FleetMap(run.grid.spec, run.rho)
         self._inside = _inside(run)
+        self._blocks = Blocks(run.grid.spec)
+        self._tally = RiskTally(len(self._blocks.all))
         self._draw_every_ms = draw_every_ms
-        self._drawn_changes = -1
+        self._changed: set[int] = set()
         self._changed_ms = 0
         self._due_ms = 0
         self._now_ms = 0
@@ -48,45 +53,61 @@ class RiskMap:
         for path, (name, colour) in METRICS.items():
             canvas.put_static(path, rr.SeriesLines(colors=[colour], names=[name], widths=[2.0]))
         self._put_frame(run, extent)
-        self._draw(0)
+        for index, block in enumerate(self._blocks.all):
+            self._put_place(block, run.grid.spec.cell_m)
+            self._tally.replace(index, self._map.risk[block.window][self._inside[block.window]])
+            self._cover_block(0, block)
+        self._add_statistics(0)
 
     def on_tile(self, received: Received, tile: CoverageTile) -> None:
         """Takes a tile; one that does not lie on the grid is left out."""
         version = (received.header.incarnation, tile.version)
         place = (tile.first_row, tile.first_column)
         try:
-            self._map.take(received.vehicle, version, *place, tile.sum_levels, tile.largest_levels, tile.settled)
+            news = self._map.take(received.vehicle, version, *place, tile.sum_levels, tile.largest_levels, tile.settled)
         except ValueError:
             return
-        self._changed_ms = max(self._changed_ms, received.header.sent_ms)
+        if news:
+            self._changed.add(self._blocks.index_at(*place))
+            self._changed_ms = max(self._changed_ms, received.header.sent_ms)
 
     def advance(self, time_ms: int) -> None:
         """Draws if it is time and all tiles sent together are in."""
         self._now_ms = max(self._now_ms, time_ms)
-        if time_ms > self._changed_ms and time_ms >= self._due_ms and self._map.changes != self._drawn_changes:
+        if self._changed and time_ms > self._changed_ms and time_ms >= self._due_ms:
             self._due_ms = time_ms + self._draw_every_ms
-            self._draw(self._changed_ms)
+            self._draw()
 
     def finish(self) -> None:
         """Draws what is not drawn yet, and draws the statistics out to the end."""
-        if self._map.changes != self._drawn_changes:
-            self._draw(self._changed_ms)
+        if self._changed:
+            self._draw()
         self._add_statistics(self._now_ms)
 
-    def _draw(self, time_ms: int) -> None:
-        self._drawn_changes = self._map.changes
-        seen = self._map.seen()
+    def _draw(self) -> None:
+        for index in sorted(self._changed):
+            self._draw_block(self._changed_ms, index)
+        self._changed.clear()
+        self._add_statistics(self._changed_ms)
+
+    def _draw_block(self, time_ms: int, index: int) -> None:
+        block = self._blocks.all[index]
+        risk = self._map.risk[block.window]
         # The first row of an image is drawn at the far end of the along axis.
-        levels = np.rint(self._map.risk[::-1] * 255).astype(np.uint8)
-        self._canvas.put(time_ms, paths.RISK, rr.GridMap.from_fields(data=levels.tobytes()))
-        cover = np.zeros((*seen.shape, 4), dtype=np.uint8)
-        cover[~seen[::-1]] = (*palette.UNSEEN, 255)
-        cover[~self._inside[::-1]] = (*palette.BACKGROUND, 255)  # cells outside count for nothing
-        self._canvas.put(time_ms, paths.UNSEEN, rr.GridMap.from_fields(data=cover.tobytes()))
-        self._add_statistics(time_ms)
+        levels = np.rint(risk[::-1] * 255).astype(np.uint8)
+        self._canvas.put(time_ms, f"{paths.RISK}/{block.name}", rr.GridMap.from_fields(data=levels.tobytes()))
+        if self._tally.replace(index, risk[self._inside[block.window]]):
+            self._cover_block(time_ms, block)
+
+    def _cover_block(self, time_ms: int, block: Block) -> None:
+        risk = self._map.risk[block.window]
+        cover = np.zeros((*risk.shape, 4), dtype=np.uint8)
+        cover[risk[::-1] == 1.0] = (*palette.UNSEEN, 255)
+        cover[~self._inside[block.window][::-1]] = (*palette.BACKGROUND, 255)  # cells outside count for nothing
+        self._canvas.put(time_ms, f"{paths.UNSEEN}/{block.name}", rr.GridMap.from_fields(data=cover.tobytes()))
 
     def _add_statistics(self, time_ms: int) -> None:
-        statistics = risk_statistics(self._map.risk, self._map.seen(), self._inside)
+        statistics = self._tally.statistics()
         self._statistics[paths.MEAN_RISK].add(time_ms, statistics.mean)
         self._statistics[paths.WORST_RISK].add(time_ms, statistics.worst30_mean)
         self._statistics[paths.COVERED_SHARE].add(time_ms, 1.0 - statistics.uncovered_share)
@@ -95,22 +116,23 @@ class RiskMap:
         spec = run.grid.spec
         corner_x_m, corner_y_m = spec.frame.to_mission(-0.5 * spec.cell_m, 0.0)
         turn = rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=-spec.frame.heading_rad)
-        self._canvas.put_static(
-            paths.RISK,
-            rr.Transform3D(translation=[float(corner_x_m), float(corner_y_m), 0.0], rotation=turn),
-            _levels(spec.columns, spec.rows, spec.cell_m),
-        )
-        self._canvas.put_static(
-            paths.UNSEEN,
-            rr.Transform3D(translation=[float(corner_x_m), float(corner_y_m), UNSEEN_Z_M], rotation=turn),
-            _cover(spec.columns, spec.rows, spec.cell_m),
-        )
+        # The larger the area, the higher is the camera, and the less it tells heights apart.
+        below_m = -DEPTH_SHARE * max(extent.width_m, extent.height_m)
+        for path, height_m in ((paths.RISK, below_m), (paths.UNSEEN, UNSEEN_Z_M)):
+            place = rr.Transform3D(translation=[float(corner_x_m), float(corner_y_m), height_m], rotation=turn)
+            self._canvas.put_static(path, place)
         rings = [ring(one, OUTLINE_Z_M) for one in (run.area, *(hole.outline for hole in run.holes))]
         self._canvas.put_static(
             paths.OUTLINE,
             rr.LineStrips3D(rings, colors=[palette.OUTLINE], radii=rr.Radius.ui_points(1.0)),
         )
         self._put_scale(extent)
+
+    def _put_place(self, block: Block, cell_m: float) -> None:
+        rows, columns = self._map.risk[block.window].shape
+        place = rr.Transform3D(translation=[block.first_column * cell_m, block.first_row * cell_m, 0.0])
+        self._canvas.put_static(f"{paths.RISK}/{block.name}", place, _levels(columns, rows, cell_m))
+        self._canvas.put_static(f"{paths.UNSEEN}/{block.name}", place, _cover(columns, rows, cell_m))
 
     def _put_scale(self, extent: Extent) -> None:
         """A bar below the area that tells the colours."""

@@ -53,6 +53,7 @@ class Story:
 
     def __init__(self) -> None:
         self._told: dict[Hashable, object] = {}
+        self._removable_m2: dict[int, float] = {}
         self._hotspots: dict[str, _HotspotNews] = {}
 
     def tell(self, received: Received) -> list[Line]:
@@ -112,9 +113,10 @@ class Story:
             news.withdrawn.append(str(number))
 
     def _strip(self, received: Received, strip: StripStatus) -> tuple[str, bool] | None:
+        number = number_of(received)
+        self._removable_m2[number] = strip.removable_m2
         if not self._is_news(received.key, strip.state):
             return None
-        number = number_of(received)
         if strip.state is StripState.OPEN:
             size = f"{strip.length_m:.0f} m x {strip.width_m:.0f} m"
             return f"strip {number} open: {size}, {strip.removable_m2:.0f} m² of risk to remove", False
@@ -126,7 +128,7 @@ class Story:
         if not self._is_news((received.vehicle, status.strip), status.state):
             return None
         what = {
-            TaskState.ACCEPTED: f"accepted, done at about {status.ends_ms / 1000:.0f} s",
+            TaskState.ACCEPTED: f"accepted{self._worth(status.strip)}, done at about {status.ends_ms / 1000:.0f} s",
             TaskState.REFUSED: "refused",
             TaskState.UNDER_WAY: "under way",
             TaskState.DONE: "done",
@@ -135,6 +137,10 @@ class Story:
         }[status.state]
         warns = status.state in (TaskState.REFUSED, TaskState.FAILED)
         return f"strip {status.strip} {what}{_because(status.reason)}", warns
+
+    def _worth(self, strip: int) -> str:
+        removable_m2 = self._removable_m2.get(strip)
+        return "" if removable_m2 is None else f": {removable_m2:.0f} m² of risk to remove"
 
 
 def number_of(received: Received) -> int:

@@ -35,7 +35,7 @@ class WebPage:
 
     def __init__(self, viewer: str, url: str) -> None:
         self._server = _Server(("127.0.0.1", 0), _handler(viewer))
-        self.address = f"http://127.0.0.1:{self._server.server_port}/?url={quote(url, safe='')}"
+        self.address = f"http://127.0.0.1:{self._server.server_port}/?url={quote(url, safe='')}&theme=dark"
         self._thread = threading.Thread(target=self._server.serve_forever, name="web page", daemon=True)
         self._thread.start()
 

@@ -137,6 +137,11 @@ class Scenario(Mapping):
         return {key: vehicle for key, vehicle in self.vehicles.items() if isinstance(vehicle, SurveyVehicle)}
 
     @property
+    def thresholds(self) -> dict[str, float]:
+        """The P_d from which data is admissible, of each vehicle that surveys."""
+        return {key: vehicle.threshold for key, vehicle in self.survey_vehicles.items()}
+
+    @property
     def revisit_vehicles(self) -> dict[str, RevisitVehicle]:
         """The vehicles that revisit, by id, in the scenario's order."""
         return {key: vehicle for key, vehicle in self.vehicles.items() if isinstance(vehicle, RevisitVehicle)}

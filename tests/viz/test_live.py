@@ -99,7 +99,7 @@ def assert_complete(path: Path, expected: Path) -> None:
     """The file is whole, and says what one says that was recorded with nobody watching."""
     assert verify(path).returncode == 0
     assert entities(path) == entities(expected)
-    for entity, component in (("/area/risk", "GridMap:data"), ("/metrics/mean_risk", "Scalars:scalars")):
+    for entity, component in (("/area/risk/0-0", "GridMap:data"), ("/metrics/mean_risk", "Scalars:scalars")):
         assert len(rows(path, entity, component)) == len(rows(expected, entity, component))
 
 
@@ -115,7 +115,7 @@ def test_a_viewer_shows_what_is_recorded_so_far(
             server.pipe, tmp_path, messages, lambda: wait_until(lambda: shown_until_ms(client) >= half_ms - 61_000)
         )
         wait_until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
-        wait_until(lambda: len(client.get_state().views) == 5)
+        wait_until(lambda: len(client.get_state().views) == 7)
         state = client.get_state()
     assert [one.store_id for one in state.recordings] == [f"Recording:secondlook:{RUN}"]
     assert [report for view in state.views for report in view.reports] == []

@@ -43,7 +43,7 @@ def test_the_viewer_draws_every_view_and_is_gone_afterwards(recording: Path) -> 
     assert early != late
     assert early[:8] == b"\x89PNG\r\n\x1a\n"
     assert struct.unpack(">II", late[16:24]) == (800, 500)
-    assert views == {"3D", "TimeSeries", "BarChart", "StateTimeline", "TextLog"}
+    assert views == {"3D", "TimeSeries", "BarChart", "StateTimeline", "TextDocument", "TextLog"}
     assert override(blueprint.blueprint, "/truth", "EntityBehavior") == {"visible": False}
 
 

@@ -14,7 +14,11 @@ from tests.viz.recordings import entities, rows, timelines, verify
 from viz.recording_file import is_recording, is_whole, repair
 from viz.viewer_program import ViewerError
 
-SHOWN = (("/area/risk", "GridMap:data"), ("/metrics/mean_risk", "Scalars:scalars"), ("/log/primary", "TextLog:text"))
+SHOWN = (
+    ("/area/risk/0-0", "GridMap:data"),
+    ("/metrics/mean_risk", "Scalars:scalars"),
+    ("/log/primary", "TextLog:text"),
+)
 
 
 def counted(recording: Path) -> Counter[str]:

@@ -45,7 +45,7 @@ def test_the_window_shows_the_recording(
             return max((line.end or 0 for line in lines), default=0) // 1_000_000
 
         wait_until(lambda: shown_until_ms() == end_ms)
-        wait_until(lambda: len(client.get_state().views) == 5)
+        wait_until(lambda: len(client.get_state().views) == 7)
         assert [report for view in client.get_state().views for report in view.reports] == []
     assert viewer.process.poll() is not None
     assert not viewer.log.parent.exists()

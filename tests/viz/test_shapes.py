@@ -8,9 +8,12 @@ import rerun.blueprint as rrb
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.messages import ClockMode, Grid, RunInfo, StripState, StripStatus, Vertex
+from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, StripState, StripStatus, Vertex
 from viz.blueprint import FIELD_OF_VIEW_RAD, MARGIN, mission_blueprint
 from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring, swath
+
+PRIMARY = RosterVehicle("primary", Role.SURVEY, 1.5, 20, 20, 40, 145, 0.4, 36_000_000)
+RUN = RunInfo(1, "x", "0" * 64, 1, ClockMode.WALL, (), Grid(0, 0, 0, 10, 4, 2), 0.0, (PRIMARY,))
 
 
 def strip(heading_rad: float) -> StripStatus:
@@ -67,7 +70,7 @@ def test_the_extent_holds_area_and_grid() -> None:
     ("extent", "container"), [(Extent(0, 0, 1200, 400), "Vertical"), (Extent(0, 0, 400, 1200), "Horizontal")]
 )
 def test_the_layout_follows_the_area(extent: Extent, container: str) -> None:
-    layout = mission_blueprint(extent, ("primary",)).root_container
+    layout = mission_blueprint(extent, RUN).root_container
     assert type(layout).__name__ == container
     view = next(iter(layout.contents))
     assert isinstance(view, rrb.View)

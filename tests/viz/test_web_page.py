@@ -74,7 +74,7 @@ def test_files_are_passed_on_as_they_are(page: WebPage) -> None:
 
 
 def test_the_page_comes_without_links_elsewhere_and_with_a_policy(page: WebPage) -> None:
-    assert page.address.endswith("/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A1%2Fproxy")
+    assert page.address.endswith("/?url=rerun%2Bhttp%3A%2F%2F127.0.0.1%3A1%2Fproxy&theme=dark")
     with urllib.request.urlopen(page.address, timeout=10) as answer:
         body = answer.read()
         assert answer.headers["Content-Security-Policy"] == POLICY

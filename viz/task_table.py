@@ -1,0 +1,96 @@
+"""The tasks as a table in words: who has which strip, what it may remove, and how the latest ones ended."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from dataclasses import dataclass
+
+import rerun as rr
+
+from comms.messages import RunInfo, StripState, StripStatus, TaskState, TaskStatus
+from comms.node import Received
+from viz import paths
+from viz.canvas import Canvas
+from viz.story import number_of
+
+MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
+IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
+COUNTED = (StripState.OPEN, StripState.DONE, StripState.WITHDRAWN, StripState.FAILED)
+HEAD = "| vehicle | strip | state | risk to remove | ends |\n|---|---|---|---|---|"
+
+
+@dataclass(frozen=True)
+class _Row:
+    vehicle: str
+    status: TaskStatus
+    time_ms: int
+
+
+class TaskTable:
+    """Writes the table anew whenever a task or the count of strips changes, once for all that is said at one time."""
+
+    def __init__(self, canvas: Canvas, run: RunInfo) -> None:
+        self._canvas = canvas
+        self._in_hand: dict[str, _Row | None] = {one.vehicle: None for one in run.vehicles if one.role.revisits}
+        self._ended: deque[_Row] = deque(maxlen=MOST_ENDED)
+        self._strips: dict[int, StripStatus] = {}
+        self._counts: Counter[StripState] = Counter()
+        self._changed_ms: int | None = 0
+
+    def on_strip(self, received: Received, strip: StripStatus) -> None:
+        """Counts the strip in its state."""
+        number = number_of(received)
+        before = self._strips.get(number)
+        self._strips[number] = strip
+        if before is None or before.state is not strip.state:
+            self._counts[strip.state] += 1
+            if before is not None:
+                self._counts[before.state] -= 1
+            self._changed_ms = received.header.sent_ms
+
+    def on_task_status(self, received: Received, status: TaskStatus) -> None:
+        """Takes the vehicle's word on its task."""
+        row = _Row(received.vehicle, status, received.header.sent_ms)
+        before = self._in_hand.get(received.vehicle)
+        if status.state in IN_HAND:
+            self._in_hand[received.vehicle] = row
+        elif before is not None and before.status.strip == status.strip:
+            self._in_hand[received.vehicle] = None
+            self._ended.appendleft(row)
+        elif status.state is TaskState.REFUSED:
+            self._ended.appendleft(row)
+        else:  # said again
+            return
+        if before is None or (before.status.strip, before.status.state) != (status.strip, status.state):
+            self._changed_ms = received.header.sent_ms
+
+    def advance(self, time_ms: int) -> None:
+        """Writes the table if all that was said at the time of its last change is in."""
+        if self._changed_ms is not None and time_ms > self._changed_ms:
+            self.finish()
+
+    def finish(self) -> None:
+        """Writes the table if it has changed."""
+        if self._changed_ms is not None:
+            words = rr.TextDocument(self._words(), media_type=rr.MediaType.MARKDOWN)
+            self._canvas.put(self._changed_ms, paths.TASKS, words)
+            self._changed_ms = None
+
+    def _words(self) -> str:
+        if not self._in_hand:
+            return "No vehicle takes a second look."
+        counts = ", ".join(f"{self._counts[state]} {state.value}" for state in COUNTED)
+        rows = [
+            f"| {vehicle} | | free | | |" if row is None else self._line(row)
+            for vehicle, row in sorted(self._in_hand.items())
+        ]
+        rows += map(self._line, self._ended)
+        return "\n".join([f"Strips: {counts}", "", HEAD, *rows])
+
+    def _line(self, row: _Row) -> str:
+        status = row.status
+        strip = self._strips.get(status.strip)
+        risk = f"{strip.removable_m2:.0f} m²" if strip and status.state in IN_HAND else ""
+        ends = f"about {status.ends_ms / 1000:.0f} s" if status.state in IN_HAND else f"{row.time_ms / 1000:.0f} s"
+        state = status.state.value.replace("_", " ")
+        return f"| {row.vehicle} | {status.strip} | {state} | {risk} | {ends} |"
