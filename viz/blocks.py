@@ -22,13 +22,17 @@ class Block:
 
 
 class Blocks:
-    """All blocks of a grid, row by row; those at the far edges may be smaller. Large grids have larger blocks."""
+    """All blocks of a grid, row by row; those at the far edges may be smaller.
+
+    `are_large`: whether the grid is so large that they have longer edges than the shortest.
+    """
 
     def __init__(self, grid: GridSpec) -> None:
         edge = SMALLEST_CELLS
         while -(-grid.rows // edge) * -(-grid.columns // edge) > MOST_BLOCKS:
             edge *= 2
         self._edge = edge
+        self.are_large = edge > SMALLEST_CELLS
         self._a_row = -(-grid.columns // edge)
         self.all = tuple(
             Block(

@@ -41,7 +41,7 @@ class Curves:
             self._canvas.put(received.header.sent_ms, paths.r_eff(received.vehicle), rr.Scalars(float(curve.r_eff_m)))
         threshold = self._thresholds.get(received.vehicle)
         if threshold is not None and range_m.size:
-            below = rr.BarChart([threshold], abscissa=[range_m[-1] / 2], widths=[range_m[-1]], color=palette.THRESHOLD)
+            below = rr.BarChart([threshold], abscissa=[0.0], widths=[range_m[-1]], color=palette.THRESHOLD)
             self._canvas.put(received.header.sent_ms, paths.threshold(received.vehicle), below)
         colours = (palette.WITHIN_R_EFF, palette.BEYOND_R_EFF)
         for path, part, colour in zip(paths.curve(received.vehicle), (within, ~within), colours, strict=True):

@@ -18,6 +18,7 @@ from viz.shapes import OUTLINE_Z_M, UNSEEN_Z_M, Extent, ring
 
 SCALE_CELLS = 64
 DEPTH_SHARE = 0.001  # how far the map lies below what covers it, of the area's longer side
+LARGE_EVERY_MS = 60_000
 RISK_OPACITY = 0.8  # over the dark background, so that lines stand out on the brightest cells
 COVER_OPACITY = 0.999  # the viewer ignores transparent cells in a map that is fully opaque
 
@@ -31,9 +32,9 @@ METRICS = {
 class RiskMap:
     """Joins tiles and draws the map at most once per `draw_every_ms` of simulated time, and only where it changed.
 
-    It is drawn in blocks, each under its own entity. `/area/risk/BLOCK` is one byte a cell: the residual risk times
-    255, the row farthest along first, from the first look at the block on. Cells that nobody has seen and those outside
-    the area are covered by `/area/unseen/BLOCK`.
+    It is drawn in blocks, each an entity; where these are large, at most once a minute. `/area/risk/BLOCK` is one byte a
+    cell: the residual risk times 255, the row farthest along first, from the first look at the block on. Cells that
+    nobody has seen and those outside the area are covered by `/area/unseen/BLOCK`.
     """
 
     def __init__(self, canvas: Canvas, run: RunInfo, extent: Extent, draw_every_ms: int) -> None:
@@ -42,7 +43,7 @@ class RiskMap:
         self._inside = _inside(run)
         self._blocks = Blocks(run.grid.spec)
         self._tally = RiskTally(len(self._blocks.all))
-        self._draw_every_ms = draw_every_ms
+        self._draw_every_ms = max(draw_every_ms, LARGE_EVERY_MS if self._blocks.are_large else 0)
         self._changed: set[int] = set()
         self._changed_ms = 0
         self._due_ms = 0

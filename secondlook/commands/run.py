@@ -47,6 +47,9 @@ def run(
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
+    cell: Annotated[
+        float | None, typer.Option("--cell", metavar="M", help="Cell of the residual-risk map, in metres.")
+    ] = None,
     no_record: Annotated[
         bool, typer.Option("--no-record", help="Without recording, messages.mpk and the report made of it.")
     ] = False,
@@ -62,7 +65,8 @@ def run(
         raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
     if real_time is not None:
         check_factor(REAL_TIME, real_time)
-    mission = load_scenario(scenario, set_ or (), seed)
+    overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
+    mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):

@@ -145,3 +145,20 @@ def test_wrong_use_is_told_without_a_traceback(secondlook: SecondLook, arguments
     assert (code, out) == (2, "")
     assert err.splitlines()[-1].startswith("Error: ")
     assert "Traceback" not in err
+
+
+def test_a_cell_is_checked_like_the_scenarios(secondlook: SecondLook, tmp_path: Path) -> None:
+    code, _, err = secondlook("run", "tellaro", "--cell", "0.1", "--out", str(tmp_path / "run"))
+    assert code == 2
+    assert "area.cell_m" in err
+    assert "20000000 cells" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_cell_is_the_scenarios(secondlook: SecondLook, tmp_path: Path) -> None:
+    brief = Path(__file__).parents[1] / "support" / "brief.yaml"
+    code, _, err = secondlook(
+        "run", str(brief), "--cell", "10", "--bus", "local", "--no-record", "--out", str(tmp_path)
+    )
+    assert (code, err) == (0, "")
+    assert "cell_m: 10" in (tmp_path / "scenario.yaml").read_text()

@@ -34,3 +34,21 @@ def test_links_within_the_repository_lead_somewhere() -> None:
     ]
     assert targets
     assert [(document.name, target) for document, target in targets if not (document.parent / target).exists()] == []
+
+
+def test_every_picture_shown_is_made_by_the_program() -> None:
+    root = Path(__file__).parents[2]
+    documents = [root / "README.md", *(root / "docs").rglob("*.md")]
+    shown = {
+        (document.parent / target).resolve().relative_to(root).as_posix()
+        for document in documents
+        for target in re.findall(r"!\[[^\]]*\]\((?!https?:)([^)#]+)", document.read_text(encoding="utf-8"))
+    }
+    recipe = re.search(r"^pictures:.*?\n\n", (root / "Makefile").read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    assert recipe is not None
+    made = set(re.findall(r"docs/[\w/-]+\.png", recipe[0]))
+    assert "secondlook paper --out docs/paper\n" in recipe[0]
+    figures = (root / "secondlook" / "paper" / "figures.py").read_text(encoding="utf-8")
+    made |= {f"docs/paper/{name}.png" for name in re.findall(r'^ +"([\w-]+)": draw_', figures, re.MULTILINE)}
+    assert shown
+    assert shown - made == set()

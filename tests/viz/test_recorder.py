@@ -44,6 +44,7 @@ from tests.viz.recordings import entities, rows, static, timelines, verify
 from viz import palette
 from viz.recorder import Recorder
 from viz.recorder_config import RecorderConfig
+from viz.task_table import HEAD
 
 Record = Callable[[list[Received], Path], Path]
 ROWS, COLUMNS = 80, 243
@@ -357,6 +358,7 @@ import os, pathlib, sys, time
 from tests.viz.mission_stream import mission
 from viz.recorder import Recorder
 from viz.recorder_config import RecorderConfig
+from viz.task_table import HEAD
 path = pathlib.Path(sys.argv[1])
 recorder = Recorder(RecorderConfig(path))
 for received in mission(tracks=1):
@@ -397,3 +399,58 @@ def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated:
         recorder.close()
         drawn = drawn_maps(path, "risk", 1)
     np.testing.assert_array_equal(drawn[-1][1][..., 0], np.rint(risk_of(FEW, FEW[-1].header.sent_ms) * 255))
+
+
+def test_the_table_tells_who_has_which_strip(messages: list[Received], recording: Path) -> None:
+    tables = [(time_ms, text[0]) for time_ms, text in rows(recording, "/tasks", "TextDocument:text")]
+    assert tables[0] == (0, f"Strips: 0 open, 0 done, 0 withdrawn, 0 failed\n\n{HEAD}\n| {HELPER} | | free | | |")
+    under_way = [(ms, s) for ms, s in of(messages, TaskStatus) if s.strip == 1 and s.state.value == "under_way"]
+    time_ms, status = under_way[0]
+    told = next(text for at_ms, text in tables if at_ms == time_ms)
+    assert f"| {HELPER} | 1 | under way | 2150 m² | about {status.ends_ms / 1000:.0f} s |" in told
+    states = [(ms, s) for ms, s in of(messages, TaskStatus) if s.state.value == "done"]
+    ended = [line for line in tables[-1][1].splitlines() if "| done |" in line]
+    assert ended == [f"| {HELPER} | {s.strip} | done |  | {ms / 1000:.0f} s |"
+                     for ms, s in reversed(states)]  # fmt: skip
+    latest = {key: strip.state.value for key, strip in ((r.key, r.message) for r in messages
+              if isinstance(r.message, StripStatus))}  # fmt: skip
+    counts = [list(latest.values()).count(state) for state in ("open", "done", "withdrawn", "failed")]
+    assert tables[-1][1].startswith("Strips: {} open, {} done, {} withdrawn, {} failed\n".format(*counts))
+
+
+def test_r_eff_and_threshold_are_told(messages: list[Received], tmp_path: Path) -> None:
+    path = tmp_path / "mission.rrd"
+    recorder = Recorder(RecorderConfig(path, thresholds={PRIMARY: 0.05}))
+    for received in messages:
+        recorder.on_message(received)
+    recorder.close()
+    flown = [(time_ms, [curve.r_eff_m]) for time_ms, curve in of(messages, Curve) if curve.track]
+    assert rows(path, f"/ranges/{PRIMARY}/r_eff", "Scalars:scalars") == flown
+    planned = rows(path, f"/ranges/{PRIMARY}/planned", "Scalars:scalars")
+    said = [(ms, plan) for ms, plan in of(messages, Plan) if plan.r_adpt_m and not all(t.flown for t in plan.tracks)]
+    assert planned == [(time_ms, [plan.r_adpt_m[-1]]) for time_ms, plan in said]
+    below = rows(path, f"/curve/{PRIMARY}/below_threshold", "BarChart:values")
+    assert [value[0]["buffer"] for _, value in below] == [[0.05]] * len(of(messages, Curve))
+
+
+def test_what_a_strip_may_remove_is_under_the_pointer(messages: list[Received], recording: Path) -> None:
+    said = of(messages, StripStatus)
+    first = next(strip for _, strip in said if strip.removable_m2 == 2150.0)
+    told = [text for _, text in rows(recording, "/strips/1", "LineStrips3D:labels")]
+    assert told[0] == [f"strip 1: 2150 m², {first.length_m:.0f} m x {first.width_m:.0f} m"]
+    assert any(HELPER in text[0] for text in told)
+    assert not any(shown[0] for _, shown in rows(recording, "/strips/1", "LineStrips3D:show_labels"))
+
+
+def test_on_a_large_area_only_strips_in_hand_have_a_number(
+    messages: list[Received], record: Record, tmp_path: Path
+) -> None:
+    narrow = [
+        replace(one, message=replace(one.message, width_m=10.0)) if isinstance(one.message, StripStatus) else one
+        for one in messages
+    ]
+    path = record(narrow, tmp_path / "narrow.rrd")
+    states = [strip.state.value for _, strip in of(messages, StripStatus) if strip.removable_m2 == 2150.0]
+    shown = [value for _, (value,) in rows(path, "/strips/1/label", "Points3D:show_labels")]
+    assert shown == [state in ("offered", "accepted", "under_way") for state in states]
+    assert {text for _, (text,) in rows(path, "/strips/1/label", "Points3D:labels")} == {"1"}

@@ -1,0 +1,148 @@
+"""What recording costs: CPU, memory and bytes of the recorder's process, and the whole mission with it and without.
+
+python -m bench.recorder_cost [SCENARIO[:KEY=VALUE...]] ... [--without]
+
+Each mission is flown by `secondlook run` over Zenoh, so that the recorder has a process of its own; its CPU time and
+memory are read from /proc (so Linux alone) twenty times a second until it ends. By default `tellaro` at 5 m and 1 m
+cells, and `tellaro` at a tenth of its vehicles' speeds, which takes ten times as long over the same map. `wide` takes
+long: name it. `--without`: flies each once more with --no-record.
+
+`of a core at 100 x`: the recorder's CPU time over a hundredth of the mission's. `memory at`: its resident memory when a
+tenth of its CPU time is spent, half of it, and at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+SLOW = "tellaro:vehicles.primary.speed_mps=0.15:vehicles.helper.speed_mps=0.2:vehicles.primary.endurance_s=360000"
+DEFAULT = (
+    "tellaro",
+    "tellaro:area.cell_m=1",
+    f"{SLOW}:vehicles.helper.endurance_s=144000:mission.time_limit_s=200000",
+)
+TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
+POLL_S = 0.05
+MOST_SHARE, MOST_MB_AN_HOUR_5M, MOST_MB_AN_HOUR_1M = 0.25, 20.0, 200.0
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A process at one moment: CPU time so far and resident memory."""
+
+    cpu_s: float
+    memory_mb: float
+
+
+@dataclass(frozen=True)
+class Flight:
+    """One mission: its length, all its processes' CPU time, the recorder's samples and the recording's size."""
+
+    mission_s: float
+    all_cpu_s: float
+    samples: list[Sample]
+    recording_mb: float
+
+
+def fly(scenario: str, sets: list[str], folder: Path, *, record: bool) -> Flight:
+    """Flies one mission. Raises RuntimeError where it fails."""
+    program = "from secondlook.entry import main; main()"
+    command = [sys.executable, "-c", program, "run", scenario, "--out", str(folder), "--no-report"]
+    command += [word for one in sets for word in ("--set", one)] + ([] if record else ["--no-record"])
+    before = os.times()
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    samples: list[Sample] = []
+    recorder: int | None = None
+    while run.poll() is None:
+        recorder = recorder or (_recorder_of(run.pid) if record else None)
+        sample = _sample(recorder) if recorder else None
+        if sample is not None:
+            samples.append(sample)
+        time.sleep(POLL_S)
+    after = os.times()
+    if run.returncode != 0:
+        raise RuntimeError(f"{scenario}: {run.stderr.read() if run.stderr else ''}")
+    mission_s = json.loads((folder / "summary.json").read_text())["time"]["mission_s"]
+    recording = folder / "mission.rrd"
+    cpu_s = after.children_user + after.children_system - before.children_user - before.children_system
+    return Flight(mission_s, cpu_s, samples, recording.stat().st_size / 1e6 if record else 0.0)
+
+
+def _recorder_of(launcher: int) -> int | None:
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (entry / "cmdline").read_bytes().split(b"\0")
+            if b"secondlook.child" in words and words[-2] == b"recorder" and _parent(entry) == launcher:
+                return int(entry.name)
+        except OSError:  # it has ended meanwhile
+            continue
+    return None
+
+
+def _parent(entry: Path) -> int:
+    return int(_stat(entry)[1])
+
+
+def _stat(entry: Path) -> list[str]:
+    """The fields of /proc/PID/stat behind the name, so from the third on."""
+    return (entry / "stat").read_text().rpartition(")")[2].split()
+
+
+def _sample(process: int) -> Sample | None:
+    entry = Path(f"/proc/{process}")
+    try:
+        fields = _stat(entry)
+    except OSError:
+        return None
+    pages = int(fields[21])
+    if not pages:  # it has ended, and nobody has taken note yet
+        return None
+    return Sample((int(fields[11]) + int(fields[12])) / TICKS_A_SECOND, pages * os.sysconf("SC_PAGE_SIZE") / 1e6)
+
+
+def _memory_at(samples: list[Sample], share: float) -> float:
+    until_s = share * samples[-1].cpu_s
+    return next(one.memory_mb for one in samples if one.cpu_s >= until_s)
+
+
+def main() -> int:
+    """Flies and prints; the exit code is 1 where a limit is not held."""
+    parser = argparse.ArgumentParser(prog="python -m bench.recorder_cost")
+    parser.add_argument("missions", nargs="*", default=DEFAULT, help="a scenario, with :KEY=VALUE for what differs")
+    parser.add_argument("--without", action="store_true", help="fly each without the recorder too")
+    options = parser.parse_args()
+    table = Table("mission", "hours", "recorder CPU s", "of a core at 100 x", "MB memory at 10 %, 50 %, end",
+                  "recording MB", "MB an hour", "all CPU s", "without")  # fmt: skip
+    held = True
+    for mission in options.missions:
+        scenario, *sets = mission.split(":")
+        with tempfile.TemporaryDirectory(prefix="secondlook-cost-") as folder:
+            flight = fly(scenario, sets, Path(folder) / "with", record=True)
+            without = fly(scenario, sets, Path(folder) / "without", record=False) if options.without else None
+        hours, last = flight.mission_s / 3600, flight.samples[-1]
+        share, mb_an_hour = last.cpu_s / (flight.mission_s / 100), flight.recording_mb / hours
+        most_mb = MOST_MB_AN_HOUR_1M if "area.cell_m=1" in sets else MOST_MB_AN_HOUR_5M
+        held = held and share <= MOST_SHARE and mb_an_hour <= most_mb
+        memory = ", ".join(f"{_memory_at(flight.samples, part):.0f}" for part in (0.1, 0.5, 1.0))
+        name = " ".join([scenario, *(one.rpartition(".")[2] for one in sets)])
+        table.add_row(name, f"{hours:.2f}", f"{last.cpu_s:.1f}", f"{share:.0%}", memory, f"{flight.recording_mb:.1f}",
+                      f"{mb_an_hour:.1f}", f"{flight.all_cpu_s:.0f}",
+                      f"{without.all_cpu_s:.0f}" if without else "")  # fmt: skip
+    Console(width=140).print(table)
+    print("All limits held." if held else "Not all limits are held.")
+    return 0 if held else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
