@@ -32,8 +32,8 @@ METRICS = {
 class RiskMap:
     """Joins tiles and draws the map at most once per `draw_every_ms` of simulated time, and only where it changed.
 
-    It is drawn in blocks, each an entity; where these are large, at most once a minute. `/area/risk/BLOCK` is one byte a
-    cell: the residual risk times 255, the row farthest along first, from the first look at the block on. Cells that
+    It is drawn in blocks, each an entity; where these are large, at most once a minute. `/area/risk/BLOCK` is one byte
+    a cell: the residual risk times 255, the row farthest along first, from the first look at the block on. Cells that
     nobody has seen and those outside the area are covered by `/area/unseen/BLOCK`.
     """
 
