@@ -61,7 +61,7 @@ def assert_gone(flying: Flight, children: dict[str, int]) -> None:
 def take_off(flying: Flight) -> dict[str, int]:
     """Waits until the mission is under way and the recorder has written of it; the children's process ids by host."""
     recording = flying.folder / "mission.rrd"
-    assert until(lambda: flying.is_under_way() and recording.stat().st_size > 100_000)
+    assert until(lambda: flying.is_under_way() and recording.stat().st_size > 100_000, 60.0)
     children = flying.children()
     assert sorted(children) == sorted(HOSTS)
     return children

@@ -55,7 +55,7 @@ def test_a_recording_whose_recorder_was_killed_is_repaired_with_all_it_had(tmp_p
     run = tmp_path / "out"
     recording = run / "mission.rrd"
     with flight(run, *LONG) as flying:
-        assert until(lambda: flying.is_under_way() and recording.stat().st_size > 100_000)
+        assert until(lambda: flying.is_under_way() and recording.stat().st_size > 100_000, 60.0)
         os.kill(flying.children()["recorder"], signal.SIGKILL)
         code, _, said = flying.finish()
     assert (code, "recorder" in said) == (1, True)
