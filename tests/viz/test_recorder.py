@@ -446,7 +446,7 @@ def test_on_a_large_area_only_strips_in_hand_have_a_number(
     messages: list[Received], record: Record, tmp_path: Path
 ) -> None:
     narrow = [
-        replace(one, message=replace(one.message, width_m=10.0)) if isinstance(one.message, StripStatus) else one
+        one._replace(message=replace(one.message, width_m=10.0)) if isinstance(one.message, StripStatus) else one
         for one in messages
     ]
     path = record(narrow, tmp_path / "narrow.rrd")
