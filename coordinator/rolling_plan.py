@@ -70,7 +70,9 @@ class RollingPlan:
                 plan, to_offer = other or plan, other is not None
             if to_offer and plan.strips and plan.strips[0] < len(open_strips):
                 offers[helper.vehicle] = strips[plan.strips[0]].strip.number
-            taken |= {*plan.strips}
+            taken |= {
+                strip for strip in plan.strips if strip < len(strips)
+            }  # one turned round may come back to its task
             kept.pop(helper.vehicle, None)
         return offers
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from situations import at_work, helper, open_strip, situation, situations, strip
 
+from bench.planning_time import situation as large_situation
 from coordinator.allocation import GreedyAllocator
 from coordinator.rolling_plan import RollingPlan
 from coordinator.service import removed_m2, service
@@ -121,3 +122,11 @@ class TestTurningRound:
     def test_if_both_can_be_done_it_goes_on(self) -> None:
         told = situation([open_strip(strip(1, y_m=650), 1200)], [self.on_its_way(1000)])
         assert PLAN.assign(told) == {}
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+def test_in_a_large_fleet_each_strip_goes_to_one_and_only_the_free_and_those_turned_round_are_told(seed: int) -> None:
+    asked = replace(large_situation(100, 10, seed), later_m2ps=0.0)
+    offers = RollingPlan().assign(asked)
+    assert len(set(offers.values())) == len(offers)
+    assert {one.vehicle for one in asked.free} <= set(offers) <= {one.vehicle for one in asked.helpers}
