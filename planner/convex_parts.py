@@ -11,7 +11,7 @@ from shapely.ops import split
 
 from planner.area import SurveyArea
 from planner.region import Region
-from planner.types import SweepFrame
+from planner.types import FloatArray, SweepFrame
 
 SHALLOW_M = 10.0
 """A dent that is no deeper is surveyed with the part about it."""
@@ -23,6 +23,10 @@ BEYOND_M = 1e-3
 """So far a cut reaches beyond the boundary, so that rounding does not leave it short."""
 GRID_M = 1e-4
 """Corners of what is cut lie on a grid as fine as this: nearer ones would keep further cuts from dividing it."""
+MANY_CORNERS = 12
+"""Where more point inward, cuts are tried through those alone that lie deepest: so many,"""
+FEW_CORNERS = 4
+"""and so many of a search that is not thorough."""
 MOST_TO_BRANCH = 40
 """Cuts from which only the one that promises most is followed to its end; of fewer the best two are."""
 
@@ -30,6 +34,9 @@ TracksFor = Callable[[float], int]
 """How many tracks a width in metres takes."""
 _Cost = tuple[int, float]
 """Tracks, and their length in metres."""
+_Parts = tuple[_Cost, list[shapely.Polygon]]
+_Corner = tuple[FloatArray, FloatArray, FloatArray]
+"""A corner, the side that leads to it and the side that leads on; (across, along) each."""
 
 
 def convex_parts(
@@ -38,8 +45,9 @@ def convex_parts(
     """Convex parts that cover a region, to be swept along a heading: a convex region is its own only part.
 
     Cuts are straight, through a corner that points inward: along the tracks, across them, or along a side. Of these
-    those are taken that lead to the fewest tracks, then to the shortest, by a search that follows the most promising.
-    A part may reach beyond the region by dents of up to `SHALLOW_M`.
+    those are taken that lead to the fewest tracks, then to the shortest, by a search that follows the most promising;
+    of many corners the deepest are cut first. A part may reach beyond the region by dents of up to
+    `SHALLOW_M`.
 
     Args:
         region: what to survey.
@@ -53,38 +61,53 @@ def convex_parts(
     Raises:
         ValueError: the heading is not finite.
     """
-    if not region.holes and _is_convex(region.polygon, 0.0):
+    if not region.holes and _is_convex(region.polygon):
         return [SurveyArea(region.outline, track_heading_rad)]
     frame = region.about(track_heading_rad).frame
-    _, pieces = _best(_to(frame, region.polygon), tracks_for, thorough)
+    _, pieces = _Cutting(tracks_for, thorough=thorough).best(_to(frame, region.polygon))
     return [_part(frame, piece, track_heading_rad) for piece in pieces]
 
 
-def _best(polygon: shapely.Polygon, tracks_for: TracksFor, thorough: bool) -> tuple[_Cost, list[shapely.Polygon]]:
-    """The parts of a polygon in the sweep frame, and what they cost."""
-    if _is_convex(polygon, SHALLOW_M):
-        return _cost(_hull(polygon), tracks_for), [_hull(polygon)]
-    promising: list[tuple[_Cost, int, list[shapely.Polygon]]] = []
-    number = 0
-    for number, line in enumerate(_cuts(polygon)):
-        pieces = [piece for piece in _split(polygon, line) if piece.area > LEAST_PART_M2]
-        if len(pieces) > 1:
-            costs = [_cost(_hull(piece), tracks_for) for piece in pieces]
-            promising.append((_sum(costs), number, pieces))
-    promising.sort(key=lambda one: one[:2])
-    if not promising:  # no cut divides it
-        return _cost(_hull(polygon), tracks_for), [_hull(polygon)]
-    found = []
-    for _, _, pieces in promising[: 2 if thorough and number < MOST_TO_BRANCH else 1]:
-        parts = [_best(piece, tracks_for, thorough) for piece in pieces]
-        found.append((_sum([cost for cost, _ in parts]), [piece for _, some in parts for piece in some]))
-    return min(found, key=lambda one: one[0])
+class _Cutting:
+    """The search for one number of tracks by width. What is left after several cuts is the same in whatever order these
+    were made, and is cut further only once."""
 
+    def __init__(self, tracks_for: TracksFor, *, thorough: bool) -> None:
+        self._tracks_for = tracks_for
+        self._thorough = thorough
+        self._known: dict[bytes, _Parts] = {}
 
-def _cost(hull: shapely.Polygon, tracks_for: TracksFor) -> _Cost:
-    from_across_m, from_along_m, to_across_m, to_along_m = hull.bounds
-    tracks = tracks_for(to_across_m - from_across_m)
-    return tracks, round(tracks * (to_along_m - from_along_m), 3)
+    def best(self, polygon: shapely.Polygon) -> _Parts:
+        """The parts of a polygon in the sweep frame, and what they cost."""
+        name = polygon.normalize().wkb
+        if name not in self._known:
+            self._known[name] = self._cut(polygon)
+        return self._known[name]
+
+    def _cut(self, polygon: shapely.Polygon) -> _Parts:
+        if is_all_but_convex(polygon):
+            return self._whole(polygon)
+        promising: list[tuple[_Cost, int, list[shapely.Polygon]]] = []
+        number = 0
+        for number, line in enumerate(_cuts(polygon, MANY_CORNERS if self._thorough else FEW_CORNERS)):
+            pieces = [piece for piece in _split(polygon, line) if piece.area > LEAST_PART_M2]
+            if len(pieces) > 1:
+                promising.append((_sum([self._whole(piece)[0] for piece in pieces]), number, pieces))
+        promising.sort(key=lambda one: one[:2])
+        if not promising:  # no cut divides it
+            return self._whole(polygon)
+        found = []
+        for _, _, pieces in promising[: 2 if self._thorough and number < MOST_TO_BRANCH else 1]:
+            parts = [self.best(piece) for piece in pieces]
+            found.append((_sum([cost for cost, _ in parts]), [piece for _, some in parts for piece in some]))
+        return min(found, key=lambda one: one[0])
+
+    def _whole(self, polygon: shapely.Polygon) -> _Parts:
+        """Its convex hull as the only part."""
+        hull = _hull(polygon)
+        from_across_m, from_along_m, to_across_m, to_along_m = hull.bounds
+        tracks = self._tracks_for(to_across_m - from_across_m)
+        return (tracks, round(tracks * (to_along_m - from_along_m), 3)), [hull]
 
 
 def _sum(costs: list[_Cost]) -> _Cost:
@@ -102,36 +125,54 @@ def _split(polygon: shapely.Polygon, line: shapely.LineString) -> list[shapely.P
     return [piece for piece in pieces if isinstance(piece, shapely.Polygon)]
 
 
-def _is_convex(polygon: shapely.Polygon, shallow_m: float) -> bool:
-    """Whether no dent, and no hole, is deeper than that; with 0, whether it is a `SurveyArea` as it stands."""
-    hull = _hull(polygon)
-    if not shallow_m:
-        return bool(hull.area - polygon.area <= ON_A_LINE_M * polygon.length)
-    left_out = hull.difference(polygon)
-    return bool(left_out.buffer(-shallow_m / 2).is_empty)
+def is_all_but_convex(polygon: shapely.Polygon) -> bool:
+    """Whether no dent, and no hole, is deeper than `SHALLOW_M`: it is surveyed in one part."""
+    left_out = _hull(polygon).difference(polygon)
+    return bool(left_out.buffer(-SHALLOW_M / 2).is_empty)
 
 
-def _cuts(polygon: shapely.Polygon) -> Iterator[shapely.LineString]:
+def _is_convex(polygon: shapely.Polygon) -> bool:
+    """Whether it is a `SurveyArea` as it stands."""
+    return bool(_hull(polygon).area - polygon.area <= ON_A_LINE_M * polygon.length)
+
+
+def _cuts(polygon: shapely.Polygon, most_corners: int) -> Iterator[shapely.LineString]:
     """Lines through each corner that points inward: right across the polygon, and as far as the next boundary only."""
     from_across_m, from_along_m, to_across_m, to_along_m = polygon.bounds
     reach_m = 2 * math.hypot(to_across_m - from_across_m, to_along_m - from_along_m)
+    for corner, one, other in _deepest(_inward_corners(polygon), polygon, most_corners):
+        for direction in (np.array([0.0, 1.0]), np.array([1.0, 0.0]), one, other):
+            along = direction / np.hypot(*direction) * reach_m
+            line = shapely.LineString([corner - along, corner + along])
+            chords = shapely.get_parts(polygon.intersection(line))
+            touching = [one for one in chords if one.distance(shapely.Point(corner)) < ON_A_LINE_M]
+            ends = shapely.get_coordinates(touching)
+            if len(touching) < len(chords) and len(ends) > 1:
+                places = (ends - corner) @ along / reach_m
+                reached = corner + np.outer([places.min() - BEYOND_M, places.max() + BEYOND_M], along / reach_m)
+                yield shapely.LineString(reached)
+            yield line
+
+
+def _inward_corners(polygon: shapely.Polygon) -> list[_Corner]:
     exterior_first = shapely.orient_polygons(polygon)
+    found: list[_Corner] = []
     for ring in (exterior_first.exterior, *exterior_first.interiors):
         corners = np.array(ring.coords[:-1])
         before, after = corners - np.roll(corners, 1, axis=0), np.roll(corners, -1, axis=0) - corners
         inward = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0] < 0
-        for corner, one, other in zip(corners[inward], before[inward], after[inward], strict=True):
-            for direction in (np.array([0.0, 1.0]), np.array([1.0, 0.0]), one, other):
-                along = direction / np.hypot(*direction) * reach_m
-                line = shapely.LineString([corner - along, corner + along])
-                chords = shapely.get_parts(polygon.intersection(line))
-                touching = [one for one in chords if one.distance(shapely.Point(corner)) < ON_A_LINE_M]
-                ends = shapely.get_coordinates(touching)
-                if len(touching) < len(chords) and len(ends) > 1:
-                    places = (ends - corner) @ along / reach_m
-                    reached = corner + np.outer([places.min() - BEYOND_M, places.max() + BEYOND_M], along / reach_m)
-                    yield shapely.LineString(reached)
-                yield line
+        found += zip(corners[inward], before[inward], after[inward], strict=True)
+    return found
+
+
+def _deepest(corners: list[_Corner], polygon: shapely.Polygon, most: int) -> list[_Corner]:
+    """Of many corners those farthest from the convex hull's sides, in the order given."""
+    if len(corners) <= MANY_CORNERS:
+        return corners
+    places = shapely.points([corner for corner, _, _ in corners])
+    depth_m = shapely.distance(_hull(polygon).exterior, places)
+    kept = np.sort(np.argsort(-depth_m, kind="stable")[:most])
+    return [corners[index] for index in kept.tolist()]
 
 
 def _to(frame: SweepFrame, polygon: shapely.Polygon) -> shapely.Polygon:

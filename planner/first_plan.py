@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from planner.area import SurveyArea
-from planner.convex_parts import convex_parts
+from planner.convex_parts import convex_parts, is_all_but_convex
 from planner.lawnmower import lawnmower
 from planner.part_order import in_order
 from planner.region import Region
@@ -92,7 +92,7 @@ def best_heading(region: Region, nadir_gap_m: float, told_range_m: float) -> flo
         (math.dist(one, other), math.atan2(other[0] - one[0], other[1] - one[1]) % math.pi)
         for one, other in zip(region.outline, (*region.outline[1:], region.outline[0]), strict=True)
     ]
-    if len(convex_parts(region, 0.0, lambda _: 1, thorough=False)) > 1:
+    if not is_all_but_convex(region.polygon):
         sides = sorted(sides, reverse=True)[:MOST_SIDES]
     headings = sorted({round(heading_rad, 9) % math.pi for _, heading_rad in sides})
 

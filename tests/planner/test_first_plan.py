@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from regions import regions
 
+from planner import convex_parts as cutting
 from planner.convex_parts import SHALLOW_M, convex_parts
 from planner.first_plan import best_heading, first_plan, parts_in_order
 from planner.part_order import in_order
@@ -128,6 +130,40 @@ class TestParts:
         for polygon in polygons:
             assert polygon.difference(region.polygon.buffer(0.01)).buffer(-0.51 * SHALLOW_M).is_empty
         assert {part.track_heading_rad for part in parts} == {parts[0].track_heading_rad}
+
+
+class TestCoastOfManyCorners:
+    COAST = Region(
+        (
+            (0.0, 0.0),
+            (1500.0, 0.0),
+            *((1500.0 - 15 * n, 450.0 + 60 * math.sin(n / 8) + 25 * (-1) ** n) for n in range(101)),
+        )
+    )
+
+    def test_nothing_is_cut_twice_and_few_cuts_are_tried_at_a_time(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        tried: dict[bytes, int] = {}
+        cuts = cutting._cuts
+
+        def counted(polygon: shapely.Polygon, most_corners: int) -> Iterator[shapely.LineString]:
+            name = polygon.normalize().wkb
+            assert name not in tried
+            tried[name] = 0
+            for line in cuts(polygon, most_corners):
+                tried[name] += 1
+                yield line
+
+        monkeypatch.setattr(cutting, "_cuts", counted)
+        parts = convex_parts(self.COAST, 0.3, lambda width_m: track_count(width_m, 40, 130))
+        assert len(parts) > 5
+        # Through twelve corners four lines each, right across and up to the next side.
+        assert max(tried.values()) <= 12 * 8
+
+    def test_all_of_it_is_seen(self) -> None:
+        plan = first_plan(self.COAST, 0.3, 40, 130)
+        grid = self.COAST.about(0.3).grid(5)
+        tracks = [track for part in plan.tracks for track in part]
+        assert (seen_cells(grid, tracks, 40, 130) | ~self.COAST.inside(grid)).all()
 
 
 class TestOrder:
