@@ -12,6 +12,9 @@ from dataclasses import dataclass
 
 TOLERANCE_M = 1e-6
 """Lengths that differ by no more are taken as equal."""
+NARROWEST_M = 1e-3
+"""No track is laid for what is narrower: headings travel in microradians, which makes a turned area wider by as much,
+and a cell whose centre is as near to a swath is seen (`planner.footprint`)."""
 
 
 @dataclass(frozen=True)
@@ -118,6 +121,6 @@ def _pairs_and_singles(width_m: float, nadir_gap_m: float, range_m: float) -> tu
     pair_m = 3 * range_m - nadir_gap_m
     pairs = math.floor(width_m / pair_m)
     left_m = width_m - pairs * pair_m
-    if left_m <= TOLERANCE_M:
+    if left_m <= NARROWEST_M:
         return pairs, 0
-    return pairs, 1 if left_m <= range_m - nadir_gap_m + TOLERANCE_M else 2
+    return pairs, 1 if left_m <= range_m - nadir_gap_m + NARROWEST_M else 2

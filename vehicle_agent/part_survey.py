@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from planner.area import SurveyArea
 from planner.settle import Reach
+from planner.spacing import NARROWEST_M
 from planner.spacing_planners import (
-    LENGTH_TOLERANCE_M,
     FlownTrack,
     SinglesPlanner,
     SpacingDecision,
@@ -62,7 +62,7 @@ class PartSurvey:
         spacing, width_m = self._config.spacing, self.area.width_m
         self._covered_m = max(self._covered_m, self._edge_m(self._since, r_eff_m))
         decision = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
-        if decision is None and self._covered_m < width_m - LENGTH_TOLERANCE_M:
+        if decision is None and self._covered_m < width_m - NARROWEST_M:
             decision = spacing.decide(width_m, self._covered_m, r_eff_m)
         if decision is None or not decision.offsets_m:
             return None
@@ -80,7 +80,7 @@ class PartSurvey:
         pair = [*self._since, *ahead][:TRACKS_A_PAIR]
         known_m = math.floor(reach.far_m) if r_eff_m is None else r_eff_m
         edge_m = self._edge_m(pair, known_m)
-        if edge_m >= self.area.width_m - LENGTH_TOLERANCE_M:
+        if edge_m >= self.area.width_m - NARROWEST_M:
             return None
         # Whatever r_eff will be, a next pair begins no nearer to this one than at twice the least range. Where the far
         # side is near its tracks are pulled in; then they lie as they would with what is known now.

@@ -151,9 +151,9 @@ class TestTrackOffsets:
             covered_m = float(rng.choice([0.0, rng.uniform(0, width_m)]))
             offsets = track_offsets(width_m, nadir_gap_m, range_m, covered_m=covered_m)
             assert len(offsets) == track_count(width_m - covered_m, nadir_gap_m, range_m)
-            assert widest_gap_m(offsets, nadir_gap_m, range_m, covered_m, width_m) <= 1e-6
+            assert widest_gap_m(offsets, nadir_gap_m, range_m, covered_m, width_m) <= 1e-3 + 1e-6
 
-    @given(pairs=st.integers(0, 8), beyond_m=st.sampled_from([-1e-3, 0.0, 1e-3]), side=st.integers(0, 1))
+    @given(pairs=st.integers(0, 8), beyond_m=st.sampled_from([-2e-3, 0.0, 2e-3]), side=st.integers(0, 1))
     def test_leaves_no_gap_where_the_count_changes(self, pairs: int, beyond_m: float, side: int) -> None:
         width_m = pairs * 320 + side * 80 + beyond_m
         offsets = track_offsets(width_m, 40, 120)
