@@ -11,8 +11,8 @@ from planner.convex_parts import convex_parts, is_all_but_convex
 from planner.lawnmower import lawnmower
 from planner.part_order import in_order
 from planner.region import Region
-from planner.spacing import adapt_range, track_count, track_offsets
-from planner.spacing_planners import lowest_range_m
+from planner.spacing import track_count
+from planner.spacing_planners import AdaptiveSpacing, SpacingPlanner, lowest_range_m
 from planner.types import Track
 
 MOST_SIDES = 6
@@ -21,10 +21,17 @@ MOST_SIDES = 6
 
 @dataclass(frozen=True)
 class FirstPlan:
-    """`parts`, in the order of flying, and the `tracks` of each, flown to and fro, numbered from 1 through all."""
+    """`parts`, in the order of flying, and of each the `tracks`, flown to and fro, numbered from 1 through all, and the
+    range that spaces them."""
 
     parts: tuple[SurveyArea, ...]
     tracks: tuple[tuple[Track, ...], ...]
+    ranges_m: tuple[int, ...]
+
+    @property
+    def all_tracks(self) -> list[Track]:
+        """Those of all parts, in the order of flying."""
+        return [track for tracks in self.tracks for track in tracks]
 
     @property
     def track_count(self) -> int:
@@ -39,7 +46,7 @@ class FirstPlan:
     @property
     def length_m(self) -> float:
         """Of all tracks together."""
-        return sum(track.length_m for tracks in self.tracks for track in tracks)
+        return sum(track.length_m for track in self.all_tracks)
 
 
 def parts_in_order(
@@ -65,19 +72,33 @@ def parts_in_order(
 
 
 def first_plan(
-    region: Region, track_heading_rad: float, nadir_gap_m: float, told_range_m: float, *, thorough: bool = True
+    region: Region,
+    track_heading_rad: float,
+    nadir_gap_m: float,
+    told_range_m: float,
+    spacing: SpacingPlanner | None = None,
+    *,
+    thorough: bool = True,
 ) -> FirstPlan:
-    """The tracks by Algorithm 1, each part by itself; for numbers and errors see `parts_in_order`."""
+    """The tracks as `spacing` lays them, by Algorithm 1 if left out, each part by itself and from its nearer end.
+
+    For numbers and errors see `parts_in_order`.
+    """
     parts = parts_in_order(region, track_heading_rad, nadir_gap_m, told_range_m, thorough=thorough)
-    lowest_m = lowest_range_m(nadir_gap_m)
+    spacing = spacing or AdaptiveSpacing(nadir_gap_m, told_range_m)
     laid: list[tuple[Track, ...]] = []
-    number = 1
+    ranges_m: list[int] = []
+    number, here = 1, None
     for part in parts:
-        choice = adapt_range(part.width_m, nadir_gap_m, lowest_m, max(told_range_m, lowest_m))
-        offsets_m = track_offsets(part.width_m, nadir_gap_m, choice.range_m)
-        laid.append(tuple(lawnmower(part, offsets_m, choice.range_m, first_number=number)))
-        number += len(laid[-1])
-    return FirstPlan(tuple(parts), tuple(laid))
+        decision = spacing.decide(part.width_m, 0.0, None)
+        tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number)
+        if here and tracks and math.dist(here, tracks[0].end) < math.dist(here, tracks[0].start):
+            tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number, first_reverse=True)
+        laid.append(tuple(tracks))
+        ranges_m.append(decision.range_m)
+        number += len(tracks)
+        here = tracks[-1].end if tracks else here
+    return FirstPlan(tuple(parts), tuple(laid), tuple(ranges_m))
 
 
 @lru_cache(maxsize=8)

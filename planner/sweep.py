@@ -48,7 +48,7 @@ def cheapest_entry(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m
         raise ValueError(f"the run-in must be finite and 0 or more, not {run_in_m} m")
     best, best_m = legs, math.inf
     for way in ways_over(legs):
-        distance_m = _distance_m(way, pose, turn_radius_m, run_in_m)
+        distance_m = distance_over(way, pose, turn_radius_m, run_in_m)
         if distance_m < best_m - LENGTH_TOLERANCE_M:
             best, best_m = way, distance_m
     return [replace(leg, number=number) for number, leg in enumerate(best, start=1)], best_m
@@ -60,7 +60,12 @@ def ways_over(legs: list[Track]) -> list[list[Track]]:
     return [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
 
 
-def _distance_m(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> float:
+def distance_over(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> float:
+    """How far it is, in metres, from `pose` over all legs in their order to the last one's end.
+
+    Each is entered straight for `run_in_m` >= 0, and left so where another follows. Raises ValueError where the turn
+    radius is not finite and above 0.
+    """
     total_m = 0.0
     for index, leg in enumerate(legs):
         entry = shifted(leg.start, leg.heading_rad, -run_in_m)

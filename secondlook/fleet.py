@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import shapely
@@ -18,7 +17,7 @@ from planner.region import Region
 from planner.types import DetectionCurve, Point
 from secondlook.errors import UserError
 from secondlook.node_spec import NodeSpec
-from secondlook.parts import ALLOCATOR, SONAR, SPACING, PartError, PartKind
+from secondlook.parts import ALLOCATOR, SONAR, SPACING, made
 from secondlook.scenario import (
     PatchySeabed,
     RevisitVehicle,
@@ -165,7 +164,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", revisit)
     survey = SurveyConfig(
         vehicle=name,
-        spacing=_made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
+        spacing=made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
         nadir_gap_m=vehicle.nadir_gap_m,
         range_m=vehicle.told_range_m,
         threshold=vehicle.threshold,
@@ -179,15 +178,6 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         config = SurveyRevisitConfig(survey, revisit)
         return NodeSpec(vehicle.agent or "vehicle_agent.survey_revisit:SurveyRevisitAgent", config)
     return NodeSpec(vehicle.agent or "vehicle_agent.survey:SurveyAgent", survey)
-
-
-def _made(kind: PartKind, text: str, **arguments: object) -> Any:
-    try:
-        return kind.maker(text)(**arguments)
-    except PartError as error:
-        raise UserError(f"{text}: {error}") from error
-    except Exception as error:
-        raise UserError(f"{text} cannot be made: {type(error).__name__}: {error}") from error
 
 
 def _world_config(scenario: Scenario) -> WorldConfig:
@@ -234,7 +224,7 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
     return CoordinatorConfig(
-        allocator=_made(ALLOCATOR, scenario.coordinator.allocator),
+        allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor,
         lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
         min_strip_m=scenario.coordinator.min_strip_m,

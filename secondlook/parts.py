@@ -13,6 +13,7 @@ from typing import Any
 
 from coordinator.allocators import ALLOCATORS
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
+from secondlook.errors import UserError
 
 _OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
 
@@ -115,3 +116,13 @@ NODE = PartKind(
     arguments=("config",),
     methods={"start": ("now_ms",), "on_message": ("received", "now_ms"), "on_wake": ("now_ms",)},
 )
+
+
+def made(kind: PartKind, text: str, **arguments: object) -> Any:
+    """The part that `text` names, made of these arguments. Raises UserError where there is none or that fails."""
+    try:
+        return kind.maker(text)(**arguments)
+    except PartError as error:
+        raise UserError(f"{text}: {error}") from error
+    except Exception as error:
+        raise UserError(f"{text} cannot be made: {type(error).__name__}: {error}") from error

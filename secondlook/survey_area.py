@@ -6,6 +6,8 @@ import math
 
 from planner.first_plan import FirstPlan, best_heading, first_plan
 from planner.region import Region
+from secondlook.errors import UserError
+from secondlook.parts import SPACING, made
 from secondlook.scenario import Scenario, SurveyVehicle
 from vehicle_agent.config import WHOLE
 
@@ -30,11 +32,19 @@ def track_heading_rad(scenario: Scenario) -> float:
     return best_heading(region_of(scenario), first.nadir_gap_m, first.told_range_m)
 
 
-def first_plans(scenario: Scenario, heading_rad: float) -> dict[str, FirstPlan]:
-    """The tracks that Algorithm 1 lays for each survey vehicle, by its id, with the range that it is told."""
-    return {
-        name: first_plan(
-            region_for(scenario, vehicle, heading_rad), heading_rad, vehicle.nadir_gap_m, vehicle.told_range_m
-        )
-        for name, vehicle in scenario.survey_vehicles.items()
-    }
+def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
+    """The first tracks of a survey vehicle, by its id, as its spacing planner lays them with the range that it is told.
+
+    Raises:
+        UserError: a spacing planner of the user's fails.
+    """
+    vehicle = scenario.survey_vehicles[name]
+    region = region_for(scenario, vehicle, heading_rad)
+    sonar = vehicle.nadir_gap_m, vehicle.told_range_m
+    spacing = made(SPACING, vehicle.spacing, nadir_gap_m=sonar[0], told_range_m=sonar[1])
+    try:
+        return first_plan(region, heading_rad, *sonar, spacing)
+    except Exception as error:
+        if vehicle.spacing in SPACING.ours:
+            raise
+        raise UserError(f"{vehicle.spacing} has failed to lay tracks: {type(error).__name__}: {error}") from error

@@ -1,33 +1,75 @@
-"""`secondlook plan`: the track spacing for a width, by itself."""
+"""`secondlook plan`: the tracks of a scenario's surveys, or the track spacing for a width by itself."""
 
 from __future__ import annotations
 
 import json
 import math
+import sys
 from typing import Annotated
 
 import typer
 
 from planner.spacing import TOLERANCE_M, adapt_range, track_offsets
 from secondlook.errors import UserError
+from secondlook.plan_output import plan_as_geojson, plan_as_json, plan_as_text
+from secondlook.planned_survey import planned_surveys
+from secondlook.scenario import load_scenario
 
 LARGEST_M = 100_000
 
 
 def plan(
-    width: Annotated[float, typer.Option(metavar="W", help="Width to cover, metres.")],
-    nadir: Annotated[float, typer.Option(metavar="R", help="Nadir gap on either side of a track, metres.")],
+    scenario: Annotated[
+        str | None, typer.Argument(help="A bundled scenario's name or a YAML file, whose area is to be surveyed.")
+    ] = None,
+    width: Annotated[float | None, typer.Option(metavar="W", help="Width to cover, metres.")] = None,
+    nadir: Annotated[
+        float | None, typer.Option(metavar="R", help="Nadir gap on either side of a track, metres.")
+    ] = None,
     range_: Annotated[
-        tuple[float, float],
+        tuple[float, float] | None,
         typer.Option("--range", metavar="A B", help="Shortest and longest sensor range to plan with, metres."),
-    ],
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
+    as_geojson: Annotated[
+        bool, typer.Option("--geojson", help="Print a scenario's area and tracks as GeoJSON alone.")
+    ] = False,
 ) -> None:
-    """Adapt the track spacing to a width: the smallest range that covers it with the fewest tracks."""
-    lowest, highest = range_
-    _check(width, nadir, lowest, highest)
-    choice = adapt_range(width, nadir, lowest, highest)
-    offsets_m = track_offsets(width, nadir, choice.range_m)
+    """Lay a scenario's first tracks, or adapt the track spacing to a width with the fewest tracks."""
+    if as_json and as_geojson:
+        raise UserError("--geojson: is not allowed with --json; one form at a time")
+    if scenario is not None:
+        for option, value in {"--width": width, "--nadir": nadir, "--range": range_}.items():
+            if value is not None:
+                raise UserError(f"{option}: is not allowed with a scenario, which says what is surveyed and how")
+        _plan_scenario(scenario, set_ or [], as_json=as_json, as_geojson=as_geojson)
+        return
+    for name in ("--set",) * bool(set_) + ("--geojson",) * as_geojson:
+        raise UserError(f"{name}: must go with a scenario")
+    if width is None or nadir is None or range_ is None:
+        raise UserError("secondlook plan needs a scenario, or --width, --nadir and --range")
+    _plan_width(width, nadir, *range_, as_json=as_json)
+
+
+def _plan_scenario(name: str, settings: list[str], *, as_json: bool, as_geojson: bool) -> None:
+    scenario = load_scenario(name, settings)
+    surveys = planned_surveys(scenario)
+    if as_json:
+        typer.echo(json.dumps(plan_as_json(scenario, surveys)))
+    elif as_geojson:
+        typer.echo(json.dumps(plan_as_geojson(scenario, surveys)))
+    else:
+        typer.echo(plan_as_text(surveys))
+    sys.stderr.writelines(f"{survey.warning}\n" for survey in surveys if survey.warning)
+
+
+def _plan_width(width_m: float, nadir_gap_m: float, lowest_m: float, highest_m: float, *, as_json: bool) -> None:
+    _check(width_m, nadir_gap_m, lowest_m, highest_m)
+    choice = adapt_range(width_m, nadir_gap_m, lowest_m, highest_m)
+    offsets_m = track_offsets(width_m, nadir_gap_m, choice.range_m)
     if as_json:
         typer.echo(json.dumps({"r_adpt_m": choice.range_m, "tracks": choice.tracks, "offsets_m": offsets_m}))
     else:

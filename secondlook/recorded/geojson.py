@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,10 @@ LOCAL_DECIMALS, DEGREE_DECIMALS = 2, 7  # a centimetre
 PATH_STEP_M = 0.5  # how far a simplified path may lie off the positions that were told
 
 
+Features = Iterable[tuple[BaseGeometry, dict[str, Any]]]
+"""Geometries of the mission frame, and the properties of each."""
+
+
 def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None) -> dict[str, Any]:
     """A FeatureCollection; each feature's property `kind` is area, track, path, hotspot or strip.
 
@@ -27,6 +31,11 @@ def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None)
     """
     if origin is None and "origin" in mission.scenario:
         origin = GeographicOrigin(**mission.scenario["origin"])
+    return collection(_features(mission), origin)
+
+
+def collection(features: Features, origin: GeographicOrigin | None) -> dict[str, Any]:
+    """A FeatureCollection as `to_geojson` tells; what is empty is left out."""
     frame = LOCAL_FRAME
     if origin is not None:
         place = f"latitude {origin.latitude_deg:.7f}, longitude {origin.longitude_deg:.7f}"
@@ -36,7 +45,7 @@ def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None)
         "frame": frame,
         "features": [
             {"type": "Feature", "geometry": drawn(geometry, origin), "properties": properties}
-            for geometry, properties in _features(mission)
+            for geometry, properties in features
             if not geometry.is_empty
         ],
     }

@@ -13,11 +13,13 @@ from regions import regions
 from planner import convex_parts as cutting
 from planner.convex_parts import SHALLOW_M, convex_parts
 from planner.first_plan import best_heading, first_plan, parts_in_order
+from planner.footprint import LookGeometry, look_on_grid
 from planner.part_order import in_order
 from planner.region import Region
 from planner.seen import seen_cells
 from planner.spacing import adapt_range, track_count, track_offsets
-from planner.types import Point, Track
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
+from planner.types import BoolArray, GridSpec, Point, Track
 
 headings = st.floats(0, 2 * math.pi)
 sonars = st.tuples(st.integers(0, 40), st.integers(0, 60)).map(lambda one: (one[0], max(20, 3 * one[0] + one[1])))
@@ -75,6 +77,36 @@ class TestCoverage:
                 assert told[row, column] == any(seen(track, (float(x_m), float(y_m)), *sonar) for track in tracks)
 
 
+class TestLooks:
+    """The planner's claim against looks, put on the grid as an agent puts them there."""
+
+    @settings(max_examples=20)
+    @given(regions(), headings, sonars, st.booleans())
+    def test_no_cell_that_is_told_covered_is_left_without_a_look(
+        self, region: Region, heading_rad: float, sonar: tuple[int, int], fixed: bool
+    ) -> None:
+        tracks = first_plan(
+            region, heading_rad, *sonar, (FixedSpacing if fixed else AdaptiveSpacing)(*sonar)
+        ).all_tracks
+        grid = region.about(heading_rad).grid(17)
+        told = seen_cells(grid, tracks, *sonar)
+        assert (told | ~region.inside(grid)).all()
+        assert not (told & ~looked_at(grid, tracks, *sonar)).any()
+
+
+def looked_at(grid: GridSpec, tracks: list[Track], nadir_gap_m: int, range_m: int) -> BoolArray:
+    """Cells that get a P_d from looks of 20 m, in bins of 5 m by 1 m, that see from the nadir gap to the range."""
+    p_detect = np.zeros((2, 4, range_m + 1))
+    p_detect[:, :, nadir_gap_m:] = 0.5
+    looked = np.zeros(grid.shape, dtype=np.bool_)
+    for track in tracks:
+        for look in range(math.ceil(track.length_m / 20)):
+            geometry = LookGeometry(track.start, track.heading_rad, 20.0 * look, 5.0, 1.0, 4, range_m + 1)
+            rows, columns, seen_p = look_on_grid(grid, geometry, p_detect)
+            looked[rows, columns] |= seen_p > 0
+    return looked
+
+
 class TestTracks:
     @settings(max_examples=25)
     @given(regions(), headings, sonars)
@@ -87,6 +119,17 @@ class TestTracks:
             assert all(track.length_m <= part.length_m + 1e-6 for track in tracks)
         numbers = [track.number for tracks in plan.tracks for track in tracks]
         assert numbers == list(range(1, plan.track_count + 1))
+
+    @settings(max_examples=25)
+    @given(regions(holes=False), headings, sonars)
+    def test_a_convex_area_takes_no_more_than_the_rectangle_of_its_width(
+        self, region: Region, heading_rad: float, sonar: tuple[int, int]
+    ) -> None:
+        hull = region.about(heading_rad)
+        plan = first_plan(Region(hull.vertices), heading_rad, *sonar)
+        box = [(0.0, 0.0), (hull.width_m, 0.0), (hull.width_m, hull.length_m), (0.0, hull.length_m)]
+        assert plan.track_count <= first_plan(Region(tuple(box)), 0.0, *sonar).track_count
+        assert len(plan.parts) == 1
 
     def test_of_the_published_area(self) -> None:
         plan = first_plan(RECTANGLE, 0, 40, 145)
@@ -130,6 +173,12 @@ class TestParts:
         for polygon in polygons:
             assert polygon.difference(region.polygon.buffer(0.01)).buffer(-0.51 * SHALLOW_M).is_empty
         assert {part.track_heading_rad for part in parts} == {parts[0].track_heading_rad}
+
+    @pytest.mark.parametrize("off_rad", [-5e-7, -3e-7, 0.0, 4e-7])
+    def test_a_heading_told_in_microradians_takes_no_track_more(self, off_rad: float) -> None:
+        # One side of one track sees 145 - 40 = 105 m; turned by so little the area is 0.4 mm wider.
+        region = Region(((0.0, 0.0), (900.0, 0.0), (900.0, 105.0), (0.0, 105.0)))
+        assert first_plan(region, math.pi / 2 + off_rad, 40, 145).track_count == 1
 
 
 class TestCoastOfManyCorners:

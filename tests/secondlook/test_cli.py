@@ -65,6 +65,96 @@ def test_plan_refuses_bad_numbers_in_one_sentence(
     assert secondlook(*arguments) == (2, "", f"{expected}\n")
 
 
+def test_plan_of_a_scenario_lays_its_tracks_in_the_sweep_frame(secondlook: SecondLook) -> None:
+    code, out, err = secondlook("plan", "tellaro")
+    assert (code, err) == (0, "")
+    first, frame, *tracks = out.splitlines()
+    assert first.startswith("primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered; ")
+    assert frame == (
+        "part 1: 1212 m across, 400 m along, spaced for 138 m; sweep frame at (0.0, 0.0), heading 0 degrees"
+    )
+    assert tracks[1] == ("  track  2  at   236.0 m across: (236.0, 400.0) to (236.0, 0.0), 400 m along 180 degrees")
+    assert len(tracks) == 7
+
+
+def test_plan_of_a_scenario_takes_any_area_heading_and_spacing(secondlook: SecondLook) -> None:
+    settings = (
+        "area.polygon_m=[[0, 0], [1212, 0], [606, 400]]",
+        "area.track_heading_deg=90",
+        "vehicles.primary.spacing=fixed",
+    )
+    code, out, err = secondlook("plan", "tellaro", "--json", *(word for one in settings for word in ("--set", one)))
+    assert (code, err) == (0, "")
+    (survey,) = json.loads(out)["surveys"]
+    # Tracks east are laid from the north, 400 m across: a pair for 145 m is pulled in to end with the area.
+    (part,) = survey["parts"]
+    assert part["frame"] == {"origin_m": [0, 400], "heading_deg": 90}
+    assert (part["r_adpt_m"], part["width_m"], part["length_m"]) == (145, 400, 1212)
+    assert [track["across_m"] for track in part["tracks"]] == [145, 250, 255]
+    assert (survey["tracks"], survey["turns"], survey["uncovered_share"]) == (3, 2, 0)
+    for track in part["tracks"]:
+        assert track["start_m"][1] == track["end_m"][1] == 400 - track["across_m"]
+
+
+def test_plan_of_a_scenario_as_geojson_lies_where_the_scenario_does(secondlook: SecondLook) -> None:
+    origin = ("--set", "origin={latitude_deg: 44, longitude_deg: 10}")
+    for settings, east in (((), (0, 1300)), (origin, (10, 10.02))):
+        code, out, err = secondlook("plan", "headland", "--geojson", *settings)
+        assert (code, err) == (0, "")
+        features = json.loads(out)["features"]
+        kinds = [feature["properties"]["kind"] for feature in features]
+        assert (kinds.count("area"), kinds.count("part"), kinds.count("track")) == (1, 7, 10)
+        assert all(
+            east[0] <= x <= east[1]
+            for f in features
+            if f["geometry"]["type"] == "LineString"
+            for x, _ in f["geometry"]["coordinates"]
+        )
+
+
+def test_a_survey_that_outlasts_its_battery_is_told(
+    secondlook: SecondLook, write: Callable[[str], str], valid_text: str
+) -> None:
+    # Three tracks of 400 m take 800 s; with the way to the first and two turns it is more than 900.
+    name = write(valid_text.replace("endurance_s: 36000", "endurance_s: 900"))
+    told = re.compile(r"primary: its survey takes (\d+) s, longer than its endurance_s of 900\n")
+    for command in ("check", "plan"):
+        code, _, err = secondlook(command, name)
+        match = told.fullmatch(err)
+        assert code == 0
+        assert match is not None
+        assert int(match[1]) > 900
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ((), "secondlook plan needs a scenario, or --width, --nadir and --range\n"),
+        (("--width", "100"), "secondlook plan needs a scenario, or --width, --nadir and --range\n"),
+        (
+            ("tellaro", "--nadir", "40"),
+            "--nadir: is not allowed with a scenario, which says what is surveyed and how\n",
+        ),
+        (("--geojson",), "--geojson: must go with a scenario\n"),
+        (("--set", "seed=1"), "--set: must go with a scenario\n"),
+        (("tellaro", "--json", "--geojson"), "--geojson: is not allowed with --json; one form at a time\n"),
+        (
+            ("tellaro", "--set", "vehicles.primary.spacing=stubborn_spacing:Stubborn"),
+            "stubborn_spacing:Stubborn has failed to lay tracks: RuntimeError: not today\n",
+        ),
+    ],
+)
+def test_plan_refuses_what_does_not_go_together(
+    secondlook: SecondLook, arguments: tuple[str, ...], expected: str
+) -> None:
+    assert secondlook("plan", *arguments) == (2, "", expected)
+
+
+def test_check_counts_of_a_share_of_the_area_what_is_its_own(secondlook: SecondLook) -> None:
+    _, out, _ = secondlook("check", "wide")
+    assert [line.split("; ")[-1] for line in out.splitlines()[1:]] == ["up to 145 m all is covered"] * 3
+
+
 def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
     expected = (
         "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
@@ -86,7 +176,9 @@ def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook
 
 def test_check_tells_what_a_plan_cannot_cover(secondlook: SecondLook, monkeypatch: pytest.MonkeyPatch) -> None:
     # One track fewer: the last one's 90 m, but for what its neighbours see.
-    monkeypatch.setattr("planner.first_plan.track_offsets", lambda *told: track_offsets(*told)[:-1])
+    monkeypatch.setattr(
+        "planner.spacing_planners.track_offsets", lambda *told, **covered: track_offsets(*told, **covered)[:-1]
+    )
     _, out, _ = secondlook("check", "tellaro")
     share = re.search(r"6 tracks .* up to 145 m (\d\.\d\d)% is not covered", out)
     assert share is not None

@@ -27,7 +27,7 @@ from secondlook.scenario.bundled import curve, scenario_text
 from secondlook.scenario.dialect import dump
 from secondlook.scenario.overrides import override
 from secondlook.scenario.reader import read, read_value
-from secondlook.survey_area import first_plans, track_heading_rad
+from secondlook.survey_area import plan_for, track_heading_rad
 
 Write = Callable[[str | bytes], str]
 BUNDLED = [name for name, _ in bundled_scenarios()]
@@ -97,8 +97,7 @@ def test_the_headland_is_concave_has_a_hole_and_leaves_the_heading_to_us() -> No
     assert outline.convex_hull.area > 1.1 * outline.area
     assert (len(area.holes_m), area.track_heading_deg) == (1, "auto")
     assert math.degrees(track_heading_rad(scenario)) == pytest.approx(90)
-    (plan,) = first_plans(scenario, math.pi / 2).values()
-    assert len(plan.parts) > 1
+    assert len(plan_for(scenario, "primary", math.pi / 2).parts) > 1
 
 
 def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: str) -> None:
