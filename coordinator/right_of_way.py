@@ -23,9 +23,9 @@ from planner.types import Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
-OFFER_MARGIN_M = 13.0
+OFFER_MARGIN_M = 16.0
 """A way that is offered, or to stand aside, keeps so much farther off: courses are known to a few metres."""
-MARGIN_M = 8.0
+MARGIN_M = 11.0
 """A helper gives way where it would come nearer than the separation and this."""
 DELAYS_S = (0.0, 10.0, 20.0, 30.0)
 """An offer that is clear so much later waits; else another is asked for."""
@@ -223,7 +223,7 @@ class RightOfWay:
     def _complain(self, one: Underway, other: Underway, approach: Approach) -> None:
         if (one.name, other.name) not in self._complained_of:
             self._complained_of.add((one.name, other.name))
-            log.warning(
+            log.debug(
                 "%s will come within %.0f m of %s at %.0f s and has nowhere to go (said once)",
                 *(one.name, approach.distance_m, other.name, approach.time_s),
             )

@@ -34,8 +34,8 @@ class CuttingRules:
     max_strip_m: float
 
     def columns(self, grid: GridSpec) -> int:
-        """Columns of cells whose centres the swath covers, both of its edges included."""
-        return min(grid.columns, math.floor(self.swath_m / grid.cell_m + TOLERANCE) + 1)
+        """Whole columns of cells that the swath covers, at least one."""
+        return min(grid.columns, max(1, math.floor(self.swath_m / grid.cell_m + TOLERANCE)))
 
 
 @dataclass(frozen=True)
@@ -162,8 +162,7 @@ def cut_strips(
 
 
 def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = False) -> Strip:
-    """The rectangle of a window, with its centre line along the grid, up or down the rows; across from the centres of
-    its first column to those of its last, which are what must be seen."""
+    """The rectangle of a window, with its centre line along the grid, up or down the rows."""
     across_m = ((window.first_column + window.end_column - 1) / 2) * grid.cell_m
     heading_rad = grid.frame.heading_rad
     if descending:
@@ -171,7 +170,7 @@ def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = 
     x_m, y_m = grid.frame.to_mission(across_m, (window.end_row if descending else window.first_row) * grid.cell_m)
     start: Point = (float(x_m), float(y_m))
     length_m = (window.end_row - window.first_row) * grid.cell_m
-    width_m = max(1, window.end_column - window.first_column - 1) * grid.cell_m
+    width_m = (window.end_column - window.first_column) * grid.cell_m
     return Strip(number, start, heading_rad, length_m, width_m)
 
 

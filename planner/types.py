@@ -105,10 +105,7 @@ class Track:
 @dataclass(frozen=True)
 class Strip:
     """A rectangle worth a second look: `width_m` wide about a centre line that starts at `start` (mission frame) and
-    runs `length_m` along `heading_rad`. `number` is stable for the strip's life.
-
-    What is to be seen is the centres of its cells: those of its outer columns lie on its long sides.
-    """
+    runs `length_m` along `heading_rad`. `number` is stable for the strip's life."""
 
     number: int
     start: Point

@@ -27,7 +27,7 @@ class Mission(Mapping):
     deadline_factor: Annotated[float, Field(ge=1, le=100)] = 1.05
     time_limit_s: Duration = 20_000.0
     rho: Share = 0.0
-    separation_m: Annotated[float, Field(ge=0, le=1000)] = 15.0
+    separation_m: Annotated[float, Field(ge=0, le=1000)] = 12.0
 
 
 class UniformSeabed(Mapping):

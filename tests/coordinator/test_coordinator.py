@@ -54,10 +54,9 @@ class TestFromHotspotToTask:
         told.hotspot(mean_risk=0.8)
         said = told.settle()
         strip, task, offered = (one.message for one in said)
-        # Centred at (97.5 + 147.5) / 2, the centres of its outer columns 45 m apart; 300 m x 50 m of risk 0.8, of which
-        # 0.7 is removed.
-        assert strip == StripStatus(1, OPEN, 122.5, 50, 0, 300, 45, 0.8 * 0.7 * 15_000, "", "badly seen")
-        assert task == Task(TaskAction.TAKE, 1, 122.5, 50, 0, 300, 45)
+        # Centred at (97.5 + 147.5) / 2; 300 m x 50 m of risk 0.8, of which 0.7 is removed.
+        assert strip == StripStatus(1, OPEN, 122.5, 50, 0, 300, 50, 0.8 * 0.7 * 15_000, "", "badly seen")
+        assert task == Task(TaskAction.TAKE, 1, 122.5, 50, 0, 300, 50)
         assert isinstance(offered, StripStatus)
         assert (offered.state, offered.vehicle, offered.revision) == (OFFERED, HELPER, 2)
 

@@ -17,7 +17,7 @@ GRID = GridSpec(SweepFrame(0, 0, 0), 5, 40, 60)  # 200 m across, 300 m along
 INSIDE: BoolArray = np.ones(GRID.shape, dtype=np.bool_)
 UP = PlannedTrack(1, 100, 100, 0, 100, 300, False)
 DOWN = PlannedTrack(1, 100, 100, 300, 100, 0, False)
-RULES = CuttingRules(swath_m=45, p_detect=0.7, worth_risk=0.25, overhead_m=40, min_strip_m=30, max_strip_m=400)
+RULES = CuttingRules(swath_m=50, p_detect=0.7, worth_risk=0.25, overhead_m=40, min_strip_m=30, max_strip_m=400)
 
 
 def layer(settled: BoolArray) -> VehicleLayer:

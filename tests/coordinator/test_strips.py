@@ -17,7 +17,7 @@ from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
 
 EAST = SweepFrame(0, 0, 0)
 GRID = GridSpec(EAST, 5, 40, 60)  # 200 m across, 300 m along
-RULES = CuttingRules(swath_m=45, p_detect=0.7, worth_risk=0.25, overhead_m=40, min_strip_m=30, max_strip_m=400)
+RULES = CuttingRules(swath_m=50, p_detect=0.7, worth_risk=0.25, overhead_m=40, min_strip_m=30, max_strip_m=400)
 NONE_OPEN: BoolArray = np.zeros(GRID.shape, dtype=np.bool_)
 
 
@@ -42,8 +42,7 @@ def value(one: Cut, rules: CuttingRules, grid: GridSpec = GRID) -> float:
 class TestByHand:
     def test_a_band_narrower_than_the_swath_gives_one_strip_centred_on_it(self) -> None:
         cuts = cut(hot(np.s_[10:40, 15:19]))
-        # 4 columns about 16.5; the swath of 45 m has the centres of 10 columns: 12 to 21. 30 x 4 cells of 25 m2, of
-        # which 0.7 is removed.
+        # 4 columns about 16.5; the swath has 10 columns: 12 to 21. 30 x 4 cells of 25 m2, of which 0.7 is removed.
         assert [one.window for one in cuts] == [Window(10, 40, 12, 22)]
         assert cuts[0].removable_m2 == pytest.approx(120 * 25 * 0.7)
 
@@ -165,7 +164,7 @@ rules_of_all_kinds = st.builds(
 
 def best_by_brute_force(risk: FloatArray, rules: CuttingRules) -> float:
     """The value of the best rectangle as wide as the swath, of any length."""
-    width = round(rules.swath_m / SMALL.cell_m) + 1
+    width = round(rules.swath_m / SMALL.cell_m)
     return max(
         value(Cut(window, risk[window.cells].sum() * rules.p_detect * SMALL.cell_area_m2), rules, SMALL)
         for column in range(SMALL.columns - width + 1)
@@ -182,7 +181,7 @@ class TestEveryMap:
         rules = replace(rules, min_strip_m=5, max_strip_m=400)
         cuts = cut_strips(SMALL, risk, np.zeros(SMALL.shape, dtype=np.bool_), rules)
         best = best_by_brute_force(risk, rules)
-        fixed = rules.worth_risk * rules.p_detect * (rules.swath_m + 5) * rules.overhead_m
+        fixed = rules.worth_risk * rules.p_detect * rules.swath_m * rules.overhead_m
         if cuts:
             assert value(cuts[0], rules, SMALL) == pytest.approx(best)
         assert bool(cuts) == (best > fixed + 1e-9) or abs(best - fixed) < 1e-9
@@ -208,14 +207,14 @@ class TestEveryMap:
         self, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules
     ) -> None:
         before = risk.copy()
-        width = round(rules.swath_m / 5) + 1
+        width = round(rules.swath_m / 5)
         for one in cut_strips(SMALL, risk, open_cells, rules):
             window = one.window
             assert 0 <= window.first_row < window.end_row <= SMALL.rows
             assert 0 <= window.first_column < window.end_column <= SMALL.columns
             assert window.end_column - window.first_column == width
             assert rules.min_strip_m <= (window.end_row - window.first_row) * 5 <= rules.max_strip_m
-            fixed = rules.worth_risk * rules.p_detect * (rules.swath_m + 5) * rules.overhead_m
+            fixed = rules.worth_risk * rules.p_detect * rules.swath_m * rules.overhead_m
             assert value(one, rules, SMALL) > fixed
         assert (risk == before).all()
 
@@ -225,7 +224,7 @@ class TestStripOf:
         strip = strip_of(GRID, Window(10, 40, 12, 22), 7)
         # Columns 12 to 21 are centred at 60 to 105 m; rows 10 to 39 lie from 50 to 200 m.
         assert (strip.number, strip.start, strip.end) == (7, (82.5, 50), (82.5, 200))
-        assert (strip.length_m, strip.width_m, strip.heading_rad) == (150, 45, 0)
+        assert (strip.length_m, strip.width_m, strip.heading_rad) == (150, 50, 0)
 
     @pytest.mark.parametrize("heading_deg", [30, 90, 200, 359])
     def test_on_a_rotated_grid_it_holds_the_centres_of_its_cells_and_no_others(self, heading_deg: float) -> None:
@@ -234,7 +233,7 @@ class TestStripOf:
         strip = strip_of(grid, window, 1)
         x_m, y_m = grid.frame.to_mission(*np.meshgrid(grid.across_m, grid.along_m))
         across, along = SweepFrame(*strip.start, strip.heading_rad).to_sweep(x_m, y_m)
-        within = (np.abs(across) < strip.width_m / 2 + 1e-6) & (along > 0) & (along < strip.length_m)
+        within = (np.abs(across) < strip.width_m / 2) & (along > 0) & (along < strip.length_m)
         expected = np.zeros(grid.shape, dtype=np.bool_)
         expected[window.cells] = True
         assert (within == expected).all()

@@ -34,7 +34,7 @@ class TestMissions:
         assert_kept_apart(flight)
         assert_no_strip_lost(flight)
         told = flight.summary["separation"]
-        assert told["least_m"] == 15
+        assert told["least_m"] == 12
         assert told["pairs_closer"] == 0
         assert told["closest"][0]["closest_m"] == pytest.approx(flight.closest[0].closest_m, abs=0.01)
 
@@ -43,7 +43,7 @@ class TestMissions:
         flight = fleet.run()
         assert_kept_apart(flight)
         with pytest.raises(AssertionError, match=r"came within \d+\.\d m of each other at \d+\.\d{3} s"):
-            assert_kept_apart(flight, 15)
+            assert_kept_apart(flight, 12)
         with pytest.raises(UserError, match="separation_m: nan is not allowed"):
             assert_kept_apart(flight, math.nan)
 

@@ -81,7 +81,7 @@ class TestEveryMission:
         assert done == {(s.vehicle, number) for number, s in last.items() if s.state is StripState.DONE}
 
     def test_a_strip_is_with_one_vehicle_at_a_time_and_a_vehicle_with_one_strip(self, mission: Flown) -> None:
-        assert {task.action for _, task in mission.all(Task)} == {TaskAction.TAKE}
+        assert TaskAction.TAKE in {task.action for _, task in mission.all(Task)}
         serving: dict[str, int] = {}
         for received, status in mission.all(TaskStatus):
             if status.state is TaskState.ACCEPTED:
@@ -95,8 +95,9 @@ class TestEveryMission:
         assert serving == {}
 
     def test_a_helper_hardly_ever_waits_while_a_strip_is_open(self, mission: Flown) -> None:
-        # The plan lets a helper wait only for what is about to settle and is better: one of two waits for 7 % of the
-        # mission at its begin, as its shortest way onto the first strips is against the survey's wake.
+        # The plan lets a helper wait only for what is about to settle and is better. One of two waits longer: where its
+        # shortest way onto a strip is against the survey's wake, until all of the strip has settled.
+        most_share = 0.05 if "second" not in mission.nodes else 0.2
         before_ms, waits, waited_ms = 0, False, 0
         free_since: dict[str, int] = {}
         strips: dict[int, StripStatus] = {}
@@ -122,7 +123,7 @@ class TestEveryMission:
             waited_ms += now_ms - before_ms if waits else 0
             before_ms, waits = now_ms, math.isfinite(free_ms) and math.isfinite(open_ms)
         assert held > 10
-        assert waited_ms <= 0.08 * mission.result.mission_ms
+        assert waited_ms <= most_share * mission.result.mission_ms
         assert mission.summary["hotspots"]["first_published_s"] < 0.2 * mission.summary["primary_s"]
 
     def test_the_helper_never_makes_it_worse(self, mission: Flown) -> None:
@@ -191,15 +192,16 @@ class TestABadLink:
         assert mission.summary["risk"]["mean"] < mission.summary["risk_primary_alone"]["mean"] - 0.02
 
     def test_a_helper_cut_off_in_mid_strip_goes_on_with_it_when_it_is_heard_again(self) -> None:
-        cut_off = Faults(5, cut_offs=[CutOff("helper", 250_000, 350_000)])
+        cut_off = Faults(5, cut_offs=[CutOff("helper", 900_000, 960_000)])
         mission = fly_scenario(load_scenario("tellaro", HALF_THE_AREA, 1), cut_off)
-        assert {task.action for _, task in mission.all(Task)} == {TaskAction.TAKE}
         reasons = [status.reason for _, status in mission.all(StripStatus)]
         assert "helper is lost: nothing heard of it" in reasons
         assert "helper is at it after all" in reasons
         taken = [status.strip for _, status in mission.all(TaskStatus) if status.state is TaskState.ACCEPTED]
-        assert len(set(taken)) == len(taken)
-        assert mission.summary["hotspots"]["revisited"] >= len(taken) - 1
+        given_back = {status.strip for _, status in mission.all(TaskStatus) if status.state is TaskState.GIVEN_BACK}
+        once = [number for number in taken if number not in given_back]
+        assert len(set(once)) == len(once)
+        assert mission.summary["hotspots"]["revisited"] >= len(once) - 1 > 2
 
 
 def alone(*overrides: str) -> Flown:

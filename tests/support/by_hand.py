@@ -42,7 +42,7 @@ def vehicle(name: str, role: Role) -> RosterVehicle:
     """A vehicle of the fleet: a helper sees 25 m to either side with P_d 0.7."""
     if role is Role.SURVEY:
         return RosterVehicle(name, role, SPEED_MPS, 20, 20, 40, 131, 0.49, 36_000_000)
-    return RosterVehicle(name, role, 2.0, 6, 5, 0, 22.5, 0.7, 14_400_000)
+    return RosterVehicle(name, role, 2.0, 6, 5, 0, 25, 0.7, 14_400_000)
 
 
 FLEET = (vehicle(PRIMARY, Role.SURVEY), vehicle(HELPER, Role.REVISIT))

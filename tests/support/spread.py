@@ -16,8 +16,6 @@ from typing import Any
 
 from flights import BRIEF, until
 
-from comms.codec import decode
-from comms.messages import CoverageTile
 from comms.topics import TOPICS, Keep, topic_of
 from secondlook.mission_files import read_messages
 
@@ -131,15 +129,9 @@ def lost_of_what_is_kept(fleet: SpreadFleet) -> dict[str, int]:
     """By topic, what of that which is kept for whoever has missed it the recorder has not got in the end."""
     said = Counter(fleet.summary["messages"])
     heard = Counter[str]()
-    newest_tile = Counter[str]()
-    for key, payload in read_messages(fleet.record / "messages.mpk"):
+    for key, _ in read_messages(fleet.record / "messages.mpk"):
         found = topic_of(key)
         assert found is not None
-        topic, vehicle = found
-        heard[topic.name] += 1
-        message = decode(payload, topic.message)[1]
-        if isinstance(message, CoverageTile):
-            newest_tile[vehicle] = max(newest_tile[vehicle], message.version)
+        heard[found[0].name] += 1
     lost = {topic.name: said[topic.name] - heard[topic.name] for topic in TOPICS if topic.keep is Keep.EVENTS}
-    lost["coverage"] = said["coverage"] - newest_tile.total()  # each tile that is published has the next version
     return {name: count for name, count in lost.items() if count}
