@@ -44,7 +44,7 @@ class _Watcher:
 def fly(scenario: str, seed: int) -> tuple[FloatArray, BoolArray]:
     """One mission: of each target its predicted risk, and whether it was missed."""
     fleet, watcher = build_fleet(load_scenario(scenario, (), seed), record=False), _Watcher()
-    nodes = {node_id: spec.make() for node_id, spec in fleet.specs.items()}
+    nodes = {node_id: spec.make for node_id, spec in fleet.specs.items()}
     run_local(Routing(fleet.roster), nodes, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
     return watcher.metrics.targets_met()
 
