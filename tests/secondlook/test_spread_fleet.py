@@ -69,7 +69,7 @@ def test_ctrl_c_ends_one_process_alone(fleet: SpreadFleet) -> None:
     assert recorder.ends() == 1
     assert recorder.said == "recorder: interrupted at 0 s of the mission; what was recorded is in record\n"
     assert fleet.summary["ending"] == "interrupted"
-    assert router.says("recorder is gone")
+    assert router.says("recorder is gone"), router.said
     interrupt(router)
     assert router.ends() == 1
     assert router.said.endswith("interrupted; the others go on, and connect again when it is back\n")
