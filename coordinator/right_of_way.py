@@ -15,10 +15,10 @@ from itertools import product
 
 from coordinator.courses import STEP_S, Course
 from coordinator.separation import Approach, too_close
-from coordinator.service import Sweep
 from coordinator.situation import Helper, OpenStrip
 from coordinator.traffic import Traffic
 from coordinator.vehicles import KnownVehicle
+from planner.sweep import Sweep
 from planner.types import Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")

@@ -2,28 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import pairwise
 
 from coordinator.situation import Helper, OpenStrip
-from planner.dubins import Pose, shortest_path
-from planner.sweep import LENGTH_TOLERANCE_M, legs_over_strip, shifted, ways_over
+from planner.dubins import Pose
+from planner.sweep import Sweep, shortest_sweep, sweeps_over
 from planner.types import Strip
-
-
-@dataclass(frozen=True)
-class Sweep:
-    """A way to fly a strip's legs: from `entry`, where the first run-in begins, to `leave`, where the last run-out
-    ends. `length_m`: of all that, turns from leg to leg included. `follows`: it is one leg, the strip's way. `legs`:
-    where each leg's run-in begins and where its run-out ends."""
-
-    entry: Pose
-    leave: Pose
-    length_m: float
-    follows: bool
-    legs: tuple[tuple[Pose, Pose], ...]
 
 
 @dataclass(frozen=True)
@@ -44,26 +28,14 @@ class Service:
 
 def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
     """The ways in which a helper may fly a strip."""
-    return _sweeps(strip, helper.swath_m, helper.turn_radius_m, helper.run_in_m)
+    return sweeps_over(strip, helper.swath_m, helper.turn_radius_m, helper.run_in_m)
 
 
 def service(one: OpenStrip, helper: Helper) -> Service:
-    """The service of a strip from where and when a helper is free, flown the way its agent takes: see
-    `cheapest_sweep`. Where the strip is still settling the helper sets out as late as it must."""
-    sweep, way_m = cheapest_sweep(one.strip, helper)
+    """The service of a strip from where and when a helper is free, flown the shortest way, which its agent takes. Where
+    the strip is still settling the helper sets out as late as it must."""
+    sweep, way_m = shortest_sweep(sweeps(one.strip, helper), helper.free_at, helper.turn_radius_m)
     return timed(one, sweep, way_m, helper)
-
-
-def cheapest_sweep(strip: Strip, helper: Helper) -> tuple[Sweep, float]:
-    """The sweep that is shortest with the way there from where a helper is free, of equals the strip's own, and the
-    length of that way in metres."""
-    best, best_m = None, math.inf
-    for sweep in sweeps(strip, helper):
-        way_m = shortest_path(helper.free_at, sweep.entry, helper.turn_radius_m).length_m
-        if way_m + sweep.length_m < best_m - LENGTH_TOLERANCE_M:
-            best, best_m = sweep, way_m + sweep.length_m
-    assert best is not None
-    return best, best_m - best.length_m
 
 
 def timed(one: OpenStrip, sweep: Sweep, way_m: float, helper: Helper) -> Service:
@@ -89,17 +61,3 @@ def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: floa
     if served.ends_s > helper.lasts_until_s:
         return 0.0
     return helper.p_detect * one.risk_m2 * served.share_by(deadline_s)
-
-
-@lru_cache(maxsize=10_000)
-def _sweeps(strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float) -> tuple[Sweep, ...]:
-    found = []
-    for way in ways_over(legs_over_strip(strip, swath_m)):
-        legs = [
-            (shifted(leg.start, leg.heading_rad, -run_in_m), shifted(leg.end, leg.heading_rad, run_in_m)) for leg in way
-        ]
-        flown_m = sum(leg.length_m + 2 * run_in_m for leg in way)
-        turns_m = sum(shortest_path(one[1], other[0], turn_radius_m).length_m for one, other in pairwise(legs))
-        follows = len(way) == 1 and way[0].start == strip.start
-        found.append(Sweep(legs[0][0], legs[-1][1], flown_m + turns_m, follows, tuple(legs)))
-    return tuple(found)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 from comms.messages import Mode
 from coordinator.courses import Course, course, lying_still, run_out_left_m, straight, survey_course, sweep_course
-from coordinator.service import Sweep, cheapest_sweep
-from coordinator.situation import Helper
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose, shortest_path
+from planner.sweep import Sweep, shortest_sweep, sweeps_over
 from planner.types import Point, Strip
 
 LAID_ANEW_S = 600.0
@@ -57,7 +56,7 @@ class Traffic:
         """The course of a free helper that sets out to a strip now, and how it sweeps it."""
         pose, start_s = self._here(vehicle, now_s)
         entry = vehicle.entry
-        sweep = cheapest_sweep(strip, _helper_at(vehicle, pose))[0]
+        sweep = _sweep_from(pose, vehicle, strip)
         return sweep_course(pose, start_s, entry.speed_mps, entry.turn_radius_m, sweep), sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
@@ -106,7 +105,7 @@ class Traffic:
         if known is None or known.strip != strip or known.stage < stage:
             pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
             same = known is not None and known.strip == strip and stage == 2
-            sweep = known.sweep if known and same else cheapest_sweep(strip, _helper_at(vehicle, pose))[0]
+            sweep = known.sweep if known and same else _sweep_from(pose, vehicle, strip)
             laid = sweep_course(
                 pose, heard_s, entry.speed_mps, entry.turn_radius_m, sweep, entered=known is not None and same
             )
@@ -139,20 +138,8 @@ def _arrival(pose: Pose, place: Point) -> Pose:
     return Pose(*place, math.atan2(place[0] - pose.x_m, place[1] - pose.y_m) % (2 * math.pi))
 
 
-def _helper_at(vehicle: KnownVehicle, pose: Pose) -> Helper:
-    """A helper as far as its ways over a strip hang on it."""
+def _sweep_from(pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
+    """How a helper sweeps a strip that it sets out to from a pose."""
     entry = vehicle.entry
-    return Helper(
-        vehicle=entry.vehicle,
-        pose=pose,
-        free_at=pose,
-        free_s=0.0,
-        task=None,
-        speed_mps=entry.speed_mps,
-        turn_radius_m=entry.turn_radius_m,
-        run_in_m=entry.run_in_m,
-        swath_m=entry.strip_width_m,
-        p_detect=entry.p_detect,
-        lasts_until_s=math.inf,
-        refused=frozenset(),
-    )
+    sweeps = sweeps_over(strip, entry.strip_width_m, entry.turn_radius_m, entry.run_in_m)
+    return shortest_sweep(sweeps, pose, entry.turn_radius_m)[0]

@@ -1,14 +1,54 @@
-"""The revisit sweep: legs over a strip, and how to fly them from where one is."""
+"""The revisit sweep: legs over a strip, the ways to fly them, and which is the shortest from where one is."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+from typing import NamedTuple
 
 from planner.dubins import Pose, shortest_path
 from planner.types import Point, Strip, SweepFrame, Track
 
 LENGTH_TOLERANCE_M = 1e-6
+
+
+class Run(NamedTuple):
+    """A leg with its run-in and run-out: where the one begins and the other ends."""
+
+    begin: Pose
+    end: Pose
+
+    @property
+    def length_m(self) -> float:
+        """From the run-in's beginning to the run-out's end."""
+        return math.dist(self.begin[:2], self.end[:2])
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """A way to fly a strip's legs, which are numbered from 1 in the order of flying.
+
+    `length_m`: from the first leg's run-in to the last one's run-out, turns included. `follows`: it is one leg, the
+    strip's way.
+    """
+
+    legs: tuple[Track, ...]
+    runs: tuple[Run, ...]
+    length_m: float
+    follows: bool
+
+    @property
+    def entry(self) -> Pose:
+        """Where the first run-in begins."""
+        return self.runs[0].begin
+
+    @property
+    def leave(self) -> Pose:
+        """Where the last run-out ends."""
+        return self.runs[-1].end
 
 
 def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list[Track]:
@@ -34,46 +74,61 @@ def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list
     return legs
 
 
-def cheapest_entry(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> tuple[list[Track], float]:
-    """The legs in the order and direction that is shortest from `pose`, and the whole distance in metres.
+@lru_cache(maxsize=10_000)
+def sweeps_over(
+    strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float, beside_m: float = 0.0
+) -> tuple[Sweep, ...]:
+    """The ways to fly the legs over a strip (see `legs_over_strip`): in sequence from the first or from the last, in
+    their directions or all turned round.
 
-    The legs are kept in sequence, from the first or from the last, and in their directions or all turned round; of ways
-    equally long the first in this sentence is taken. They are numbered from 1 in the order of flying. Each is entered
-    straight for `run_in_m` >= 0, and left so where another follows. Raises ValueError where there are no legs, or the
-    run-in or the turn radius is not finite or out of its range.
+    Each leg is entered and left straight for `run_in_m` >= 0. Raises ValueError where the run-in, or the turn
+    radius where there are turns, is not finite or out of its range.
     """
-    if not legs:
-        raise ValueError("a sweep has at least one leg")
     if not (math.isfinite(run_in_m) and run_in_m >= 0):
         raise ValueError(f"the run-in must be finite and 0 or more, not {run_in_m} m")
-    best, best_m = legs, math.inf
-    for way in ways_over(legs):
-        distance_m = distance_over(way, pose, turn_radius_m, run_in_m)
-        if distance_m < best_m - LENGTH_TOLERANCE_M:
-            best, best_m = way, distance_m
-    return [replace(leg, number=number) for number, leg in enumerate(best, start=1)], best_m
-
-
-def ways_over(legs: list[Track]) -> list[list[Track]]:
-    """The ways to fly legs in sequence: from the first or from the last, in their directions or all turned round."""
+    legs = legs_over_strip(strip, swath_m, beside_m)
     turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
-    return [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
+    ways = [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
+    found = []
+    for way in ways:
+        runs = tuple(run_over(leg.start, leg.end, run_in_m) for leg in way)
+        numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
+        follows = len(legs) == 1 and way is legs
+        found.append(Sweep(numbered, runs, length_over(runs, turn_radius_m), follows))
+    return tuple(found)
 
 
-def distance_over(legs: list[Track], pose: Pose, turn_radius_m: float, run_in_m: float) -> float:
-    """How far it is, in metres, from `pose` over all legs in their order to the last one's end.
+def shortest_sweep(sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float) -> tuple[Sweep, float]:
+    """The sweep that is shortest with the way there from `pose`, of equals the first, and the length of that way in
+    metres. Raises ValueError where there is none."""
+    best, best_m = None, math.inf
+    for sweep in sweeps:
+        way_m = shortest_path(pose, sweep.entry, turn_radius_m).length_m
+        if way_m + sweep.length_m < best_m - LENGTH_TOLERANCE_M:
+            best, best_m = sweep, way_m + sweep.length_m
+    if best is None:
+        raise ValueError("there is no sweep to choose from")
+    return best, best_m - best.length_m
 
-    Each is entered straight for `run_in_m` >= 0, and left so where another follows. Raises ValueError where the turn
-    radius is not finite and above 0.
-    """
-    total_m = 0.0
-    for index, leg in enumerate(legs):
-        entry = shifted(leg.start, leg.heading_rad, -run_in_m)
-        total_m += shortest_path(pose, entry, turn_radius_m).length_m + run_in_m + leg.length_m
-        if index + 1 < len(legs):
-            total_m += run_in_m
-            pose = shifted(leg.end, leg.heading_rad, run_in_m)
-    return total_m
+
+def run_over(start: Point, end: Point, run_in_m: float) -> Run:
+    """The run over a leg from `start` to `end`."""
+    heading_rad = math.atan2(end[0] - start[0], end[1] - start[1]) % (2 * math.pi)
+    return Run(shifted(start, heading_rad, -run_in_m), shifted(end, heading_rad, run_in_m))
+
+
+def length_over(runs: Sequence[Run], turn_radius_m: float) -> float:
+    """How far it is, in metres, over runs in their order, with the turns between them. Raises ValueError where the turn
+    radius is not finite and above 0."""
+    turns_m = (shortest_path(one.end, other.begin, turn_radius_m).length_m for one, other in pairwise(runs))
+    return sum(run.length_m for run in runs) + sum(turns_m)
+
+
+def distance_over(pose: Pose, runs: Sequence[Run], turn_radius_m: float) -> float:
+    """How far it is, in metres, from a pose over runs in their order to the last one's end; 0 without runs."""
+    if not runs:
+        return 0.0
+    return shortest_path(pose, runs[0].begin, turn_radius_m).length_m + length_over(runs, turn_radius_m)
 
 
 def shifted(point: Point, heading_rad: float, distance_m: float) -> Pose:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from planner.dubins import Pose
 from planner.first_plan import FirstPlan
 from planner.seen import seen_cells
-from planner.sweep import distance_over
+from planner.sweep import distance_over, run_over
 from secondlook.scenario import Scenario, SurveyVehicle
 from secondlook.survey_area import plan_for, region_for, track_heading_rad
 
@@ -61,7 +61,9 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     inside = region.inside(grid)
     missed = inside & ~seen_cells(grid, tracks, vehicle.nadir_gap_m, vehicle.told_range_m)
     start = Pose(vehicle.start.x_m, vehicle.start.y_m, math.radians(vehicle.start.heading_deg))
-    way_m = distance_over(tracks, start, vehicle.turn_radius_m, vehicle.run_in_m)
+    runs = [run_over(track.start, track.end, vehicle.run_in_m) for track in tracks]
+    # The last track's run-out comes after its end.
+    way_m = distance_over(start, runs, vehicle.turn_radius_m) - vehicle.run_in_m
     return PlannedSurvey(
         name, vehicle, heading_rad, plan, float(missed.sum() / max(1, inside.sum())), way_m / vehicle.speed_mps
     )

@@ -8,7 +8,7 @@ from comms.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, Task
 from comms.topics import TASK_STATUS
 from planner.dubins import Pose
 from planner.region import share_within
-from planner.sweep import cheapest_entry, legs_over_strip
+from planner.sweep import shortest_sweep, sweeps_over
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
@@ -111,23 +111,24 @@ class SecondLooks:
         # A sensor that looks to the side can pass on either.
         sides_m = (config.beside_m, -config.beside_m) if config.beside_m else (0.0,)
         ways = [
-            cheapest_entry(legs_over_strip(strip, config.swath_m, side_m), pose, config.turn_radius_m, config.run_in_m)
+            sweep
             for side_m in sides_m
+            for sweep in sweeps_over(strip, config.swath_m, config.turn_radius_m, config.run_in_m, side_m)
         ]
-        ordered, distance_m = min(ways, key=lambda way: way[1])
-        ends_ms = now_ms + round(distance_m / config.speed_mps * 1000)
+        sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
+        ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
         if agent.battery(ends_ms) <= 0.0:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         self.strip = strip
-        self._legs = ordered
-        self._length_m = sum(leg.length_m for leg in ordered)
+        self._legs = list(sweep.legs)
+        self._length_m = sum(leg.length_m for leg in sweep.legs)
         self._swept_m = 0.0
         agent.mode = Mode.TRANSIT
         agent.works_on = strip.number
         agent.expected_end_ms = ends_ms
         self._tell(strip.number, TaskState.ACCEPTED, ends_ms)
-        agent.follow(ordered[0], config.run_in_m)
+        agent.follow(sweep.legs[0], config.run_in_m)
         agent.report_state(now_ms)
 
     def _give_back(self, number: int, now_ms: int) -> None:

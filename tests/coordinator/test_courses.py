@@ -15,9 +15,10 @@ from situations import helper, strip
 from comms.messages import AgentState, Mode, Plan, PlannedTrack, Role
 from coordinator.courses import STEP_S, Course, course, straight, survey_course, sweep_course
 from coordinator.separation import too_close
-from coordinator.service import cheapest_sweep, service
+from coordinator.service import service, sweeps
 from coordinator.situation import OpenStrip
 from planner.dubins import Pose
+from planner.sweep import shortest_sweep
 
 EAST, NORTH, SOUTH = math.pi / 2, 0.0, math.pi
 
@@ -40,7 +41,7 @@ class TestCourses:
 
     def test_a_sweep_ends_when_and_where_its_service_does(self) -> None:
         one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
-        sweep, _ = cheapest_sweep(one, free)
+        sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
         laid = sweep_course(free.pose, 0, free.speed_mps, free.turn_radius_m, sweep)
         served = service(OpenStrip(one, 1), free)
         assert laid.arrives_s == pytest.approx(served.free_s)
@@ -72,7 +73,8 @@ class TestCourses:
     ) -> None:
         speed_mps, radius_m, start_s = moves
         free = helper(x_m=place[0], y_m=place[1], heading_rad=place[2], speed_mps=speed_mps, turn_radius_m=radius_m)
-        laid = sweep_course(free.pose, start_s, speed_mps, radius_m, cheapest_sweep(strip(1), free)[0])
+        sweep, _ = shortest_sweep(sweeps(strip(1), free), free.pose, radius_m)
+        laid = sweep_course(free.pose, start_s, speed_mps, radius_m, sweep)
         steps = [math.dist(one[:2], other[:2]) for one, other in pairwise(laid.poses.tolist())]
         assert max(steps) <= speed_mps * STEP_S + 1e-6
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.dubins import Pose, shortest_path
-from planner.sweep import cheapest_entry, legs_over_strip
+from planner.sweep import Sweep, distance_over, legs_over_strip, run_over, shortest_sweep, sweeps_over
 from planner.types import Strip, Track
 
 NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
@@ -82,9 +82,16 @@ class TestLegsOverStrip:
             legs_over_strip(Strip(1, (0, 0), 0, length_m, width_m), swath_m)
 
 
-class TestCheapestEntry:
+def cheapest(strip: Strip, pose: Pose, turn_radius_m: float, run_in_m: float, swath_m: float) -> tuple[Sweep, float]:
+    """The shortest sweep, and the distance to its last run-out's end."""
+    sweep, way_m = shortest_sweep(sweeps_over(strip, swath_m, turn_radius_m, run_in_m), pose, turn_radius_m)
+    assert way_m + sweep.length_m == pytest.approx(distance_over(pose, sweep.runs, turn_radius_m))
+    return sweep, way_m + sweep.length_m
+
+
+class TestShortestSweep:
     # Legs at 10, 30 and 50 m east, 100 m long; the first runs north.
-    LEGS = legs_over_strip(Strip(1, (30, 0), NORTH, 100, 60), 20)
+    STRIP = Strip(1, (30, 0), NORTH, 100, 60)
 
     @pytest.mark.parametrize(
         ("pose", "first"),
@@ -96,7 +103,8 @@ class TestCheapestEntry:
         ],
     )
     def test_begins_at_the_nearest_end(self, pose: Pose, first: tuple[tuple[float, float], ...]) -> None:
-        ordered, distance_m = cheapest_entry(self.LEGS, pose, 10, 0)
+        sweep, distance_m = cheapest(self.STRIP, pose, 10, 0, 20)
+        ordered = sweep.legs
         assert ordered[0].start == pytest.approx(first[0], abs=1e-9)
         assert ordered[0].end == pytest.approx(first[1], abs=1e-9)
         # 50 m there, three legs and two half circles of 10 m radius.
@@ -105,23 +113,32 @@ class TestCheapestEntry:
         assert [leg.across_m for leg in ordered] == ([10, 30, 50] if first[0][0] == 10 else [50, 30, 10])
 
     def test_goes_straight_before_and_after_legs(self) -> None:
-        ordered, distance_m = cheapest_entry(self.LEGS, Pose(10, -50, NORTH), 10, 30)
-        # The run-in is part of the way there; between two legs it is flown on both sides.
-        assert distance_m == pytest.approx(50 + 300 + 2 * 10 * math.pi + 4 * 30)
-        assert ordered[0].length_m == pytest.approx(100)
-        _, too_near_m = cheapest_entry(self.LEGS[:1], Pose(10, -20, NORTH), 10, 30)
-        _, near_enough_m = cheapest_entry(self.LEGS[:1], Pose(10, -30, NORTH), 10, 30)
-        assert near_enough_m == pytest.approx(130)
-        assert too_near_m > 150
+        sweep, distance_m = cheapest(self.STRIP, Pose(10, -50, NORTH), 10, 30, 20)
+        # The first run-in is part of the way there.
+        assert distance_m == pytest.approx(50 + 300 + 2 * 10 * math.pi + 5 * 30)
+        assert sweep.length_m == pytest.approx(300 + 2 * 10 * math.pi + 6 * 30)
+        assert (*sweep.entry, *sweep.leave) == pytest.approx((10, -30, NORTH, 50, 130, NORTH))
+        assert sweep.legs[0].length_m == pytest.approx(100)
+        one_leg = Strip(1, (10, 0), NORTH, 100, 20)
+        _, too_near_m = cheapest(one_leg, Pose(10, -20, NORTH), 10, 30, 20)
+        _, near_enough_m = cheapest(one_leg, Pose(10, -30, NORTH), 10, 30, 20)
+        assert near_enough_m == pytest.approx(160)
+        assert too_near_m > 180
+
+    def test_one_leg_the_strips_way_follows(self) -> None:
+        one_leg = Strip(1, (10, 0), NORTH, 100, 20)
+        assert [sweep.follows for sweep in sweeps_over(one_leg, 20, 10, 0)] == [True, False]
+        assert cheapest(one_leg, Pose(10, -50, NORTH), 10, 0, 20)[0].follows
+        assert not cheapest(one_leg, Pose(10, 150, SOUTH), 10, 0, 20)[0].follows
+        assert not any(sweep.follows for sweep in sweeps_over(self.STRIP, 20, 10, 0))
 
     @pytest.mark.parametrize("heading_rad", [0.3 * k for k in range(21)])
     def test_of_equal_ways_takes_the_first(self, heading_rad: float) -> None:
         # Where rounding makes one of them shorter, now this and now that.
         x_m, y_m = 123.4, -567.8
-        legs = legs_over_strip(Strip(1, (x_m, y_m), heading_rad, 100, 60), 20)
         behind = Pose(x_m - 100 * math.sin(heading_rad), y_m - 100 * math.cos(heading_rad), heading_rad)
-        ordered, _ = cheapest_entry(legs, behind, 10, 0)
-        assert [leg.across_m for leg in ordered] == [10, 30, 50]
+        sweep, _ = cheapest(Strip(1, (x_m, y_m), heading_rad, 100, 60), behind, 10, 0, 20)
+        assert [leg.across_m for leg in sweep.legs] == [10, 30, 50]
 
     @given(strips, poses, st.floats(2, 40), st.sampled_from([0.0, 15.0]))
     def test_is_the_shortest_of_the_four_ways(
@@ -131,7 +148,7 @@ class TestCheapestEntry:
         turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
 
         def flown_m(way: list[Track]) -> float:
-            total_m, at = -run_in_m, pose  # after the last leg there is none
+            total_m, at = 0.0, pose
             for leg in way:
                 run_in = run_in_m * math.sin(leg.heading_rad), run_in_m * math.cos(leg.heading_rad)
                 enter = Pose(leg.start[0] - run_in[0], leg.start[1] - run_in[1], leg.heading_rad)
@@ -139,7 +156,8 @@ class TestCheapestEntry:
                 at = Pose(leg.end[0] + run_in[0], leg.end[1] + run_in[1], leg.heading_rad)
             return total_m
 
-        ordered, distance_m = cheapest_entry(legs, pose, turn_radius_m, run_in_m)
+        sweep, distance_m = cheapest(strip, pose, turn_radius_m, run_in_m, 30)
+        ordered = list(sweep.legs)
         assert distance_m == pytest.approx(min(map(flown_m, (legs, legs[::-1], turned, turned[::-1]))))
         assert distance_m == pytest.approx(flown_m(ordered))
         assert {frozenset((leg.start, leg.end)) for leg in ordered} == {frozenset((leg.start, leg.end)) for leg in legs}
@@ -147,11 +165,15 @@ class TestCheapestEntry:
         for first, second in itertools.pairwise(ordered):
             assert math.dist(first.end, second.start) == pytest.approx(strip.width_m / len(legs))
 
-    def test_refuses_no_legs_and_lengths_out_of_range(self) -> None:
-        with pytest.raises(ValueError, match="at least one leg"):
-            cheapest_entry([], Pose(0, 0, 0), 10, 0)
+    def test_nothing_is_flown_over_nothing(self) -> None:
+        assert distance_over(Pose(0, 0, 0), [], 10) == 0
+        assert distance_over(Pose(0, -50, NORTH), [run_over((0, 0), (0, 100), 30)], 10) == pytest.approx(180)
+
+    def test_refuses_no_sweeps_and_lengths_out_of_range(self) -> None:
+        with pytest.raises(ValueError, match="no sweep"):
+            shortest_sweep([], Pose(0, 0, 0), 10)
         for run_in_m in (-1, math.nan, math.inf):
             with pytest.raises(ValueError, match="run-in"):
-                cheapest_entry(self.LEGS, Pose(0, 0, 0), 10, run_in_m)
+                sweeps_over(self.STRIP, 20, 10, run_in_m)
         with pytest.raises(ValueError, match="turn radius"):
-            cheapest_entry(self.LEGS, Pose(0, 0, 0), 0, 0)
+            sweeps_over(self.STRIP, 20, 0, 0)
