@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,27 +50,26 @@ class BadlySeen:
         self._is_new = True
         return True
 
-    def risk(self, fleet: FleetMap, primaries: Iterable[str]) -> FloatArray:
+    def risk(self, fleet: FleetMap, settled: BoolArray) -> FloatArray:
         """Residual risk that a second look may remove, 0 elsewhere: the joined map's where cells have settled, and on
-        hotspots where tiles have come; where none have, the mean that the hotspot tells."""
+        hotspots where tiles have come; where none have, the mean that the hotspot tells.
+
+        `settled`: cells that a primary has declared so.
+        """
         if self._is_new:
             self._draw()
-        settled = fleet.settled_by(primaries)
         risk = np.where(fleet.seen() | settled, fleet.risk, self._told_risk)
         return np.where(self._inside & (settled | self._hot), risk, 0.0)
 
-    def still_open(self, fleet: FleetMap, primaries: Iterable[str]) -> BoolArray:
-        """Cells that the survey may still improve: those that tiles tell are not settled; where no tile has come, those
-        in and about hotspots that grow."""
-        primaries = list(primaries)
+    def still_open(self, told: BoolArray, settled: BoolArray) -> BoolArray:
+        """Cells that the survey may still improve: those that tiles of the primaries tell of and that have not settled;
+        where no tile has come, those in and about hotspots that grow."""
         growing = np.zeros(self._grid.shape, dtype=np.bool_)
         for one in self._hotspots.values():
             if one.growing:
                 growing[one.window] |= one.cells
-        told_open = fleet.told_by(primaries)
-        if growing.any():
-            told_open |= growing | neighbours(growing)
-        return self._inside & told_open & ~fleet.settled_by(primaries)
+        may_improve = told | growing | neighbours(growing) if growing.any() else told
+        return self._inside & may_improve & ~settled
 
     def _draw(self) -> None:
         """Draws all hotspots afresh: which cells they hold, and the worst mean told of each cell."""

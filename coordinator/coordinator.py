@@ -28,24 +28,21 @@ from comms.messages import (
 )
 from comms.node import Publication, Received, Step
 from comms.topics import MISSION_OVER, STRIP, TASK
-from coordinator.badly_seen import BadlySeen
 from coordinator.config import CoordinatorConfig
-from coordinator.expected_looks import ExpectedLooks
-from coordinator.growth import Growth
-from coordinator.last_cut import LastCut
+from coordinator.cutter import Cutter
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.offers import checked_offers, offers_let_through
 from coordinator.right_of_way import Order, RightOfWay, Underway
 from coordinator.service import service
 from coordinator.situation import Helper, OpenStrip, Situation
-from coordinator.strips import Cut, CuttingRules, Window, cut_strips, strip_of
+from coordinator.strips import Cut, CuttingRules, Window, strip_of
 from coordinator.vehicles import KnownVehicle, Offer
-from coordinator.worth import Supply, worth_later_m2ps, worth_risk
+from coordinator.worth import Supply, worth_later_m2ps
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.risk import NATS_PER_LEVEL, LevelArray
-from planner.types import BoolArray, FloatArray, Point, Strip
+from planner.types import BoolArray, Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
@@ -73,17 +70,13 @@ class Coordinator:
         self.map: FleetMap | None = None
         self._primaries: dict[str, KnownVehicle] = {}
         self._inside: BoolArray
-        self._badly_seen: BadlySeen
-        self._rules: CuttingRules | None = None
-        self._last_cut: LastCut
-        self._expected_looks: ExpectedLooks
+        self._cutter: Cutter | None = None  # where there are helpers
         self._tasks = 0
         self._outbox: list[Publication] = []
         self._to_cut = False
         self._cut_by_ms: int | None = None
         self._to_assign = False
         self._coming: list[Cut] = []
-        self._more_to_come = 0.0  # area that is still to settle, as a multiple of what has
         self._ripe_ms: int | None = None
         self._over: MissionOver | None = None
         self._over_ms = 0
@@ -148,9 +141,6 @@ class Coordinator:
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
         self._inside = Region(run.outline, run.hole_outlines).inside(spec)
-        self._badly_seen = BadlySeen(spec, self._inside)
-        self._last_cut = LastCut(spec)
-        self._expected_looks = ExpectedLooks(spec)
         if self.config.separation_m > 0:
             self._right_of_way = RightOfWay(self.config.separation_m, self._is_inside)
         self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
@@ -158,7 +148,7 @@ class Coordinator:
         helpers = [entry for entry in run.vehicles if entry.role.revisits]
         if helpers:
             narrowest = min(helpers, key=lambda entry: entry.strip_width_m)
-            self._rules = CuttingRules(
+            rules = CuttingRules(
                 swath_m=narrowest.strip_width_m,
                 p_detect=narrowest.p_detect,
                 worth_risk=self.config.worth_risk,
@@ -166,6 +156,7 @@ class Coordinator:
                 min_strip_m=self.config.min_strip_m,
                 max_strip_m=self.config.max_strip_m,
             )
+            self._cutter = Cutter(self.map, self._inside, rules)
 
     def _take_tile(self, received: Received, tile: CoverageTile, now_ms: int) -> None:
         assert self.map is not None
@@ -193,8 +184,9 @@ class Coordinator:
             log.warning("dropped a message from %s: %s (said once)", vehicle, why)
 
     def _take_hotspot(self, received: Received, message: Hotspot) -> None:
-        place = (received.vehicle, int(received.key.rsplit("/", 1)[1]))
-        self._to_cut |= self._badly_seen.take(place, (received.header.incarnation, message.revision), message)
+        if self._cutter is not None:
+            place = (received.vehicle, int(received.key.rsplit("/", 1)[1]))
+            self._to_cut |= self._cutter.take_hotspot(place, (received.header.incarnation, message.revision), message)
 
     def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost = vehicle.is_idle, vehicle.is_finished, vehicle.lost
@@ -308,10 +300,10 @@ class Coordinator:
         """Learns from a strip that a vehicle has swept what second looks find."""
         assert self.map is not None
         layer = self.map.layers.get(vehicle.entry.vehicle)
-        if layer is not None:
+        if layer is not None and self._cutter is not None:
             levels = layer.largest_levels[record.window.cells].astype(np.float64)
             p_detect = -np.expm1(-NATS_PER_LEVEL * levels)
-            self._expected_looks.learn(record.window, p_detect, vehicle.entry.p_detect)
+            self._cutter.learn(record.window, p_detect, vehicle.entry.p_detect)
 
     def _note_failure(self, vehicle: KnownVehicle, record: StripRecord | None = None) -> None:
         """It has not served what it accepted; where `record` is given, it is not to be sent there again."""
@@ -377,24 +369,15 @@ class Coordinator:
                 self._to_assign = True
 
     def _cut(self, now_ms: int) -> None:
-        assert self.map is not None
-        if self._rules is None:
+        cutter = self._cutter
+        if cutter is None:
             return
-        grid, primaries = self.map.grid, list(self._primaries)
-        risk = self._badly_seen.risk(self.map, primaries)
-        risk = risk * self._expected_looks.factor(risk)
-        open_cells = self._badly_seen.still_open(self.map, primaries)
-        growth = self._growth(risk)
-        ahead = int((self._inside & ~self.map.settled_by(primaries) & (growth.settles_s == 0)).sum())
-        self._more_to_come = ahead / max(1, int(self._inside.sum()) - ahead)
-        self._set_worth_risk(risk, now_ms)
-        reach = 2 * self._rules.columns(grid)
-        columns = self._last_cut.changed_columns(risk, open_cells, growth, self._looked_at(), reach)
+        under_way = {name: one.track_under_way for name, one in self._primaries.items()}
+        columns = cutter.look(under_way, self._sweeps_m2(now_ms), self._looked_at())
         unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
         self._coming = [cut for cut in self._coming if not columns[cut.window.columns].any()]
         to_cut = {record.window for record in unmatched}
-        looked_at = [window for window in self._looked_at() if window not in to_cut]
-        for cut in cut_strips(grid, risk, open_cells, self._rules, looked_at, growth, columns):
+        for cut in cutter.cut(columns, [window for window in self._looked_at() if window not in to_cut]):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
@@ -405,41 +388,18 @@ class Coordinator:
                 self._open(cut, now_ms)
         for record in unmatched:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
-        self._last_cut.remember(self._looked_at())
+        cutter.remember(self._looked_at())
 
-    def _set_worth_risk(self, risk: FloatArray, now_ms: int) -> None:
-        """Where helpers have time for more than is badly seen, what is seen less badly is worth a second look, too."""
-        assert self.map is not None
-        assert self._rules is not None
+    def _sweeps_m2(self, now_ms: int) -> float:
+        """What helpers have time to sweep until the mission ends; infinite while nobody can tell."""
         deadline_s = self._expected_deadline_s()
-        if math.isinf(deadline_s):
-            return
-        helpers = [self._helper(vehicle, now_ms) for vehicle in self.vehicles.values()]
-        swept_m2 = sum(
-            SWEEPING_SHARE * max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m
-            for one in helpers
-            if one is not None
-        )
-        cells = swept_m2 / self.map.grid.cell_area_m2 / (1.0 + self._more_to_come)
-        worth = min(self.config.worth_risk, worth_risk(risk[risk > 0], cells))
-        if worth != self._rules.worth_risk:
-            self._rules = replace(self._rules, worth_risk=worth)
-            self._last_cut = LastCut(self.map.grid)
+        left_m2 = (max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m for one in self._helpers(now_ms))
+        return SWEEPING_SHARE * sum(left_m2) if math.isfinite(deadline_s) else math.inf
 
     def _looked_at(self) -> list[Window]:
         """What is a strip's that is open or with a vehicle, or will be one's."""
         records = self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
         return [*(record.window for record in records), *(cut.window for cut in self._coming)]
-
-    def _growth(self, risk: FloatArray) -> Growth:
-        """What the primaries are about to settle on the tracks they fly."""
-        assert self.map is not None
-        growth = Growth.none(self.map.grid)
-        for name, vehicle in self._primaries.items():
-            under_way, layer = vehicle.track_under_way, self.map.layers.get(name)
-            if under_way is not None and layer is not None:
-                growth.add(self.map.grid, self._inside, risk, layer, under_way)
-        return growth
 
     def _open(self, cut: Cut, now_ms: int) -> StripRecord:
         number = self.ledger.next_number
@@ -453,14 +413,13 @@ class Coordinator:
 
     def _open_what_is_ripe(self, now_ms: int) -> None:
         """Opens a strip that is still settling when a free helper that sets out now will not overtake the survey."""
-        helpers = [self._helper(vehicle, now_ms) for vehicle in self.vehicles.values()]
-        free = [helper for helper in helpers if helper is not None and helper.task is None]
         self._ripe_ms = None
+        free = [helper for helper in self._helpers(now_ms) if helper.task is None] if self._coming else []
+        if not free:
+            return
         for cut in [*self._coming]:
-            one = OpenStrip(self._strip_of(cut, 0), self._risk_m2(cut), cut.settles_s)
-            leaves_ms = min((math.floor(service(one, helper).leaves_s * 1000) for helper in free), default=None)
-            if leaves_ms is None:
-                continue
+            one = self._coming_strip(cut)
+            leaves_ms = min(math.floor(service(one, helper).leaves_s * 1000) for helper in free)
             if leaves_ms <= now_ms:
                 self._coming.remove(cut)
                 self._open(cut, now_ms)
@@ -545,8 +504,7 @@ class Coordinator:
         return 0 <= column < grid.columns and 0 <= row < grid.rows and bool(self._inside[row, column])
 
     def _situation(self, now_ms: int) -> Situation:
-        helpers = (self._helper(vehicle, now_ms) for _, vehicle in sorted(self.vehicles.items()))
-        found = tuple(helper for helper in helpers if helper is not None)
+        helpers = self._helpers(now_ms)
         deadline_s = self._expected_deadline_s()
         under_way = (one.track_under_way for one in self._primaries.values())
         ends_s = [one.ends_s for one in under_way if one is not None]
@@ -554,30 +512,31 @@ class Coordinator:
             now_s=now_ms / 1000,
             deadline_s=deadline_s,
             strips=tuple(self._open_strip(record) for record in self.ledger.in_state(StripState.OPEN)),
-            helpers=found,
-            coming=tuple(OpenStrip(self._strip_of(cut, 0), self._risk_m2(cut), cut.settles_s) for cut in self._coming),
+            helpers=helpers,
+            coming=tuple(self._coming_strip(cut) for cut in self._coming),
             switch_margin=self.config.switch_margin,
-            later_m2ps=self._worth_later_m2ps(found, deadline_s),
+            later_m2ps=self._worth_later_m2ps(helpers, deadline_s),
             later_s=min(ends_s, default=math.inf),
         )
 
     def _worth_later_m2ps(self, helpers: Sequence[Helper], deadline_s: float) -> float:
         """Of what is open, and of what is to come if the rest of the area is like what has settled."""
-        rules = self._rules
-        if rules is None or not helpers or math.isinf(deadline_s):
+        if not helpers or math.isinf(deadline_s):
             return 0.0
+        assert self.map is not None
+        assert self._cutter is not None
         speed_mps = sum(one.speed_mps for one in helpers) / len(helpers)
-        cell_m = self.map.grid.cell_m if self.map else 1.0
+        cell_m, overhead_m, to_come = self.map.grid.cell_m, self._cutter.rules.overhead_m, self._cutter.more_to_come
 
         def supply(cut: Cut, count: float) -> Supply:
             length_m = (cut.window.end_row - cut.window.first_row) * cell_m
-            return Supply(cut.removable_m2, (length_m + rules.overhead_m) / speed_mps, count)
+            return Supply(cut.removable_m2, (length_m + overhead_m) / speed_mps, count)
 
-        supplies = [supply(cut, 1.0 + self._more_to_come) for cut in self._coming]
+        supplies = [supply(cut, 1.0 + to_come) for cut in self._coming]
         for record in self.ledger:
             if record.state is not StripState.WITHDRAWN:
                 there = 1.0 if record.state is StripState.OPEN else 0.0
-                supplies.append(supply(record.cut, there + self._more_to_come))
+                supplies.append(supply(record.cut, there + to_come))
         return worth_later_m2ps(supplies, sum(max(0.0, deadline_s - one.free_s) for one in helpers))
 
     def _expected_deadline_s(self) -> float:
@@ -587,17 +546,25 @@ class Coordinator:
             return math.inf
         return max(known_ms) * self.config.deadline_factor / 1000
 
+    def _coming_strip(self, cut: Cut) -> OpenStrip:
+        return OpenStrip(self._strip_of(cut, 0), self._risk_m2(cut), cut.settles_s)
+
     def _open_strip(self, record: StripRecord) -> OpenStrip:
         return OpenStrip(record.strip, self._risk_m2(record.cut), record.cut.settles_s)
 
     def _risk_m2(self, cut: Cut) -> float:
-        assert self._rules is not None
-        return cut.removable_m2 / self._rules.p_detect
+        assert self._cutter is not None
+        return cut.removable_m2 / self._cutter.rules.p_detect
 
     def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:
         self._tasks += 1
         task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
         self._outbox.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
+
+    def _helpers(self, now_ms: int) -> tuple[Helper, ...]:
+        """Those that can be given something, by name."""
+        found = (self._helper(vehicle, now_ms) for _, vehicle in sorted(self.vehicles.items()))
+        return tuple(helper for helper in found if helper is not None)
 
     def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
         """A helper as an allocator sees it; None where it is lost or can be given nothing."""

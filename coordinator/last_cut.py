@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordinator.growth import Growth
-from coordinator.strips import Window, stretches
+from coordinator.strips import CuttingRules, Window, stretches
 from planner.types import BoolArray, FloatArray, GridSpec
 
 
@@ -18,20 +18,26 @@ class LastCut:
 
     grid: GridSpec
     _arrays: tuple[FloatArray | BoolArray, ...] = ()
+    _rules: CuttingRules | None = None
     _looked_at: frozenset[Window] = frozenset()
 
     def changed_columns(
-        self, risk: FloatArray, open_cells: BoolArray, growth: Growth, looked_at: Iterable[Window], reach: int
+        self,
+        risk: FloatArray,
+        open_cells: BoolArray,
+        growth: Growth,
+        rules: CuttingRules,
+        looked_at: Iterable[Window],
     ) -> BoolArray:
         """Columns, shape (columns,), with a cell whose risk, settling or strip is another than at the last cut, and
-        those up to `reach` columns beside.
+        those two swaths beside; all of them where the rules are others.
 
         `looked_at`: the windows that are a strip's, or will be; where one has gone its cells have changed. Remembers
-        the arrays.
+        the arrays and the rules.
         """
         arrays = (risk, open_cells, growth.risk, growth.settles_s, growth.descending)
-        if not self._arrays:
-            self._arrays = arrays
+        if rules != self._rules:
+            self._arrays, self._rules = arrays, rules
             return np.ones(self.grid.columns, dtype=np.bool_)
         found = np.zeros(self.grid.columns, dtype=np.bool_)
         for now, before in zip(arrays, self._arrays, strict=True):
@@ -39,6 +45,7 @@ class LastCut:
         for window in self._looked_at.difference(looked_at):
             found[window.columns] = True
         self._arrays = arrays
+        reach = 2 * rules.columns(self.grid)
         columns = np.zeros_like(found)
         for stretch in stretches(found):
             columns[max(0, stretch.start - reach) : stretch.stop + reach] = True

@@ -59,7 +59,8 @@ def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -
                 passed.append((name, number))
             elif math.isinf(wait_s):
                 long[name] = helpers[name].refused | {number}
-            again_s = min(again_s, wait_s if 0 < wait_s < ASKED_LATER_S else ASKED_LATER_S if wait_s else math.inf)
+            if wait_s > 0:
+                again_s = min(again_s, wait_s, ASKED_LATER_S)
         if not long:
             break
         helpers_now = (replace(one, refused=long.get(one.vehicle, one.refused)) for one in situation.helpers)

@@ -119,14 +119,15 @@ class _Search:
         chosen = np.argsort(-rates, kind="stable")[: self._allocator.candidates]
         chosen = chosen[rates[chosen] > 0]
         later_m2ps = self._situation.later_m2ps
-        best = Plan((), later_m2ps * self._left_s(np.array(self._helper.free_s)).item(), self._helper.free_s)
+        free_s = self._helper.free_s
+        left_s = self._left_s(np.array(free_s)).item()
         if not chosen.size:
-            return best
+            return Plan((), later_m2ps * left_s, free_s)
         rank_m2ps = max(later_m2ps, LEAST_WORTH * float(rates[chosen[0]]))
         end_m2ps = rank_m2ps if chosen.size > self._allocator.depth else later_m2ps
-        best = replace(best, value_m2=end_m2ps * best.value_m2 / later_m2ps if later_m2ps > 0 else 0.0)
+        best = Plan((), end_m2ps * left_s if later_m2ps > 0 else 0.0, free_s)
         table = self._table.of(chosen)
-        poses, times_s, values_m2 = self._pose, np.array([self._helper.free_s]), np.zeros(1)
+        poses, times_s, values_m2 = self._pose, np.array([free_s]), np.zeros(1)
         used = np.zeros((1, chosen.size), dtype=np.bool_)
         sequences: list[tuple[int, ...]] = [()]
         leaves_s = [0.0]

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from coordinator.growth import Growth
 from coordinator.last_cut import LastCut
-from coordinator.strips import Window
+from coordinator.strips import CuttingRules, Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, 40, 30)
 RISK = np.full(GRID.shape, 0.5)
 ALL_SETTLED = np.zeros(GRID.shape, dtype=np.bool_)
 STRIP = Window(5, 20, 30, 36)
+# A swath of one column: what has changed is told with two columns beside.
+RULES = CuttingRules(swath_m=5, p_detect=0.9, worth_risk=0.5, overhead_m=50, min_strip_m=20, max_strip_m=200)
 
 
 @pytest.fixture
@@ -26,10 +30,9 @@ def last() -> LastCut:
 
 
 def changed(
-    last: LastCut, risk: FloatArray = RISK, reach: int = 0, windows: tuple[Window, ...] = (STRIP,)
+    last: LastCut, risk: FloatArray = RISK, rules: CuttingRules = RULES, windows: tuple[Window, ...] = (STRIP,)
 ) -> list[int]:
-    growth = Growth.none(GRID)
-    columns = last.changed_columns(risk, ALL_SETTLED, growth, windows, reach)
+    columns = last.changed_columns(risk, ALL_SETTLED, Growth.none(GRID), rules, windows)
     return np.flatnonzero(columns).tolist()
 
 
@@ -43,19 +46,31 @@ def test_nothing_has_where_all_is_as_it_was(last: LastCut) -> None:
     assert changed(last) == []
 
 
-def test_the_column_of_a_cell_has_and_those_beside_within_the_grid(last: LastCut) -> None:
-    assert changed(last, with_risk(3, 10)) == [10]
-    assert changed(last, with_risk(3, 1), reach=2) == [0, 1, 2, 3, 8, 9, 10, 11, 12]  # the cell before is back, too
-    assert changed(last, with_risk(3, 39), reach=2) == [0, 1, 2, 3, 37, 38, 39]
+def test_the_column_of_a_cell_has_and_those_two_swaths_beside_within_the_grid(last: LastCut) -> None:
+    assert changed(last, with_risk(3, 10)) == [8, 9, 10, 11, 12]
+    assert changed(last, with_risk(3, 1)) == [0, 1, 2, 3, 8, 9, 10, 11, 12]  # the cell before is back, too
+    assert changed(last, with_risk(3, 39)) == [0, 1, 2, 3, 37, 38, 39]
+
+
+def test_a_wider_swath_reaches_farther(last: LastCut) -> None:
+    wider = replace(RULES, swath_m=10)
+    changed(last, rules=wider)
+    assert changed(last, with_risk(3, 10), wider) == [*range(6, 15)]
 
 
 def test_what_has_changed_once_is_known_the_next_time(last: LastCut) -> None:
-    assert changed(last, with_risk(3, 10)) == [10]
+    assert changed(last, with_risk(3, 10)) == [8, 9, 10, 11, 12]
     assert changed(last, with_risk(3, 10)) == []
 
 
+def test_with_other_rules_all_has_once(last: LastCut) -> None:
+    assert changed(last, rules=replace(RULES, worth_risk=0.4)) == [*range(40)]
+    assert changed(last, rules=replace(RULES, worth_risk=0.4)) == []
+    assert changed(last) == [*range(40)]
+
+
 def test_where_a_strip_has_gone_the_cells_have(last: LastCut) -> None:
-    assert changed(last, windows=()) == [*range(30, 36)]
+    assert changed(last, windows=()) == [*range(28, 38)]
 
 
 def test_where_one_has_come_they_have_not(last: LastCut) -> None:
@@ -66,4 +81,5 @@ def test_what_settles_has(last: LastCut) -> None:
     open_cells, growth = ALL_SETTLED.copy(), Growth.none(GRID)
     open_cells[7, 4] = True
     growth.settles_s[0, 20] = 99.0
-    assert np.flatnonzero(last.changed_columns(RISK, open_cells, growth, [STRIP], 0)).tolist() == [4, 20]
+    columns = last.changed_columns(RISK, open_cells, growth, RULES, [STRIP])
+    assert np.flatnonzero(columns).tolist() == [*range(2, 7), *range(18, 23)]

@@ -1,0 +1,85 @@
+"""Where a second look is worth flying to, and what is still to come: from the hotspots, the fleet's map, what helpers
+have found, and what the primaries are about to settle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from comms.messages import Hotspot
+from coordinator.badly_seen import BadlySeen, Place, Revision
+from coordinator.expected_looks import ExpectedLooks
+from coordinator.growth import Growth, TrackUnderWay
+from coordinator.last_cut import LastCut
+from coordinator.strips import Cut, CuttingRules, Window, cut_strips
+from coordinator.worth import worth_risk
+from planner.fleet_map import FleetMap
+from planner.types import BoolArray, FloatArray
+
+
+class Cutter:
+    """Cuts the area again and again, each time only where something has changed.
+
+    `inside`: the area's cells, shape of the map's grid. `rules`: their `worth_risk` is the most that it may become; it
+    falls where helpers have time for more than is badly seen.
+    """
+
+    def __init__(self, fleet: FleetMap, inside: BoolArray, rules: CuttingRules) -> None:
+        self.rules = rules
+        self.more_to_come = 0.0
+        """Area that is still to settle, as a multiple of what has."""
+        self._most_worth_risk = rules.worth_risk
+        self._fleet = fleet
+        self._inside = inside
+        self._inside_cells = int(inside.sum())
+        self._badly_seen = BadlySeen(fleet.grid, inside)
+        self._expected_looks = ExpectedLooks(fleet.grid)
+        self._last_cut = LastCut(fleet.grid)
+        self._risk: FloatArray = np.zeros(fleet.grid.shape)
+        self._open_cells: BoolArray = inside
+        self._growth = Growth.none(fleet.grid)
+
+    def take_hotspot(self, place: Place, revision: Revision, message: Hotspot) -> bool:
+        """Takes a hotspot's newest word; returns whether it was news."""
+        return self._badly_seen.take(place, revision, message)
+
+    def learn(self, window: Window, p_detect: FloatArray, typical: float) -> None:
+        """Learns what a helper's looks have found: see `ExpectedLooks.learn`."""
+        self._expected_looks.learn(window, p_detect, typical)
+
+    def look(
+        self, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, looked_at: Sequence[Window]
+    ) -> BoolArray:
+        """Looks at the area as it is now; returns the columns, shape (columns,), that are to be cut anew.
+
+        `primaries`: the track that each flies. `sweeps_m2`: what helpers have time for until the mission ends, infinite
+        while nobody can tell. `looked_at`: the windows that are a strip's, or will be.
+        """
+        fleet, inside = self._fleet, self._inside
+        settled = fleet.settled_by(primaries)
+        risk = self._badly_seen.risk(fleet, settled)
+        self._risk = risk * self._expected_looks.factor(risk)
+        self._open_cells = self._badly_seen.still_open(fleet.told_by(primaries), settled)
+        self._growth = Growth.none(fleet.grid)
+        for name, under_way in primaries.items():
+            if under_way is not None and name in fleet.layers:
+                self._growth.add(fleet.grid, inside, self._risk, fleet.layers[name], under_way)
+        ahead = int((inside & ~settled & (self._growth.settles_s == 0)).sum())
+        self.more_to_come = ahead / max(1, self._inside_cells - ahead)
+        if math.isfinite(sweeps_m2):
+            cells = sweeps_m2 / fleet.grid.cell_area_m2 / (1.0 + self.more_to_come)
+            worth = min(self._most_worth_risk, worth_risk(self._risk[self._risk > 0], cells))
+            self.rules = replace(self.rules, worth_risk=worth)
+        return self._last_cut.changed_columns(self._risk, self._open_cells, self._growth, self.rules, looked_at)
+
+    def cut(self, columns: BoolArray, looked_at: Sequence[Window]) -> list[Cut]:
+        """The strips in these columns, best first; `looked_at`: windows that are a strip's already."""
+        rules, grid = self.rules, self._fleet.grid
+        return cut_strips(grid, self._risk, self._open_cells, rules, looked_at, self._growth, columns)
+
+    def remember(self, looked_at: Sequence[Window]) -> None:
+        """Remembers the windows that are a strip's, or will be, after the cut."""
+        self._last_cut.remember(looked_at)
