@@ -2,7 +2,7 @@
 
 Every helper's next few strips are planned anew each time: a beam search over sequences, in which the time that is left
 counts for what a second of a helper is worth later. Only a plan's first strip is offered, when the helper has to set
-out.
+out. A helper waits for a strip that is known to be coming, never for what may come: that can be far away.
 """
 
 from __future__ import annotations
@@ -120,12 +120,13 @@ class _Search:
         chosen = chosen[rates[chosen] > 0]
         later_m2ps = self._situation.later_m2ps
         free_s = self._helper.free_s
-        left_s = self._left_s(np.array(free_s)).item()
+        best = Plan((), later_m2ps * self._left_s(np.array(free_s)).item(), free_s)
         if not chosen.size:
-            return Plan((), later_m2ps * left_s, free_s)
+            return best
         rank_m2ps = max(later_m2ps, LEAST_WORTH * float(rates[chosen[0]]))
-        end_m2ps = rank_m2ps if chosen.size > self._allocator.depth else later_m2ps
-        best = Plan((), end_m2ps * left_s if later_m2ps > 0 else 0.0, free_s)
+        # Where the plans of all helpers leave strips over, time left will be spent on them.
+        left_over = chosen.size > self._allocator.depth * len(self._situation.helpers)
+        end_m2ps = rank_m2ps if left_over else later_m2ps
         table = self._table.of(chosen)
         poses, times_s, values_m2 = self._pose, np.array([free_s]), np.zeros(1)
         used = np.zeros((1, chosen.size), dtype=np.bool_)
@@ -140,7 +141,7 @@ class _Search:
             total_m2 = np.where(possible, gained_m2 + end_m2ps * self._left_s(found.free_s), -np.inf)
             place = int(total_m2.argmax())
             row, strip = divmod(place, chosen.size)
-            if total_m2[row, strip] > best.value_m2 + TOLERANCE_M2:
+            if not depth or total_m2[row, strip] > best.value_m2 + TOLERANCE_M2:
                 first_s = leaves_s[row] if depth else float(found.leaves_s[row, strip])
                 best = Plan((*sequences[row], int(chosen[strip])), float(total_m2[row, strip]), first_s)
             ranks = np.where(possible, gained_m2 - rank_m2ps * found.free_s, -np.inf)

@@ -56,12 +56,18 @@ class TestLookingAhead:
         assert PLAN.assign(told) == {}
         assert PLAN.assign(replace(told, coming=())) == {"alpha": 1}
 
-    def test_time_that_is_worth_more_later_is_not_spent_on_little(self) -> None:
+    def test_it_does_not_wait_for_what_it_does_not_know_of(self) -> None:
         told = situation([open_strip(strip(1), 100)], [helper()])
-        assert PLAN.assign(told) == {"alpha": 1}
-        # 70 m2 in 152.5 s; but only the time from `later_s` on counts.
-        assert PLAN.assign(replace(told, later_m2ps=1.0)) == {}
-        assert PLAN.assign(replace(told, later_m2ps=1.0, later_s=200)) == {"alpha": 1}
+        assert PLAN.assign(replace(told, later_m2ps=1.0)) == {"alpha": 1}
+
+    def test_of_much_that_is_far_and_little_that_is_near_the_worth_of_time_decides(self) -> None:
+        # 70 m2 close behind, 350 m2 far ahead, done 650 s later: there is time for one of them.
+        near, far = open_strip(strip(1, y_m=-300), 100), open_strip(strip(2, y_m=1000), 500)
+        told = situation([near, far], [helper()], deadline_s=660)
+        assert PLAN.assign(told) == {"alpha": 2}
+        assert PLAN.assign(replace(told, later_m2ps=1.0)) == {"alpha": 1}
+        # But only the time from `later_s` on counts.
+        assert PLAN.assign(replace(told, later_m2ps=1.0, later_s=600)) == {"alpha": 2}
 
     @settings(max_examples=60, deadline=None)
     @given(told=situations(most_strips=4))
