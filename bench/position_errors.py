@@ -64,8 +64,8 @@ class TrueMap:
         for one in self.run.vehicles:
             if one.role in roles and one.vehicle in self.layers:
                 layer = self.layers[one.vehicle].layer
-                sums += layer.sum_levels()
-                np.maximum(largest, layer.largest_levels(), out=largest)
+                sums += layer.sum_levels
+                np.maximum(largest, layer.largest_levels, out=largest)
         inside = Region(self.run.outline, self.run.hole_outlines).inside(spec)
         return float(risk_statistics(residual_risk(sums, largest, self.run.rho), sums > 0, inside).mean)
 

@@ -22,11 +22,12 @@ REPORTED_WITHIN_S = 10.0
 
 @dataclass(frozen=True)
 class TrackUnderWay:
-    """The track that a primary flies, when it ends and how fast the primary is."""
+    """The track that a primary flies, when it ends, how fast the primary is, and how far it sees to each side."""
 
     track: PlannedTrack
     ends_s: float
     speed_mps: float
+    range_m: float
 
 
 @dataclass(frozen=True)
@@ -48,19 +49,21 @@ class Growth:
     ) -> None:
         """Adds what one primary is about to settle. `risk`: the residual risk where it was seen badly, 0 elsewhere."""
         track = under_way.track
-        _, (start_m, end_m) = grid.frame.to_sweep(
+        (across_m, _), (start_m, end_m) = grid.frame.to_sweep(
             np.array([track.start_x_m, track.end_x_m]), np.array([track.start_y_m, track.end_y_m])
         )
         descending = bool(end_m < start_m)
-        way = slice(None, None, -1 if descending else 1)
-        settled, still_open = (inside & layer.settled)[way], (inside & ~layer.settled)[way]
+        far_m = under_way.range_m + 2 * grid.cell_m  # cells are taken for settled with a margin
+        first, end = np.searchsorted(grid.across_m, [across_m - far_m, across_m + far_m]).tolist()
+        beside = (slice(None, None, -1 if descending else 1), slice(first, end))
+        settled, still_open = inside[beside] & layer.settled[beside], inside[beside] & ~layer.settled[beside]
         count = settled.sum(axis=0)
         last_settled = settled.shape[0] - 1 - settled[::-1].argmax(axis=0)
         columns = (count >= SETTLED_ROWS) & still_open.any(axis=0) & (last_settled < still_open.argmax(axis=0))
-        expected = np.where(settled, risk[way], 0.0).sum(axis=0) / np.maximum(count, 1)
+        expected = np.where(settled, risk[beside], 0.0).sum(axis=0) / np.maximum(count, 1)
         ahead = still_open & columns & (expected > 0)
-        to_end_m = np.maximum(0.0, (float(end_m) - grid.along_m) * (-1 if descending else 1))
+        to_end_m = np.maximum(0.0, (float(end_m) - grid.along_m[beside[0]]) * (-1 if descending else 1))
         settles_s = under_way.ends_s + REPORTED_WITHIN_S - to_end_m / under_way.speed_mps
-        self.risk[way][ahead] = np.broadcast_to(expected, ahead.shape)[ahead]
-        self.settles_s[ahead[way]] = np.broadcast_to(settles_s[:, np.newaxis], ahead.shape)[ahead[way]]
-        self.descending[ahead[way]] = descending
+        self.risk[beside][ahead] = np.broadcast_to(expected, ahead.shape)[ahead]
+        self.settles_s[beside][ahead] = np.broadcast_to(settles_s[:, np.newaxis], ahead.shape)[ahead]
+        self.descending[beside][ahead] = descending

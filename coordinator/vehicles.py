@@ -141,7 +141,7 @@ class KnownVehicle:
         track = next((one for one in self.plan.tracks if one.number == self.state.works_on and not one.flown), None)
         if track is None or self.state.expected_end_ms == 0:
             return None
-        return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps)
+        return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps, self.entry.swath_m)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; takes note of it."""

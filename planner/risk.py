@@ -21,13 +21,18 @@ LevelArray = NDArray[np.uint8]
 
 
 class RiskLayer:
-    """One vehicle's looks, summed over the grid (equation 2 of the paper, in logarithms)."""
+    """One vehicle's looks, summed over the grid (equation 2 of the paper, in logarithms).
+
+    All arrays have grid shape and change with each look. `sum_levels`: the sums in levels; they saturate at 255, a
+    residual risk of 0.006. `largest_levels`: the largest single looks in levels; they saturate at 255 (one look of P_d
+    0.994).
+    """
 
     def __init__(self, grid: GridSpec) -> None:
         self.sum_nats: FloatArray = np.zeros(grid.shape)
         self.largest_nats: FloatArray = np.zeros(grid.shape)
-        self._sum_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
-        self._largest_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
+        self.sum_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
+        self.largest_levels: LevelArray = np.zeros(grid.shape, dtype=np.uint8)
 
     def add_look(self, rows: slice, columns: slice, p_detect: FloatArray) -> None:
         """Adds a look's P_d per cell of a window, 0 where a cell was not seen.
@@ -39,16 +44,8 @@ class RiskLayer:
         nats = -np.log1p(-p_detect)
         self.sum_nats[rows, columns] += nats
         np.maximum(self.largest_nats[rows, columns], nats, out=self.largest_nats[rows, columns])
-        self._sum_levels[rows, columns] = to_levels(self.sum_nats[rows, columns])
-        self._largest_levels[rows, columns] = to_levels(self.largest_nats[rows, columns])
-
-    def sum_levels(self) -> LevelArray:
-        """The sums in levels; they saturate at 255, a residual risk of 0.006."""
-        return self._sum_levels.copy()
-
-    def largest_levels(self) -> LevelArray:
-        """The largest single looks in levels; they saturate at 255 (one look of P_d 0.994)."""
-        return self._largest_levels.copy()
+        self.sum_levels[rows, columns] = to_levels(self.sum_nats[rows, columns])
+        self.largest_levels[rows, columns] = to_levels(self.largest_nats[rows, columns])
 
 
 def to_levels(nats: FloatArray) -> LevelArray:

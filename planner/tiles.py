@@ -45,9 +45,10 @@ def tiles(grid: GridSpec) -> tuple[Tile, ...]:
 
 def tiles_holding(grid: GridSpec, all_tiles: tuple[Tile, ...], cells: BoolArray) -> list[Tile]:
     """The tiles, out of all of the grid's, that hold one of these cells; `cells`: shape grid.shape."""
-    in_rows = np.logical_or.reduceat(cells, range(0, grid.rows, TILE_CELLS), axis=0)
-    held = np.logical_or.reduceat(in_rows, range(0, grid.columns, TILE_CELLS), axis=1)
-    return [all_tiles[place] for place in np.flatnonzero(held)]
+    rows, columns = np.divmod(np.flatnonzero(cells), grid.columns)
+    held = np.zeros(len(all_tiles), dtype=np.bool_)
+    held[rows // TILE_CELLS * -(-grid.columns // TILE_CELLS) + columns // TILE_CELLS] = True
+    return [all_tiles[place] for place in np.flatnonzero(held).tolist()]
 
 
 def tiles_about(grid: GridSpec, all_tiles: tuple[Tile, ...], points: Sequence[Point]) -> list[Tile]:
@@ -55,10 +56,10 @@ def tiles_about(grid: GridSpec, all_tiles: tuple[Tile, ...], points: Sequence[Po
     x_m, y_m = np.asarray(points).T
     across_m, along_m = grid.frame.to_sweep(x_m, y_m)
     columns = _cells(across_m / grid.cell_m + 0.5, grid.columns)
-    return _tiles_within(grid, all_tiles, _cells(along_m / grid.cell_m, grid.rows), columns)
+    return tiles_within(grid, all_tiles, _cells(along_m / grid.cell_m, grid.rows), columns)
 
 
-def _tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, columns: slice) -> list[Tile]:
+def tiles_within(grid: GridSpec, all_tiles: tuple[Tile, ...], rows: slice, columns: slice) -> list[Tile]:
     """The tiles, out of all of the grid's, that share a cell with a window."""
     if rows.start >= rows.stop or columns.start >= columns.stop:
         return []

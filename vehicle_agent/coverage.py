@@ -9,14 +9,17 @@ from comms.node import Publication
 from comms.topics import COVERAGE
 from planner.footprint import LookGeometry, look_on_grid
 from planner.risk import RiskLayer
-from planner.tiles import Tile, tiles, tiles_about, tiles_holding
+from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within
 from planner.types import BoolArray, GridSpec, Strip
 
 OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is lost, 3 of 1,000,000 tiles stay unheard
 
 
 class CoverageLayer:
-    """Sums a vehicle's looks over the grid and publishes whole tiles, each under its next version."""
+    """Sums a vehicle's looks over the grid and publishes whole tiles, each under its next version.
+
+    `settled`: the cells that are, shape `grid.shape`; to be replaced by another array, not changed in place.
+    """
 
     def __init__(self, vehicle: str, grid: GridSpec) -> None:
         self.grid = grid
@@ -28,7 +31,8 @@ class CoverageLayer:
         self._said: dict[Tile, tuple[int, int]] = {}  # of each tile its version, and how often that was said
         self._published_sum = np.zeros(grid.shape, dtype=np.uint8)
         self._published_largest = np.zeros(grid.shape, dtype=np.uint8)
-        self._published_settled = np.zeros(grid.shape, dtype=np.bool_)
+        self._published_settled = self.settled
+        self._looked_at: set[Tile] = set()  # since tiles were last published
 
     def add(self, look: Look) -> None:
         """Adds a valid look."""
@@ -44,20 +48,33 @@ class CoverageLayer:
         )
         rows, columns, p_detect = look_on_grid(self.grid, geometry, look.p_detect)
         self.layer.add_look(rows, columns, p_detect)
+        self._looked_at.update(tiles_within(self.grid, self._tiles, rows, columns))
 
     def changed_tiles(self) -> list[Publication]:
         """The tiles that differ from what was last published."""
-        sums, largest = self.layer.sum_levels(), self.layer.largest_levels()
-        changed = (sums != self._published_sum) | (largest != self._published_largest)
-        changed |= self.settled != self._published_settled
-        self._published_sum, self._published_largest = sums, largest
-        self._published_settled = self.settled.copy()
+        changed = {tile for tile in self._looked_at if self._take_levels(tile)}
+        self._looked_at.clear()
+        if self.settled is not self._published_settled:
+            changed.update(tiles_holding(self.grid, self._tiles, self.settled != self._published_settled))
+            self._published_settled = self.settled
         published = []
-        for tile in tiles_holding(self.grid, self._tiles, changed) if changed.any() else ():
+        for tile in sorted(changed, key=lambda one: (one.first_row, one.first_column)):
             self._version += 1
             self._said[tile] = (self._version, 0)
             published.append(self._say(tile))
         return published
+
+    def _take_levels(self, tile: Tile) -> bool:
+        """Takes a tile's levels to be published; returns whether they are others than before."""
+        window, changed = tile.window, False
+        for now, published in (
+            (self.layer.sum_levels[window], self._published_sum[window]),
+            (self.layer.largest_levels[window], self._published_largest[window]),
+        ):
+            if not np.array_equal(now, published):
+                published[:] = now
+                changed = True
+        return changed
 
     def one_again(self) -> list[Publication]:
         """A tile of those that were said the fewest times since they changed, as it was said last: the oldest."""

@@ -230,7 +230,7 @@ class SurveyAgent(Agent):
     def _ending(self) -> str:
         """In words, how much of the area the survey leaves unseen."""
         assert self.coverage is not None
-        unseen = (self.coverage.layer.sum_levels() == 0) & self._inside
+        unseen = (self.coverage.layer.sum_levels == 0) & self._inside
         if not unseen.any():
             return "the survey ends, all of the area is seen"
         return f"the survey ends, {unseen.sum() / self._inside.sum():.2%} of the area is not seen"
@@ -298,7 +298,7 @@ class SurveyAgent(Agent):
         self._hotspots_due_ms = now_ms + HOTSPOTS_EVERY_MS
         self._settle()
         layer = self.coverage.layer
-        risk = residual_risk(layer.sum_levels(), layer.largest_levels(), self._rho)
+        risk = residual_risk(layer.sum_levels, layer.largest_levels, self._rho)
         hot = self.coverage.settled & (risk >= self.config.hotspot_risk)
         unsettled = self._inside & ~self.coverage.settled
         update = update_hotspots(self.coverage.grid, hot, unsettled, risk, self._hotspots)

@@ -98,11 +98,11 @@ def _own_layer_is_told(flight: Flight, vehicle: str, told: VehicleLayer | None) 
     shape = flight.run_info.grid.spec.shape
     nothing = np.zeros(shape, dtype=np.uint8)
     sums, largest = (nothing, nothing) if told is None else (told.sum_levels, told.largest_levels)
-    differs = (own.layer.sum_levels() != sums) | (own.layer.largest_levels() != largest)
+    differs = (own.layer.sum_levels != sums) | (own.layer.largest_levels != largest)
     if not differs.any():
         return []
     row, column = (int(place) for place in np.argwhere(differs)[0])
-    told_here = f"{sums[row, column]} in its tiles and {own.layer.sum_levels()[row, column]} by its looks"
+    told_here = f"{sums[row, column]} in its tiles and {own.layer.sum_levels[row, column]} by its looks"
     return [
         f"{vehicle}: {int(differs.sum())} cells differ between its tiles and its looks up to"
         f" {max(spoke_ms, default=0) / 1000:.3f} s, first row {row}, column {column}: {told_here}"

@@ -29,7 +29,7 @@ def layer(settled: BoolArray) -> VehicleLayer:
 def grown(settled: BoolArray, track: PlannedTrack) -> Growth:
     growth = Growth.none(GRID)
     risk = np.where(settled, 0.8, 0.0)
-    growth.add(GRID, INSIDE, risk, layer(settled), TrackUnderWay(track, 500, 1.5))
+    growth.add(GRID, INSIDE, risk, layer(settled), TrackUnderWay(track, 500, 1.5, 1000))
     return growth
 
 
@@ -66,7 +66,7 @@ class TestAhead:
     def test_nor_of_columns_without_a_hotspot(self) -> None:
         growth = Growth.none(GRID)
         settled = settled_rows(0, 30)
-        growth.add(GRID, INSIDE, np.zeros(GRID.shape), layer(settled), TrackUnderWay(UP, 500, 1.5))
+        growth.add(GRID, INSIDE, np.zeros(GRID.shape), layer(settled), TrackUnderWay(UP, 500, 1.5, 1000))
         assert not growth.settles_s.any()
 
 

@@ -139,8 +139,8 @@ class TestEveryMission:
         assert fleet is not None
         for name, layer in fleet.layers.items():
             own = mission.nodes[name].coverage
-            assert (layer.sum_levels == own.layer.sum_levels()).all()
-            assert (layer.largest_levels == own.layer.largest_levels()).all()
+            assert (layer.sum_levels == own.layer.sum_levels).all()
+            assert (layer.largest_levels == own.layer.largest_levels).all()
             assert (layer.settled == own.settled).all()
         assert (coordinators.layers[PRIMARY].sum_levels == fleet.layers[PRIMARY].sum_levels).all()
 

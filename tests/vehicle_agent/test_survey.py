@@ -220,7 +220,7 @@ class TestSpacingAtItsLimits:
         assert node.coverage is not None
         behind = node.ahead[0]
         assert behind.across_m < node.flown[-1].across_m
-        grid, layer = node.coverage.grid, node.coverage.layer.sum_levels()
+        grid, layer = node.coverage.grid, node.coverage.layer.sum_levels
         lateral_m = np.abs(grid.across_m - behind.across_m)
         seen_next = (lateral_m >= 25) & (lateral_m <= 100)
         assert (layer[:, seen_next] == 0).any()
@@ -544,8 +544,8 @@ class TestTiles:
     def test_they_hold_the_layer(self, experiment_1: OneNode) -> None:
         fleet = joined(experiment_1, experiment_1.said)
         coverage = experiment_1.node.coverage  # type: ignore[attr-defined]
-        assert (fleet.layers[PRIMARY].sum_levels == coverage.layer.sum_levels()).all()
-        assert (fleet.layers[PRIMARY].largest_levels == coverage.layer.largest_levels()).all()
+        assert (fleet.layers[PRIMARY].sum_levels == coverage.layer.sum_levels).all()
+        assert (fleet.layers[PRIMARY].largest_levels == coverage.layer.largest_levels).all()
         assert (fleet.layers[PRIMARY].settled == coverage.settled).all()
         # -ln(1 - 0.3) is 0.357: 18 levels of 0.02 for one look, 36 for two, 54 for three.
         assert set(np.unique(fleet.layers[PRIMARY].sum_levels)) == {0, 18, 36, 54}

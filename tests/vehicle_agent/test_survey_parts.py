@@ -113,7 +113,7 @@ class TestPartByPart:
         fly_all(agent, flat(0.3, 25, 100))
         (second,) = (plan.note for plan in agent.all(Plan) if plan.note.startswith("part 2 of 2"))
         assert second.endswith("r_eff 100 m is below 3 r_min: the fewest single tracks over all that is left")
-        layer = node_of(agent).coverage.layer.sum_levels()  # type: ignore[union-attr]
+        layer = node_of(agent).coverage.layer.sum_levels  # type: ignore[union-attr]
         assert (layer[node_of(agent)._inside] > 0).all()
 
     # With the other sonar the tracks still to come, as they would lie now, leave most of their part unseen.
@@ -177,6 +177,6 @@ class TestAnyArea:
         fly_all(agent, flat(0.3, 40, 140))
         node = node_of(agent)
         assert node.coverage is not None
-        unseen = node._inside & (node.coverage.layer.sum_levels() == 0)
+        unseen = node._inside & (node.coverage.layer.sum_levels == 0)
         # Looks come in bins of 5 m, and places in centimetres: a few cells at the edges of what is seen may differ.
         assert unseen.sum() <= 0.01 * node._inside.sum()

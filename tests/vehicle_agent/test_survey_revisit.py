@@ -79,10 +79,10 @@ def test_afterwards_it_passes_beside_the_strip_on_the_nearer_side() -> None:
 def test_its_looks_at_a_strip_are_coverage_and_add_no_track() -> None:
     agent = surveyed()
     flown, node = len(agent.node.flown), agent.node  # type: ignore[attr-defined]
-    before = node.coverage.layer.sum_levels().sum()  # type: ignore[attr-defined]
+    before = node.coverage.layer.sum_levels.sum()  # type: ignore[attr-defined]
     offer(agent)
     fly(agent, PRIMARY, agent.last(Maneuver), SEES_TO_130_M)
-    assert node.coverage.layer.sum_levels().sum() > before  # type: ignore[attr-defined]
+    assert node.coverage.layer.sum_levels.sum() > before  # type: ignore[attr-defined]
     assert len(node.flown) == flown  # type: ignore[attr-defined]
 
 

@@ -277,7 +277,7 @@ class Publisher:
 
     def publish(self, time_s: float) -> None:
         """Says the tiles that have changed."""
-        sums, largest = self.layer.sum_levels(), self.layer.largest_levels()
+        sums, largest = self.layer.sum_levels.copy(), self.layer.largest_levels.copy()
         for tile in tiles(self.grid):
             if (sums[tile.window] == self._published[tile.window]).all():
                 continue
