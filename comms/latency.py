@@ -6,6 +6,7 @@ from __future__ import annotations
 from comms.messages import StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus
 from comms.node import Received
 from comms.runner import Outgoing
+from comms.topics import number_of
 
 STRIP_TO_TASK = "strip_to_task"
 
@@ -20,7 +21,7 @@ class StripLatency:
     def sending(self, outgoing: list[Outgoing], wall_s: float) -> None:
         """The coordinator's publications of one round, about to be sent."""
         new = {
-            int(one.key.rsplit("/", 1)[1])
+            number_of(one.key)
             for one in outgoing
             if isinstance(one.message, StripStatus) and one.message.state is StripState.OPEN
         }

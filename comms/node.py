@@ -12,7 +12,7 @@ import numpy as np
 
 from comms.codec import Header
 from comms.messages import Message
-from comms.topics import Topic
+from comms.topics import Topic, number_of
 
 
 class Received(NamedTuple):
@@ -24,6 +24,11 @@ class Received(NamedTuple):
     header: Header
     message: Message
     payload: bytes = b""
+
+    @property
+    def number(self) -> int:
+        """The number that its key ends in, of topics whose keys do."""
+        return number_of(self.key)
 
 
 class Publication(NamedTuple):

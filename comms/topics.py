@@ -186,6 +186,11 @@ TOPICS: tuple[Topic, ...] = (
 )  # fmt: skip
 
 
+def number_of(key: str) -> int:
+    """The number that a key ends in, of topics whose keys do."""
+    return int(key.rpartition("/")[2])
+
+
 def topic_of(key: str) -> tuple[Topic, str] | None:
     """The topic of a key below the run id and the vehicle it names ("" for none); None for a key of no topic."""
     for topic in TOPICS:

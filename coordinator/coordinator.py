@@ -190,7 +190,7 @@ class Coordinator:
 
     def _take_hotspot(self, received: Received, message: Hotspot) -> None:
         if self._cutter is not None:
-            place = (received.vehicle, int(received.key.rsplit("/", 1)[1]))
+            place = (received.vehicle, received.number)
             self._to_cut |= self._cutter.take_hotspot(place, (received.header.incarnation, message.revision), message)
 
     def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:

@@ -70,7 +70,7 @@ class Metrics:
     map: FleetMap | None = None
     inside: BoolArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
     vehicles: dict[str, VehicleFigures] = field(default_factory=dict)
-    strips: dict[str, StripFigures] = field(default_factory=dict)
+    strips: dict[int, StripFigures] = field(default_factory=dict)
     targets: TruthTargets | None = None
     detected: set[int] = field(default_factory=set)
     risk_at: list[dict[str, float]] = field(default_factory=list)
@@ -241,7 +241,7 @@ class Metrics:
             for left in self.strips.values():
                 if left.status.state in _STILL_OPEN:
                     left.status = replace(left.status, state=StripState.WITHDRAWN, vehicle="", reason=CUT_ANEW)
-        number = received.key.rsplit("/", 1)[1]
+        number = received.number
         strip = self.strips.get(number)
         if strip is None:
             strip = self.strips[number] = StripFigures(status, received.header.sent_ms)

@@ -9,7 +9,6 @@ from comms.node import Received
 from viz import palette, paths
 from viz.canvas import Canvas
 from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_ring
-from viz.story import number_of
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each
 IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
@@ -25,7 +24,7 @@ class SecondLooks:
 
     def on_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         """Draws the outline as it is now."""
-        path = f"{paths.HOTSPOTS}/{received.vehicle}/{number_of(received)}"
+        path = f"{paths.HOTSPOTS}/{received.vehicle}/{received.number}"
         if hotspot.state is HotspotState.WITHDRAWN:
             self._canvas.put(received.header.sent_ms, path, rr.Clear(recursive=False))
             return
@@ -37,14 +36,14 @@ class SecondLooks:
                 [outline],
                 colors=[palette.HOTSPOT],
                 radii=rr.Radius.ui_points(0.7),
-                labels=f"hotspot {number_of(received)}: {hotspot.cells} cells, mean risk {hotspot.mean_risk:.2f}",
+                labels=f"hotspot {received.number}: {hotspot.cells} cells, mean risk {hotspot.mean_risk:.2f}",
                 show_labels=False,
             ),
         )
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
-        number, time_ms = number_of(received), received.header.sent_ms
+        number, time_ms = received.number, received.header.sent_ms
         path = f"{paths.STRIPS}/{number}"
         if strip.state is StripState.WITHDRAWN:
             self._canvas.put(time_ms, path, rr.Clear(recursive=True))

@@ -106,14 +106,14 @@ class Story:
         if not self._is_news(received.key, hotspot.state):
             return
         news = self._hotspots.setdefault(received.header.sender, _HotspotNews(received.header.sent_ms))
-        number = number_of(received)
+        number = received.number
         if hotspot.state is HotspotState.ACTIVE:
             news.new.append(f"{number} ({hotspot.cells} cells, risk {hotspot.mean_risk:.2f})")
         else:
             news.withdrawn.append(str(number))
 
     def _strip(self, received: Received, strip: StripStatus) -> tuple[str, bool] | None:
-        number = number_of(received)
+        number = received.number
         self._removable_m2[number] = strip.removable_m2
         if not self._is_news(received.key, strip.state):
             return None
@@ -141,11 +141,6 @@ class Story:
     def _worth(self, strip: int) -> str:
         removable_m2 = self._removable_m2.get(strip)
         return "" if removable_m2 is None else f": {removable_m2:.0f} m² of risk to remove"
-
-
-def number_of(received: Received) -> int:
-    """The number a key ends in, of a topic whose keys do."""
-    return int(received.key.rpartition("/")[2])
 
 
 def _run(run: RunInfo) -> str:

@@ -11,7 +11,6 @@ from comms.messages import RunInfo, StripState, StripStatus, TaskState, TaskStat
 from comms.node import Received
 from viz import paths
 from viz.canvas import Canvas
-from viz.story import number_of
 
 MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
 IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
@@ -39,7 +38,7 @@ class TaskTable:
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Counts the strip in its state."""
-        number = number_of(received)
+        number = received.number
         before = self._strips.get(number)
         self._strips[number] = strip
         if before is None or before.state is not strip.state:

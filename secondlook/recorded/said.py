@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 from comms.messages import Message
+from comms.topics import number_of
 
 M = TypeVar("M", bound=Message)
 
@@ -23,4 +24,4 @@ class Said(Generic[M]):
     @property
     def number(self) -> int:
         """The number that the key ends in, of topics whose keys do."""
-        return int(self.key.rpartition("/")[2])
+        return number_of(self.key)

@@ -29,7 +29,6 @@ from secondlook.testing.strip_assertions import (
     assert_no_strip_served_twice,
     assert_one_strip_at_a_time,
     assert_strips_offered_within,
-    number_of,
 )
 
 if TYPE_CHECKING:
@@ -64,7 +63,6 @@ __all__ = [
     "check_node",
     "check_sonar_model",
     "check_spacing_planner",
-    "number_of",
     "scenario_from",
 ]
 

@@ -43,7 +43,7 @@ def assert_no_strip_lost(flight: Flight) -> None:
     strips: dict[int, tuple[Received, StripStatus]] = {}
     incarnation, first = 0, None
     for one, status in _all(flight, StripStatus):
-        number = number_of(one)
+        number = one.number
         if first is None or one.header.incarnation != incarnation:  # started anew it gives numbers of its own
             incarnation, strips, first = one.header.incarnation, {}, _first_number(number)
         before = strips.get(number)
@@ -165,7 +165,7 @@ def assert_one_strip_at_a_time(flight: Flight) -> None:
     for one, status in _all(flight, StripStatus):
         if one.header.incarnation != incarnation:  # started anew it has books of its own
             incarnation, strip_of = one.header.incarnation, {}
-        number = number_of(one)
+        number = one.number
         strip_of = {vehicle: its for vehicle, its in strip_of.items() if its != number}
         if status.state not in WITH_A_VEHICLE:
             continue
@@ -230,7 +230,7 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
         elif isinstance(message, TaskStatus) and message.state in (TaskState.REFUSED, TaskState.FAILED):
             not_for.add((message.strip, one.vehicle))
         elif isinstance(message, StripStatus):
-            number = number_of(one)
+            number = one.number
             serving.pop(number, None)
             if message.state is StripState.OPEN:
                 open_since.setdefault(number, now_ms)
@@ -242,11 +242,6 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
             if isinstance(kill, Kill) and kill.at_ms <= now_ms:
                 idle_since.pop(kill.node_id, None)
     fail_if(problems, "strips wait for a helper that is free")
-
-
-def number_of(received: Received) -> int:
-    """The number that ends a message's key: a strip's, say."""
-    return int(received.key.rsplit("/", 1)[1])
 
 
 def _all(flight: Flight, kind: type[M]) -> list[tuple[Received, M]]:

@@ -36,7 +36,6 @@ from secondlook.testing import (
     assert_no_strip_lost,
     assert_no_strip_served_twice,
     assert_one_strip_at_a_time,
-    number_of,
 )
 
 MakeFleet = Callable[..., Fleet]
@@ -74,7 +73,7 @@ def check(flight: Flight, *, but_served_twice: bool = False) -> dict[int, StripS
     for one in flight.messages("coord/strip/*"):
         assert isinstance(one.message, StripStatus)
         assert one.message.reason
-        last[number_of(one)] = one.message
+        last[one.number] = one.message
     for status in last.values():
         assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
     assert any(isinstance(one.message, MissionOver) for one in flight.heard)
@@ -194,7 +193,7 @@ class TestACoordinatorThatIsKilled:
         assert_no_strip_served_twice(flight)
         numbers: dict[int, set[int]] = {}
         for one in flight.messages("coord/strip/*"):
-            numbers.setdefault(one.header.incarnation, set()).add(number_of(one))
+            numbers.setdefault(one.header.incarnation, set()).add(one.number)
         assert not numbers[0] & numbers[1]
         assert min(numbers[1]) % 1000 == 1
         done = {
@@ -213,7 +212,7 @@ def check_of_last(flight: Flight) -> None:
     last: dict[int, StripStatus] = {}
     for one in flight.messages("coord/strip/*"):
         if isinstance(one.message, StripStatus) and one.header.incarnation == 1:
-            last[number_of(one)] = one.message
+            last[one.number] = one.message
     assert last
     figures = flight.summary["hotspots"]
     assert figures["open"] == sum(status.state is StripState.OPEN for status in last.values())

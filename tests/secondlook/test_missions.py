@@ -44,10 +44,6 @@ def mission(request: pytest.FixtureRequest) -> Flown:
     return flown(name, seed, helpers=helpers)
 
 
-def number_of(key: str) -> int:
-    return int(key.rsplit("/", 1)[1])
-
-
 class TestDigests:
     def test_the_same_seed_gives_the_same_digest(self) -> None:
         again = fly_scenario(load_scenario("tellaro", (), 1))
@@ -68,10 +64,10 @@ class TestEveryMission:
     def test_every_strip_is_accounted_for(self, mission: Flown) -> None:
         last: dict[int, StripStatus] = {}
         for received, status in mission.all(StripStatus):
-            before = last.get(number_of(received.key))
+            before = last.get(received.number)
             assert status.revision == (1 if before is None else before.revision + 1)
             assert before is None or before.state not in ENDED
-            last[number_of(received.key)] = status
+            last[received.number] = status
         figures = mission.summary["hotspots"]
         assert sorted(last) == list(range(1, figures["published"] + 1))
         counted = [figures[name] for name in ("revisited", "open", "withdrawn", "failed")]
@@ -111,7 +107,7 @@ class TestEveryMission:
                 else:
                     free_since.pop(received.vehicle, None)
             elif isinstance(message, StripStatus):
-                number = number_of(received.key)
+                number = received.number
                 strips[number] = message
                 if message.state is StripState.OPEN:
                     open_since.setdefault(number, now_ms)
@@ -160,7 +156,7 @@ class TestEveryMission:
         standing: set[int] = set()
         times: dict[int, list[tuple[int, Hotspot]]] = {}
         for received, hotspot in mission.all(Hotspot):
-            times.setdefault(received.header.sent_ms, []).append((number_of(received.key), hotspot))
+            times.setdefault(received.header.sent_ms, []).append((received.number, hotspot))
         for hotspots in times.values():
             standing |= {number for number, hotspot in hotspots if hotspot.state is HotspotState.ACTIVE}
             standing -= {number for number, hotspot in hotspots if hotspot.state is HotspotState.WITHDRAWN}

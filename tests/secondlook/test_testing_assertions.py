@@ -42,7 +42,6 @@ from secondlook.testing import (
     assert_repeats,
     assert_risk_at_most,
     assert_strips_offered_within,
-    number_of,
     scenario_from,
 )
 
@@ -253,7 +252,7 @@ class TestNoStripServedTwice:
 class TestOneStripAtATime:
     def test_a_vehicle_with_two(self, two: Flight) -> None:
         offered = first(two, StripStatus, state=StripState.OFFERED)
-        number = number_of(offered)
+        number = offered.number
         other = _changed(offered, revision=1)._replace(key=f"coord/strip/{number + 50}")
         vehicle = offered.message.vehicle  # type: ignore[union-attr]
         said = f"strip {number + 50} is offered with {vehicle} at {at(offered)}, which has strip {number} as well"
@@ -263,7 +262,7 @@ class TestOneStripAtATime:
     def test_a_strip_that_is_offered_to_nobody(self, two: Flight) -> None:
         offered = first(two, StripStatus, state=StripState.OFFERED)
         flight = with_changed(two, lambda one: one is offered, vehicle="")
-        with pytest.raises(AssertionError, match=f"strip {number_of(offered)} is offered at {at(offered)} with nobody"):
+        with pytest.raises(AssertionError, match=f"strip {offered.number} is offered at {at(offered)} with nobody"):
             assert_one_strip_at_a_time(flight)
 
 

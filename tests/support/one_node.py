@@ -9,7 +9,7 @@ from typing import TypeVar
 from comms.codec import Header, decode, encode
 from comms.messages import Message, Role
 from comms.node import Node, Received, Step
-from comms.topics import topic_of
+from comms.topics import number_of, topic_of
 
 M = TypeVar("M")
 
@@ -25,7 +25,7 @@ class Said:
     @property
     def number(self) -> int:
         """The number that ends the key."""
-        return int(self.key.rsplit("/", 1)[1])
+        return number_of(self.key)
 
 
 def received(

@@ -46,7 +46,7 @@ from comms.topics import (
     TASK_STATUS,
     Topic,
 )
-from viz.story import TELLING, Line, Story, number_of
+from viz.story import TELLING, Line, Story
 
 TIME_MS = 5000
 
@@ -164,11 +164,6 @@ def test_hotspots_of_one_time_share_a_line() -> None:
     assert story.tell(hotspot(5, time_ms=TIME_MS + 1)) == []
     assert story.rest() == line("hotspots: withdrawn 6", time_ms=TIME_MS + 1)
     assert story.rest() == []
-
-
-def test_numbers_come_from_the_key() -> None:
-    assert number_of(strip(StripState.OPEN)) == 3
-    assert number_of(hotspot(5)) == 5
 
 
 def test_of_other_messages_there_is_nothing_to_tell(messages: list[Received]) -> None:
