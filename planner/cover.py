@@ -6,17 +6,19 @@ x + r and from x - r to x - r_min. With r_min and r in whole metres nothing is l
 cover up to the next whole metre keeps each whole cell of which a point was seen.
 
 A run of w cells needs the least n with `n (r - r_min) + (r + r_min) floor(n / k) >= w`, k being
-`ceil((r + r_min) / (r - r_min))`: k tracks side by side close each other's gaps. For k = 2 that is Algorithm 1's count;
-decision 7 in docs/decisions proves it. Anything else is searched: the nearest cell left is seen by some track, and of
-those that see it with their right side the farthest is best. A branch ends where the count above, or cells of which no
-track sees two, need more tracks than are left, or where a part of what is left has failed with as many.
+`ceil((r + r_min) / (r - r_min))`: k tracks side by side close each other's gaps. For k = 2 that is Algorithm 1's count.
+Anything else is searched: some track sees the nearest cell left with its left side. A branch ends where what it leaves
+needs more tracks than there are, counted in pairs of cells as far apart as a track's sides or in windows of which no
+track sees two, or where a part of what it leaves has failed with as many. Decision 7 in docs/decisions proves it all.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from planner.spacing import TOLERANCE_M
 
@@ -25,12 +27,11 @@ Span = tuple[float, float]
 Cells = int
 """A set of cells: bit i stands for cell i."""
 
-MOST_STEPS = 10_000
-"""Of the search for the fewest; an area of the paper's size takes tens, rarely thousands."""
+MOST_STEPS = 30_000
+"""Of the search for the fewest, some seconds. What surveys leave takes hundreds, rarely thousands."""
 STEPS_FOR_ANY = 500
-"""With one more track, once the fewest are not found within `MOST_STEPS`."""
-STEPS_FOR_A_RANGE = 2_000
-"""To find out whether a smaller range suffices; if it takes more, the range counts as one that does not."""
+"""With one more track, once the fewest are not found within `MOST_STEPS`; and to find out whether a smaller range then
+suffices."""
 
 
 @dataclass(frozen=True)
@@ -90,11 +91,11 @@ def fewest_tracks(left: Sequence[Span], nadir_gap_m: float, highest_m: float) ->
             raise ValueError(f"what is left must lie at 0 or more, not from {near_m} to {far_m} m")
         first, end = math.floor(near_m + TOLERANCE_M), math.ceil(far_m - TOLERANCE_M)
         cells |= _run(first, end)
-    offsets, fewest = _Search(gap, highest).fewest(cells)
+    offsets, fewest = _Search(cells, gap, highest).fewest()
     lowest = gap + 1
     while lowest < highest:
         middle = (lowest + highest) // 2
-        fewer = _Search(gap, middle).with_tracks(cells, len(offsets), STEPS_FOR_A_RANGE)
+        fewer = _Search(cells, gap, middle).with_tracks(len(offsets), MOST_STEPS if fewest else STEPS_FOR_ANY)
         if fewer is None:
             lowest = middle + 1
         else:
@@ -103,77 +104,147 @@ def fewest_tracks(left: Sequence[Span], nadir_gap_m: float, highest_m: float) ->
 
 
 class _Search:
-    """All for one nadir gap and range, in whole metres."""
+    """Cells to cover with one nadir gap and range, in whole metres. A track `at` a cell sees `side` cells from there on
+    with its left side, and as many with its right side, `apart` farther on."""
 
-    def __init__(self, gap: int, range_: int) -> None:
-        self._gap, self._range = gap, range_
+    def __init__(self, cells: Cells, gap: int, range_: int) -> None:
+        self._cells, self._gap, self._range = cells, gap, range_
         self._side = range_ - gap
         self._apart = range_ + gap
         self._group = -(-self._apart // self._side)
-        self._side_cells = (1 << self._side) - 1
-        self._shared_cells = (1 << (2 * self._side - 1)) - 1
         self._steps = 0
+        self._track = _run(0, self._side) | _run(self._apart, self._apart + self._side)
 
-    def fewest(self, cells: Cells) -> tuple[list[int], bool]:
-        """Tracks that cover these cells, and whether they are proven to be the fewest."""
-        tracks, proven = self._least(cells)[0], True
-        while (found := self.with_tracks(cells, tracks, max(MOST_STEPS - self._steps, STEPS_FOR_ANY))) is None:
-            proven &= self._steps < MOST_STEPS
+    def fewest(self) -> tuple[list[int], bool]:
+        """Offsets of tracks that cover the cells, and whether they are proven to be the fewest."""
+        tracks, proven = self._least(self._cells)[0], True
+        while (found := self.with_tracks(tracks, max(MOST_STEPS - self._steps, STEPS_FOR_ANY))) is None:
+            proven &= self._steps <= MOST_STEPS
             tracks += 1
         return found, proven
 
-    def with_tracks(self, cells: Cells, tracks: int, most_steps: int) -> list[int] | None:
-        """At most so many tracks that cover these cells; None where there are none, or none is found in time."""
+    def with_tracks(self, tracks: int, most_steps: int) -> list[int] | None:
+        """At most so many tracks that cover the cells; None where there are none, or none is found in time."""
         steps_end = self._steps + most_steps
+        least, _, closed = self._least(self._cells)
+        if least > tracks:
+            return None
+        if closed:
+            return self._over_run(self._cells)
+        if self._least_from[0] > tracks:
+            return None
         failed: dict[int, list[Cells]] = {}
         chosen: list[int] = []
         # For each track chosen, and the one to choose now: what was left before it, and what is still to be tried.
-        open_: list[tuple[Cells, Iterator[tuple[int, Cells]]]] = []
-        left = cells
-        while True:
-            budget = tracks - len(chosen)
-            least, is_run = self._least(left)
-            if least <= budget and is_run:
-                return chosen + self._over_run(left)
-            hopeless = least > budget or any(one & left == one for one in failed.get(budget, ()))
-            if not hopeless:
-                self._steps += 1
-                if self._steps > steps_end:
-                    return None
-                open_.append((left, self._choices(left)))
-            while open_:
-                before, choices = open_[-1]
-                del chosen[len(open_) - 1 :]
-                choice = next(choices, None)
-                if choice is not None:
-                    chosen.append(choice[0])
-                    left = choice[1]
-                    break
+        open_ = [(self._cells, iter(self._choices(self._cells, tracks - 1)))]
+        while open_:
+            del chosen[len(open_) - 1 :]
+            before, choices = open_[-1]
+            budget = tracks - len(open_)
+            choice = next(choices, None)
+            if choice is None:
                 open_.pop()
-                known = failed.setdefault(tracks - len(open_), [])
+                known = failed.setdefault(budget + 1, [])
                 known[:] = [one for one in known if one & before != before]
                 known.append(before)
-            else:
+                continue
+            self._steps += 1
+            if self._steps > steps_end:
                 return None
+            _, at, left, closed = choice
+            chosen.append(at + self._range)
+            if closed:
+                return chosen + self._over_run(left)
+            if self._least_in_windows(left) <= budget and all(one & left != one for one in failed.get(budget, ())):
+                open_.append((left, iter(self._choices(left, budget - 1))))
+        return None
 
-    def _least(self, cells: Cells) -> tuple[int, bool]:
-        """How many tracks these cells need at least; and whether they are one run or none, which needs no more."""
+    def _choices(self, cells: Cells, budget: int) -> list[tuple[int, int, Cells, bool]]:
+        """The tracks that may be the one whose left side sees the nearest cell, the most promising first.
+
+        Of each an order, where it is, what it leaves, and whether that is closed (`_least`); those alone that leave
+        what so many more tracks may cover. A right side need not see it: a track there with its left side sees more.
+        Nor is a track needed that sees nothing with the first cell of its right side (the next one sees as much), or
+        with its last cells where the one before sees something with its first.
+        """
+        nearest = _first(cells)
+        begin = nearest - self._side + 1
+        by_first = cells >> begin + self._apart
+        by_last = cells >> nearest | cells >> nearest + self._apart
+        tried = by_first & (by_last | ~(by_first << 1)) & _run(0, self._side - 1) | 1 << self._side - 1
+        choices = []
+        while tried:
+            at = begin + _first(tried)
+            tried &= tried - 1
+            left = cells & ~_shifted(self._track, at)
+            least, paired, closed = self._least(left)
+            if least <= budget:
+                choices.append((left.bit_count() + 2 * paired, at, left, closed))
+        return sorted(choices)
+
+    def _least(self, cells: Cells) -> tuple[int, int, bool]:
+        """How many tracks these cells need at least, `_paired` of them, and whether they are closed: one run, none, or
+        within a side, which needs no more."""
         if not cells:
-            return 0, True
-        end = cells.bit_length()
-        last_run = (~cells & _run(0, end)).bit_length()
-        least = self._for_run(end - last_run)
-        if not cells & _run(0, last_run):
-            return least, True
-        least = max(least, -(-cells.bit_count() // (2 * self._side)))
-        # Cells from the nearest on of which no track sees two, and what no track that sees one sees of the last run.
-        apart = 0
+            return 0, 0, True
+        first, end = _first(cells), cells.bit_length()
+        if end - first <= self._side or cells == _run(first, end):
+            return self._for_run(end - first), 0, True
+        paired = self._paired(cells)
+        return -(-paired // self._side), paired, False
+
+    @cached_property
+    def _least_from(self) -> list[int]:
+        """How many tracks what lies at a cell and beyond needs at least, for each cell and well past the last."""
+        at = _ones(self._cells)
+        least = [0] * (at[-1] + 1 + self._apart + self._side)
+        # As `_paired` counts, but from the last of a row on.
+        paired: set[int] = set()
+        for index in range(len(at) - 1, -1, -1):
+            cell = at[index]
+            if cell + self._apart not in paired:
+                paired.add(cell)
+            needed = max(-(-len(paired) // self._side), self._least_from_window(at, index, least), least[cell + 1])
+            before = at[index - 1] if index else -1
+            least[before + 1 : cell + 1] = [needed] * (cell - before)
+        return least
+
+    def _least_in_windows(self, left: Cells) -> int:
+        """How many tracks what is left needs at least, by a window from its nearest cell on and what lies beyond."""
+        nearest = _first(left)
+        at = [nearest + cell for cell in _ones(left >> nearest & _run(0, self._apart))]
+        return self._least_from_window(at, 0, self._least_from)
+
+    def _least_from_window(self, at: list[int], index: int, beyond: list[int]) -> int:
+        """How many tracks cells need at least, counted in windows so far from each other that no track sees of two.
+
+        Args:
+            at: the cells, ascending; those as near as the sides of a track are apart suffice.
+            index: of the cell where the first window begins.
+            beyond: `_least_from`, as far as needed.
+        """
+        most, tracks = 0, 0
+        begin, window = at[index], index
+        # Cells of which no track sees two: farther from each other than a side is wide, nearer than the two sides are.
+        while window < len(at) and at[window] - begin <= self._apart - self._side:
+            tracks += 1
+            most = max(most, tracks + beyond[at[window] + self._apart + self._side])
+            window = bisect_left(at, at[window] + self._side, window + 1)
+        # Of as many cells as its sides are apart, a track sees no more than a side.
+        while (window := index + tracks * self._side) < len(at) and at[window] - begin < self._apart:
+            tracks += 1
+            most = max(most, tracks + beyond[at[window] + self._apart + self._side])
+        return most
+
+    def _paired(self, cells: Cells) -> int:
+        """How many cells left sides must see at least: of each two cells that lie as far apart as the sides of a track,
+        and so on in a row, the first, the third, ..."""
+        count = 0
         while cells:
-            nearest = (cells & -cells).bit_length() - 1
-            apart += 1
-            least = max(least, apart + self._for_run(end - max(nearest + self._apart + self._side, last_run)))
-            cells &= ~(self._side_cells << nearest | self._shared_cells << (nearest + self._apart - self._side + 1))
-        return max(least, apart), False
+            firsts = cells & ~(cells << self._apart)
+            count += firsts.bit_count()
+            cells &= ~(firsts | firsts << self._apart)
+        return count
 
     def _for_run(self, length: int) -> int:
         """How many tracks a run of so many cells needs; 0 for none."""
@@ -186,7 +257,7 @@ class _Search:
         """The fewest tracks over one run of cells: groups side by side, the last one pulled in, or singles."""
         if not cells:
             return []
-        first, end = (cells & -cells).bit_length() - 1, cells.bit_length()
+        first, end = _first(cells), cells.bit_length()
         groups, singles = divmod(self._for_run(end - first), self._group)
         spread = self._group * self._side + self._apart
         offsets = []
@@ -200,25 +271,13 @@ class _Search:
             offsets.append(max(first, min(begin, end - self._side)) - self._gap)
         return offsets
 
-    def _choices(self, cells: Cells) -> Iterator[tuple[int, Cells]]:
-        """The tracks that may be the one to see the nearest cell, with what they leave, the least first.
 
-        A track is left out if another leaves no cell that it does not.
-        """
-        nearest, end = (cells & -cells).bit_length() - 1, cells.bit_length()
-        by_left: dict[Cells, int] = {}
-        farthest = min(nearest + self._range, end + self._gap)
-        for offset in (nearest - self._gap, *range(farthest, nearest + self._gap, -1)):
-            by_left.setdefault(cells & ~self._seen_from(offset), offset)
-        kept: list[Cells] = []
-        for left in sorted(by_left, key=int.bit_count):
-            if not any(one & left == one for one in kept):
-                kept.append(left)
-                yield by_left[left], left
+def _first(cells: Cells) -> int:
+    return (cells & -cells).bit_length() - 1
 
-    def _seen_from(self, offset: int) -> Cells:
-        """The cells that a track sees."""
-        return _shifted(self._side_cells, offset - self._range) | _shifted(self._side_cells, offset + self._gap)
+
+def _ones(cells: Cells) -> list[int]:
+    return [cell for cell, bit in enumerate(reversed(f"{cells:b}")) if bit == "1"]
 
 
 def _run(first: int, end: int) -> Cells:

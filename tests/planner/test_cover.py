@@ -16,6 +16,7 @@ from planner.spacing import adapt_range, track_count
 spans = st.lists(st.tuples(st.integers(0, 150), st.integers(1, 60)), min_size=1, max_size=4).map(
     lambda pairs: [(float(near), float(near + length)) for near, length in pairs]
 )
+slivers = st.lists(st.tuples(st.integers(0, 25), st.integers(1, 30)), min_size=2, max_size=9)
 gaps_and_ranges = st.integers(0, 15).flatmap(lambda gap: st.tuples(st.just(gap), st.integers(gap + 1, 3 * gap + 10)))
 
 
@@ -166,6 +167,23 @@ class TestOptimality:
         assert found.fewest
         assert len(found.offsets_m) == fewest_by_integer_programming(left, *sensor)
 
+    @given(slivers, gaps_and_ranges)
+    def test_of_covers_of_many_pieces(self, pieces: list[tuple[int, int]], sensor: tuple[int, int]) -> None:
+        ends_m = np.cumsum(np.array(pieces).ravel()).reshape(-1, 2)
+        left = [(float(near_m), float(far_m)) for near_m, far_m in ends_m]
+        found = fewest_tracks(left, *sensor)
+        assert found.fewest
+        assert len(found.offsets_m) == fewest_by_integer_programming(left, *sensor)
+
+    @pytest.mark.parametrize("seed", sorted({*range(60)} - {0, 5, 12, 13, 24, 27, 30, 34}))  # those are slow for it
+    def test_of_covers_of_a_quarter_of_that(self, seed: int) -> None:
+        rng = random.Random(seed)
+        range_m = rng.randint(11, 29)
+        left = after_a_survey(rng, 303, 10, range_m)
+        found = fewest_tracks(left, 10, range_m)
+        assert found.fewest
+        assert len(found.offsets_m) == fewest_by_integer_programming(left, 10, range_m)
+
     @pytest.mark.parametrize("seed", [6, 7, 8, 10, 11, 12, 13])  # of which the other solver is not slow
     def test_of_covers_of_the_papers_size(self, seed: int) -> None:
         rng = random.Random(seed)
@@ -183,6 +201,13 @@ class TestOptimality:
             left = [(0.0, float(width_m))]
             found = fewest_tracks(left, gap_m, range_m)
             assert len(found.offsets_m) == fewest_by_integer_programming(left, gap_m, range_m)
+
+    @pytest.mark.parametrize("seed", range(20))
+    def test_of_covers_that_take_long_is_proven(self, seed: int) -> None:
+        # Beyond what the other solver can do in time. From 46 to 50 m on a side is a tenth as wide as the gap.
+        rng = random.Random(seed)
+        range_m = rng.randint(46, 50)
+        assert fewest_tracks(after_a_survey(rng, 1212, 40, range_m), 40, range_m).fewest
 
 
 class TestRefusals:
