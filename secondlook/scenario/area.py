@@ -40,7 +40,7 @@ class Area(Mapping):
     polygon_m: Corners
     holes_m: Annotated[tuple[Corners, ...], Field(strict=False, max_length=20)] = ()
     track_heading_deg: TrackHeading = 0.0
-    cell_m: Bin = 5.0
+    cell_m: Annotated[Bin, Field(validate_default=True)] = 5.0
 
     @property
     def extent_m(self) -> tuple[float, float]:

@@ -104,7 +104,10 @@ def _problem(
         value, what = path[-1], _allowed(error)
     else:
         what = _allowed(error)
-    return Problem(place_of(path, places), f"{dotted(path)}: {shown(value)} is not allowed; {what}")
+    text = shown(value)
+    if kind == "refused" and isinstance(holder, dict) and path[-1] not in holder:
+        text = f"{shown(error['input'])}, the default,"
+    return Problem(place_of(path, places), f"{dotted(path)}: {text} is not allowed; {what}")
 
 
 def _locate(location: Iterable[str | int], data: dict[str, Value]) -> tuple[Path, Any, Any]:

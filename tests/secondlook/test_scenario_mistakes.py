@@ -286,6 +286,19 @@ MISTAKES = {
         POLYGON + "\n  cell_m: 0.0999",
         ["bad.yaml:4: area.cell_m: 0.0999 is not allowed; must be larger, the map would have more than 20000000 cells"],
     ),
+    "area smaller than a cell by default": (
+        POLYGON,
+        "[[0, 0], [500, 0], [500, 4], [0, 4]]",
+        ["bad.yaml:2: area.cell_m: 5.0, the default, is not allowed; must be at most the area's shorter side, 4"],
+    ),
+    "too many cells by default": (
+        POLYGON,
+        "[[0, 0], [1e+6, 0], [1e+6, 1e+6], [0, 1e+6]]",
+        [
+            "bad.yaml:2: area.cell_m: 5.0, the default, is not allowed; "
+            "must be larger, the map would have more than 20000000 cells"
+        ],
+    ),
     "unknown curve": (
         "curve: muscle",
         "curve: mussel",
