@@ -27,7 +27,7 @@ def wall_access_rules(
             "writes": (["ingress"], ["put"], [*writes, *says]),
             "subscribes": (["ingress"], ["declare_subscriber"], [*reads, *hears]),
             "reads": (["egress"], ["put"], [*reads, *hears]),
-            "lives": (["ingress"], ["liveliness_token"], [keys.alive(plan.host)]),
+            "lives": (["ingress"], ["liveliness_token"], [keys.life(plan.host, "*")]),
             "asks": (["ingress"], ["query"], reads),
             "is-answered": (["egress"], ["reply"], reads),
             "knows": (["egress"], ["declare_subscriber", "declare_queryable"], [keys.topic("**")]),

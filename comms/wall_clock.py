@@ -105,10 +105,10 @@ class WallClock:
         else:
             self._greet(host, known, hello, now_s)
 
-    def gone(self, host: str) -> None:
-        """A host's connection is gone."""
+    def gone(self, host: str, instance: str) -> None:
+        """The connection of a process is gone; one that takes no part is not missed."""
         known = self._hosts.get(host)
-        if known is not None and known.instance and known.last_word is None:
+        if known is not None and known.instance == instance and known.last_word is None:
             known.instance, known.ready = "", False
             known.heard_s -= HERE_S
             self.notices.append(f"{host} is gone")

@@ -58,7 +58,6 @@ class WallHost:
         notice: Callable[[str], None] = lambda sentence: None,
     ) -> None:
         self.interrupted = False
-        self._session = session
         self._keys = keys
         self._host = host
         self._seat = seat
@@ -83,6 +82,8 @@ class WallHost:
             session, keys, expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me], keeps=seat.keeps
         )
         self._post = WallPost(self._line, keys, routing)
+        # Before the first hello: whoever the clock has heard of is missed when it ends, however soon that is.
+        self._token = session.liveliness().declare_token(keys.life(host, self._instance))
 
     @property
     def factor(self) -> float:
@@ -214,7 +215,6 @@ class WallHost:
                 if not self._welcomed:
                     self._welcomed = True
                     self._hello_at_s = 0.0
-                    self._token = self._session.liveliness().declare_token(self._keys.alive(self._host))
             case ["refused", self._instance, str(sentence)]:  # not for another process of the same name
                 raise RefusedError(f"refused by the router: {sentence}")
             case ["finish", *_]:

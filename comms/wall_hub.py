@@ -97,8 +97,8 @@ class WallHub:
                         self._take(item)
                     case Words(key, words) if key.startswith(FROM):
                         self._hear(key.removeprefix(FROM), words)
-                    case Life(host, alive) if not alive:
-                        self._lose(host)
+                    case Life(host, instance, alive) if not alive:
+                        self._lose(host, instance)
             self._send_words()
         self._send_words()
         return clock.result
@@ -181,10 +181,10 @@ class WallHub:
         except ControlError as error:
             self._post.intake.drop("senseless words", host, str(error))
 
-    def _lose(self, host: str) -> None:
+    def _lose(self, host: str, instance: str) -> None:
         if self._strict and not self._clock.is_done(host):
             raise HostLostError(host, self._now_ms(time.monotonic()))
-        self._clock.gone(host)
+        self._clock.gone(host, instance)
 
     def _now_ms(self, now_s: float) -> int:
         return self._clock.time.now_ms(now_s) if self._clock.time.known else 0

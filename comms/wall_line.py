@@ -51,9 +51,10 @@ class Answered:
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """A host's connection has come up, or is gone."""
+    """The connection of a process has come up, or is gone."""
 
     host: str
+    instance: str
     alive: bool
 
 
@@ -86,7 +87,7 @@ class WallLine:
         ]
         if watches_lives:
             handler = zenoh.handlers.Callback(self._on_token, indirect=False)
-            self._lives = session.liveliness().declare_subscriber(keys.alive("*"), handler, history=True)
+            self._lives = session.liveliness().declare_subscriber(keys.life("*", "*"), handler, history=True)
         self._subscribers = subscribe(session, map(str, self._reads), self._on_mail)
 
     def get(self, timeout_s: float) -> Event | None:
@@ -162,5 +163,6 @@ class WallLine:
         self._queue.put(Asked(query))
 
     def _on_token(self, sample: zenoh.Sample) -> None:
-        host = str(sample.key_expr).rsplit("/", 1)[1]
-        self._queue.put(Life(host, sample.kind == zenoh.SampleKind.PUT))  # not `is`: each look at it makes a new one
+        _, host, instance = str(sample.key_expr).rsplit("/", 2)
+        alive = sample.kind == zenoh.SampleKind.PUT  # not `is`: each look at it makes a new one
+        self._queue.put(Life(host, instance, alive))

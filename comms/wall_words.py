@@ -22,6 +22,10 @@ class WallKeys(RunKeys):
         """The clock's time signal."""
         return f"{self.root}clock/time"
 
+    def life(self, host: str, instance: str) -> str:
+        """The liveliness token of one process of a host's name; both may be `*`."""
+        return f"{self.alive(host)}/{instance}"
+
     def beat(self, node: str) -> str:
         """A node's beat."""
         return f"{self.root}clock/beat/{node}"

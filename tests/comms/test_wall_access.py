@@ -92,6 +92,20 @@ def test_a_certificate_lets_its_node_read_what_is_for_it_alone(guarded: Guarded)
     assert keys == {"clock/to/beta", "veh/beta/nav", "clock/time"}
 
 
+def test_a_certificate_lets_its_process_live_under_its_own_name_alone(guarded: Guarded) -> None:
+    lives: queue.SimpleQueue[str] = queue.SimpleQueue()
+
+    def note(sample: zenoh.Sample) -> None:
+        lives.put(str(sample.key_expr).removeprefix(WALL_KEYS.root))
+
+    handler = zenoh.handlers.Callback(note, indirect=False)
+    with guarded.router.liveliness().declare_subscriber(WALL_KEYS.life("*", "*"), handler, history=True):
+        liveliness = guarded.session("beta").liveliness()
+        tokens = [liveliness.declare_token(WALL_KEYS.life(host, "1")) for host in ("alpha", "beta")]
+        assert lives.get(timeout=SOON_S) == "clock/alive/beta/1"
+    assert len(tokens) == 2
+
+
 def test_what_is_kept_is_told_to_those_who_may_read_it(guarded: Guarded) -> None:
     alpha = guarded.session("alpha")
     key = WALL_KEYS.topic("agent/alpha/state")

@@ -95,7 +95,9 @@ def test_who_does_not_fit_is_refused_with_the_reason(host: str, said: Hello, sen
 def test_a_host_that_is_gone_or_silent_may_be_replaced() -> None:
     told = clock()
     told.hello("beta", hello("1"), 1.0)
-    told.gone("beta")
+    told.gone("beta", "2")
+    assert told.notices == ["beta is here"]
+    told.gone("beta", "1")
     told.hello("beta", hello("2"), 1.5)
     assert [name for _, name in words(told)] == []
     told.hello("beta", hello("3"), 1.5 + HERE_S)

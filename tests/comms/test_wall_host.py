@@ -110,6 +110,22 @@ def test_who_is_not_welcome_does_nothing_and_heeds_a_refusal_of_its_own_alone(be
     assert beta.host.now_ms == 0
 
 
+def test_whoever_has_said_hello_is_missed_when_it_ends_welcome_or_not(beta: Beta) -> None:
+    lives: queue.SimpleQueue[tuple[str, bool]] = queue.SimpleQueue()
+
+    def note(sample: zenoh.Sample) -> None:
+        lives.put((str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT))
+
+    handler = zenoh.handlers.Callback(note, indirect=False)
+    life = WALL_KEYS.life("beta", str(unpack(beta.hears("clock/from/beta", "hello"))[1]))
+    with beta.session.liveliness().declare_subscriber(WALL_KEYS.life("*", "*"), handler, history=True):
+        assert lives.get(timeout=SOON_S) == (life, True)
+        beta.host.interrupt()
+        beta.thread.join(SOON_S)
+        beta.own.close()  # type: ignore[no-untyped-call]
+        assert lives.get(timeout=SOON_S) == (life, False)
+
+
 def test_later_starts_have_larger_incarnations_that_fit_two_bytes() -> None:
     assert [incarnation_at(ms, LIMIT_MS) for ms in (0, 999, 1000, 59_999)] == [1, 1, 2, 60]
     longest_ms = 10_000_000_000
