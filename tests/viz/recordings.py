@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import subprocess
+from collections import defaultdict
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +15,7 @@ from rerun.chunk import RrdReader
 def rows(recording: Path, entity: str, component: str) -> list[tuple[int, Any]]:
     """(milliseconds, value) of each row that changes over time, in the order of time; of one time as written."""
     found: list[tuple[int, int, Any]] = []
-    for chunk in RrdReader(recording).stream().filter(content=entity):
-        batch = chunk.to_record_batch()
+    for chunk, batch in _of(recording, entity):
         if chunk.is_static or component not in batch.schema.names:
             continue
         times = batch.column("sim_time").cast("int64").to_pylist()
@@ -26,8 +27,7 @@ def rows(recording: Path, entity: str, component: str) -> list[tuple[int, Any]]:
 
 def static(recording: Path, entity: str, component: str) -> Any:
     """The value that holds at all times."""
-    for chunk in RrdReader(recording).stream().filter(content=entity):
-        batch = chunk.to_record_batch()
+    for chunk, batch in _of(recording, entity):
         if chunk.is_static and component in batch.schema.names:
             return batch.column(component).to_pylist()[-1]
     raise KeyError(f"{entity} has no static {component}")
@@ -35,13 +35,13 @@ def static(recording: Path, entity: str, component: str) -> Any:
 
 def entities(recording: Path) -> set[str]:
     """All entity paths but the recording's properties."""
-    paths = {str(chunk.entity_path) for chunk in RrdReader(recording).stream()}
-    return {path for path in paths if not path.startswith("/__properties")}
+    return {path for path in _read_again_if_changed(recording) if not path.startswith("/__properties")}
 
 
 def timelines(recording: Path) -> set[str]:
     """The names of all index columns."""
-    return {name for chunk in RrdReader(recording).stream() for name in chunk.timeline_names}
+    chunks = [chunk for its in _read_again_if_changed(recording).values() for chunk, _ in its]
+    return {name for chunk in chunks for name in chunk.timeline_names}
 
 
 def verify(recording: Path) -> subprocess.CompletedProcess[str]:
@@ -50,3 +50,22 @@ def verify(recording: Path) -> subprocess.CompletedProcess[str]:
     # CI keeps the command from sending usage statistics.
     environment = {"CI": "1", "HOME": str(recording.parent), "PATH": ""}
     return subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+
+
+def _of(recording: Path, entity: str) -> list[tuple[Any, Any]]:
+    """Chunks and record batches of one entity path."""
+    return _read_again_if_changed(recording).get(entity, [])
+
+
+def _read_again_if_changed(recording: Path) -> dict[str, list[tuple[Any, Any]]]:
+    stat = recording.stat()
+    return _read(recording, (stat.st_mtime_ns, stat.st_size))
+
+
+@lru_cache(maxsize=2)
+def _read(recording: Path, version: tuple[int, int]) -> dict[str, list[tuple[Any, Any]]]:
+    """All chunks with their record batches, by entity path."""
+    found = defaultdict(list)
+    for chunk in RrdReader(recording).stream():
+        found[str(chunk.entity_path)].append((chunk, chunk.to_record_batch()))
+    return dict(found)

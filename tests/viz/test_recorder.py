@@ -78,22 +78,19 @@ def risk_of(messages: list[Received], until_ms: int) -> np.ndarray[Any, np.dtype
 def drawn_maps(recording: Path, kind: str, depth: int) -> list[tuple[int, np.ndarray[Any, np.dtype[np.uint8]]]]:
     """(time, whole image of shape (ROWS, COLUMNS, depth), nearest row first) of each time at which a block was drawn,
     put together from the blocks as they were then."""
-    blocks = {
-        path: static(recording, path, "Transform3D:translation")[0]
-        for path in entities(recording)
-        if re.fullmatch(f"/area/{kind}/.*", path)
-    }
+    paths = [path for path in entities(recording) if re.fullmatch(f"/area/{kind}/.*", path)]
+    corners = {path: static(recording, path, "Transform3D:translation")[0] for path in paths}
+    widths = {path: static(recording, path, "GridMap:format")[0]["width"] for path in paths}
     news = sorted(
-        (time_ms, path, bytes(data[0])) for path in blocks for time_ms, data in rows(recording, path, "GridMap:data")
+        (time_ms, path, bytes(data[0])) for path in paths for time_ms, data in rows(recording, path, "GridMap:data")
     )
     whole = np.full((ROWS, COLUMNS, depth), 255, dtype=np.uint8)
     found = []
     for time_ms, together in itertools.groupby(news, key=lambda one: one[0]):
         for _, path, data in together:
-            width = static(recording, path, "GridMap:format")[0]["width"]
-            image = np.frombuffer(data, dtype=np.uint8).reshape(-1, width, depth)[::-1]
-            column, row = (round(part / 5.0) for part in blocks[path][:2])
-            whole[row : row + len(image), column : column + width] = image
+            image = np.frombuffer(data, dtype=np.uint8).reshape(-1, widths[path], depth)[::-1]
+            column, row = (round(part / 5.0) for part in corners[path][:2])
+            whole[row : row + len(image), column : column + widths[path]] = image
         found.append((time_ms, whole.copy()))
     return found
 
