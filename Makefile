@@ -45,12 +45,14 @@ golden: .venv/.run-ready
 	@cp runs/golden/scenario.yaml $(GOLDEN)
 	@gzip --best --no-name --stdout runs/golden/messages.mpk >$(GOLDEN)/messages.mpk.gz
 
+# Two tests at a time. The processes they start, some hundreds, are not to compile each module anew.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: .venv/.test-ready
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	$(BIN)/pytest
+	$(BIN)/pytest -n 2 --dist worksteal
 
 # An example's tests, as a user runs them: against the wheel, in an environment of its own, away from this folder.
 example: .venv/.test-ready

@@ -21,7 +21,7 @@ BODY = ("--start", "-10", "-20", "--speed", "12", "--range", "15", "--run", "bay
 def test_a_vehicle_that_is_cut_off_is_lost_for_a_while_and_its_map_is_whole_in_the_end(tmp_path: Path) -> None:
     require(missing_for_namespaces())
     require(missing_for_certificates())
-    longer = ("--set", "mission.deadline_factor=4")  # the helper is to have time for its strips however slow it goes
+    longer = ("--set", "mission.deadline_factor=2.5")  # the helper is to have time for strips however slow it goes
     with (
         namespaces("ship", "helper") as hosts,
         spread_fleet(tmp_path, f"tls/{hosts.address}:7447", *longer, scenario=EXAMPLE / "bay.yaml") as fleet,

@@ -19,9 +19,8 @@ from flights import BRIEF, until
 from comms.topics import TOPICS, Keep, topic_of
 from secondlook.mission_files import read_messages
 
-# So that a slow machine does no harm: nobody is lost soon, and the helper has time for its strips, after which the
-# mission is over anyway.
-PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=6")
+# So that a slow machine does no harm: nobody is lost soon, and the helper has time for strips after the survey.
+PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=2.5")
 
 
 class Started:
@@ -41,11 +40,11 @@ class Started:
         """All it has printed."""
         return self._log.read_text()
 
-    def says(self, words: str, timeout_s: float = 30.0) -> bool:
+    def says(self, words: str, timeout_s: float = 60.0) -> bool:
         """Whether it prints these words in time."""
         return until(lambda: words in self.said or self.process.poll() is not None, timeout_s) and words in self.said
 
-    def ends(self, timeout_s: float = 60.0) -> int:
+    def ends(self, timeout_s: float = 180.0) -> int:
         """Its exit code."""
         return self.process.wait(timeout_s)
 

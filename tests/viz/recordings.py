@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import warnings
 from collections import defaultdict
 from functools import lru_cache
 from pathlib import Path
@@ -42,6 +43,16 @@ def timelines(recording: Path) -> set[str]:
     """The names of all index columns."""
     chunks = [chunk for its in _read_again_if_changed(recording).values() for chunk, _ in its]
     return {name for chunk in chunks for name in chunk.timeline_names}
+
+
+def rows_so_far(recording: Path, entities: str = "/**") -> int:
+    """How many rows of some entities a recording has that is still being written; 0 as long as it cannot be read."""
+    try:
+        with warnings.catch_warnings():  # it has no end yet, which the reader mentions
+            warnings.simplefilter("ignore")
+            return sum(chunk.num_rows for chunk in RrdReader(recording).stream().filter(content=entities))
+    except (OSError, RuntimeError, ValueError):  # not there, empty, or just in the middle of an entry
+        return 0
 
 
 def verify(recording: Path) -> subprocess.CompletedProcess[str]:
