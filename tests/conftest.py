@@ -6,13 +6,13 @@ import signal
 from collections import Counter
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 # Whoever starts the tests in the background may have made them deaf to Ctrl-C, and what they start with them.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 # How long one example takes says more about the machine than about the code.
-settings.register_profile("secondlook", deadline=None)
+settings.register_profile("secondlook", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("secondlook")
 
 

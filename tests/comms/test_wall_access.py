@@ -22,7 +22,7 @@ from comms.zenoh_session import ConnectionFailedError, subscribe
 
 NAMES = ("router", "world", "alpha", "beta", "coordinator", "observer")
 HOSTS = (HostPlan("world", ("world",)), *EACH_ALONE)
-SOON_S = 5.0
+SOON_S = 20.0
 
 
 @pytest.fixture(scope="module")

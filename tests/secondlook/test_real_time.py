@@ -23,7 +23,7 @@ from secondlook.optional_value import with_number
 # Half as long again after the primary's end, so that the helper has time for its strips however slow the machine is.
 FAST = ("--real-time", "40", "--set", "mission.deadline_factor=1.5", "--set", "coordinator.lost_after_s=120")
 SLOW = ("--real-time", "10")
-SOON_S = 8.0
+SOON_S = 20.0
 
 
 def summary_of(folder: Path) -> dict[str, Any]:

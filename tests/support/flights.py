@@ -22,7 +22,7 @@ LONG = ("--set", "vehicles.primary.speed_mps=0.2")
 MARKER = "SECONDLOOK_TEST_RUN"
 
 
-def until(condition: Callable[[], bool], timeout_s: float = 20.0) -> bool:
+def until(condition: Callable[[], bool], timeout_s: float = 60.0) -> bool:
     """Whether a condition that nothing announces comes true in time."""
     deadline_s = time.monotonic() + timeout_s
     pause = threading.Event()

@@ -106,11 +106,17 @@ def spread_fleet(folder: Path, endpoint: str, *options: str, scenario: Path = BR
         fleet.stop()
 
 
+_held: list[socket.socket] = []
+
+
 def loopback_endpoint() -> str:
-    """One on which nobody listens now."""
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{free.getsockname()[1]}"
+    """One on which nobody listens. Its port is held until these tests end, so that the system gives it to nobody else;
+    a router, which sets SO_REUSEADDR too, may listen there all the same."""
+    held = socket.socket()
+    held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    held.bind(("127.0.0.1", 0))
+    _held.append(held)
+    return f"tcp/127.0.0.1:{held.getsockname()[1]}"
 
 
 def interrupt(one: Started) -> None:
