@@ -3,11 +3,14 @@ from __future__ import annotations
 import socket
 import struct
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
 from viz import picture
+from viz.paths import TIMELINE
 from viz.picture import PictureError, headless_viewer, main, reports, show
 
 
@@ -45,6 +48,36 @@ def test_the_viewer_draws_every_view_and_is_gone_afterwards(recording: Path) -> 
     assert struct.unpack(">II", late[16:24]) == (800, 500)
     assert views == {"3D", "TimeSeries", "BarChart", "StateTimeline", "TextDocument", "TextLog"}
     assert override(blueprint.blueprint, "/truth", "EntityBehavior") == {"visible": False}
+
+
+class BusyViewer:
+    """A viewer that has opened a recording and is too slow for so many pictures."""
+
+    def __init__(self, too_slow: int) -> None:
+        self.too_slow = too_slow
+
+    def get_state(self) -> object:
+        timeline = SimpleNamespace(name=TIMELINE)
+        return SimpleNamespace(loading=False, recordings=[SimpleNamespace(timelines=[timeline])])
+
+    def set_time(self, timeline: str, *, duration: float, play_state: str) -> None:
+        assert (timeline, duration, play_state) == (TIMELINE, 600.0, "paused")
+
+    def take_screenshot(self) -> bytes:
+        self.too_slow -= 1
+        if self.too_slow >= 0:
+            raise TimeoutError("Deadline expired before operation could complete")
+        return b"drawn"
+
+
+def test_a_viewer_that_is_slow_to_draw_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(picture, "STEADY_S", 0.0)
+    slow: Any = BusyViewer(3)
+    assert show(slow, 600.0) == b"drawn"
+    monkeypatch.setattr(picture, "READY_WITHIN_S", 0.0)
+    too_slow: Any = BusyViewer(1000)
+    with pytest.raises(PictureError, match=r"^The viewer had not drawn the recording after 0 s\.$"):
+        show(too_slow, 600.0)
 
 
 @pytest.mark.usefixtures("drawable")
