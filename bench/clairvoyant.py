@@ -3,10 +3,11 @@
 python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--seconds S] [--jobs J] [--set KEY=VALUE]
 python -m bench.clairvoyant --run RUN [--seconds S]      a recorded run; --json for programs, with either
 
-For each seed: what each allocator's second looks removed (residual risk times m2, as measured), the bound that no
-schedule exceeds (`clairvoyant_bound` says why), and the best schedule that was found (`clairvoyant_schedule`, which
-begins with what the scenario's own allocator flew, or a better one); then the
-ratios. S is the wall time of the search for the schedule; the bound takes some seconds more.
+For each seed: the bound on the residual risk (times m2) that a schedule can remove (`clairvoyant_bound` says why none
+removes more), what the best schedule removes that was found (`clairvoyant_schedule`, which begins with the best that an
+allocator flew), and what each allocator's legs remove; then the ratios. All three are counted alike, by the true P_d of
+the helpers; what the mission's map told, from what the vehicles made of their P_d, is compared with that at the end.
+S is the wall time of the search for the schedule; the bound takes some seconds more.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ import argparse
 import json
 import os
 import sys
-import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping
 from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,11 @@ import secondlook
 from bench.clairvoyant_bound import upper_bound
 from bench.clairvoyant_schedule import best_schedule
 from bench.flown_legs import FlownLegs
-from bench.removable import Clairvoyance, Removable, watched
-from secondlook.compare.contenders import contenders
+from bench.legs import Schedule, Simulator
+from bench.removable import Clairvoyance, Removable
+from secondlook.compare.contenders import BASELINES, contenders
 from secondlook.compare.flight import FailedFlight, fly
 from secondlook.errors import UserError
-from secondlook.mission import RunOptions, run_mission
 from secondlook.processes import RunFailedError
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.side_by_side import worker_pool
@@ -43,15 +44,29 @@ from secondlook.signals import signals_interrupt
 
 BOUND_S = 60.0
 LARGEST_GRID_CELLS = 60_000
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What an allocator flew, and what that removed as the mission's map told."""
+
+    schedule: Schedule
+    measured_m2: float
 
 
 @dataclass(frozen=True)
 class Row:
-    """One seed. `removed_m2`: by allocator, None for a mission that failed. `there_m2`: all the risk that the survey
-    alone left. `search_s`: how long the search for a schedule took."""
+    """One seed. `removed_m2`: by allocator, what its legs remove, None for a mission that failed; `measured_m2`: the
+    same as the mission's map told. `there_m2`: all the risk that the survey alone left. `search_s`: how long the search
+    for a schedule took.
+
+    Raises ValueError where one of these contradicts another.
+    """
 
     seed: int
     removed_m2: dict[str, float | None]
+    measured_m2: dict[str, float | None]
     there_m2: float
     bound_m2: float
     best_m2: float
@@ -60,22 +75,34 @@ class Row:
     bound_s: float
     search_s: float
 
+    def __post_init__(self) -> None:
+        steps = {"all that was there": self.there_m2, "the bound": self.bound_m2, "the best schedule": self.best_m2}
+        for (more, most_m2), (less, least_m2) in pairwise(steps.items()):
+            self._hold(more, most_m2, less, least_m2)
+        for name, removed_m2 in self.removed_m2.items():
+            self._hold("the best schedule", self.best_m2, name, removed_m2 or 0.0)
 
-def solve(
-    mission: Removable, seed: int, removed_m2: dict[str, float | None], seconds: float, flown: Sequence[FlownLegs]
-) -> Row:
-    """Bound and best schedule of one mission; the search knows what was flown."""
+    def _hold(self, more: str, most_m2: float, less: str, least_m2: float) -> None:
+        if least_m2 > most_m2 * (1 + ROUNDING):
+            raise ValueError(
+                f"seed {self.seed}: {less} removes {least_m2:.1f} m2, and {more} must be at least that, not "
+                f"{most_m2:.1f} m2: legs are counted wrongly"
+            )
+
+
+def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seconds: float) -> Row:
+    """Bound and best schedule of one mission; the search knows what was flown, by allocator, None for a failure."""
     if mission.risk.size > LARGEST_GRID_CELLS:
         raise ValueError(f"a map of {mission.risk.size} cells is too large; must have at most {LARGEST_GRID_CELLS}")
     began_s = time.monotonic()
     bound = upper_bound(mission, BOUND_S)
     bounded_s = time.monotonic()
-    helpers = [helper.name for helper in mission.helpers]
-    known = [legs.schedule(mission.grid, helpers) for legs in flown]
-    best = best_schedule(mission, bound, seconds, seed, known)
+    best = best_schedule(mission, bound, seconds, seed, [one.schedule for one in flown.values() if one])
+    simulator = Simulator(mission)
     return Row(
         seed=seed,
-        removed_m2=removed_m2,
+        removed_m2={name: simulator.removed_m2(one.schedule) if one else None for name, one in flown.items()},
+        measured_m2={name: one.measured_m2 if one else None for name, one in flown.items()},
         there_m2=mission.total_m2,
         bound_m2=bound.removed_m2,
         best_m2=best.removed_m2,
@@ -88,49 +115,65 @@ def solve(
 
 def one_seed(scenario: Scenario, allocators: list[str], seconds: float) -> Row:
     """Flies the seed with each allocator, and solves it. The survey is the same with all of them."""
-    removed: dict[str, float | None] = {}
+    clairvoyance = Clairvoyance(contenders(scenario, ["none"])[0].scenario)
+    survey = fly(clairvoyance.scenario, clairvoyance.take)
+    if isinstance(survey, FailedFlight):
+        raise ValueError(f"seed {scenario.seed}: {survey.failure}")
+    mission = clairvoyance.removable()
+    flown: dict[str, Flown | None] = {}
     for contender in contenders(scenario, allocators):
-        flight = fly(contender.with_seed(scenario.seed))
-        removed[contender.name] = None if isinstance(flight, FailedFlight) else flight.removed_m2
-    clairvoyance, flown = Clairvoyance(contenders(scenario, ["none"])[0].scenario), FlownLegs()
-    for watched_scenario, watch in ((clairvoyance.scenario, clairvoyance.take), (scenario, flown.take)):
-        with tempfile.TemporaryDirectory(prefix="secondlook-clairvoyant-") as folder:
-            run_mission(watched_scenario, RunOptions(Path(folder), "local", record=False, watch=watch))
-    return solve(clairvoyance.removable(), scenario.seed, removed, seconds, [flown])
+        legs = FlownLegs()
+        flight = fly(contender.scenario, legs.take)
+        flown[contender.name] = (
+            None
+            if isinstance(flight, FailedFlight)
+            else Flown(legs.schedule(mission.grid, mission.helpers), flight.removed_m2)
+        )
+    return solve(mission, scenario.seed, flown, seconds)
 
 
 def one_run(folder: Path, seconds: float) -> Row:
     """Solves a recorded run."""
     scenario = load_scenario(str(folder / "scenario.yaml"))
-    received = list(secondlook.load(folder).received())
-    clairvoyance, flown = watched(scenario, received), FlownLegs()
-    for one in received:
-        flown.take(one)
+    clairvoyance, legs = Clairvoyance(scenario), FlownLegs()
+    for received in secondlook.load(folder).received():
+        clairvoyance.take(received)
+        legs.take(received)
     alone, fleet = clairvoyance.metrics.risk_primary_alone(), clairvoyance.metrics.risk()
     if alone is None or fleet is None:
         raise UserError(f"{folder}: the run ended before the mission began")
-    removed_m2 = (alone.mean - fleet.mean) * alone.cells * scenario.area.cell_m**2
-    return solve(
-        clairvoyance.removable(), scenario.seed, {scenario.coordinator.allocator: removed_m2}, seconds, [flown]
+    mission = clairvoyance.removable()
+    flown = Flown(
+        legs.schedule(mission.grid, mission.helpers), (alone.mean - fleet.mean) * alone.cells * scenario.area.cell_m**2
     )
+    return solve(mission, scenario.seed, {scenario.coordinator.allocator: flown}, seconds)
 
 
 def summary(rows: list[Row]) -> dict[str, Any]:
-    """Means and worst cases of the ratios."""
+    """Means and worst cases of the ratios; `measured`: of what the map told to what the legs remove, where any do."""
     told: dict[str, Any] = {"best_to_bound": _ratios([row.best_m2 / row.bound_m2 for row in rows])}
     for name in rows[0].removed_m2:
         flown = [(removed, row) for row in rows if (removed := row.removed_m2[name]) is not None]
         if flown:
+            measured = [row.measured_m2[name] or 0.0 for _, row in flown]
             told[name] = {
                 "missions": len(flown),
                 "to_best": _ratios([removed / row.best_m2 for removed, row in flown]),
                 "to_bound": _ratios([removed / row.bound_m2 for removed, row in flown]),
+                "measured": _ratios(
+                    [by_map / removed if removed else 1.0 for by_map, (removed, _) in zip(measured, flown, strict=True)]
+                ),
             }
     return told
 
 
 def _ratios(values: list[float]) -> dict[str, float]:
-    return {"mean": float(np.mean(values)), "least": min(values), "deviation": float(np.std(values))}
+    return {
+        "mean": float(np.mean(values)),
+        "least": min(values),
+        "most": max(values),
+        "deviation": float(np.std(values)),
+    }
 
 
 def _arguments() -> argparse.Namespace:
@@ -152,6 +195,9 @@ def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
         raise UserError(f"{arguments.scenario}: has no helper whose schedule could be compared")
     allocators = arguments.allocators.split(",") if arguments.allocators else [scenario.coordinator.allocator]
     contenders(scenario, allocators)  # refuses unknown names before anything flies
+    alone = next((name for name in allocators if name in BASELINES), None)
+    if alone is not None:
+        raise UserError(f"--allocators: {alone} is not allowed; it flies without the helpers that are compared")
     columns = (TextColumn("clairvoyant"), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"), TimeRemainingColumn())
     console = Console(stderr=True)
     with (
@@ -177,10 +223,11 @@ def _print(rows: list[Row]) -> None:
         if name == "best_to_bound":
             print(f"best schedule found, of the bound: mean {ratios['mean']:.3f}, least {ratios['least']:.3f}")
         else:
-            best, bound = ratios["to_best"], ratios["to_bound"]
+            best, bound, measured = ratios["to_best"], ratios["to_bound"], ratios["measured"]
             print(
                 f"{name}: of the best schedule mean {best['mean']:.3f}, least {best['least']:.3f}; "
-                f"of the bound mean {bound['mean']:.3f}, least {bound['least']:.3f}"
+                f"of the bound mean {bound['mean']:.3f}, least {bound['least']:.3f}; "
+                f"its map told {measured['least']:.3f} to {measured['most']:.3f} times as much"
             )
     search_s, bound_s = np.mean([row.search_s for row in rows]), np.mean([row.bound_s for row in rows])
     print(f"m2 of residual risk; {search_s:.0f} s of search a seed, {bound_s:.0f} s for the bound")

@@ -1,7 +1,7 @@
 """An upper bound on the risk that any schedule of second looks could have removed.
 
-The model. Helpers fly straight legs along the grid, at any of its columns, from any row to any other, in any number and
-order, and see what lies within their reach; a look at a cell counts once the cell is released. What is relaxed:
+The model. Helpers fly straight legs along the grid, every cell's width, from any row to any other, in any number and
+order, and see what lies in their swath; a look at a cell counts once the cell is released. What is relaxed:
 
 - A leg is cut into crossings of single rows, each of which may be flown at a time of its own, from the release of the
   first cell in its swath on; all of its swath then counts.
@@ -30,6 +30,7 @@ from ortools.linear_solver import pywraplp
 
 from bench.removable import Removable
 from bench.row_packing import LOOKS, RowPacking
+from bench.swath import Swath
 from planner.types import FloatArray
 
 STEP_S = 60.0
@@ -51,12 +52,12 @@ class Bound:
 
 @dataclass(frozen=True, eq=False)
 class BestKind:
-    """Each helper taken for the best of them in speed, turn, reach and P_d. `crossing_s`: a row's share of all that
+    """Each helper taken for the best of them in speed, turn, swath and P_d. `crossing_s`: a row's share of all that
     takes time; `turn_s`: the part of it that a turn takes beyond the way sideways."""
 
     count: int
     speed_mps: float
-    reach: int
+    swath: Swath
     p_detect: FloatArray
     crossing_s: float
     turn_s: float
@@ -70,7 +71,7 @@ def best_kind(mission: Removable) -> BestKind:
     return BestKind(
         count=len(helpers),
         speed_mps=speed_mps,
-        reach=max(one.sensor.reach for one in helpers),
+        swath=Swath(max(one.sensor.swath.width for one in helpers)),
         p_detect=np.max([one.sensor.best for one in helpers], axis=0),
         crossing_s=grid.cell_m / speed_mps * (1 + turn_m / (grid.rows * grid.cell_m)),
         turn_s=turn_m / speed_mps,
@@ -92,8 +93,8 @@ class Relaxation:
         released_s = np.where(mission.inside, mission.released_s, np.inf)
         self.worth = np.where(released_s < mission.ends_s, mission.risk, 0.0) * mission.grid.cell_area_m2
         p = kind.p_detect
-        self.packing = RowPacking([self.worth * p * (1 - p) ** look for look in range(LOOKS)], kind.reach)
-        crossing_from_s = _least_within(released_s, kind.reach)
+        self.packing = RowPacking([self.worth * p * (1 - p) ** look for look in range(LOOKS)], kind.swath)
+        crossing_from_s = _least_within(released_s, kind.swath)
         self.flyable = crossing_from_s < mission.ends_s
         self.column_from_s = crossing_from_s.min(axis=0)
         first_s = float(crossing_from_s.min())
@@ -155,8 +156,8 @@ class Relaxation:
         return lost
 
 
-def _least_within(values: FloatArray, reach: int) -> FloatArray:
-    """The least value within so many columns to either side."""
-    padded = np.pad(values, ((0, 0), (reach, reach)), constant_values=np.inf)
-    least: FloatArray = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1, axis=1).min(axis=2)
+def _least_within(values: FloatArray, swath: Swath) -> FloatArray:
+    """The least value in the swath of a leg at each column."""
+    padded = np.pad(values, ((0, 0), (swath.left, swath.right)), constant_values=np.inf)
+    least: FloatArray = np.lib.stride_tricks.sliding_window_view(padded, swath.width, axis=1).min(axis=2)
     return least

@@ -48,7 +48,8 @@ def best_schedule(
     mission: Removable, bound: Bound, seconds: float, seed: int, known: Sequence[Schedule] = ()
 ) -> Solution:
     """Searches for about so many seconds of wall time; with more time the result is at least as good, but for the
-    solver's own chances. `known`: schedules to begin with, if they are better than those that routing finds."""
+    solver's own chances. `known`: schedules to begin with, if they are better than those that routing finds; the
+    result is at least as good as each of them."""
     began_s = time.monotonic()
     simulator = Simulator(mission)
     price = bound.price_m2ps
@@ -59,10 +60,11 @@ def best_schedule(
     routed = [_routed(simulator, legs, each_s) for legs in sets]
     routed.append(tuple(() for _ in mission.helpers))
     routed += known
+    routed += [tuple(tuple(replace(leg, waits=True) for leg in legs) for legs in schedule) for schedule in known]
     by_worth = sorted(((simulator.removed_m2(one), index) for index, one in enumerate(routed)), reverse=True)
     start_m2, start = by_worth[0]
     candidates = [leg for legs in sets for leg in legs]
-    candidates += [leg for schedule in known for legs in schedule for leg in legs]
+    candidates += [replace(leg, from_s=0.0) for schedule in known for legs in schedule for leg in legs]
     left_s = seconds - (time.monotonic() - began_s)
     best_m2, best = _annealed(
         simulator, simulator.in_time(routed[start]), candidates, left_s, np.random.default_rng(seed)
@@ -81,7 +83,7 @@ def _packed(mission: Removable, price_m2ps: float, blocks: int) -> list[Leg]:
     edges = np.linspace(0, mission.grid.rows, blocks + 1).round().astype(int)
     values = [np.add.reduceat(worth * p * (1 - p) ** look, edges[:-1], axis=0) for look in range(LOOKS)]
     seconds = np.diff(edges) * mission.grid.cell_m / kind.speed_mps + kind.turn_s
-    packed = RowPacking(values, kind.reach).solve(
+    packed = RowPacking(values, kind.swath).solve(
         np.broadcast_to(price_m2ps * seconds[:, np.newaxis], (blocks, mission.grid.columns))
     )
     legs: list[Leg] = []
@@ -101,9 +103,8 @@ def _cut(mission: Removable, price_m2ps: float) -> list[Leg]:
     row_price = price_m2ps * mission.grid.cell_m / kind.speed_mps
     legs: list[Leg] = []
     while len(legs) < 100:
-        width = 2 * kind.reach + 1
-        padded = np.pad(worth, ((0, 0), (kind.reach, kind.reach)))
-        profit = np.lib.stride_tricks.sliding_window_view(padded, width, axis=1).sum(axis=2) - row_price
+        padded = np.pad(worth, ((0, 0), (kind.swath.left, kind.swath.right)))
+        profit = np.lib.stride_tricks.sliding_window_view(padded, kind.swath.width, axis=1).sum(axis=2) - row_price
         total = np.vstack([np.zeros(profit.shape[1]), np.cumsum(profit, axis=0)])
         gain = total - np.minimum.accumulate(total, axis=0)
         end, column = np.unravel_index(int(gain.argmax()), gain.shape)
@@ -111,7 +112,7 @@ def _cut(mission: Removable, price_m2ps: float) -> list[Leg]:
             break
         first = int(total[: end + 1, column].argmin())
         legs.append(Leg(int(column), first, int(end)))
-        columns = slice(max(0, int(column) - kind.reach), int(column) + kind.reach + 1)
+        columns = kind.swath.columns(int(column), mission.grid.columns)
         worth[first:end, columns] *= 1 - kind.p_detect[first:end, columns]
     return legs
 
@@ -180,7 +181,7 @@ def _times(simulator: Simulator, helper: int, nodes: Sequence[Leg]) -> NDArray[n
 def _alone_m2(simulator: Simulator, leg: Leg) -> float:
     """What a leg removes if no other is flown and it is released."""
     mission, kind = simulator.mission, best_kind(simulator.mission)
-    rows, columns = slice(leg.first, leg.end), slice(max(0, leg.column - kind.reach), leg.column + kind.reach + 1)
+    rows, columns = slice(leg.first, leg.end), kind.swath.columns(leg.column, mission.grid.columns)
     return float((_worth(mission)[rows, columns] * kind.p_detect[rows, columns]).sum())
 
 
@@ -192,11 +193,11 @@ def _annealed(
     now, now_m2 = start, simulator.removed_m2(start)
     best, best_m2 = now, now_m2
     while (share := (time.monotonic() - began_s) / max(seconds, 1e-9)) < 1:
-        changed = simulator.in_time(_changed(now, candidates, simulator.mission, chance))
+        changed = _changed(now, candidates, simulator.mission, chance)
         changed_m2 = simulator.removed_m2(changed)
         temperature = max(best_m2, 1.0) * HOTTEST * (COLDEST / HOTTEST) ** share
         if changed_m2 >= now_m2 or chance.random() < math.exp((changed_m2 - now_m2) / temperature):
-            now, now_m2 = changed, changed_m2
+            now, now_m2 = simulator.in_time(changed), changed_m2
             if now_m2 > best_m2:
                 best, best_m2 = now, now_m2
     return best_m2, best
@@ -205,38 +206,43 @@ def _annealed(
 def _changed(
     schedule: Schedule, candidates: Sequence[Leg], mission: Removable, chance: np.random.Generator
 ) -> Schedule:
-    """A schedule that differs in a leg or two."""
+    """A schedule that differs in a leg or two, or in where or in which direction a run of legs is flown."""
     helper = int(chance.integers(len(schedule)))
     legs = list(schedule[helper])
     others = list(schedule)
     move = chance.random()
     place = int(chance.integers(len(legs))) if legs else 0
+    behind = place  # from which leg on directions may change
     if not legs or (move < 0.12 and candidates):
         if candidates:
             leg = candidates[int(chance.integers(len(candidates)))]
-            leg = replace(leg, up=bool(chance.integers(2)), waits=bool(chance.integers(2)))
-            legs.insert(int(chance.integers(len(legs) + 1)), leg)
+            place = int(chance.integers(len(legs) + 1))
+            legs.insert(place, replace(leg, up=bool(chance.integers(2)), waits=bool(chance.integers(2))))
+            behind = place + 1
     elif move < 0.2:
         legs.pop(place)
-    elif move < 0.3 and candidates:
+    elif move < 0.28 and candidates:
         leg = candidates[int(chance.integers(len(candidates)))]
         legs[place] = replace(leg, up=legs[place].up, waits=legs[place].waits)
-    elif move < 0.55:
-        column = legs[place].column + int(chance.integers(-3, 4))
-        legs[place] = replace(legs[place], column=min(max(column, 0), mission.grid.columns - 1))
+    elif move < 0.56:
+        by = int(chance.integers(-3, 4))
+        end = place + 1 if move < 0.4 else int(chance.integers(place + 1, len(legs) + 1))
+        legs[place:end] = [
+            replace(leg, column=min(max(leg.column + by, 0), mission.grid.columns - 1)) for leg in legs[place:end]
+        ]
     elif move < 0.8:
         first = min(max(legs[place].first + int(chance.integers(-6, 7)), 0), mission.grid.rows - 1)
         end = min(max(legs[place].end + int(chance.integers(-6, 7)), first + 1), mission.grid.rows)
         legs[place] = replace(legs[place], first=first, end=end)
     elif move < 0.86:
-        legs[place] = replace(legs[place], waits=not legs[place].waits)
-    elif move < 0.92:
-        legs[place:] = [replace(leg, up=not leg.up) for leg in legs[place:]]
-    else:
+        legs[place] = replace(legs[place], waits=not legs[place].waits, from_s=0.0)
+    elif move >= 0.92:
         given = legs.pop(place)
         taker = int(chance.integers(len(schedule)))
         takers = legs if taker == helper else list(others[taker])
         takers.insert(int(chance.integers(len(takers) + 1)), given)
         others[taker] = tuple(takers)
+    if 0.86 <= move < 0.92 or (move < 0.2 and chance.integers(2)):  # what is put in or taken out turns the rest round
+        legs[behind:] = [replace(leg, up=not leg.up) for leg in legs[behind:]]
     others[helper] = tuple(legs)
     return tuple(others)

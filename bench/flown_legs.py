@@ -1,4 +1,4 @@
-"""The legs that a fleet's helpers flew in a mission, from what was said: a schedule to begin a search with."""
+"""The legs that a fleet's helpers flew in a mission, from their looks: a schedule to begin a search with."""
 
 from __future__ import annotations
 
@@ -7,42 +7,46 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from bench.legs import Leg, Schedule
-from comms.messages import AgentState, Mode, StripStatus
+from bench.removable import LegHelper
+from comms.messages import Look
 from comms.node import Received
 from planner.types import GridSpec
 
 
 @dataclass
 class FlownLegs:
-    """Told every message of a mission, it knows which strips were swept by whom, in which order and direction."""
+    """Told every message of a mission, it knows by whom which legs were flown, and when."""
 
-    _strips: dict[int, StripStatus] = field(default_factory=dict)
-    _swept: dict[str, dict[int, tuple[StripStatus, float]]] = field(default_factory=dict)
+    _looks: dict[str, dict[int, list[tuple[float, Look]]]] = field(default_factory=dict)
 
     def take(self, received: Received) -> None:
         """Takes one message, in the order of sending."""
-        message = received.message
-        if isinstance(message, StripStatus):
-            self._strips[int(received.key.rsplit("/", 1)[1])] = message
-        elif isinstance(message, AgentState) and message.mode is Mode.REVISIT and message.works_on in self._strips:
-            flown = self._strips[message.works_on], message.heading_rad
-            self._swept.setdefault(received.vehicle, {}).setdefault(message.works_on, flown)
+        look = received.message
+        if isinstance(look, Look) and look.valid:
+            legs = self._looks.setdefault(received.vehicle, {})
+            legs.setdefault(look.maneuver, []).append((received.header.sent_ms / 1000, look))
 
-    def schedule(self, grid: GridSpec, helpers: Sequence[str]) -> Schedule:
-        """Each helper's strips as one leg each, along the column nearest to the centre line, begun once released."""
-        return tuple(tuple(_leg(grid, *one) for one in self._swept.get(name, {}).values()) for name in helpers)
+    def schedule(self, grid: GridSpec, helpers: Sequence[LegHelper]) -> Schedule:
+        """Each helper's legs, on the nearest lines and rows, begun when they were."""
+        return tuple(
+            tuple(_leg(grid, helper, looks) for looks in self._looks.get(helper.name, {}).values())
+            for helper in helpers
+        )
 
 
-def _leg(grid: GridSpec, strip: StripStatus, heading_rad: float) -> Leg:
-    x_m = strip.start_x_m, strip.start_x_m + strip.length_m * math.sin(strip.heading_rad)
-    y_m = strip.start_y_m, strip.start_y_m + strip.length_m * math.cos(strip.heading_rad)
-    ends = [grid.frame.to_sweep(*end) for end in zip(x_m, y_m, strict=True)]
-    first, end = sorted(round(float(along_m) / grid.cell_m) for _, along_m in ends)
-    column = round(float(ends[0][0]) / grid.cell_m)
+def _leg(grid: GridSpec, helper: LegHelper, looks: Sequence[tuple[float, Look]]) -> Leg:
+    first_s, first = looks[0]
+    end_m = max(look.first_along_m + look.p_detect.shape[1] * look.along_bin_m for _, look in looks)
+    across_m, along_m = map(float, grid.frame.to_sweep(first.origin_x_m, first.origin_y_m))
+    up = math.cos(first.heading_rad - grid.frame.heading_rad) > 0
+    way = 1 if up else -1
+    begin, end = sorted(round((along_m + way * at_m) / grid.cell_m) for at_m in (first.first_along_m, end_m))
+    column = helper.sensor.swath.column_at(across_m / grid.cell_m)
     return Leg(
         column=min(max(column, 0), grid.columns - 1),
-        first=min(max(first, 0), grid.rows - 1),
+        first=min(max(begin, 0), grid.rows - 1),
         end=min(max(end, 1), grid.rows),
-        up=math.cos(heading_rad - grid.frame.heading_rad) > 0,
-        waits=True,
+        up=up,
+        waits=False,
+        from_s=first_s - first.p_detect.shape[1] * first.along_bin_m / helper.speed_mps,
     )

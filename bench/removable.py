@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from bench.swath import Swath
 from comms.messages import CoverageTile, Look
 from comms.node import Received
 from planner.dubins import Pose
-from planner.footprint import LookGeometry, look_on_grid
+from planner.footprint import look_on_grid
 from planner.types import BoolArray, FloatArray, GridSpec
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics
@@ -19,24 +19,23 @@ from secondlook.scenario import Scenario
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.seabed import make_seabed
 from sim_world.sonar import CurveSonar
-
-EDGE_M = 1e-3
+from vehicle_agent.coverage import geometry
 
 
 @dataclass(frozen=True, eq=False)
 class LegSensor:
     """What one look from a leg along the grid does.
 
-    `reach`: how many columns to either side of its own a leg covers. `p_detect`: true P_d of a look at each cell, by
-    the column's distance from the leg (0 to `reach`), shape (reach + 1, rows, columns); 0 outside the area.
+    `p_detect`: true P_d of a look at each cell, by the column's place in the swath, shape (width, rows, columns); 0
+    outside the area.
     """
 
-    reach: int
+    swath: Swath
     p_detect: FloatArray
 
     @property
     def best(self) -> FloatArray:
-        """The P_d of each cell at its best distance, grid shape."""
+        """The P_d of each cell at its best place in the swath, grid shape."""
         best: FloatArray = self.p_detect.max(axis=0)
         return best
 
@@ -130,14 +129,6 @@ class Clairvoyance:
         )
 
 
-def watched(scenario: Scenario, messages: Iterable[Received]) -> Clairvoyance:
-    """One that was told all of these."""
-    made = Clairvoyance(scenario)
-    for one in messages:
-        made.take(one)
-    return made
-
-
 def leg_helpers(scenario: Scenario, grid: GridSpec, inside: BoolArray) -> tuple[LegHelper, ...]:
     """The scenario's helpers with the truth of what their sensors would see."""
     fleet = build_fleet(scenario, record=False)
@@ -160,24 +151,15 @@ def leg_helpers(scenario: Scenario, grid: GridSpec, inside: BoolArray) -> tuple[
 
 def _leg_sensor(world: WorldConfig, body: VehicleConfig, grid: GridSpec, inside: BoolArray) -> LegSensor:
     curve = body.sensor.curve
-    reach = math.floor((float(curve.range_m[-1]) + EDGE_M) / grid.cell_m)
+    swath = Swath.of(grid, 2 * float(curve.range_m[-1]))
     sonar = (body.sensor.sonar or CurveSonar)(curve=curve, seabed=make_seabed(world.seabed, world.area, world.seed))
     x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
     # Either side looks across the same crests: a leg there and a leg back see alike.
     bearing_rad = grid.frame.heading_rad + math.pi / 2
-    by_distance = [
+    by_place = [
         np.where(
             inside, sonar.p_detect(np.full(grid.shape, distance_m), bearing_rad, body.altitude_m, (x_m, y_m), 0.0), 0.0
         )
-        for distance_m in np.arange(reach + 1) * grid.cell_m
+        for distance_m in np.abs(np.arange(swath.width) - (swath.width - 1) / 2) * grid.cell_m
     ]
-    return LegSensor(reach, np.array(by_distance))
-
-
-def geometry(look: Look) -> LookGeometry:
-    """Where a look lies."""
-    _, along_bins, range_bins = look.p_detect.shape
-    return LookGeometry(
-        (look.origin_x_m, look.origin_y_m), look.heading_rad, look.first_along_m, look.along_bin_m, look.range_bin_m,
-        along_bins, range_bins,
-    )  # fmt: skip
+    return LegSensor(swath, np.array(by_place))

@@ -1,6 +1,6 @@
 """Where to cross rows of cells, each for itself: the best columns for any number of crossings, exactly.
 
-A crossing at a column looks at all cells within reach of it. The first look at a cell brings what `values[0]` says, the
+A crossing at a column looks at all cells in its swath. The first look at a cell brings what `values[0]` says, the
 second what `values[1]` says, each further one `values[2]`; each crossing has a price. Rows are solved side by side.
 """
 
@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from bench.swath import Swath
 from planner.types import FloatArray
 
 LOOKS = 3
@@ -18,13 +19,13 @@ LOOKS = 3
 class RowPacking:
     """Dynamic programming over the column of the last crossing and its distance to the one before.
 
-    `values`: three arrays of shape (rows, columns), none larger than the one before. `reach`: in columns, either side.
+    `values`: three arrays of shape (rows, columns), none larger than the one before.
     """
 
-    def __init__(self, values: Sequence[FloatArray], reach: int) -> None:
+    def __init__(self, values: Sequence[FloatArray], swath: Swath) -> None:
         self.rows, self.columns = values[0].shape
-        self.reach = reach
-        self._span = 2 * reach
+        self._swath = swath
+        self._span = swath.width - 1
         self._gains, self.alone = self._all_gains(values)
 
     def solve(self, price: FloatArray) -> Packing:
@@ -73,8 +74,8 @@ class RowPacking:
 
     def _all_gains(self, values: Sequence[FloatArray]) -> tuple[FloatArray, FloatArray]:
         """What a crossing adds: by its column, the distance to the crossing before, that one's to the one before it
-        (last entry: out of reach) and row; and by column and row with none before within reach."""
-        span, reach = self._span, self.reach
+        (last entry: too far to overlap) and row; and by column and row with none before that overlaps."""
+        span, swath = self._span, self._swath
         sums = [np.concatenate([np.zeros((1, self.rows)), np.cumsum(value.T, axis=0)]) for value in values]
 
         def between(look: int, begin: int, end: int) -> FloatArray:
@@ -85,7 +86,7 @@ class RowPacking:
         gains = np.zeros((self.columns, span + 1, span + 2, self.rows))
         alone = np.zeros((self.columns, self.rows))
         for column in range(self.columns):
-            left, right = column - reach, column + reach + 1
+            left, right = column - swath.left, column + swath.right + 1
             alone[column] = between(0, left, right)
             for distance in range(span + 1):
                 once = right - distance  # behind the cells that the one before has seen

@@ -36,17 +36,7 @@ class CoverageLayer:
 
     def add(self, look: Look) -> None:
         """Adds a valid look."""
-        _, along_bins, range_bins = look.p_detect.shape
-        geometry = LookGeometry(
-            origin=(look.origin_x_m, look.origin_y_m),
-            heading_rad=look.heading_rad,
-            first_along_m=look.first_along_m,
-            along_bin_m=look.along_bin_m,
-            range_bin_m=look.range_bin_m,
-            along_bins=along_bins,
-            range_bins=range_bins,
-        )
-        rows, columns, p_detect = look_on_grid(self.grid, geometry, look.p_detect)
+        rows, columns, p_detect = look_on_grid(self.grid, geometry(look), look.p_detect)
         self.layer.add_look(rows, columns, p_detect)
         self._looked_at.update(tiles_within(self.grid, self._tiles, rows, columns))
 
@@ -101,3 +91,17 @@ class CoverageLayer:
             settled=self._published_settled[window].copy(),
         )
         return Publication(COVERAGE.key(vehicle=self._vehicle, tile=tile.name), message)
+
+
+def geometry(look: Look) -> LookGeometry:
+    """Where a look's bins lie."""
+    _, along_bins, range_bins = look.p_detect.shape
+    return LookGeometry(
+        origin=(look.origin_x_m, look.origin_y_m),
+        heading_rad=look.heading_rad,
+        first_along_m=look.first_along_m,
+        along_bin_m=look.along_bin_m,
+        range_bin_m=look.range_bin_m,
+        along_bins=along_bins,
+        range_bins=range_bins,
+    )

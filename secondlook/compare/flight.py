@@ -8,6 +8,7 @@ from pathlib import Path
 
 from secondlook.metrics import Metrics
 from secondlook.mission import RunOptions, run_mission
+from secondlook.observer import Watch
 from secondlook.processes import RunFailedError
 from secondlook.scenario import Scenario
 
@@ -50,12 +51,13 @@ class FailedFlight:
     failure: str
 
 
-def fly(scenario: Scenario) -> Flight | FailedFlight:
-    """Flies a mission; its files lie in a folder that is gone afterwards."""
+def fly(scenario: Scenario, watch: Watch | None = None) -> Flight | FailedFlight:
+    """Flies a mission; its files lie in a folder that is gone afterwards. `watch`: see `RunOptions`."""
     notes = _Notes()
     with tempfile.TemporaryDirectory(prefix="secondlook-compare-") as folder:
         try:
-            summary = run_mission(scenario, RunOptions(Path(folder), bus="local", record=False, progress=notes.take))
+            options = RunOptions(Path(folder), bus="local", record=False, progress=notes.take, watch=watch)
+            summary = run_mission(scenario, options)
         except RunFailedError as error:
             return FailedFlight(scenario.seed, str(error))
     primary_s, mission_s = summary["time"]["primary_s"], summary["time"]["mission_s"]
