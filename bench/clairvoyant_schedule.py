@@ -2,9 +2,11 @@
 
 Candidate legs are cut for several prices of a helper's second, each a set of legs that hardly overlap: as packings of
 crossings, and one by one where most is to be had. OR-tools' routing solver chooses and orders the legs of each set,
-with exact Dubins paths between them and no leg before it is released. The best route is then flown in `legs.Simulator`,
-where looks that overlap count for what they are, and improved by simulated annealing: legs are moved sideways, made
-shorter or longer, turned round, given to others, taken out and put in.
+with exact Dubins paths between them and no leg before it is released. The routes, and schedules that were flown, are
+then flown in `legs.Simulator`, where looks that overlap count for what they are, and improved by simulated annealing:
+legs are moved sideways, made shorter or longer, turned round, given to others, taken out and put in. As the schedule
+that is best to begin with is often not the one that becomes best, all are annealed for a while, then the best few of
+what came of them, and at last one.
 """
 
 from __future__ import annotations
@@ -28,8 +30,10 @@ PRICES = (0.7, 1.0)
 """Of a helper's second, as shares of that at the bound."""
 BLOCKS = (1, 3)
 """Into how many pieces the area's length is cut where legs are packed."""
-ROUTING_SHARE = 0.4
+ROUTING_SHARE = 0.2
 """Of the time; the rest is for annealing."""
+SURVIVORS = 0.25
+"""Share of the schedules that are annealed further, after each round."""
 TICKS_PER_S = 10
 COST_PER_M2 = 100  # against ticks: what is removed decides, of equals the shorter way
 HOTTEST, COLDEST = 1e-3, 1e-5  # of what is removed: the temperatures of annealing
@@ -37,11 +41,11 @@ HOTTEST, COLDEST = 1e-3, 1e-5  # of what is removed: the temperatures of anneali
 
 @dataclass(frozen=True)
 class Solution:
-    """The best schedule found; `started_m2`: what the search began with."""
+    """The best schedule found; `started_m2`: what the best that annealing began with removes."""
 
     removed_m2: float
-    started_m2: float
     schedule: Schedule
+    started_m2: float
 
 
 def best_schedule(
@@ -58,18 +62,30 @@ def best_schedule(
     sets = [legs for legs in sets if legs]
     each_s = ROUTING_SHARE * seconds / max(1, len(sets))
     routed = [_routed(simulator, legs, each_s) for legs in sets]
-    routed.append(tuple(() for _ in mission.helpers))
-    routed += known
-    routed += [tuple(tuple(replace(leg, waits=True) for leg in legs) for legs in schedule) for schedule in known]
-    by_worth = sorted(((simulator.removed_m2(one), index) for index, one in enumerate(routed)), reverse=True)
-    start_m2, start = by_worth[0]
+    starts = routed or [tuple(() for _ in mission.helpers)]
+    for flown in known:
+        hurried = tuple(tuple(replace(leg, waits=True) for leg in legs) for legs in flown)
+        starts.append(max(flown, hurried, key=simulator.removed_m2))
     candidates = [leg for legs in sets for leg in legs]
     candidates += [replace(leg, from_s=0.0) for schedule in known for legs in schedule for leg in legs]
     left_s = seconds - (time.monotonic() - began_s)
-    best_m2, best = _annealed(
-        simulator, simulator.in_time(routed[start]), candidates, left_s, np.random.default_rng(seed)
-    )
-    return Solution(best_m2, start_m2, best)
+    chance = np.random.default_rng(seed)
+    found = [(simulator.removed_m2(start), simulator.in_time(start)) for start in starts]
+    started_m2 = max(removed_m2 for removed_m2, _ in found)
+    counts = _rounds(len(found))
+    for count in counts:
+        found = sorted(found, key=lambda one: -one[0])[:count]
+        each_s = left_s / len(counts) / count
+        found = [_annealed(simulator, start, candidates, each_s, chance) for _, start in found]
+    return Solution(*max(found, key=lambda one: one[0]), started_m2)
+
+
+def _rounds(count: int) -> list[int]:
+    """How many schedules are annealed in each round."""
+    counts = [count]
+    while counts[-1] > 1:
+        counts.append(math.ceil(counts[-1] * SURVIVORS))
+    return counts
 
 
 def _worth(mission: Removable) -> FloatArray:
