@@ -51,10 +51,10 @@ class Solution:
 def best_schedule(
     mission: Removable, bound: Bound, seconds: float, seed: int, known: Sequence[Schedule] = ()
 ) -> Solution:
-    """Searches for about so many seconds of wall time; with more time the result is at least as good, but for the
+    """Searches for about so many seconds of processor time; with more time the result is at least as good, but for the
     solver's own chances. `known`: schedules to begin with, if they are better than those that routing finds; the
     result is at least as good as each of them."""
-    began_s = time.monotonic()
+    began_s = time.process_time()
     simulator = Simulator(mission)
     price = bound.price_m2ps
     sets = [_packed(mission, price * share, blocks) for share in PRICES for blocks in BLOCKS]
@@ -68,7 +68,7 @@ def best_schedule(
         starts.append(max(flown, hurried, key=simulator.removed_m2))
     candidates = [leg for legs in sets for leg in legs]
     candidates += [replace(leg, from_s=0.0) for schedule in known for legs in schedule for leg in legs]
-    left_s = seconds - (time.monotonic() - began_s)
+    left_s = seconds - (time.process_time() - began_s)
     chance = np.random.default_rng(seed)
     found = [(simulator.removed_m2(start), simulator.in_time(start)) for start in starts]
     started_m2 = max(removed_m2 for removed_m2, _ in found)
@@ -205,10 +205,10 @@ def _annealed(
     simulator: Simulator, start: Schedule, candidates: Sequence[Leg], seconds: float, chance: np.random.Generator
 ) -> tuple[float, Schedule]:
     """The best schedule on a walk through schedules that begins at `start`."""
-    began_s = time.monotonic()
+    began_s = time.process_time()
     now, now_m2 = start, simulator.removed_m2(start)
     best, best_m2 = now, now_m2
-    while (share := (time.monotonic() - began_s) / max(seconds, 1e-9)) < 1:
+    while (share := (time.process_time() - began_s) / max(seconds, 1e-9)) < 1:
         changed = _changed(now, candidates, simulator.mission, chance)
         changed_m2 = simulator.removed_m2(changed)
         temperature = max(best_m2, 1.0) * HOTTEST * (COLDEST / HOTTEST) ** share
