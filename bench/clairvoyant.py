@@ -97,7 +97,7 @@ def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seco
         raise ValueError(f"a map of {mission.risk.size} cells is too large; must have at most {LARGEST_GRID_CELLS}")
     began_s = time.monotonic()
     bound = upper_bound(mission, BOUND_S)
-    bounded_s = time.monotonic()
+    bound_s = time.monotonic() - began_s
     best = best_schedule(mission, bound, seconds, seed, [one.schedule for one in flown.values() if one])
     simulator = Simulator(mission)
     return Row(
@@ -109,7 +109,7 @@ def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seco
         best_m2=best.removed_m2,
         started_m2=best.started_m2,
         legs=sum(len(legs) for legs in best.schedule),
-        bound_s=bounded_s - began_s,
+        bound_s=bound_s,
         search_s=seconds,
     )
 

@@ -58,8 +58,8 @@ class Removable:
     """A mission as a clairvoyant sees it.
 
     `risk`: the residual risk that the survey alone leaves, grid shape, 0 outside the area. `released_s`: when each cell
-    had its last look by a primary; where none ever looked, when a primary said that none would. `ends_s`: the mission's
-    deadline; `primary_s`: when the last primary had surveyed all.
+    had its last look by a primary, or when a primary said that none would come any more, if that was sooner. `ends_s`:
+    the mission's deadline; `primary_s`: when the last primary had surveyed all.
     """
 
     grid: GridSpec
@@ -122,7 +122,7 @@ class Clairvoyance:
             grid=metrics.map.grid,
             inside=metrics.inside,
             risk=np.where(metrics.inside, risk, 0.0),
-            released_s=np.where(self._looked_s >= 0, self._looked_s, self._settled_s),
+            released_s=np.minimum(np.where(self._looked_s >= 0, self._looked_s, np.inf), self._settled_s),
             primary_s=primary_ms / 1000,
             ends_s=primary_ms / 1000 * self.scenario.mission.deadline_factor,
             helpers=leg_helpers(self.scenario, metrics.map.grid, metrics.inside),

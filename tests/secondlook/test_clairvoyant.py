@@ -311,6 +311,21 @@ class TestAFlownMission:
         for leg, begins_s in zip(legs[0], Simulator(made).begins_s(0, legs[0]), strict=True):
             assert begins_s == pytest.approx(leg.from_s, abs=0.05)
 
+    def test_what_was_swept_once_settled_counts_though_a_primary_comes_again(self, tmp_path: Path) -> None:
+        # Here the survey's tracks get so close to each other that it looks at settled cells once more.
+        clairvoyance, flown = Clairvoyance(load_scenario("patchy", (), 4)), FlownLegs()
+
+        def watch(received: Received) -> None:
+            clairvoyance.take(received)
+            flown.take(received)
+
+        options = RunOptions(tmp_path, "local", record=False, watch=watch)
+        summary = run_mission(clairvoyance.scenario, options)
+        made = clairvoyance.removable()
+        measured = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
+        removed_m2 = Simulator(made).removed_m2(flown.schedule(made.grid, made.helpers))
+        assert removed_m2 == pytest.approx(measured * made.inside.sum() * 25, rel=0.03)
+
     def test_a_seed_is_flown_and_solved(self) -> None:
         row = one_seed(load_scenario(BRIEF, (), 1), ["greedy", "none"], 2.0)
         greedy, none = row.removed_m2["greedy"], row.removed_m2["none"]
