@@ -139,7 +139,9 @@ def fly(agent: OneNode, name: str, maneuver: Maneuver, p_detect: P_Detect, looks
     for first, end in pairwise(edges):
         x_m, y_m = _at(maneuver, end * 5.0)
         agent.hear(f"veh/{name}/nav", nav(x_m, y_m, heading_rad(maneuver)), at_ms=began_ms + _flown_ms(end))
-        agent.hear(f"veh/{name}/look", look(maneuver, maneuver.number * 100 + end, first * 5.0, end - first, p_detect))
+        agent.hear(
+            f"veh/{name}/look", look(maneuver, maneuver.number * 10_000 + end, first * 5.0, end - first, p_detect)
+        )
     tell_status(agent, name, maneuver.number, ManeuverState.DONE)
 
 

@@ -170,10 +170,18 @@ class TestAnyArea:
         assert (node.coverage.settled == node._inside).all()
         assert all(track.flown for track in agent.last(Plan).tracks)
 
+    def test_what_a_sonar_that_sees_less_than_told_has_left_is_said(self) -> None:
+        # The first pair lies 102 m apart, for 142 m: the second, which sees to 140 m, does not reach all of the gap of
+        # the first.
+        outline = (100.0, 111.0), (281.0, 597.71), (-103.0, 289.4), (-319.0, 111.0), (-50.5, 23.53), (185.5, -210.3)
+        agent = surveyor(announced(Region(outline), 3.353515625, cell_m=20))
+        fly_all(agent, flat(0.3, 40, 140))
+        assert agent.last(Plan).note == "the survey ends, 7.05% of the area is not seen"
+
     @settings(max_examples=15)
     @given(regions(), st.floats(0, 6.2))
     def test_a_sonar_that_sees_as_told_leaves_nothing_unseen(self, region: Region, heading_rad: float) -> None:
-        agent = surveyor(announced(region, heading_rad, cell_m=20))
+        agent = surveyor(announced(region, heading_rad, cell_m=20), range_m=140)
         fly_all(agent, flat(0.3, 40, 140))
         node = node_of(agent)
         assert node.coverage is not None
