@@ -24,6 +24,10 @@ class LastFirst:
     def assign(self, situation):
         return {helper.vehicle: one.strip.number for helper, one in zip(situation.free, reversed(situation.strips))}
 
+class Idle:
+    def assign(self, situation):
+        return {}
+
 class OldFashioned:
     def assign(self, strips, helpers):
         return {}
@@ -119,7 +123,7 @@ def test_all_kinds_of_parts_together_on_either_bus(folder: Path, bus: str) -> No
 def test_a_part_changes_what_happens(folder: Path) -> None:
     _, plain, _ = run(folder)
     for setting in (
-        "coordinator.allocator=own:LastFirst",
+        "coordinator.allocator=own:Idle",
         "vehicles.primary.spacing=own:Every60",
         "vehicles.primary.agent=own:HalfCharged",
         "vehicles.helper.sensor.sonar=own:Deaf",
