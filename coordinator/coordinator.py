@@ -14,7 +14,6 @@ from comms.codec import Header
 from comms.messages import (
     AgentState,
     CoverageTile,
-    Curve,
     Hotspot,
     MissionOver,
     Mode,
@@ -110,10 +109,6 @@ class Coordinator:
                 self._take_status(vehicle, received.header, message, now_ms)
             elif isinstance(message, Plan) and vehicle is not None:
                 vehicle.take_plan(received.header, message)
-                if self._cutter is not None and vehicle.plan is message:
-                    self._cutter.take_plan(received.vehicle, message, now_ms)
-            elif isinstance(message, Curve) and vehicle is not None and self._cutter is not None:
-                self._cutter.take_curve(received.vehicle, message)
         elif self._over is not None:
             vehicle = self.vehicles.get(received.vehicle)
             if isinstance(message, AgentState) and vehicle is not None:
@@ -378,7 +373,7 @@ class Coordinator:
         if cutter is None:
             return
         under_way = {name: one.track_under_way for name, one in self._primaries.items()}
-        columns = cutter.look(now_ms, under_way, self._sweeps_m2(now_ms), self._looked_at())
+        columns = cutter.look(under_way, self._sweeps_m2(now_ms), self._looked_at())
         unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
         self._coming = [cut for cut in self._coming if not columns[cut.window.columns].any()]
         to_cut = {record.window for record in unmatched}

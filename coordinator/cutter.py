@@ -9,12 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from comms.messages import Curve, Hotspot, Plan
+from comms.messages import Hotspot
 from coordinator.badly_seen import BadlySeen, Place, Revision
 from coordinator.expected_looks import ExpectedLooks
-from coordinator.growth import REPORTED_WITHIN_S, Growth, TrackUnderWay
+from coordinator.growth import Growth, TrackUnderWay
 from coordinator.last_cut import LastCut
-from coordinator.seabed_share import SeabedShare
 from coordinator.strips import Cut, CuttingRules, Window, cut_strips
 from coordinator.worth import worth_risk
 from planner.fleet_map import FleetMap
@@ -38,8 +37,6 @@ class Cutter:
         self._inside_cells = int(inside.sum())
         self._badly_seen = BadlySeen(fleet.grid, inside)
         self._expected_looks = ExpectedLooks(fleet.grid)
-        self._seabed = SeabedShare(fleet.grid, inside)
-        self._learns_ms: int | None = None
         self._last_cut = LastCut(fleet.grid)
         self._risk: FloatArray = np.zeros(fleet.grid.shape)
         self._open_cells: BoolArray = inside
@@ -53,17 +50,8 @@ class Cutter:
         """Learns what a helper's looks have found: see `ExpectedLooks.learn`."""
         self._expected_looks.learn(window, p_detect, typical)
 
-    def take_curve(self, primary: str, curve: Curve) -> None:
-        """Takes a primary's P(y) curve."""
-        self._seabed.take_curve(primary, curve)
-
-    def take_plan(self, primary: str, plan: Plan, now_ms: int) -> None:
-        """Takes a primary's plan; what it has seen on a track is known when its tiles have come."""
-        if self._seabed.take_plan(primary, plan):
-            self._learns_ms = now_ms + round(REPORTED_WITHIN_S * 1000)
-
     def look(
-        self, now_ms: int, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, looked_at: Sequence[Window]
+        self, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, looked_at: Sequence[Window]
     ) -> BoolArray:
         """Looks at the area as it is now; returns the columns, shape (columns,), that are to be cut anew.
 
@@ -73,10 +61,7 @@ class Cutter:
         fleet, inside = self._fleet, self._inside
         settled = fleet.settled_by(primaries)
         risk = self._badly_seen.risk(fleet, settled)
-        if self._learns_ms is not None and now_ms >= self._learns_ms:
-            self._learns_ms = None
-            self._seabed.learn({name: fleet.layers[name] for name in primaries if name in fleet.layers})
-        self._risk = risk * self._expected_looks.factor(self._seabed.share)
+        self._risk = risk * self._expected_looks.factor(risk)
         self._open_cells = self._badly_seen.still_open(fleet.told_by(primaries), settled)
         self._growth = Growth.none(fleet.grid)
         for name, under_way in primaries.items():
