@@ -42,6 +42,13 @@ def fewest_by_integer_programming(left: list[Span], gap_m: int, range_m: int) ->
     return round(float(found.fun))
 
 
+def assert_the_fewest(left: list[Span], gap_m: int, range_m: int) -> None:
+    """Proven, and as many as an independent solver finds."""
+    found = fewest_tracks(left, gap_m, range_m)
+    assert found.fewest
+    assert len(found.offsets_m) == fewest_by_integer_programming(left, gap_m, range_m)
+
+
 def after_a_survey(rng: random.Random, width_m: int, gap_m: int, range_m: int) -> list[Span]:
     """What is left of an area after up to three pairs laid for more than the sonar then saw."""
     told_m = 3 * gap_m + rng.randint(0, gap_m)
@@ -163,35 +170,27 @@ class TestOptimality:
 
     @given(spans, gaps_and_ranges)
     def test_of_small_covers(self, left: list[Span], sensor: tuple[int, int]) -> None:
-        found = fewest_tracks(left, *sensor)
-        assert found.fewest
-        assert len(found.offsets_m) == fewest_by_integer_programming(left, *sensor)
+        assert_the_fewest(left, *sensor)
 
     @given(slivers, gaps_and_ranges)
     def test_of_covers_of_many_pieces(self, pieces: list[tuple[int, int]], sensor: tuple[int, int]) -> None:
         ends_m = np.cumsum(np.array(pieces).ravel()).reshape(-1, 2)
         left = [(float(near_m), float(far_m)) for near_m, far_m in ends_m]
-        found = fewest_tracks(left, *sensor)
-        assert found.fewest
-        assert len(found.offsets_m) == fewest_by_integer_programming(left, *sensor)
+        assert_the_fewest(left, *sensor)
 
     @pytest.mark.parametrize("seed", sorted({*range(60)} - {0, 5, 12, 13, 24, 27, 30, 34}))  # those are slow for it
     def test_of_covers_of_a_quarter_of_that(self, seed: int) -> None:
         rng = random.Random(seed)
         range_m = rng.randint(11, 29)
         left = after_a_survey(rng, 303, 10, range_m)
-        found = fewest_tracks(left, 10, range_m)
-        assert found.fewest
-        assert len(found.offsets_m) == fewest_by_integer_programming(left, 10, range_m)
+        assert_the_fewest(left, 10, range_m)
 
     @pytest.mark.parametrize("seed", [6, 7, 8, 10, 11, 12, 13])  # of which the other solver is not slow
     def test_of_covers_of_the_papers_size(self, seed: int) -> None:
         rng = random.Random(seed)
         range_m = rng.randint(75, 119)
         left = after_a_survey(rng, 1212, 40, range_m)
-        found = fewest_tracks(left, 40, range_m)
-        assert found.fewest
-        assert len(found.offsets_m) == fewest_by_integer_programming(left, 40, range_m)
+        assert_the_fewest(left, 40, range_m)
 
     @pytest.mark.parametrize(
         ("gap_m", "range_m"), [(40, 119), (40, 100), (40, 80), (40, 65), (40, 50), (7, 12), (0, 9)]
