@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coordinator.strips import CuttingRules
+from coordinator.strips import columns_across
 from planner.types import GridSpec
 
 
@@ -21,8 +21,7 @@ class Swath:
     @classmethod
     def of(cls, grid: GridSpec, swath_m: float) -> Swath:
         """The swath of a sensor that sees so many metres across."""
-        rules = CuttingRules(swath_m, p_detect=1, worth_risk=0, overhead_m=0, min_strip_m=0, max_strip_m=0)
-        return cls(rules.columns(grid))
+        return cls(columns_across(grid, swath_m))
 
     @property
     def left(self) -> int:

@@ -36,7 +36,7 @@ class CuttingRules:
 
     def columns(self, grid: GridSpec) -> int:
         """Whole columns of cells that the swath covers, at least one."""
-        return min(grid.columns, max(1, math.floor(self.swath_m / grid.cell_m + TOLERANCE)))
+        return columns_across(grid, self.swath_m)
 
 
 @dataclass(frozen=True)
@@ -173,6 +173,11 @@ def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = 
     length_m = (window.end_row - window.first_row) * grid.cell_m
     width_m = (window.end_column - window.first_column) * grid.cell_m
     return Strip(number, start, heading_rad, length_m, width_m)
+
+
+def columns_across(grid: GridSpec, swath_m: float) -> int:
+    """Whole columns of cells that a swath covers, at least one."""
+    return min(grid.columns, max(1, math.floor(swath_m / grid.cell_m + TOLERANCE)))
 
 
 def stretches(columns: BoolArray) -> list[slice]:
