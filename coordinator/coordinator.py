@@ -373,11 +373,12 @@ class Coordinator:
         if cutter is None:
             return
         under_way = {name: one.track_under_way for name, one in self._primaries.items()}
-        columns = cutter.look(under_way, self._sweeps_m2(now_ms), self._looked_at())
+        ground = cutter.look(under_way, self._sweeps_m2(now_ms), self._looked_at())
+        columns = ground.columns
         unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
         self._coming = [cut for cut in self._coming if not columns[cut.window.columns].any()]
         to_cut = {record.window for record in unmatched}
-        for cut in cutter.cut(columns, [window for window in self._looked_at() if window not in to_cut]):
+        for cut in cutter.cut(ground, [window for window in self._looked_at() if window not in to_cut]):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
@@ -393,8 +394,10 @@ class Coordinator:
     def _sweeps_m2(self, now_ms: int) -> float:
         """What helpers have time to sweep until the mission ends; infinite while nobody can tell."""
         deadline_s = self._expected_deadline_s()
-        left_m2 = (max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m for one in self._helpers(now_ms))
-        return SWEEPING_SHARE * sum(left_m2) if math.isfinite(deadline_s) else math.inf
+        if math.isinf(deadline_s):
+            return math.inf
+        helpers = self._helpers(now_ms)
+        return SWEEPING_SHARE * sum(max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m for one in helpers)
 
     def _looked_at(self) -> list[Window]:
         """What is a strip's that is open or with a vehicle, or will be one's."""

@@ -5,9 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from comms.messages import Hotspot
 from coordinator.badly_seen import BadlySeen, Place, Revision
@@ -18,6 +16,16 @@ from coordinator.strips import Cut, CuttingRules, Window, cut_strips
 from coordinator.worth import worth_risk
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """The area as it was looked at once. `columns`: those to be cut anew; for the other arrays see `cut_strips`."""
+
+    columns: BoolArray
+    risk: FloatArray
+    open_cells: BoolArray
+    growth: Growth
 
 
 class Cutter:
@@ -38,9 +46,6 @@ class Cutter:
         self._badly_seen = BadlySeen(fleet.grid, inside)
         self._expected_looks = ExpectedLooks(fleet.grid)
         self._last_cut = LastCut(fleet.grid)
-        self._risk: FloatArray = np.zeros(fleet.grid.shape)
-        self._open_cells: BoolArray = inside
-        self._growth = Growth.none(fleet.grid)
 
     def take_hotspot(self, place: Place, revision: Revision, message: Hotspot) -> bool:
         """Takes a hotspot's newest word; returns whether it was news."""
@@ -52,8 +57,8 @@ class Cutter:
 
     def look(
         self, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, looked_at: Sequence[Window]
-    ) -> BoolArray:
-        """Looks at the area as it is now; returns the columns, shape (columns,), that are to be cut anew.
+    ) -> Ground:
+        """Looks at the area as it is now.
 
         `primaries`: the track that each flies. `sweeps_m2`: what helpers have time for until the mission ends, infinite
         while nobody can tell. `looked_at`: the windows that are a strip's, or will be.
@@ -61,24 +66,25 @@ class Cutter:
         fleet, inside = self._fleet, self._inside
         settled = fleet.settled_by(primaries)
         risk = self._badly_seen.risk(fleet, settled)
-        self._risk = risk * self._expected_looks.factor(risk)
-        self._open_cells = self._badly_seen.still_open(fleet.told_by(primaries), settled)
-        self._growth = Growth.none(fleet.grid)
+        risk = risk * self._expected_looks.factor(risk)
+        open_cells = self._badly_seen.still_open(fleet.told_by(primaries), settled)
+        growth = Growth.none(fleet.grid)
         for name, under_way in primaries.items():
             if under_way is not None and name in fleet.layers:
-                self._growth.add(fleet.grid, inside, self._risk, fleet.layers[name], under_way)
-        ahead = int((inside & ~settled & (self._growth.settles_s == 0)).sum())
+                growth.add(fleet.grid, inside, risk, fleet.layers[name], under_way)
+        ahead = int((inside & ~settled & (growth.settles_s == 0)).sum())
         self.more_to_come = ahead / max(1, self._inside_cells - ahead)
         if math.isfinite(sweeps_m2):
             cells = sweeps_m2 / fleet.grid.cell_area_m2 / (1.0 + self.more_to_come)
-            worth = min(self._most_worth_risk, worth_risk(self._risk[self._risk > 0], cells))
+            worth = min(self._most_worth_risk, worth_risk(risk[risk > 0], cells))
             self.rules = replace(self.rules, worth_risk=worth)
-        return self._last_cut.changed_columns(self._risk, self._open_cells, self._growth, self.rules, looked_at)
+        columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, looked_at)
+        return Ground(columns, risk, open_cells, growth)
 
-    def cut(self, columns: BoolArray, looked_at: Sequence[Window]) -> list[Cut]:
-        """The strips in these columns, best first; `looked_at`: windows that are a strip's already."""
-        rules, grid = self.rules, self._fleet.grid
-        return cut_strips(grid, self._risk, self._open_cells, rules, looked_at, self._growth, columns)
+    def cut(self, ground: Ground, looked_at: Sequence[Window]) -> list[Cut]:
+        """The strips in the columns to be cut anew, best first; `looked_at`: windows that are a strip's already."""
+        grid, rules = self._fleet.grid, self.rules
+        return cut_strips(grid, ground.risk, ground.open_cells, rules, looked_at, ground.growth, ground.columns)
 
     def remember(self, looked_at: Sequence[Window]) -> None:
         """Remembers the windows that are a strip's, or will be, after the cut."""
