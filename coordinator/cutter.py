@@ -76,8 +76,9 @@ class Cutter:
         self.more_to_come = ahead / max(1, self._inside_cells - ahead)
         if math.isfinite(sweeps_m2):
             cells = sweeps_m2 / fleet.grid.cell_area_m2 / (1.0 + self.more_to_come)
-            worth = min(self._most_worth_risk, worth_risk(risk[risk > 0], cells))
-            self.rules = replace(self.rules, worth_risk=worth)
+            marginal = worth_risk(risk[risk > 0], cells)
+            worth = min(self._most_worth_risk, marginal)
+            self.rules = replace(self.rules, worth_risk=worth, marginal_risk=marginal)
         columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, looked_at)
         return Ground(columns, risk, open_cells, growth)
 

@@ -1,31 +1,34 @@
 """Cuts strips: rectangles along the tracks, as wide as the helper's swath, where a second look removes the most risk.
 
 The risk that one look would remove is summed over every window as wide as the swath; along the window each metre has to
-pay for the time it takes. The best window becomes a strip, its cells count as looked at, and the search goes on.
+pay for the time it takes. Where helpers have not the time for all that is worth a look, windows side by side are chosen
+that together remove most of what they do have time for. Then the best window becomes a strip, its cells count as looked
+at, and the search goes on.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
 
 from coordinator.growth import Growth
+from coordinator.runs import TOLERANCE, Runs
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
 MOST_STRIPS_A_CUT = 100
 SAME_PLACE = 0.75  # share of a run's cells
-MOST_ADDED = 16  # columns that are faster added one by one
-TOLERANCE = 1e-9  # relative: sums that differ by no more are taken as equal
 
 
 @dataclass(frozen=True)
 class CuttingRules:
     """`swath_m`: the helper's full swath; `p_detect`: its P_d there. `worth_risk`: mean residual risk over the swath
-    from which a further metre is worth flying. `overhead_m`: what getting to a strip costs, in metres flown."""
+    from which a further metre is worth flying. `marginal_risk`: that of the last metre that helpers have time for;
+    where it is more, strips from there up are chosen together. `overhead_m`: what getting to a strip costs, in metres
+    flown."""
 
     swath_m: float
     p_detect: float
@@ -33,6 +36,7 @@ class CuttingRules:
     overhead_m: float
     min_strip_m: float
     max_strip_m: float
+    marginal_risk: float = field(default=0.0, compare=False)
 
     def columns(self, grid: GridSpec) -> int:
         """Whole columns of cells that the swath covers, at least one."""
@@ -65,9 +69,14 @@ class Window:
         return max(rows, 0) * max(columns, 0)
 
     @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.end_row - self.first_row
+
+    @property
     def size(self) -> int:
         """Number of cells."""
-        return (self.end_row - self.first_row) * (self.end_column - self.first_column)
+        return self.rows * (self.end_column - self.first_column)
 
     @property
     def columns(self) -> slice:
@@ -95,7 +104,7 @@ def cut_strips(
     growth: Growth | None = None,
     columns: BoolArray | None = None,
 ) -> list[Cut]:
-    """The strips worth flying, best first.
+    """The strips worth flying, best first; before them, where time is short, those that were chosen together.
 
     `risk`: residual risk of the cells that a strip may serve, 0 elsewhere. `open_cells`: inside the area and not
     settled; what still grows towards such cells is left for later, unless it is as long as a strip may be. A strip is
@@ -113,52 +122,46 @@ def cut_strips(
     looked_at = list(taken)
     for window in taken:
         removable[window.cells] *= 1.0 - rules.p_detect
-    row_cost = rules.worth_risk * rules.p_detect * width * grid.cell_area_m2
-    fixed_cost = row_cost * rules.overhead_m / grid.cell_m
     shortest = max(1, round(rules.min_strip_m / grid.cell_m))
     longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
-    windows = grid.columns - width + 1
-    value, first_row, end_row = np.zeros(windows), np.zeros(windows, dtype=np.intp), np.zeros(windows, dtype=np.intp)
-
-    def look(columns: slice) -> None:
-        """Looks for the best run in these columns' windows."""
-        near = slice(max(0, columns.start - width + 1), min(windows, columns.stop))
-        profit = _window_sums(removable[:, near.start : near.stop + width - 1], width) - row_cost
-        # No run brings more than all rows that bring anything.
-        promising = np.flatnonzero(np.maximum(profit, 0.0).sum(axis=0) > fixed_cost * (1 - TOLERANCE))
-        value[near] = 0.0
-        places = near.start + promising
-        value[places], first_row[places], end_row[places] = _best_runs(profit[:, promising])
-
+    row_cost = rules.worth_risk * rules.p_detect * width * grid.cell_area_m2
+    fixed_cost = row_cost * rules.overhead_m / grid.cell_m
+    runs = Runs(removable, width, row_cost, fixed_cost)
     to_look_at = np.ones(grid.columns, dtype=np.bool_) if columns is None else columns
     for stretch in stretches(removable.any(axis=0) & to_look_at):
-        look(stretch)
+        runs.look(stretch)
+    dearer = rules.marginal_risk / rules.worth_risk
+    together = dearer > 1
     cuts: list[Cut] = []
     for _ in range(MOST_STRIPS_A_CUT):
-        best = float(value.max())
-        if best <= fixed_cost:
+        found = runs.side_by_side(dearer) if together else []
+        if not found:
+            together, found = False, runs.best()
+        if not found or len(cuts) >= MOST_STRIPS_A_CUT:
             break
-        column = int((value >= best * (1 - TOLERANCE)).argmax())
-        rows = (int(first_row[column]), int(end_row[column]))
-        column = _centred(removable[rows[0] : rows[1]], column, width)
-        run = Window(*rows, column, column + width)
-        beside = slice(max(0, rows[0] - 1), rows[1] + 1), slice(column, column + width)
-        least = longest if open_cells[beside].any() else shortest
-        if rows[1] - rows[0] < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
-            removable[run.cells] = 0.0  # the search goes on elsewhere
+        chosen = [Window(one.first_row, one.end_row, one.first_column, one.first_column + width) for one in found]
+        for run in chosen:
+            beside = slice(max(0, run.first_row - 1), run.end_row + 1), run.columns
+            least = longest if open_cells[beside].any() else shortest
+            if run.rows < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
+                removable[run.cells] = 0.0  # the search goes on elsewhere, and others are chosen
+                runs.look(run.columns)
+                break
         else:
-            for begin, end in _pieces(*rows, shortest, longest):
-                window = Window(begin, end, column, column + width)
-                settles_s = float(growth.settles_s[window.cells].max())
-                descending = bool(growth.descending[window.cells].any())
-                cut = Cut(window, float(removable[window.cells].sum()), settles_s, descending)
-                if cut.removable_m2 - (end - begin) * row_cost > fixed_cost:
-                    cuts.append(cut)
-                    looked_at.append(window)
-                    removable[window.cells] *= 1.0 - rules.p_detect
-                else:
-                    removable[window.cells] = 0.0
-        look(slice(column, column + width))
+            for run in chosen:
+                for begin, end in _pieces(run.first_row, run.end_row, shortest, longest):
+                    window = Window(begin, end, run.first_column, run.end_column)
+                    settles_s = float(growth.settles_s[window.cells].max())
+                    descending = bool(growth.descending[window.cells].any())
+                    cut = Cut(window, float(removable[window.cells].sum()), settles_s, descending)
+                    if cut.removable_m2 > (end - begin) * row_cost + fixed_cost:
+                        cuts.append(cut)
+                        looked_at.append(window)
+                        removable[window.cells] *= 1.0 - rules.p_detect
+                    else:
+                        removable[window.cells] = 0.0
+            for stretch in _together([run.columns for run in chosen]):
+                runs.look(stretch)
     return cuts
 
 
@@ -186,38 +189,15 @@ def stretches(columns: BoolArray) -> list[slice]:
     return [slice(first, end) for first, end in zip(edges[::2], edges[1::2], strict=True)]
 
 
-def _window_sums(values: FloatArray, width: int) -> FloatArray:
-    """Sums over `width` neighbouring columns, shape (rows, columns - width + 1)."""
-    windows = values.shape[1] - width + 1
-    if width > MOST_ADDED:
-        total = np.zeros((values.shape[0], values.shape[1] + 1))
-        values.cumsum(axis=1, out=total[:, 1:])
-        return total[:, width:] - total[:, :windows]
-    sums = values[:, :windows].copy()
-    for column in range(1, width):
-        sums += values[:, column : column + windows]
-    return sums
-
-
-def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
-    """For each window the run of rows with the largest sum: the sum, its first row, the row behind its last."""
-    rows, windows = profit.shape
-    total = np.zeros((rows + 1, windows))
-    profit.cumsum(axis=0, out=total[1:])
-    lowest_before = np.minimum.accumulate(total, axis=0)
-    gain = total - lowest_before
-    end_row = gain.argmax(axis=0)
-    best = end_row, np.arange(windows)
-    first_row = (total == lowest_before[best]).argmax(axis=0)
-    return gain[best], first_row, end_row
-
-
-def _centred(removable: FloatArray, column: int, width: int) -> int:
-    """The window of columns moved so that what it holds lies in its middle, where it holds it with room to spare."""
-    filled = np.flatnonzero(removable[:, column : column + width].any(axis=0))
-    spare_left, spare_right = int(filled[0]), width - 1 - int(filled[-1])
-    last: int = removable.shape[1] - width
-    return min(max(column + (spare_left - spare_right) // 2, 0), last)
+def _together(columns: Iterable[slice]) -> list[slice]:
+    """The columns in as few stretches as hold them."""
+    found: list[slice] = []
+    for one in sorted(columns, key=lambda one: one.start):
+        if found and one.start <= found[-1].stop:
+            found[-1] = slice(found[-1].start, max(found[-1].stop, one.stop))
+        else:
+            found.append(one)
+    return found
 
 
 def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:

@@ -59,6 +59,16 @@ class TestByHand:
         cuts = cut(hot(np.s_[10:40, 7:27]))
         assert {one.window for one in cuts} == {Window(10, 40, 7, 17), Window(10, 40, 17, 27)}
 
+    def test_where_time_is_short_two_strips_side_by_side_are_better_than_the_best_one(self) -> None:
+        # Five columns each of 0.6, 0.9, 0.9, 0.6: one strip on the 0.9, or two of 0.75 side by side. Full rows: 60 in
+        # length and 8 for the way. If time is worth 0.4, that is 54 - 27.2 or 2 * (45 - 27.2); if 0.6, 54 - 40.8 or
+        # 2 * (45 - 40.8).
+        risk = hot(np.s_[:, 10:15], np.s_[:, 25:30], risk=0.6) + hot(np.s_[:, 15:25], risk=0.9)
+        scarce, scarcer = (cut(risk, replace(RULES, marginal_risk=marginal_risk)) for marginal_risk in (0.4, 0.6))
+        assert sorted(one.window.first_column for one in scarce) == [10, 20]
+        assert all(one.window.rows == GRID.rows for one in scarce)
+        assert scarcer[0].window.columns == cut(risk)[0].window.columns == slice(15, 25)
+
     def test_a_band_as_long_as_the_area_is_split_into_equal_pieces(self) -> None:
         cuts = cut(hot(np.s_[:, 15:19]), replace(RULES, max_strip_m=110))
         assert [one.window for one in cuts] == [Window(first, first + 20, 12, 22) for first in (0, 20, 40)]
@@ -202,12 +212,13 @@ class TestEveryMap:
         assert all(later <= earlier + 1e-6 for earlier, later in pairwise(values))
 
     @settings(max_examples=80, deadline=None)
-    @given(risk=risks, open_cells=masks, rules=rules_of_all_kinds)
+    @given(risk=risks, open_cells=masks, rules=rules_of_all_kinds, marginal_risk=st.sampled_from([0.0, 0.4, 0.7]))
     def test_strips_lie_on_the_grid_are_as_long_as_allowed_and_worth_their_while(
-        self, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules
+        self, risk: FloatArray, open_cells: BoolArray, rules: CuttingRules, marginal_risk: float
     ) -> None:
         before = risk.copy()
         width = round(rules.swath_m / 5)
+        rules = replace(rules, marginal_risk=marginal_risk)
         for one in cut_strips(SMALL, risk, open_cells, rules):
             window = one.window
             assert 0 <= window.first_row < window.end_row <= SMALL.rows
