@@ -129,6 +129,7 @@ class SurveyAgent(Agent):
         self._last_number = track.number
         self.mode = Mode.TRANSIT
         self.works_on = track.number
+        self.expected_end_ms = 0  # the vehicle has yet to say
         self._looked_to_m = None
         self._tally = None
         self.follow(track, self.config.run_in_m)

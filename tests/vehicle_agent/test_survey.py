@@ -302,6 +302,15 @@ class TestWaiting:
         assert agent.last(AgentState).works_on == 1
         assert agent.last(AgentState).expected_end_ms == 330_001  # as the vehicle has just said
 
+    def test_the_end_of_a_track_is_not_told_of_the_next(self) -> None:
+        agent = on_its_way()
+        fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
+        state = agent.last(AgentState)
+        assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.TRANSIT, 2, 0)
+        tell_status(agent, PRIMARY, 2, ManeuverState.ACCEPTED, agent.now_ms + 1)
+        agent.wait_until(agent.now_ms + 10_000)
+        assert agent.last(AgentState).expected_end_ms > agent.now_ms
+
     def test_the_battery_empties_with_time(self) -> None:
         agent = on_its_way()
         agent.wait_until(9_000_000)
