@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coordinator.priorities import Priority
 from coordinator.situation import Allocator
 
 
@@ -14,6 +15,7 @@ class CoordinatorConfig:
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, at most:
     it falls where helpers have time for more.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
+    `priorities`: ground whose residual risk counts more, or less.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens."""
 
     allocator: Allocator
@@ -24,3 +26,4 @@ class CoordinatorConfig:
     worth_risk: float
     switch_margin: float
     separation_m: float = 0.0
+    priorities: tuple[Priority, ...] = ()

@@ -32,6 +32,7 @@ from coordinator.config import CoordinatorConfig
 from coordinator.cutter import Cutter
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.offers import checked_offers, offers_let_through
+from coordinator.priorities import weights_over
 from coordinator.right_of_way import Order, RightOfWay, Underway
 from coordinator.service import service
 from coordinator.situation import Helper, OpenStrip, Situation
@@ -156,7 +157,7 @@ class Coordinator:
                 min_strip_m=self.config.min_strip_m,
                 max_strip_m=self.config.max_strip_m,
             )
-            self._cutter = Cutter(self.map, self._inside, rules)
+            self._cutter = Cutter(self.map, self._inside, rules, weights_over(spec, self.config.priorities))
 
     def _take_tile(self, received: Received, tile: CoverageTile, now_ms: int) -> None:
         assert self.map is not None
@@ -434,8 +435,8 @@ class Coordinator:
         return GIVEN_UP_AFTER * self.config.lost_after_ms
 
     def _revise(self, record: StripRecord, cut: Cut) -> None:
-        change_m2 = abs(cut.removable_m2 - record.cut.removable_m2)
-        if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.removable_m2:
+        change_m2 = abs(cut.counts_m2 - record.cut.counts_m2)
+        if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
             return
         self.ledger.revise(record, self._strip_of(cut, record.strip.number), cut)
         for vehicle in self.vehicles.values():
@@ -533,7 +534,7 @@ class Coordinator:
 
         def supply(cut: Cut, count: float) -> Supply:
             length_m = (cut.window.end_row - cut.window.first_row) * cell_m
-            return Supply(cut.removable_m2, (length_m + overhead_m) / speed_mps, count)
+            return Supply(cut.counts_m2, (length_m + overhead_m) / speed_mps, count)
 
         supplies = [supply(cut, 1.0 + to_come) for cut in self._coming]
         for record in self.ledger:
@@ -557,7 +558,7 @@ class Coordinator:
 
     def _risk_m2(self, cut: Cut) -> float:
         assert self._cutter is not None
-        return cut.removable_m2 / self._cutter.rules.p_detect
+        return cut.counts_m2 / self._cutter.rules.p_detect
 
     def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:
         self._tasks += 1

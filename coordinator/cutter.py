@@ -32,11 +32,13 @@ class Cutter:
     """Cuts the area again and again, each time only where something has changed.
 
     `inside`: the area's cells, shape of the map's grid. `rules`: their `worth_risk` is the most that it may become; it
-    falls where helpers have time for more than is badly seen.
+    falls where helpers have time for more than is badly seen. `weights`: how many times a cell's risk counts
+    when strips are compared.
     """
 
-    def __init__(self, fleet: FleetMap, inside: BoolArray, rules: CuttingRules) -> None:
+    def __init__(self, fleet: FleetMap, inside: BoolArray, rules: CuttingRules, weights: FloatArray) -> None:
         self.rules = rules
+        self._weights = weights
         self.more_to_come = 0.0
         """Area that is still to settle, as a multiple of what has."""
         self._most_worth_risk = rules.worth_risk
@@ -76,7 +78,8 @@ class Cutter:
         self.more_to_come = ahead / max(1, self._inside_cells - ahead)
         if math.isfinite(sweeps_m2):
             cells = sweeps_m2 / fleet.grid.cell_area_m2 / (1.0 + self.more_to_come)
-            marginal = worth_risk(risk[risk > 0], cells)
+            counts = risk * self._weights
+            marginal = worth_risk(counts[counts > 0], cells)
             worth = min(self._most_worth_risk, marginal)
             self.rules = replace(self.rules, worth_risk=worth, marginal_risk=marginal)
         columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, looked_at)
@@ -84,8 +87,16 @@ class Cutter:
 
     def cut(self, ground: Ground, looked_at: Sequence[Window]) -> list[Cut]:
         """The strips in the columns to be cut anew, best first; `looked_at`: windows that are a strip's already."""
-        grid, rules = self._fleet.grid, self.rules
-        return cut_strips(grid, ground.risk, ground.open_cells, rules, looked_at, ground.growth, ground.columns)
+        return cut_strips(
+            self._fleet.grid,
+            ground.risk,
+            ground.open_cells,
+            self.rules,
+            looked_at,
+            ground.growth,
+            ground.columns,
+            self._weights,
+        )
 
     def remember(self, looked_at: Sequence[Window]) -> None:
         """Remembers the windows that are a strip's, or will be, after the cut."""

@@ -23,7 +23,9 @@ class Run(NamedTuple):
 class Runs:
     """The best run of rows in every window of columns as wide as the swath: what it removes beyond what its rows cost.
 
-    `removable`: what one look removes of each cell; after a change, `look` again. `fixed_cost`: of each strip."""
+    `removable`: what one look removes of each cell, as it counts; `look` again where it has changed. `fixed_cost`: of
+    each strip.
+    """
 
     def __init__(self, removable: FloatArray, width: int, row_cost: float, fixed_cost: float) -> None:
         self._removable = removable

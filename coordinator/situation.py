@@ -12,8 +12,8 @@ from planner.types import Strip
 
 @dataclass(frozen=True)
 class OpenStrip:
-    """A strip and the residual risk on it, summed over its cells and times their area; a sweep by a helper is expected
-    to remove its `p_detect` of that.
+    """A strip and the residual risk on it as it counts in the objective, summed over its cells and times their area; a
+    sweep by a helper is expected to remove its `p_detect` of that.
 
     `settles_s`: when all of it will have settled, 0 if it has. Until then a helper must follow in the survey's wake,
     the strip's way, and not overtake it.

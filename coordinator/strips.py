@@ -86,11 +86,13 @@ class Window:
 
 @dataclass(frozen=True)
 class Cut:
-    """A strip's window and the risk that one look along it is expected to remove (residual risk times m2).
+    """A strip's window and the risk that one look along it is expected to remove (residual risk times m2); `counts_m2`:
+    what that counts in the objective.
     `settles_s`: when all of it will have settled, 0 if it has; `descending`: whether it runs down the rows."""
 
     window: Window
     removable_m2: float
+    counts_m2: float
     settles_s: float = 0.0
     descending: bool = False
 
@@ -103,6 +105,7 @@ def cut_strips(
     taken: Sequence[Window] = (),
     growth: Growth | None = None,
     columns: BoolArray | None = None,
+    weights: FloatArray | None = None,
 ) -> list[Cut]:
     """The strips worth flying, best first; before them, where time is short, those that were chosen together.
 
@@ -112,23 +115,26 @@ def cut_strips(
     `taken`: strips that are being served; their cells count as looked at. No strip lies by three quarters or more on
     another one, or on one that is taken: whether a place is worth two looks is asked when it has had the first.
     `growth`: what is about to settle counts as if it had. `columns`: where to look, shape (columns,); windows that hold
-    none of them are left out; None for everywhere.
+    none of them are left out; None for everywhere. `weights`: how many times a cell's risk counts
+    when strips are compared, 1 if left out.
     """
     growth = growth or Growth.none(grid)
     risk = np.where(growth.settles_s > 0, growth.risk, risk)
     open_cells = open_cells & (growth.settles_s == 0)
     width = rules.columns(grid)
     removable = risk * (rules.p_detect * grid.cell_area_m2)
+    counts = removable.copy() if weights is None else removable * weights
     looked_at = list(taken)
     for window in taken:
         removable[window.cells] *= 1.0 - rules.p_detect
+        counts[window.cells] *= 1.0 - rules.p_detect
     shortest = max(1, round(rules.min_strip_m / grid.cell_m))
     longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
     row_cost = rules.worth_risk * rules.p_detect * width * grid.cell_area_m2
     fixed_cost = row_cost * rules.overhead_m / grid.cell_m
-    runs = Runs(removable, width, row_cost, fixed_cost)
+    runs = Runs(counts, width, row_cost, fixed_cost)
     to_look_at = np.ones(grid.columns, dtype=np.bool_) if columns is None else columns
-    for stretch in stretches(removable.any(axis=0) & to_look_at):
+    for stretch in stretches(counts.any(axis=0) & to_look_at):
         runs.look(stretch)
     dearer = rules.marginal_risk / rules.worth_risk
     together = dearer > 1
@@ -144,7 +150,7 @@ def cut_strips(
             beside = slice(max(0, run.first_row - 1), run.end_row + 1), run.columns
             least = longest if open_cells[beside].any() else shortest
             if run.rows < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
-                removable[run.cells] = 0.0  # the search goes on elsewhere, and others are chosen
+                counts[run.cells] = 0.0  # the search goes on elsewhere, and others are chosen
                 runs.look(run.columns)
                 break
         else:
@@ -153,13 +159,14 @@ def cut_strips(
                     window = Window(begin, end, run.first_column, run.end_column)
                     settles_s = float(growth.settles_s[window.cells].max())
                     descending = bool(growth.descending[window.cells].any())
-                    cut = Cut(window, float(removable[window.cells].sum()), settles_s, descending)
-                    if cut.removable_m2 > (end - begin) * row_cost + fixed_cost:
-                        cuts.append(cut)
+                    removed_m2, counts_m2 = (float(each[window.cells].sum()) for each in (removable, counts))
+                    if counts_m2 > (end - begin) * row_cost + fixed_cost:
+                        cuts.append(Cut(window, removed_m2, counts_m2, settles_s, descending))
                         looked_at.append(window)
                         removable[window.cells] *= 1.0 - rules.p_detect
+                        counts[window.cells] *= 1.0 - rules.p_detect
                     else:
-                        removable[window.cells] = 0.0
+                        counts[window.cells] = 0.0
             for stretch in _together([run.columns for run in chosen]):
                 runs.look(stretch)
     return cuts

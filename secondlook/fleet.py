@@ -13,6 +13,7 @@ from comms.codec import CLOCK, SCHEMA_VERSION, Header, encode
 from comms.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.routing import RosterNode
 from coordinator.config import CoordinatorConfig
+from coordinator.priorities import Priority
 from planner.region import Region
 from planner.types import DetectionCurve, Point
 from secondlook.errors import UserError
@@ -232,4 +233,5 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
         separation_m=scenario.mission.separation_m,
+        priorities=tuple(Priority(one.polygon_m, one.weight) for one in scenario.area.priorities),
     )

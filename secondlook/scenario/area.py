@@ -33,14 +33,28 @@ TrackHeading = Annotated[
 ]
 
 
+class Priority(Mapping):
+    """Ground whose residual risk counts `weight` times when second looks are planned."""
+
+    polygon_m: Corners
+    weight: Annotated[float, Field(ge=0, le=100)]
+
+    @field_validator("polygon_m")
+    @classmethod
+    def _check_polygon(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
+        _check_outline(polygon_m)
+        return polygon_m
+
+
 class Area(Mapping):
     """A polygon in the mission frame, convex or not, and holes in it that are not surveyed; the compass heading of the
-    tracks, `auto` for the one that needs the fewest; and the map's cell."""
+    tracks, `auto` for the one that needs the fewest; the map's cell; and ground that counts more in second looks."""
 
     polygon_m: Corners
     holes_m: Annotated[tuple[Corners, ...], Field(strict=False, max_length=20)] = ()
     track_heading_deg: TrackHeading = 0.0
     cell_m: Annotated[Bin, Field(validate_default=True)] = 5.0
+    priorities: Annotated[tuple[Priority, ...], Field(strict=False, max_length=20)] = ()
 
     @property
     def extent_m(self) -> tuple[float, float]:
@@ -70,6 +84,15 @@ class Area(Mapping):
         ):
             raise refused("must not touch each other")
         return holes_m
+
+    @field_validator("priorities")
+    @classmethod
+    def _check_priorities(cls, priorities: tuple[Priority, ...], info: ValidationInfo) -> tuple[Priority, ...]:
+        if "polygon_m" in info.data:
+            area = Polygon(info.data["polygon_m"])
+            if any(area.intersection(Polygon(one.polygon_m)).area < TOLERANCE for one in priorities):
+                raise refused("must each share ground with polygon_m")
+        return priorities
 
     @field_validator("cell_m")
     @classmethod

@@ -15,7 +15,7 @@ from planner.types import Strip
 
 OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN = StripState
 WINDOW = Window(0, 10, 0, 10)
-CUT = Cut(WINDOW, 100)
+CUT = Cut(WINDOW, 100, 100)
 ALLOWED = {
     (OPEN, OFFERED),
     (OPEN, WITHDRAWN),
@@ -115,7 +115,7 @@ def test_a_number_is_given_once_and_in_order(number: int) -> None:
 def test_only_an_open_strip_is_revised() -> None:
     ledger = Ledger()
     record = opened(ledger)
-    ledger.revise(record, Strip(1, (5, 5), 0, 60, 50), Cut(Window(1, 13, 0, 10), 120))
+    ledger.revise(record, Strip(1, (5, 5), 0, 60, 50), Cut(Window(1, 13, 0, 10), 120, 120))
     assert (record.strip.length_m, record.window.end_row, record.cut.removable_m2, record.revision) == (60, 13, 120, 2)
     ledger.move(record, OFFERED, 10, "", "alpha")
     with pytest.raises(ValueError, match="only an open one can be revised"):

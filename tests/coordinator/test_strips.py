@@ -33,6 +33,10 @@ def cut(risk: FloatArray, rules: CuttingRules = RULES, open_cells: BoolArray = N
     return cut_strips(GRID, risk, open_cells, rules)
 
 
+def by_hand(window: Window, removable_m2: float) -> Cut:
+    return Cut(window, removable_m2, removable_m2)
+
+
 def value(one: Cut, rules: CuttingRules, grid: GridSpec = GRID) -> float:
     """What a strip removes beyond the cost of its length."""
     rows = one.window.end_row - one.window.first_row
@@ -93,6 +97,18 @@ class TestByHand:
         assert [one.window for one in cuts] == [Window(5, 40, 10, 20)]
         far = cut(hot(np.s_[0:10, 10:20], np.s_[50:60, 10:20]))  # 40 rows cost 10, a run brings 7.5
         assert {one.window for one in far} == {Window(0, 10, 10, 20), Window(50, 60, 10, 20)}
+
+    def test_ground_that_counts_more_comes_first_and_what_a_look_removes_stays_true(self) -> None:
+        risk = hot(np.s_[10:40, 2:12], risk=0.8) + hot(np.s_[10:40, 25:35], risk=0.5)
+        weights = np.where(np.arange(GRID.columns) < 20, 1.0, 2.0) * np.ones(GRID.shape)
+        cuts = cut_strips(GRID, risk, NONE_OPEN, RULES, weights=weights)
+        assert [one.window.first_column for one in cuts[:2]] == [25, 2]
+        # 30 x 10 cells of 25 m2, of which 0.7 is removed: 0.5 of that counts twice.
+        assert (cuts[0].removable_m2, cuts[0].counts_m2) == pytest.approx((2625, 5250))
+        assert (cuts[1].removable_m2, cuts[1].counts_m2) == pytest.approx((4200, 4200))
+
+    def test_ground_that_counts_nothing_gets_no_strip(self) -> None:
+        assert cut_strips(GRID, hot(np.s_[:, :]), NONE_OPEN, RULES, weights=np.zeros(GRID.shape)) == []
 
     def test_nothing_hot_gives_nothing(self) -> None:
         assert cut(np.zeros(GRID.shape)) == []
@@ -176,7 +192,7 @@ def best_by_brute_force(risk: FloatArray, rules: CuttingRules) -> float:
     """The value of the best rectangle as wide as the swath, of any length."""
     width = round(rules.swath_m / SMALL.cell_m)
     return max(
-        value(Cut(window, risk[window.cells].sum() * rules.p_detect * SMALL.cell_area_m2), rules, SMALL)
+        value(by_hand(window, risk[window.cells].sum() * rules.p_detect * SMALL.cell_area_m2), rules, SMALL)
         for column in range(SMALL.columns - width + 1)
         for first in range(SMALL.rows)
         for end in range(first + 1, SMALL.rows + 1)

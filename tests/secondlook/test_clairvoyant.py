@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.clairvoyant import Row, one_seed
+from bench.clairvoyant import Row, check_modelled, one_seed
 from bench.clairvoyant_bound import Relaxation, upper_bound
 from bench.clairvoyant_schedule import best_schedule
 from bench.flown_legs import FlownLegs
@@ -27,6 +27,7 @@ from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.sweep import legs_over_strip
 from planner.types import FloatArray, GridSpec, SweepFrame
+from secondlook.errors import UserError
 from secondlook.fleet import build_fleet
 from secondlook.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
@@ -371,3 +372,16 @@ class TestFlownLegs:
         removed_m2 = row.removed_m2["plan"]
         assert removed_m2 is not None
         assert row.best_m2 >= row.started_m2 >= removed_m2 > 0
+
+
+@pytest.mark.parametrize(
+    ("setting", "key"),
+    [
+        ("mission.rho=0.5", "mission.rho: 0.5"),
+        ("area.priorities=[{polygon_m: [[0, 0], [100, 0], [0, 100]], weight: 2}]", "area.priorities"),
+    ],
+)
+def test_an_objective_that_is_not_the_clairvoyants_is_refused(setting: str, key: str) -> None:
+    check_modelled(load_scenario(BRIEF))
+    with pytest.raises(UserError, match=key):
+        check_modelled(load_scenario(BRIEF, [setting]))

@@ -255,6 +255,19 @@ class TestTheTrial:
         assert mission.summary["risk"]["mean"] == pytest.approx(straight.summary["risk"]["mean"], abs=0.005)
         assert mission.summary["risk"]["cells"] == pytest.approx(straight.summary["risk"]["cells"], rel=0.01)
 
+    def test_ground_that_counts_more_is_left_with_less_risk_and_the_rest_with_more(self) -> None:
+        """A channel of 200 m in the middle of the area: columns of 5 m from 600 to 800 m."""
+        corners = "[[600, 0], [800, 0], [800, 400], [600, 400]]"
+        left = {}
+        for weight in (0, 1, 3):
+            mission = flown("tellaro", 1, f"area.priorities=[{{polygon_m: {corners}, weight: {weight}}}]")
+            assert mission.metrics.map is not None
+            risk = mission.metrics.map.risk
+            left[weight] = float(risk[:, 120:160].mean()), float(np.delete(risk, np.s_[120:160], axis=1).mean())
+        channel, elsewhere = zip(*(left[weight] for weight in (0, 1, 3)), strict=True)
+        assert channel[0] > 2 * channel[1] > 3 * channel[2]
+        assert elsewhere[0] < elsewhere[1] < elsewhere[2]
+
     def test_without_an_allocator_strips_are_cut_but_nobody_is_sent(self) -> None:
         mission = flown("tellaro", 1, "coordinator.allocator=none")
         figures = mission.summary["hotspots"]

@@ -256,6 +256,27 @@ MISTAKES = {
             "must be the corners in order, but its sides cross"
         ],
     ),
+    "priority elsewhere": (
+        POLYGON,
+        POLYGON + "\n  priorities: [{polygon_m: [[900, 0], [950, 0], [950, 50]], weight: 3}]",
+        [
+            'bad.yaml:4: area.priorities: [{"polygon_m": [[900, 0], [950, 0], [950, 50]], "weight":... is not allowed; '
+            "must each share ground with polygon_m"
+        ],
+    ),
+    "priority of negative weight": (
+        POLYGON,
+        POLYGON + "\n  priorities: [{polygon_m: [[10, 10], [50, 10], [50, 50]], weight: -1}]",
+        ["bad.yaml:4: area.priorities[0].weight: -1 is not allowed; must be at least 0"],
+    ),
+    "priority with crossing sides": (
+        POLYGON,
+        POLYGON + "\n  priorities: [{polygon_m: [[10, 10], [50, 50], [50, 10], [10, 50]], weight: 2}]",
+        [
+            "bad.yaml:4: area.priorities[0].polygon_m: [[10, 10], [50, 50], [50, 10], [10, 50]] is not allowed; "
+            "must be the corners in order, but its sides cross"
+        ],
+    ),
     "heading in a word": (
         POLYGON,
         POLYGON + "\n  track_heading_deg: north",

@@ -1,0 +1,27 @@
+"""Ground whose residual risk counts for more in the objective, or for less."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.region import Region
+from planner.types import FloatArray, GridSpec, Point
+
+
+@dataclass(frozen=True)
+class Priority:
+    """Ground, by its corners in the mission frame, whose residual risk counts `weight` times."""
+
+    outline: tuple[Point, ...]
+    weight: float
+
+
+def weights_over(grid: GridSpec, priorities: Iterable[Priority]) -> FloatArray:
+    """The weight of each cell, shape of the grid: 1, or that of the last priority that its centre lies in."""
+    weights: FloatArray = np.ones(grid.shape)
+    for one in priorities:
+        weights[Region(one.outline).inside(grid)] = one.weight
+    return weights
