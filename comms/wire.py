@@ -13,7 +13,7 @@ import re
 import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from typing import Annotated, Any, Protocol, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,13 +37,25 @@ _BRIEFLY.maxstring = _BRIEFLY.maxother = 60
 
 
 class Kind(Protocol):
-    """How one field's value becomes a MessagePack value and back."""
+    """How one field's value becomes a MessagePack value and back.
+
+    A kind of which there are many may have both written out as expressions too, see `Quick`.
+    """
 
     def encode(self, value: Any) -> Any:
         """The wire form; raises WireError where the value is outside the field's range."""
 
     def decode(self, wire: Any) -> Any:
         """The value; raises WireError where the wire form is not one this field can have."""
+
+
+class Quick(NamedTuple):
+    """A kind's conversions as Python expressions, which a record's codec is put together from: most of the time would
+    go into calls, one for each field. `{got}` stands for what is converted and is to be evaluated once, `{slow}` for
+    the kind's own method, to which an expression leaves all that is not plain, and to say no."""
+
+    encode: str
+    decode: str
 
 
 @dataclass(frozen=True)
@@ -67,6 +79,14 @@ class Scaled:
             )
         return wire / self.steps_per_unit
 
+    @property
+    def quick(self) -> Quick:
+        low, high, steps = self.low, self.high, self.steps_per_unit
+        return Quick(
+            f"round(v * {steps}) if {low!r} <= (v := {{got}}) <= {high!r} else {{slow}}(v)",
+            f"w if type(v := {{got}}) is int and {low!r} <= (w := v / {steps}) <= {high!r} else {{slow}}(v)",
+        )
+
 
 @dataclass(frozen=True)
 class Whole:
@@ -86,6 +106,11 @@ class Whole:
             raise WireError(f"{_BRIEFLY.repr(wire)} is not a whole number from {self.low} to {self.high}")
         return wire
 
+    @property
+    def quick(self) -> Quick:
+        plain = f"v if type(v := {{got}}) is int and {self.low} <= v <= {self.high} else {{slow}}(v)"
+        return Quick(plain, plain)
+
 
 @dataclass(frozen=True)
 class Flag:
@@ -100,6 +125,11 @@ class Flag:
         if type(wire) is not bool:
             raise WireError(f"{_BRIEFLY.repr(wire)} is not true or false")
         return wire
+
+    @property
+    def quick(self) -> Quick:
+        plain = "v if type(v := {got}) is bool else {slow}(v)"
+        return Quick(plain, plain)
 
 
 @dataclass(frozen=True)
@@ -232,16 +262,16 @@ class Record:
 
     def __init__(self, cls: type[Any]) -> None:
         hints = get_type_hints(cls, include_extras=True)
+        kinds = {field.name: _kind_of(hints[field.name], f"{cls.__name__}.{field.name}") for field in fields(cls)}
         self.cls = cls
         self.fields: tuple[tuple[str, Callable[[Any], Any], Callable[[Any], Any]], ...] = tuple(
-            (field.name, kind.encode, kind.decode)
-            for field in fields(cls)
-            for kind in (_kind_of(hints[field.name], f"{cls.__name__}.{field.name}"),)
+            (name, kind.encode, kind.decode) for name, kind in kinds.items()
         )
+        self._encode, self._decode = _put_together(cls, kinds)
 
     def encode(self, value: Any) -> list[Any]:
         try:
-            return [encode(getattr(value, name)) for name, encode, _ in self.fields]
+            return self._encode(value)
         except MISFITS:
             return self._name_the_field(lambda name, encode, _: encode(getattr(value, name)))
 
@@ -249,7 +279,7 @@ class Record:
         if type(wire) is not list or len(wire) != len(self.fields):
             raise WireError(f"{self.cls.__name__} needs a list of {len(self.fields)} fields")
         try:
-            return self.cls(*[decode(one) for (_, _, decode), one in zip(self.fields, wire, strict=True)])
+            return self._decode(*wire)
         except MISFITS:
             values = iter(wire)
             return self._name_the_field(lambda _name, _encode, decode: decode(next(values)))
@@ -264,6 +294,21 @@ class Record:
         raise AssertionError("a conversion that failed once passed the second time")
 
 
+def _put_together(cls: type[Any], kinds: dict[str, Kind]) -> tuple[Callable[[Any], list[Any]], Callable[..., Any]]:
+    """Two functions: from an object of a class to the list of its fields' wire forms, and from these to an object."""
+    methods: dict[str, Any] = {"cls": cls}
+    to_wire, from_wire = [], []
+    for name, kind in kinds.items():
+        quick: Quick = getattr(kind, "quick", _SLOW)
+        methods |= {f"encode_{name}": kind.encode, f"decode_{name}": kind.decode}
+        to_wire.append(quick.encode.format(got=f"record.{name}", slow=f"encode_{name}"))
+        from_wire.append(quick.decode.format(got=name, slow=f"decode_{name}"))
+    encode = eval(f"lambda record: [{', '.join(to_wire)}]", methods)
+    decode = eval(f"lambda {', '.join(kinds)}: cls({', '.join(from_wire)})", methods)
+    return encode, decode
+
+
+_SLOW = Quick("{slow}({got})", "{slow}({got})")
 _RECORDS: dict[object, Record] = {}
 
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from largest_message import MESSAGE_TYPES, headers, largest_message
+from same_message import assert_same
 
 from comms.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, SCHEMA_VERSION, Header, decode, encode
 from comms.messages import (
@@ -26,7 +27,7 @@ from comms.messages import (
     Task,
 )
 from comms.topics import TASK, TOPICS, Topic
-from comms.wire import LARGEST_MS, Scaled, WireError
+from comms.wire import LARGEST_MS, MISFITS, Scaled, WireError, record_of
 from comms.zenoh_session import LARGEST_MESSAGE_BYTES
 from planner.tiles import TILE_CELLS
 from secondlook.testing.checks.any_message import any_message, kind_of
@@ -112,6 +113,22 @@ def _assert_close(got: Any, sent: Any, message_type: type[Any]) -> None:
             _assert_close(one, other, type(other))
         else:
             assert one == other
+
+
+@by_type
+@settings(max_examples=25)
+@given(data=st.data())
+def test_a_record_is_converted_as_its_fields_kinds_say(message_type: type[Any], data: st.DataObject) -> None:
+    record, message = record_of(message_type), data.draw(any_message(message_type))
+    assert record.encode(message) == [encode(getattr(message, name)) for name, encode, _ in record.fields]
+    wire = [data.draw(st.one_of(st.just(encode(getattr(message, name))), values)) for name, encode, _ in record.fields]
+    try:
+        by_field = [decode(one) for (_, _, decode), one in zip(record.fields, wire, strict=True)]
+    except MISFITS:
+        with pytest.raises(WireError):
+            record.decode(wire)
+    else:
+        assert_same(record.decode(wire), message_type(*by_field))
 
 
 def test_a_payload_is_a_positional_array_behind_the_schema_version() -> None:
