@@ -13,7 +13,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from comms.events import JOINER_DELAY_MS, Change, Happening, NodeEvent, absent_at_start, timeline
 from comms.routing import Routing
@@ -29,8 +29,20 @@ class RunawayError(Exception):
     """Too many rounds or messages within one simulated second: nodes answer each other without end."""
 
 
+class Said(Protocol):
+    """One message that a node has published in a round, as far as the clock is concerned."""
+
+    @property
+    def key(self) -> str:
+        """The key below the run id."""
+
+    @property
+    def size(self) -> int:
+        """The payload's size in bytes."""
+
+
 class Sent(NamedTuple):
-    """One message that a node has published in a round: its key and its payload's size in bytes."""
+    """The same, as a node's process tells the clock of it."""
 
     key: str
     size: int
@@ -105,7 +117,7 @@ class LockstepClock:
         """The acting nodes that are there now."""
         return [node for node in self._wakes if node not in self._absent]
 
-    def publish(self, sender: str, sent: Sequence[Sent]) -> None:
+    def publish(self, sender: str, sent: Sequence[Said]) -> None:
         """Takes note of messages published at the present time: by a node that was granted it, or by the clock."""
         for one in sent:
             route = self._routing.route(one.key)
@@ -133,7 +145,7 @@ class LockstepClock:
             heapq.heappush(self._due_times, due_ms)
         self._due[due_ms].update(readers)
 
-    def answer(self, node_id: str, wake_ms: int | None, sent: Sequence[Sent]) -> None:
+    def answer(self, node_id: str, wake_ms: int | None, sent: Sequence[Said]) -> None:
         """Takes a granted node's answer: the wake-up it wants next (in the future) and what it has published.
 
         Raises ValueError for a node that was not granted anything or has answered, for a wake-up that is not in the
@@ -167,7 +179,12 @@ class LockstepClock:
             happenings = self._happen(next_ms)
             receivers = self._receivers(next_ms)
             grants = tuple(
-                [self._grant(node_id, next_ms) for node_id in self._wakes if self._acts(node_id, receivers, next_ms)]
+                [
+                    self._grant(node_id, woken)
+                    for node_id, wake_ms in self._wakes.items()
+                    if (woken := wake_ms is not None and wake_ms <= next_ms and node_id not in self._frozen)
+                    or node_id in receivers
+                ]
             )
             if grants or happenings:  # else all receivers are frozen or gone
                 self._count_round(next_ms)
@@ -217,18 +234,14 @@ class LockstepClock:
         self._held = waiting & self._frozen
         return waiting - self._frozen
 
-    def _acts(self, node_id: str, receivers: set[str], now_ms: int) -> bool:
-        wake_ms = self._wakes[node_id]
-        return node_id in receivers or (wake_ms is not None and wake_ms <= now_ms and node_id not in self._frozen)
-
-    def _grant(self, node_id: str, now_ms: int) -> Grant:
-        wake_ms, counts = self._wakes[node_id], self._sent_to[node_id]
+    def _grant(self, node_id: str, woken: bool) -> Grant:
+        counts, grown = self._sent_to[node_id], self._grown[node_id]
+        expected = {sender: counts[sender] for sender in grown}
+        grown.clear()
         start = node_id in self._to_start
-        grown = {sender: counts[sender] for sender in self._grown[node_id]}
         self._to_start.discard(node_id)
-        self._grown[node_id].clear()
         self._waiting.add(node_id)
-        return Grant(node_id, wake_ms is not None and wake_ms <= now_ms, grown, start)
+        return Grant(node_id, woken, expected, start)
 
     def _last_ms(self) -> int:
         """The last time at which anything happens; an agent that has heard of the end asks for no wake-up any more."""

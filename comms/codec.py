@@ -38,16 +38,31 @@ class Header(NamedTuple):
 
 def encode(header: Header, message: Message) -> bytes:
     """The payload of a message; raises WireError where a field does not fit."""
-    _check(*header)
-    body = record_of(type(message)).encode(message)
-    payload: bytes = _pack([SCHEMA_VERSION, *header, body])
-    return payload
+    return packed(header, body_of(message))
 
 
 def decode(payload: bytes, message_type: type[Message]) -> tuple[Header, Message]:
     """Header and message of a payload; raises WireError, and nothing else, where it is not one of `message_type`."""
     header, body = _parts(payload)
-    return header, record_of(message_type).decode(body)
+    return header, message_of(body, message_type)
+
+
+def body_of(message: Message) -> list[Any]:
+    """What MessagePack is to pack of a message; raises WireError where a field does not fit."""
+    return record_of(type(message)).encode(message)
+
+
+def message_of(body: Any, message_type: type[Message]) -> Message:
+    """The message of such a body, unpacked or not packed yet; raises WireError where it is not one of that type."""
+    message: Message = record_of(message_type).decode(body)
+    return message
+
+
+def packed(header: Header, body: list[Any]) -> bytes:
+    """The payload of a header and a body; raises WireError where the header does not fit."""
+    _check(*header)
+    payload: bytes = _pack([SCHEMA_VERSION, *header, body])
+    return payload
 
 
 def header_of(payload: bytes) -> Header:

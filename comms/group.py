@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from comms.clock import Grant
 from comms.faults import NO_FAULTS, Faults
 from comms.node import Node, Received
-from comms.routing import Routing
+from comms.routing import Route, Routing
 from comms.runner import Intake, NodeRunner, Outgoing, SenderDigest
 
 LOST = "lost by a fault"
@@ -54,12 +54,19 @@ class NodeGroup:
             runner.arrived[route.writer] += 1
         received = self.intake.open(key, payload)
         if received is not None:
-            for runner in readers:
-                if self._faults:
-                    self._deliver_with_faults(runner, received)
-                else:
-                    runner.deliver(received)
+            self.deliver(received, route)
         return received
+
+    def deliver(self, received: Received, route: Route) -> None:
+        """Puts a message that is open already into the mailboxes of those here that read it, as far as faults let."""
+        for name in route.readers:
+            runner = self.runners.get(name)
+            if runner is None:
+                continue
+            if self._faults:
+                self._deliver_with_faults(runner, received)
+            else:
+                runner.deliver(received)
 
     def give_kept(self, node_id: str, messages: Iterable[tuple[str, bytes]], due_ms: int) -> None:
         """What was kept for a node that joins."""

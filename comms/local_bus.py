@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from comms.clock import LockstepClock, Sent
+from comms.clock import LockstepClock
 from comms.codec import CLOCK
 from comms.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.faults import NO_FAULTS, Faults
@@ -15,7 +15,7 @@ from comms.messages import Message, RunInfo
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending
 from comms.routing import Routing
-from comms.runner import Intake, Outgoing, Stamp, fleet_digest
+from comms.runner import Outgoing, Stamp, fleet_digest
 from comms.topics import RUN
 
 
@@ -54,7 +54,6 @@ class _Local:
         self.makers = makers
         self.group = NodeGroup({name: makers[name]() for name in clock.present()}, routing, faults)
         self.listeners = listeners
-        self.opened = Intake(routing)
         self.announcer = Stamp(CLOCK, routing)
         self.kept = {node_id: KeptMessages(node_id, routing) for node_id in clock.said_to_joiners}
 
@@ -66,7 +65,7 @@ class _Local:
             sent: list[Outgoing] = []
             for grant in turn.grants:
                 wake_ms, outgoing = self.group.act(grant, turn.now_ms)
-                self.clock.answer(grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing])
+                self.clock.answer(grant.node_id, wake_ms, outgoing)
                 sent.extend(outgoing)
             if len(turn.grants) > 1:
                 sent.sort(key=lambda one: one.route.writer)  # stable: a sender's own messages stay in order
@@ -82,7 +81,7 @@ class _Local:
 
     def _announce(self, message: Message) -> Outgoing:
         outgoing = self.announcer(RUN.key(), message, 0)
-        self.clock.publish(CLOCK, [Sent(outgoing.key, len(outgoing.payload))])
+        self.clock.publish(CLOCK, [outgoing])
         return outgoing
 
     def _happen(self, happening: Happening) -> None:
@@ -98,15 +97,13 @@ class _Local:
 
     def _carry(self, sent: list[Outgoing]) -> None:
         for one in sent:
-            received = self.group.receive(one.key, one.payload) if one.route.readers else None
+            received = one.opened()
+            self.group.deliver(received, one.route)
             for kept in self.kept.values():
                 kept.take(one.key, one.payload)
             for name in one.route.watchers:
                 listener = self.listeners.get(name)
-                if listener is None:
-                    continue
-                received = received or self.opened.open(one.key, one.payload)
-                if received is not None:
+                if listener is not None:
                     listener.on_message(received)
 
 

@@ -6,12 +6,18 @@ import logging
 
 import pytest
 from fleets import ROSTER, nav, state
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from same_message import assert_same
 
 from comms.codec import Header, encode
+from comms.messages import Role
 from comms.node import Received
 from comms.routing import Routing
-from comms.runner import Intake
-from comms.topics import NAV, STATE
+from comms.runner import Intake, Stamp
+from comms.topics import NAV, STATE, TOPICS, Topic
+from comms.wire import LARGEST_MS
+from secondlook.testing.checks.any_message import any_message
 
 GOOD = encode(Header("world", 0, 0, 1000), nav(2.0))
 
@@ -25,6 +31,23 @@ def test_a_message_that_fits_is_opened(intake: Intake) -> None:
     expected = Received("veh/alpha/nav", NAV, "alpha", Header("world", 0, 0, 1000), nav(2.0), GOOD)
     assert intake.open("veh/alpha/nav", GOOD) == expected
     assert not intake.dropped
+
+
+@pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
+@settings(max_examples=20)
+@given(data=st.data())
+def test_what_is_opened_without_unpacking_is_what_the_payload_holds(topic: Topic, data: st.DataObject) -> None:
+    routing, vehicle = Routing(ROSTER), "beta" if Role.SURVEY not in topic.writers else "alpha"
+    key = topic.key(vehicle=vehicle, number=7, tile="3-4")
+    route = routing.route(key)
+    assert route is not None
+    message = data.draw(any_message(topic.message))
+    sent = Stamp(route.writer, routing)(key, message, data.draw(st.integers(0, LARGEST_MS)))
+    assert sent.size == len(sent.payload)
+    unpacked, opened = Intake(routing).open(key, sent.payload), sent.opened()
+    assert unpacked is not None
+    assert opened._replace(message=message) == unpacked._replace(message=message)
+    assert_same(opened.message, unpacked.message)
 
 
 @pytest.mark.parametrize(
