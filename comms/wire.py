@@ -7,12 +7,12 @@ value, on every bus, so that everyone decides on the same numbers. Whatever does
 from __future__ import annotations
 
 import enum
-import math
 import operator
 import re
 import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cached_property
 from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -190,27 +190,32 @@ class Packed:
         if self.steps_per_unit is not None:
             if array.size and not (float(array.min()) >= 0.0 and float(array.max()) <= self.high):  # refuses NaN too
                 raise WireError(f"an array's values are outside 0 to {self.high}")
-            array = np.rint(array * self.steps_per_unit)
-        elif not np.can_cast(array.dtype, self.dtype):
-            raise WireError(f"an array of {array.dtype} does not go into {np.dtype(self.dtype)} without loss")
-        return [*array.shape, np.ascontiguousarray(array, dtype=self.dtype).tobytes()]
+            array = np.rint(array * self.steps_per_unit).astype(self._dtype)
+        elif array.dtype != self._dtype:
+            if not np.can_cast(array.dtype, self._dtype):
+                raise WireError(f"an array of {array.dtype} does not go into {self._dtype} without loss")
+            array = array.astype(self._dtype)
+        return [*array.shape, array.tobytes()]
 
     def decode(self, wire: Any) -> NDArray[Any]:
         if type(wire) is not list or len(wire) != self.dimensions + 1 or type(wire[-1]) is not bytes:
             raise WireError(f"not an array of {self.dimensions} axes")
-        shape = wire[:-1]
-        if not all(type(n) is int and 0 <= n <= self.most for n in shape) or math.prod(shape) > self.most:
-            raise WireError(f"{_BRIEFLY.repr(shape)} is not a shape of at most {self.most} elements")
-        if math.prod(shape) * np.dtype(self.dtype).itemsize != len(wire[-1]):
-            raise WireError(f"{len(wire[-1])} bytes do not fill the shape {shape}")
-        array = np.frombuffer(wire[-1], dtype=self.dtype).reshape(shape)
+        *shape, packed = wire
+        size = _size_of(shape, self.most)
+        if size * self._dtype.itemsize != len(packed):
+            raise WireError(f"{len(packed)} bytes do not fill the shape {shape}")
+        array = np.frombuffer(packed, dtype=self._dtype).reshape(shape)
         if self.steps_per_unit is None:
             return array
         values = array / self.steps_per_unit
-        if values.size and float(values.max()) > self.high:
+        if size and float(values.max()) > self.high:
             raise WireError(f"an array's values are above {self.high}")
         values.setflags(write=False)  # one message may have several readers
         return values
+
+    @cached_property
+    def _dtype(self) -> np.dtype[Any]:
+        return np.dtype(self.dtype)
 
 
 @dataclass(frozen=True)
@@ -228,15 +233,27 @@ class Mask:
     def decode(self, wire: Any) -> NDArray[np.bool_]:
         if type(wire) is not list or len(wire) != 3 or type(wire[2]) is not bytes:
             raise WireError("not a mask")
-        rows, columns, packed = wire
-        if not all(type(n) is int and 0 <= n <= self.most for n in (rows, columns)) or rows * columns > self.most:
-            raise WireError(f"{_BRIEFLY.repr((rows, columns))} is not a shape of at most {self.most} cells")
-        if len(packed) != (rows * columns + 7) // 8:
-            raise WireError(f"{len(packed)} bytes do not fill the shape {(rows, columns)}")
-        bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=rows * columns)
-        mask = bits.astype(np.bool_).reshape(rows, columns)
+        *shape, packed = wire
+        size = _size_of(shape, self.most)
+        if len(packed) != (size + 7) // 8:
+            raise WireError(f"{len(packed)} bytes do not fill the shape {shape}")
+        bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=size)  # each 0 or 1, as a truth value is
+        mask = bits.view(np.bool_).reshape(shape)
         mask.setflags(write=False)
         return mask
+
+
+def _size_of(shape: list[Any], most: int) -> int:
+    """How many elements an array has; raises WireError where that is more than `most`, or this is no shape."""
+    size = 1
+    for axis in shape:
+        if type(axis) is not int or not 0 <= axis <= most:
+            break
+        size *= axis
+    else:
+        if size <= most:
+            return size
+    raise WireError(f"{_BRIEFLY.repr(shape)} is not a shape of at most {most} elements")
 
 
 @dataclass(frozen=True)

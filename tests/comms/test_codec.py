@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, get_type_hints
 
@@ -19,6 +20,7 @@ from comms.messages import (
     AgentState,
     CoverageTile,
     Curve,
+    Look,
     ManeuverState,
     ManeuverStatus,
     Mode,
@@ -249,6 +251,7 @@ def test_a_number_that_is_none_or_out_of_range_is_not_sent(message_type: type[An
 
 
 TILE = CoverageTile(1, 0, 0, np.zeros((2, 2), np.uint8), np.zeros((2, 2), np.uint8), np.zeros((2, 2), np.bool_))
+LOOK = Look(1, 1, 0.0, 0.0, 0.0, 0.0, 5.0, 1.0, np.zeros((2, 1, 2)), 15.0, 0.0, True, ())
 CURVE = Curve(1, 1.0, np.array([0.1, 0.2]), 2)
 STATUS = ManeuverStatus(1, ManeuverState.DONE, 0, "")
 STATE = AgentState(Mode.IDLE, 0, 1.0, 0, 0, 0, 0)
@@ -298,6 +301,15 @@ def test_a_message_is_not_shared_by_its_arrays() -> None:
     for array in (tile.sum_levels, tile.largest_levels, tile.settled, curve.p_detect):
         with pytest.raises(ValueError, match="read-only"):
             array[:1] = 0
+
+
+@pytest.mark.parametrize("lies", [np.asfortranarray, lambda a: np.repeat(a, 2, axis=-1)[..., ::2]])
+def test_an_array_travels_alike_however_it_lies_in_memory(lies: Callable[[Any], Any]) -> None:
+    levels = np.arange(6, dtype=np.uint8).reshape(2, 3)
+    look = replace(LOOK, p_detect=np.stack([levels / 100, levels / 50]))
+    assert encode(HEADER, replace(look, p_detect=lies(look.p_detect))) == encode(HEADER, look)
+    tile = replace(TILE, sum_levels=levels, settled=levels > 2)
+    assert encode(HEADER, replace(tile, sum_levels=lies(levels), settled=lies(levels > 2))) == encode(HEADER, tile)
 
 
 # Vehicles' ids have up to 40 characters, the coordinator's is its own.
