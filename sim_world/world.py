@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 from comms.messages import Maneuver, MissionOver
 from comms.node import Publication, Received, Step
 from comms.topics import TRUTH_TARGETS
@@ -31,7 +33,8 @@ class World:
     def start(self, now_ms: int) -> Step:
         """Publishes the targets and where the vehicles are."""
         targets = Publication(TRUTH_TARGETS.key(), self._targets.truth())
-        return Step((targets, *self._navigation(now_ms)), self._wake_ms())
+        publish, wake_ms = self._due(now_ms)
+        return Step((targets, *publish), wake_ms)
 
     def on_message(self, received: Received, now_ms: int) -> Step:
         """Takes a manoeuvre, after all that was due until now; falls silent when the mission is over."""
@@ -39,35 +42,38 @@ class World:
             self._over = True
         if self._over:
             return Step()
-        publish = self._due(now_ms)
+        publish, wake_ms = self._due(now_ms)
         body = self._bodies.get(received.vehicle)
         if body is not None and isinstance(received.message, Maneuver):
             publish.append(body.command(received.message, received.header.incarnation, now_ms))
-            publish += self._due(now_ms)  # a manoeuvre may be done, or on its track, at once
-        return Step(tuple(publish), self._wake_ms())
+            more, wake_ms = self._due(now_ms)  # a manoeuvre may be done, or on its track, at once
+            publish += more
+        return Step(tuple(publish), wake_ms)
 
     def on_wake(self, now_ms: int) -> Step:
         """Publishes what has happened since."""
         if self._over:
             return Step()
-        return Step(tuple(self._due(now_ms)), self._wake_ms())
+        publish, wake_ms = self._due(now_ms)
+        return Step(tuple(publish), wake_ms)
 
-    def _due(self, now_ms: int) -> list[Publication]:
+    def _due(self, now_ms: int) -> tuple[list[Publication], int | None]:
+        """What there is to say by now, and when there is more."""
         publish: list[Publication] = []
-        if self._bodies and self._next_nav_ms <= now_ms:
+        if not self._bodies:
+            return publish, None
+        if self._next_nav_ms <= now_ms:
             publish += self._navigation(now_ms)
         while True:
             # Of several events at one time min takes the first body's: bodies are in the order of their ids.
             due = [(at_ms, body) for body in self._bodies.values() if (at_ms := body.next_event_ms) is not None]
-            at_ms, body = min(due, key=lambda one: one[0], default=(now_ms + 1, None))
-            if body is None or at_ms > now_ms:
-                return publish
+            if not due:
+                return publish, self._next_nav_ms
+            at_ms, body = min(due, key=itemgetter(0))
+            if at_ms > now_ms:
+                return publish, min(at_ms, self._next_nav_ms)
             publish += body.next_event(at_ms)
 
     def _navigation(self, now_ms: int) -> list[Publication]:
         self._next_nav_ms = (now_ms // NAV_PERIOD_MS + 1) * NAV_PERIOD_MS
         return [one for body in self._bodies.values() for one in body.navigation(now_ms)]
-
-    def _wake_ms(self) -> int | None:
-        events_ms = (body.next_event_ms for body in self._bodies.values())
-        return min((self._next_nav_ms, *(ms for ms in events_ms if ms is not None))) if self._bodies else None
