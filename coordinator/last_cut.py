@@ -39,9 +39,11 @@ class LastCut:
         if rules != self._rules:
             self._arrays, self._rules = arrays, rules
             return np.ones(self.grid.columns, dtype=np.bool_)
-        found = np.zeros(self.grid.columns, dtype=np.bool_)
+        changed = np.zeros(self.grid.shape, dtype=np.bool_)
         for now, before in zip(arrays, self._arrays, strict=True):
-            found |= (now != before).any(axis=0)
+            changed |= now != before
+        found = np.zeros(self.grid.columns, dtype=np.bool_)
+        found |= changed.any(axis=0)
         for window in self._looked_at.difference(looked_at):
             found[window.columns] = True
         self._arrays = arrays

@@ -101,4 +101,5 @@ class Ledger:
 
     def in_state(self, *states: StripState) -> list[StripRecord]:
         """Records in one of these states, by number."""
-        return [self._records[number] for number in sorted(set().union(*(self._by_state[state] for state in states)))]
+        numbers = [number for state in states for number in self._by_state[state]]
+        return [self._records[number] for number in sorted(numbers)]

@@ -65,5 +65,5 @@ def _window(corners_m: list[float], centres_m: FloatArray) -> slice:
     """The cells along one axis of the grid with their centres between a look's corners, all in the sweep frame."""
     margin_m = 2 * EDGE_TOLERANCE_M  # one that a bin may begin early, one for rounding
     ends_m = min(corners_m) - margin_m, max(corners_m) + margin_m
-    first, behind_last = np.searchsorted(centres_m, ends_m).tolist()
+    first, behind_last = centres_m.searchsorted(ends_m).tolist()
     return slice(first, behind_last)

@@ -19,8 +19,8 @@ def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: Float
         columns: the lattice's x, ascending, at least one.
         rows: its y, ascending.
     """
-    next_x, next_y = np.roll(x, -1), np.roll(y, -1)
-    row, side = np.nonzero((y <= rows[:, np.newaxis]) != (next_y <= rows[:, np.newaxis]))
+    next_x, next_y = np.concatenate([x[1:], x[:1]]), np.concatenate([y[1:], y[:1]])
+    row, side = ((y <= rows[:, np.newaxis]) != (next_y <= rows[:, np.newaxis])).nonzero()
     crossing = x[side] + (rows[row] - y[side]) * (next_x - x)[side] / (next_y - y)[side]
     inside = np.zeros((rows.size, columns.size + 1), dtype=np.bool_)
     np.logical_xor.at(inside, (row, np.searchsorted(columns, crossing)), True)

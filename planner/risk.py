@@ -42,16 +42,17 @@ class RiskLayer:
         if p_detect.size and not (float(p_detect.min()) >= 0.0 and float(p_detect.max()) <= HIGHEST_P_DETECT):
             raise ValueError(f"P_d outside 0 to {HIGHEST_P_DETECT}")
         nats = -np.log1p(-p_detect)
-        self.sum_nats[rows, columns] += nats
-        np.maximum(self.largest_nats[rows, columns], nats, out=self.largest_nats[rows, columns])
-        self.sum_levels[rows, columns] = to_levels(self.sum_nats[rows, columns])
-        self.largest_levels[rows, columns] = to_levels(self.largest_nats[rows, columns])
+        sums, largest = self.sum_nats[rows, columns], self.largest_nats[rows, columns]
+        sums += nats
+        np.maximum(largest, nats, out=largest)
+        self.sum_levels[rows, columns] = to_levels(sums)
+        self.largest_levels[rows, columns] = to_levels(largest)
 
 
 def to_levels(nats: FloatArray) -> LevelArray:
     """Nats as whole levels. What was seen at all is at least one level, so that it does not read as unseen."""
     levels = np.minimum(np.rint(nats * (1 / NATS_PER_LEVEL)), MOST_LEVELS)
-    return np.where((nats > 0) & (levels == 0), 1, levels).astype(np.uint8)
+    return np.maximum(levels, nats > 0).astype(np.uint8)
 
 
 def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.integer], rho: float = 0.0) -> FloatArray:

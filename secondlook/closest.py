@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from comms.messages import Nav, TruthPose
 from comms.node import Received
@@ -20,8 +21,7 @@ class Closest:
     t_s: float
 
 
-@dataclass(frozen=True)
-class _Leg:
+class _Leg(NamedTuple):
     """A vehicle's way from one position told to the next, taken to be straight."""
 
     from_s: float

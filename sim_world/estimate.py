@@ -47,7 +47,7 @@ class PDetectEstimate:
         logits = _logit(np.where(seen, p_detect, 0.5))
         logits += np.interp(logits, self._truth_logits, self._shifts) + track_error
         logits += errors
-        return np.where(seen, np.clip(_sigmoid(logits), LOWEST_SEEN, HIGHEST), 0.0)
+        return np.where(seen, np.minimum(np.maximum(_sigmoid(logits), LOWEST_SEEN), HIGHEST), 0.0)
 
 
 def _logit(p: FloatArray) -> FloatArray:

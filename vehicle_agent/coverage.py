@@ -61,7 +61,7 @@ class CoverageLayer:
             (self.layer.sum_levels[window], self._published_sum[window]),
             (self.layer.largest_levels[window], self._published_largest[window]),
         ):
-            if not np.array_equal(now, published):
+            if now.tobytes() != published.tobytes():
                 published[:] = now
                 changed = True
         return changed
