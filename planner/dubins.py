@@ -137,42 +137,45 @@ def path_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -
     Returns:
         Shape (n, m).
     """
-    turned = []
-    for poses in (starts, ends):
-        # Centres of the turns to starboard and to port, in turn radii, and the heading counterclockwise from east.
-        x, y, heading = poses[:, 0] / turn_radius_m, poses[:, 1] / turn_radius_m, poses[:, 2]
-        sin, cos = np.sin(heading), np.cos(heading)
-        turned.append((math.pi / 2 - heading, {1: (x + cos, y - sin), -1: (x - cos, y + sin)}))
-    (alpha, from_centres), (beta, to_centres) = turned
-    alpha, beta = alpha[:, np.newaxis], beta[np.newaxis]
-    best = np.full((starts.shape[0], ends.shape[0]), np.inf)
-    for side in (-1, 1):
-        for last in (side, -side):
-            x = to_centres[last][0][np.newaxis] - from_centres[side][0][:, np.newaxis]
-            y = to_centres[last][1][np.newaxis] - from_centres[side][1][:, np.newaxis]
-            square = x * x + y * y
-            direction = np.arctan2(y, x)
-            if last == side:
-                between = np.sqrt(square)
-                apart = between >= _TOLERANCE
-                first = _turns(np.where(apart, -side * (direction - alpha), 0.0))
-                second = _turns(-side * (beta - np.where(apart, direction, alpha)))
-                np.minimum(best, first + np.where(apart, between, 0.0) + second, out=best)
-                near = np.flatnonzero(apart & (between <= 4))
-                if near.size:
-                    middle = _FULL_TURN_RAD - 2 * np.arcsin(between.flat[near] / 4)
-                    rows, columns = np.divmod(near, best.shape[1])
-                    towards = -side * (direction.flat[near] - alpha[rows, 0])
-                    first = _turns(towards + middle / 2)
-                    third = _turns(-side * (beta[0, columns] - alpha[rows, 0]) - first + middle)
-                    best.flat[near] = np.minimum(best.flat[near], first + middle + third)
-            else:
-                possible = square - 4 >= -_TOLERANCE
-                straight = np.sqrt(np.maximum(square - 4, 0.0))
-                lean = -side * direction + np.arctan2(2, straight)
-                length = _turns(lean + side * alpha) + straight + _turns(lean + side * beta)
-                np.minimum(best, length, out=best, where=possible)
-    return best * turn_radius_m
+    # The axes of what follows: turning to port or to starboard first, start, end.
+    side = np.array([-1.0, 1.0])[:, np.newaxis, np.newaxis]
+    alpha, from_x, from_y = _turning_circles(starts[:, np.newaxis], turn_radius_m, side)
+    beta, to_x, to_y = _turning_circles(ends[np.newaxis], turn_radius_m, side)
+
+    # From the centre of the first turn to that of a last turn to the same side.
+    x, y = to_x - from_x, to_y - from_y
+    between, direction = np.sqrt(x * x + y * y), np.arctan2(y, x)
+    apart = between >= _TOLERANCE
+    first = _turns(np.where(apart, -side * (direction - alpha), 0.0))
+    last = _turns(-side * (beta - np.where(apart, direction, alpha)))
+    same = first + np.where(apart, between, 0.0) + last
+    near = (apart & (between <= 4)).nonzero()
+    if near[0].size:
+        way, row, column = near
+        near_side = side[way, 0, 0]
+        middle = _FULL_TURN_RAD - 2 * np.arcsin(between[near] / 4)
+        towards = -near_side * (direction[near] - alpha[row, 0])
+        first = _turns(towards + middle / 2)
+        last = _turns(-near_side * (beta[0, column] - alpha[row, 0]) - first + middle)
+        same[near] = np.minimum(same[near], first + middle + last)
+
+    # To that of a last turn to the other side.
+    x, y = to_x[::-1] - from_x, to_y[::-1] - from_y
+    straight_squared = x * x + y * y - 4
+    straight = np.sqrt(np.maximum(straight_squared, 0.0))
+    lean = -side * np.arctan2(y, x) + np.arctan2(2, straight)
+    other = _turns(lean + side * alpha) + straight + _turns(lean + side * beta)
+    other[straight_squared < -_TOLERANCE] = np.inf
+    lengths: FloatArray = np.minimum(same, other).min(axis=0) * turn_radius_m
+    return lengths
+
+
+def _turning_circles(
+    poses: FloatArray, turn_radius_m: float, side: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Headings counterclockwise from east, and the centres of the turns to each side, in turn radii."""
+    x, y, heading_rad = poses[..., 0] / turn_radius_m, poses[..., 1] / turn_radius_m, poses[..., 2]
+    return math.pi / 2 - heading_rad, x + side * np.cos(heading_rad), y - side * np.sin(heading_rad)
 
 
 def _turns(angles_rad: FloatArray) -> FloatArray:
