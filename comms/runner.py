@@ -30,19 +30,16 @@ def failure_of(node_id: str, error: Exception, *, at_ms: int | None = None) -> N
 
 
 class Outgoing(NamedTuple):
-    """A message on its way: key below the run id, route, the message, its payload, and header and body in that."""
+    """A message on its way: key below the run id, route, the message, its payload, that one's size in bytes, and header
+    and body in it."""
 
     key: str
     route: Route
     message: Message
     payload: bytes
+    size: int
     header: Header
     body: list[Any]
-
-    @property
-    def size(self) -> int:
-        """The payload's size in bytes."""
-        return len(self.payload)
 
     def opened(self) -> Received:
         """The message as its readers get it: what `Intake.open` makes of the payload. That is for a bus within one
@@ -82,14 +79,14 @@ class Stamp:
             payload = packed(header, body)
         except WireError as error:
             raise NodeError(f"{self.sender} has published a message that does not fit: {error}") from error
-        if len(payload) > route.topic.max_bytes:
+        size = len(payload)
+        if size > route.topic.max_bytes:
             raise NodeError(
-                f"{self.sender} has published {len(payload)} bytes under {key}; at most {route.topic.max_bytes} fit"
+                f"{self.sender} has published {size} bytes under {key}; at most {route.topic.max_bytes} fit"
             )
         self._count += 1
-        self._hash.update(b"%s %d\n" % (key.encode(), len(payload)))
-        self._hash.update(payload)
-        return Outgoing(key, route, message, payload, header, body)
+        self._hash.update(b"%s %d\n%s" % (key.encode(), size, payload))
+        return Outgoing(key, route, message, payload, size, header, body)
 
     def digest(self) -> SenderDigest:
         """What was said so far."""
@@ -169,7 +166,7 @@ class NodeRunner:
             if start:
                 self._take(self._node.start(now_ms), published)
             else:
-                for due in sorted(due for due in self._mail if due <= now_ms):
+                for due in sorted([due for due in self._mail if due <= now_ms]):
                     mail = self._mail.pop(due)
                     if len(mail) > 1:
                         mail.sort(key=lambda one: one.header.order)

@@ -94,10 +94,10 @@ class Looks:
         if not passed.numbers.size:
             return [], None
         p_detect = self._p_detect(swath, np.abs(passed.lateral_m), passed.lateral_m, (passed.x_m, passed.y_m), time_s)
-        detected, contacts = self._recogniser.detect(passed, p_detect, self._stream("detection", self._looks))
         seen = p_detect > 0.0
         if not seen.any():
             return [], None
+        detected, contacts = self._recogniser.detect(passed, p_detect, self._stream("detection", self._looks))
         truth = TruthLook(
             self._config.vehicle,
             self._looks,

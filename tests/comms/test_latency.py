@@ -18,7 +18,7 @@ routing = Routing(ROSTER)
 def outgoing(key: str, message: Message) -> Outgoing:
     route = routing.route(key)
     assert route is not None
-    return Outgoing(key, route, message, b"", Header(route.writer, 0, 0, 0), [])
+    return Outgoing(key, route, message, b"", 0, Header(route.writer, 0, 0, 0), [])
 
 
 def strip(number: int, state: StripState = StripState.OPEN) -> Outgoing:
