@@ -83,7 +83,7 @@ class Scaled:
     def quick(self) -> Quick:
         low, high, steps = self.low, self.high, self.steps_per_unit
         return Quick(
-            f"round(v * {steps}) if {low!r} <= (v := {{got}}) <= {high!r} else {{slow}}(v)",
+            f"(v * {steps}).__round__() if {low!r} <= (v := {{got}}) <= {high!r} else {{slow}}(v)",
             f"w if type(v := {{got}}) is int and {low!r} <= (w := v / {steps}) <= {high!r} else {{slow}}(v)",
         )
 

@@ -85,10 +85,14 @@ class BadlySeen:
         grid = self._grid
         corners = np.asarray(outline)
         across, along = grid.frame.to_sweep(corners[:, 0], corners[:, 1])
-        columns = np.flatnonzero((grid.across_m >= across.min()) & (grid.across_m <= across.max()))
-        rows = np.flatnonzero((grid.along_m >= along.min()) & (grid.along_m <= along.max()))
-        if not columns.size or not rows.size:
+        columns, rows = _from_first_to_last(grid.across_m, across), _from_first_to_last(grid.along_m, along)
+        if columns.start == columns.stop or rows.start == rows.stop:
             return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
-        window = (slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1))
         within = points_inside(across, along, grid.across_m[columns], grid.along_m[rows])
-        return window, within & self._inside[window]
+        return (rows, columns), within & self._inside[rows, columns]
+
+
+def _from_first_to_last(centres_m: FloatArray, corners_m: FloatArray) -> slice:
+    """Which of these centres, ascending, lie among the corners."""
+    first = int(centres_m.searchsorted(corners_m.min()))
+    return slice(first, max(first, int(centres_m.searchsorted(corners_m.max(), side="right"))))

@@ -75,14 +75,16 @@ class FleetMap:
                 told=np.zeros(self.grid.shape, dtype=np.bool_),
             )
         place = (first_row, first_column)
-        if version <= layer.versions.get(place, (-1, -1)):
+        known = layer.versions.get(place)
+        if known is not None and version <= known:
             return False
         layer.versions[place] = version
         window = (slice(first_row, first_row + rows), slice(first_column, first_column + columns))
         layer.sum_levels[window] = sum_levels
         layer.largest_levels[window] = largest_levels
         layer.settled[window] = settled
-        layer.told[window] = True
+        if known is None:
+            layer.told[window] = True
         self._changed[place] = window
         self.changes += 1
         return True

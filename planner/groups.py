@@ -45,7 +45,7 @@ def label_groups(cells: BoolArray, block: int) -> tuple[NDArray[np.int32], int]:
     begins, ends = cells.copy(), cells.copy()
     begins[:, 1:] ^= goes_on
     ends[:, :-1] ^= goes_on
-    first, last = np.flatnonzero(begins), np.flatnonzero(ends)
+    first, last = begins.ravel().nonzero()[0], ends.ravel().nonzero()[0]
 
     leader = _connected(first.size, *_neighbours(first, last, cells.shape[1], block))
     number = np.cumsum(leader == np.arange(leader.size), dtype=np.int32)
@@ -63,8 +63,8 @@ def _neighbours(first: IndexArray, last: IndexArray, columns: int, block: int) -
         columns: of the array.
         block: rows of a block.
     """
-    lowest = np.searchsorted(last, first - columns)
-    counts = np.searchsorted(first, last - columns, side="right") - lowest
+    lowest = last.searchsorted(first - columns)
+    counts = first.searchsorted(last - columns, side="right") - lowest
     counts[first // columns % block == 0] = 0
     above = np.repeat(np.arange(first.size), counts)
     below = np.arange(above.size) + np.repeat(lowest + counts - np.cumsum(counts), counts)
@@ -76,7 +76,7 @@ def _connected(count: int, one: IndexArray, other: IndexArray) -> IndexArray:
     leader = np.arange(count)
     while True:
         leads_one, leads_other = leader[one], leader[other]
-        if np.array_equal(leads_one, leads_other):
+        if (leads_one == leads_other).all():
             return leader
         # Of two leaders the later follows the earlier; then everyone follows the leader's leader.
         np.minimum.at(leader, np.maximum(leads_one, leads_other), np.minimum(leads_one, leads_other))

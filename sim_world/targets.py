@@ -46,5 +46,5 @@ class Targets:
         """The targets within the stretch of track that a swath covers, as far to the sides as it reaches."""
         along_m, lateral_m = swath.to_track(self._x_m, self._y_m)
         within = (along_m >= swath.first_along_m) & (along_m < swath.end_along_m) & (np.abs(lateral_m) <= swath.reach_m)
-        numbers = np.flatnonzero(within)
+        numbers = within.nonzero()[0]
         return Passed(numbers, along_m[numbers], lateral_m[numbers], self._x_m[numbers], self._y_m[numbers])

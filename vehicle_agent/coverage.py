@@ -68,7 +68,10 @@ class CoverageLayer:
 
     def one_again(self) -> list[Publication]:
         """A tile of those that were said the fewest times since they changed, as it was said last: the oldest."""
-        return [self._say(min(self._said, key=lambda tile: self._said[tile][::-1]))] if self._said else []
+        if not self._said:
+            return []
+        tile, _ = min(self._said.items(), key=lambda said: said[1][::-1])
+        return [self._say(tile)]
 
     def again_at(self, strip: Strip) -> list[Publication]:
         """The tiles about a strip, as they were said last."""
