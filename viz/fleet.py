@@ -156,7 +156,7 @@ def _poses(rows: FloatArray) -> rr.ComponentColumnList:
 
 
 def _segments(rows: FloatArray) -> rr.ComponentColumnList:
-    return rr.LineStrips3D.columns(strips=list(rows.reshape(-1, 2, 3)))
+    return rr.LineStrips3D.columns(strips=rows.reshape(-1, 2, 3).astype(np.float32))
 
 
 def _states(colours: dict[Mode, palette.Colour] | dict[TaskState, palette.Colour]) -> rr.StateConfiguration:

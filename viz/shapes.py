@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from comms.messages import RunInfo, StripStatus, Vertex
 from planner.types import FloatArray
@@ -15,6 +16,8 @@ from planner.types import FloatArray
 UNSEEN_Z_M, OUTLINE_Z_M, PLAN_Z_M, HOTSPOT_Z_M, STRIP_Z_M, FLOWN_Z_M, POINT_Z_M, VEHICLE_Z_M = (
     0.2 * step for step in range(1, 9)
 )
+
+Line = npt.NDArray[np.float32]  # as the viewer takes them, so that it need not look at each point
 
 GOLDEN_SHARE = (math.sqrt(5.0) - 1.0) / 2.0  # its multiples, whole parts left out, keep apart from each other
 
@@ -55,20 +58,23 @@ def extent_of(run: RunInfo) -> Extent:
     return Extent(float(min(xs)), float(min(ys)), float(max(xs)), float(max(ys)))
 
 
-def ring(outline: Iterable[Vertex], z_m: float) -> FloatArray:
+def ring(outline: Iterable[Vertex], z_m: float) -> Line:
     """A closed outline, shape (corners + 1, 3); shape (0, 3) for no corner."""
     corners = [(vertex.x_m, vertex.y_m, z_m) for vertex in outline]
-    return np.array([*corners, *corners[:1]], dtype=np.float64).reshape(-1, 3)
+    return np.array([*corners, *corners[:1]], dtype=np.float32).reshape(-1, 3)
 
 
-def strip_ring(strip: StripStatus, z_m: float) -> FloatArray:
+def strip_ring(strip: StripStatus, z_m: float) -> Line:
     """A strip's closed outline, shape (5, 3)."""
-    ahead = np.array([math.sin(strip.heading_rad), math.cos(strip.heading_rad)])
-    right = np.array([ahead[1], -ahead[0]]) * strip.width_m / 2
-    start = np.array([strip.start_x_m, strip.start_y_m])
-    end = start + ahead * strip.length_m
-    corners = np.array([start - right, end - right, end + right, start + right, start - right])
-    return np.column_stack([corners, np.full(5, z_m)])
+    sin, cos = math.sin(strip.heading_rad), math.cos(strip.heading_rad)
+    right_x_m, right_y_m = cos * strip.width_m / 2, -sin * strip.width_m / 2
+    x_m, y_m = strip.start_x_m, strip.start_y_m
+    end_x_m, end_y_m = x_m + sin * strip.length_m, y_m + cos * strip.length_m
+    start_left = (x_m - right_x_m, y_m - right_y_m, z_m)
+    end_left = (end_x_m - right_x_m, end_y_m - right_y_m, z_m)
+    end_right = (end_x_m + right_x_m, end_y_m + right_y_m, z_m)
+    start_right = (x_m + right_x_m, y_m + right_y_m, z_m)
+    return np.array([start_left, end_left, end_right, start_right, start_left], dtype=np.float32)
 
 
 def label_place(strip: StripStatus, number: int, z_m: float) -> tuple[float, float, float]:

@@ -59,8 +59,8 @@ class Story:
     def tell(self, received: Received) -> list[Line]:
         """The lines that are ready now that this message has come; none where it has nothing new for a person."""
         header = received.header
-        lines = self.rest(before_ms=header.sent_ms)
-        told = self._words(received)
+        lines = self.rest(before_ms=header.sent_ms) if self._hotspots else []
+        told = self._words(received) if type(received.message) in TELLING else None
         if told is not None:
             text, warns = told
             lines.append(Line(header.sent_ms, header.sender, text, warns))
