@@ -84,12 +84,9 @@ class _Mission:
         self._map = RiskMap(canvas, run, extent, draw_every_ms)
         self._story = Story()
         self._table = TaskTable(canvas, run)
-        fleet, second_looks, curves, truth = (
-            Fleet(canvas, run, extent),
-            SecondLooks(canvas, extent),
-            Curves(canvas, run, thresholds),
-            Truth(canvas),
-        )
+        self._second_looks = SecondLooks(canvas, extent)
+        self._time_ms = -1
+        fleet, curves, truth = Fleet(canvas, run, extent), Curves(canvas, run, thresholds), Truth(canvas)
         self._draw: dict[type[Message], tuple[Callable[[Received, Any], None], ...]] = {
             CoverageTile: (self._map.on_tile,),
             Nav: (fleet.on_nav,),
@@ -97,8 +94,8 @@ class _Mission:
             AgentState: (fleet.on_state,),
             TaskStatus: (fleet.on_task_status, self._table.on_task_status),
             Contact: (fleet.on_contact,),
-            Hotspot: (second_looks.on_hotspot,),
-            StripStatus: (second_looks.on_strip, self._table.on_strip),
+            Hotspot: (self._second_looks.on_hotspot,),
+            StripStatus: (self._second_looks.on_strip, self._table.on_strip),
             Curve: (curves.on_curve,),
             TruthTargets: (truth.on_targets,),
             TruthLook: (truth.on_look,),
@@ -106,16 +103,22 @@ class _Mission:
         }
 
     def draw(self, received: Received) -> None:
-        time_ms = received.header.sent_ms
-        self._map.advance(time_ms)
-        self._table.advance(time_ms)
-        self._canvas.advance(time_ms)
+        if received.header.sent_ms != self._time_ms:
+            self._advance(received.header.sent_ms)
         for draw in self._draw.get(type(received.message), ()):
             draw(received, received.message)
         self._put_lines(self._story.tell(received))
 
+    def _advance(self, time_ms: int) -> None:
+        self._time_ms = time_ms
+        self._map.advance(time_ms)
+        self._second_looks.advance(time_ms)
+        self._table.advance(time_ms)
+        self._canvas.advance(time_ms)
+
     def finish(self) -> None:
         self._map.finish()
+        self._second_looks.finish()
         self._table.finish()
         self._put_lines(self._story.rest())
 

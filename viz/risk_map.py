@@ -13,6 +13,7 @@ from planner.types import BoolArray
 from viz import palette, paths
 from viz.blocks import Block, Blocks
 from viz.canvas import Canvas
+from viz.pace import Pace
 from viz.risk_tally import RiskTally
 from viz.shapes import OUTLINE_Z_M, UNSEEN_Z_M, Extent, ring
 
@@ -43,10 +44,8 @@ class RiskMap:
         self._inside = _inside(run)
         self._blocks = Blocks(run.grid.spec)
         self._tally = RiskTally(len(self._blocks.all))
-        self._draw_every_ms = max(draw_every_ms, LARGE_EVERY_MS if self._blocks.are_large else 0)
+        self._pace = Pace(max(draw_every_ms, LARGE_EVERY_MS if self._blocks.are_large else 0))
         self._changed: set[int] = set()
-        self._changed_ms = 0
-        self._due_ms = 0
         self._now_ms = 0
         self._statistics = {
             path: canvas.column(path, lambda rows: rr.Scalars.columns(scalars=rows[:, 0])) for path in METRICS
@@ -70,26 +69,25 @@ class RiskMap:
             return
         if news:
             self._changed.add(self._blocks.index_at(*place))
-            self._changed_ms = max(self._changed_ms, received.header.sent_ms)
+            self._pace.note(received.header.sent_ms)
 
     def advance(self, time_ms: int) -> None:
         """Draws if it is time and all tiles sent together are in."""
         self._now_ms = max(self._now_ms, time_ms)
-        if self._changed and time_ms > self._changed_ms and time_ms >= self._due_ms:
-            self._due_ms = time_ms + self._draw_every_ms
-            self._draw()
+        self._draw(self._pace.due(time_ms))
 
     def finish(self) -> None:
         """Draws what is not drawn yet, and draws the statistics out to the end."""
-        if self._changed:
-            self._draw()
+        self._draw(self._pace.rest())
         self._add_statistics(self._now_ms)
 
-    def _draw(self) -> None:
+    def _draw(self, changed_ms: int | None) -> None:
+        if changed_ms is None:
+            return
         for index in sorted(self._changed):
-            self._draw_block(self._changed_ms, index)
+            self._draw_block(changed_ms, index)
         self._changed.clear()
-        self._add_statistics(self._changed_ms)
+        self._add_statistics(changed_ms)
 
     def _draw_block(self, time_ms: int, index: int) -> None:
         block = self._blocks.all[index]

@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import rerun as rr
 
 from comms.messages import Hotspot, HotspotState, StripState, StripStatus
 from comms.node import Received
 from viz import palette, paths
 from viz.canvas import Canvas
+from viz.pace import Pace
 from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_ring
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each
 IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
+OPEN_EVERY_MS = 60_000
 
 
 class SecondLooks:
-    """Draws each hotspot and each strip under its own entity; what is withdrawn disappears."""
+    """Draws each hotspot and each strip under its own entity; what is withdrawn disappears.
+
+    A change of a strip's state is drawn at once. As long as it is open its place and its worth often change: such
+    changes of all strips are drawn together, at most once a minute, of each strip the latest, at the time it was said.
+    """
 
     def __init__(self, canvas: Canvas, extent: Extent) -> None:
         self._canvas = canvas
-        self._drawn: dict[int, tuple[object, ...]] = {}
         self._labelled_m = LABELLED_SHARE * max(extent.width_m, extent.height_m)
+        self._pace = Pace(OPEN_EVERY_MS)
+        self._states: dict[int, StripState] = {}
+        self._held: dict[int, tuple[int, StripStatus]] = {}
+        self._drawn: dict[int, tuple[object, object]] = {}
+        self._labelled: set[int] = set()
 
     def on_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         """Draws the outline as it is now."""
@@ -28,61 +40,90 @@ class SecondLooks:
         if hotspot.state is HotspotState.WITHDRAWN:
             self._canvas.put(received.header.sent_ms, path, rr.Clear(recursive=False))
             return
-        outline = ring(hotspot.outline, HOTSPOT_Z_M)
-        self._canvas.put(
-            received.header.sent_ms,
-            path,
-            rr.LineStrips3D(
-                [outline],
-                colors=[palette.HOTSPOT],
-                radii=rr.Radius.ui_points(0.7),
-                labels=f"hotspot {received.number}: {hotspot.cells} cells, mean risk {hotspot.mean_risk:.2f}",
-                show_labels=False,
-            ),
+        outline = rr.LineStrips3D.from_fields(
+            strips=ring(hotspot.outline, HOTSPOT_Z_M),
+            labels=f"hotspot {received.number}: {hotspot.cells} cells, mean risk {hotspot.mean_risk:.2f}",
         )
+        self._canvas.put(received.header.sent_ms, path, outline, _hotspot_look())
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
         number, time_ms = received.number, received.header.sent_ms
+        before = self._states.get(number)
+        self._states[number] = strip.state
+        if before is strip.state is StripState.OPEN:
+            self._held[number] = (time_ms, strip)
+            self._pace.note(time_ms)
+        else:
+            self._held.pop(number, None)  # what was said before is out of date
+            self._draw(time_ms, number, strip)
+
+    def advance(self, time_ms: int) -> None:
+        """Draws what was held back if its minute is over."""
+        if self._held and self._pace.due(time_ms) is not None:
+            self.finish()
+
+    def finish(self) -> None:
+        """Draws what was held back."""
+        for number, (time_ms, strip) in self._held.items():
+            self._draw(time_ms, number, strip)
+        self._held.clear()
+
+    def _draw(self, time_ms: int, number: int, strip: StripStatus) -> None:
         path = f"{paths.STRIPS}/{number}"
+        drawn_look, drawn_place = self._drawn.pop(number, (None, None))
         if strip.state is StripState.WITHDRAWN:
             self._canvas.put(time_ms, path, rr.Clear(recursive=True))
-            self._drawn.pop(number, None)
+            self._labelled.discard(number)
             return
         wide = strip.width_m >= self._labelled_m
-        label = _words(strip, number) if wide else str(number)
-        told = f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_whose(strip)}"
-        looks = (strip.state, strip.start_x_m, strip.start_y_m, strip.heading_rad, strip.length_m, strip.width_m)
-        if self._drawn.get(number) == looks:  # only its worth has changed, which happens often
-            self._canvas.put(time_ms, path, rr.LineStrips3D.from_fields(labels=told))
-            if wide:
-                self._canvas.put(time_ms, f"{path}/label", rr.Points3D.from_fields(labels=label))
-            return
-        self._drawn[number] = looks
-        done = strip.state is StripState.DONE
-        self._canvas.put(
-            time_ms,
-            path,
-            rr.LineStrips3D(
-                [strip_ring(strip, STRIP_Z_M)],
-                colors=[palette.STRIP[strip.state]],
-                radii=rr.Radius.ui_points((0.8 if done else 1.5) if wide else (0.4 if done else 0.6)),
-                labels=told,
-                show_labels=False,  # it is told under the pointer
-            ),
+        look = (strip.state, wide)
+        place = (strip.start_x_m, strip.start_y_m, strip.heading_rad, strip.length_m, strip.width_m)
+        self._drawn[number] = (look, place)
+        # Often nothing but its worth has changed, or nothing but its place and its worth.
+        looks_new = look != drawn_look
+        lies_new = looks_new or place != drawn_place
+        outline = rr.LineStrips3D.from_fields(
+            strips=strip_ring(strip, STRIP_Z_M) if lies_new else None,
+            labels=f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_whose(strip)}",
         )
-        # Words in the colour of the state would not be legible on every part of the map.
-        self._canvas.put(
-            time_ms,
-            f"{path}/label",
-            rr.Points3D(
-                [label_place(strip, number, STRIP_Z_M)],
-                labels=label,
-                show_labels=wide or strip.state in IN_HAND,
-                colors=[palette.STRIP[StripState.DONE] if done else palette.TEXT],
-                radii=rr.Radius.ui_points(0.1),
-            ),
-        )
+        self._canvas.put(time_ms, path, outline, *([_strip_look(*look)] if looks_new else []))
+        shows = wide or strip.state in IN_HAND
+        if shows or number in self._labelled:
+            self._labelled.add(number)
+            label = rr.Points3D.from_fields(
+                positions=[label_place(strip, number, STRIP_Z_M)] if lies_new else None,
+                labels=_words(strip, number) if wide else str(number),
+            )
+            self._canvas.put(time_ms, f"{path}/label", label, *([_label_look(shows, strip.state)] if looks_new else []))
+
+
+# How things look is made once and put beside each outline: to make it anew takes longer than to draw it.
+
+
+@cache
+def _hotspot_look() -> rr.LineStrips3D:
+    return rr.LineStrips3D.from_fields(colors=[palette.HOTSPOT], radii=rr.Radius.ui_points(0.7), show_labels=False)
+
+
+@cache
+def _strip_look(state: StripState, wide: bool) -> rr.LineStrips3D:
+    done = state is StripState.DONE
+    return rr.LineStrips3D.from_fields(
+        colors=[palette.STRIP[state]],
+        radii=rr.Radius.ui_points((0.8 if done else 1.5) if wide else (0.4 if done else 0.6)),
+        show_labels=False,  # it is told under the pointer
+    )
+
+
+@cache
+def _label_look(shows: bool, state: StripState) -> rr.Points3D:
+    # Words in the colour of the state would not be legible on every part of the map.
+    return rr.Points3D.from_fields(
+        colors=[palette.STRIP[state] if state is StripState.DONE else palette.TEXT],
+        radii=rr.Radius.ui_points(0.1),
+        show_labels=shows,
+    )
 
 
 def _whose(strip: StripStatus) -> str:

@@ -11,6 +11,7 @@ from comms.messages import RunInfo, StripState, StripStatus, TaskState, TaskStat
 from comms.node import Received
 from viz import paths
 from viz.canvas import Canvas
+from viz.pace import Pace
 
 MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
 IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
@@ -34,7 +35,8 @@ class TaskTable:
         self._ended: deque[_Row] = deque(maxlen=MOST_ENDED)
         self._strips: dict[int, StripStatus] = {}
         self._counts: Counter[StripState] = Counter()
-        self._changed_ms: int | None = 0
+        self._pace = Pace(0)
+        self._pace.note(0)
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Counts the strip in its state."""
@@ -45,7 +47,7 @@ class TaskTable:
             self._counts[strip.state] += 1
             if before is not None:
                 self._counts[before.state] -= 1
-            self._changed_ms = received.header.sent_ms
+            self._pace.note(received.header.sent_ms)
 
     def on_task_status(self, received: Received, status: TaskStatus) -> None:
         """Takes the vehicle's word on its task."""
@@ -61,19 +63,20 @@ class TaskTable:
         else:  # said again
             return
         if before is None or (before.status.strip, before.status.state) != (status.strip, status.state):
-            self._changed_ms = received.header.sent_ms
+            self._pace.note(received.header.sent_ms)
 
     def advance(self, time_ms: int) -> None:
         """Writes the table if all that was said at the time of its last change is in."""
-        if self._changed_ms is not None and time_ms > self._changed_ms:
-            self.finish()
+        self._write(self._pace.due(time_ms))
 
     def finish(self) -> None:
         """Writes the table if it has changed."""
-        if self._changed_ms is not None:
+        self._write(self._pace.rest())
+
+    def _write(self, changed_ms: int | None) -> None:
+        if changed_ms is not None:
             words = rr.TextDocument(self._words(), media_type=rr.MediaType.MARKDOWN)
-            self._canvas.put(self._changed_ms, paths.TASKS, words)
-            self._changed_ms = None
+            self._canvas.put(changed_ms, paths.TASKS, words)
 
     def _words(self) -> str:
         if not self._in_hand:

@@ -462,6 +462,9 @@ def test_on_a_large_area_only_strips_in_hand_have_a_number(
     ]
     path = record(narrow, tmp_path / "narrow.rrd")
     states = [strip.state.value for _, strip in of(messages, StripStatus) if strip.removable_m2 == 2150.0]
+    assert states == ["open", "offered", "accepted", "under_way", "done"]
     shown = [value for _, (value,) in rows(path, "/strips/1/label", "Points3D:show_labels")]
-    assert shown == [state in ("offered", "accepted", "under_way") for state in states]
+    assert shown == [True, True, True, False]
     assert {text for _, (text,) in rows(path, "/strips/1/label", "Points3D:labels")} == {"1"}
+    assert "/strips/10" in entities(path)
+    assert "/strips/10/label" not in entities(path)

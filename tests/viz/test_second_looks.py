@@ -1,0 +1,131 @@
+"""How often strips are drawn: changes of state at once, the changes of open strips once a minute."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from comms import topics
+from comms.codec import Header
+from comms.messages import MissionOver, RunInfo, StripState, StripStatus
+from comms.node import Received
+from tests.viz.mission_stream import mission
+from tests.viz.recordings import rows
+from viz import palette
+
+Record = Callable[[list[Received], Path], Path]
+RUN = next(received for received in mission(tracks=1) if isinstance(received.message, RunInfo))
+STRIP = StripStatus(1, StripState.OPEN, 300.0, 50.0, 0.0, 100.0, 60.0, 1000.0, "", "")
+
+
+def says(time_s: float, number: int, state: StripState, worth_m2: float, length_m: float = 100.0) -> Received:
+    """A strip as it is from a time on."""
+    strip = replace(STRIP, state=state, removable_m2=worth_m2, length_m=length_m)
+    return Received(
+        topics.STRIP.key(number=number), topics.STRIP, "", Header("coordinator", 0, 0, round(time_s * 1000)), strip
+    )
+
+
+def passes(time_s: float) -> Received:
+    """Any message of a time."""
+    header = Header("coordinator", 0, 0, round(time_s * 1000))
+    return Received(topics.MISSION_OVER.key(), topics.MISSION_OVER, "", header, MissionOver(""))
+
+
+def worths(recording: Path, number: int) -> list[tuple[float, str]]:
+    """When a strip was drawn, in seconds, and which risk it was said to remove."""
+    told = rows(recording, f"/strips/{number}", "LineStrips3D:labels")
+    return [(time_ms / 1000, text.split(": ")[1].split(" m²")[0]) for time_ms, (text,) in told]
+
+
+def outlines(recording: Path, number: int) -> list[tuple[float, float]]:
+    """When a strip's outline was drawn, in seconds, and how long it was."""
+    drawn = rows(recording, f"/strips/{number}", "LineStrips3D:strips")
+    return [(time_ms / 1000, outline[1][1] - outline[0][1]) for time_ms, (outline,) in drawn]
+
+
+def test_changes_of_open_strips_are_drawn_once_a_minute(record: Record, tmp_path: Path) -> None:
+    is_open, offered = StripState.OPEN, StripState.OFFERED
+    path = record([
+        RUN,
+        says(10, 1, is_open, 100),
+        says(20, 1, is_open, 200),
+        says(20, 1, is_open, 201),  # of one time the last
+        passes(21),  # and so the next ones are due at 81 s
+        says(30, 1, is_open, 300),
+        says(40, 1, is_open, 400, length_m=140.0),
+        says(45, 2, is_open, 450),  # new: at once
+        says(50, 2, is_open, 500),
+        says(80.9, 2, is_open, 809),
+        says(81, 3, is_open, 810),  # the minute is over; the next ones are due at 141 s
+        says(81.5, 2, is_open, 815),
+        says(100, 1, is_open, 1000),
+        says(110, 1, offered, 1100),  # at once, and what was held back is out of date
+        says(120, 2, StripState.WITHDRAWN, 815),
+        says(130, 1, is_open, 1300),  # another state again
+        says(135, 1, is_open, 1350),
+        says(140, 3, is_open, 1400),  # held back until the end
+    ], tmp_path / "strips.rrd")  # fmt: skip
+    assert worths(path, 1) == [(10, "100"), (20, "201"), (40, "400"), (110, "1100"), (130, "1300"), (135, "1350")]
+    # The place alone where it is new, or the state is.
+    assert outlines(path, 1) == [(10, 100), (40, 140), (110, 100), (130, 100)]
+    assert worths(path, 2) == [(45, "450"), (80.9, "809")]
+    assert [time_ms for time_ms, _ in rows(path, "/strips/2", "Clear:is_recursive")] == [120_000]
+    assert worths(path, 3) == [(81, "810"), (140, "1400")]
+
+
+def test_what_is_held_back_is_drawn_when_its_minute_is_over(record: Record, tmp_path: Path) -> None:
+    is_open = StripState.OPEN
+    said = [RUN, says(0, 1, is_open, 1), says(1, 1, is_open, 2), passes(2), says(3, 1, is_open, 3), passes(61.999)]
+    assert worths(record(said, tmp_path / "whole.rrd"), 1) == [(0, "1"), (1, "2"), (3, "3")]
+    # One that is withdrawn has no minute to wait for, and so delays nobody.
+    said += [passes(62), says(63, 1, is_open, 4), says(64, 1, StripState.WITHDRAWN, 4), passes(122), passes(123)]
+    said += [says(124, 2, is_open, 5), says(125, 2, is_open, 6), passes(126), says(127, 2, is_open, 7), passes(186)]
+    path = record(said, tmp_path / "delayed.rrd")
+    assert worths(path, 1) == [(0, "1"), (1, "2"), (3, "3")]
+    assert worths(path, 2) == [(124, "5"), (125, "6"), (127, "7")]
+
+
+STATES = st.sampled_from([StripState.OPEN] * 6 + [StripState.OFFERED, StripState.WITHDRAWN])
+SAID = st.lists(st.tuples(st.integers(1, 40), st.integers(1, 2), STATES), min_size=1, max_size=40)
+
+
+@settings(max_examples=25)
+@given(SAID)
+def test_at_any_time_a_strip_has_its_state_and_in_the_end_its_last_word(
+    record: Record, told: list[tuple[int, int, StripState]]
+) -> None:
+    now_s, stream = 0, [RUN]
+    said: dict[int, list[tuple[float, StripState, str]]] = {}
+    for worth_m2, (after_s, number, state) in enumerate(told, start=1):
+        now_s += after_s
+        stream.append(says(now_s, number, state, worth_m2))
+        said.setdefault(number, []).append((now_s, state, str(worth_m2)))
+    with tempfile.TemporaryDirectory() as folder:
+        path = record(stream, Path(folder) / "strips.rrd")
+        for number, words in said.items():
+            cleared = [(time_ms / 1000, None) for time_ms, _ in rows(path, f"/strips/{number}", "Clear:is_recursive")]
+            coloured = [
+                (time_ms / 1000, colour)
+                for time_ms, (colour,) in rows(path, f"/strips/{number}", "LineStrips3D:colors")
+            ]
+            for time_s, state, _ in words:
+                _, latest = max((one for one in (*cleared, *coloured) if one[0] <= time_s), key=lambda one: one[0])
+                assert latest == colour_of(state)
+            drawn = worths(path, number)
+            assert set(drawn) <= {(time_s, worth) for time_s, _, worth in words}
+            last_s, state, worth = words[-1]
+            assert state is StripState.WITHDRAWN or drawn[-1] == (last_s, worth)
+
+
+def colour_of(state: StripState) -> int | None:
+    """As recordings have it; None for what is not there."""
+    if state is StripState.WITHDRAWN:
+        return None
+    red, green, blue = palette.STRIP[state]
+    return (red << 24) | (green << 16) | (blue << 8) | 0xFF
