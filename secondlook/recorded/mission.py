@@ -125,8 +125,7 @@ class RecordedMission:
             tile = isinstance(one.message, CoverageTile)
             if not tile or (one.header.sent_ms <= until_ms and (vehicles is None or one.vehicle in vehicles)):
                 metrics.take(one)
-        assert metrics.map is not None
-        return RiskMap(until_ms / 1000, metrics.map.grid, metrics.map.risk, metrics.map.seen(), metrics.inside)
+        return RiskMap.of(until_ms / 1000, metrics)
 
     @cached_property
     def activities(self) -> list[Activity]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +13,10 @@ from shapely.geometry.base import BaseGeometry
 
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec
+from secondlook.metrics import Metrics
+
+Cells = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.intp]]]
+"""Rows and columns of cells."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +31,14 @@ class RiskMap:
     risk: FloatArray
     seen: BoolArray
     inside: BoolArray
+
+    @classmethod
+    def of(cls, t_s: float, metrics: Metrics, vehicles: Collection[str] | None = None) -> RiskMap:
+        """The map of all that was taken until `t_s`; `vehicles`: of these alone."""
+        fleet = metrics.map
+        assert fleet is not None  # announced before anything else
+        risk, seen = (fleet.risk, fleet.seen()) if vehicles is None else fleet.risk_of(set(vehicles))
+        return cls(t_s, fleet.grid, risk, seen, metrics.inside)
 
     @cached_property
     def x_m(self) -> FloatArray:
@@ -51,17 +65,37 @@ class RiskMap:
 
     def mean_within(self, geometry: BaseGeometry) -> float:
         """Mean risk of the cells inside the area whose centres lie in a geometry (mission frame); NaN if none does."""
-        cells = self.cells_within(geometry)
+        return self.mean_of(self.cells_within(geometry))
+
+    def mean_of(self, cells: Cells) -> float:
+        """Mean risk of some cells; NaN of none."""
         return float(self.risk[cells].mean()) if cells[0].size else float("nan")
 
-    def cells_within(self, geometry: BaseGeometry) -> tuple[np.ndarray[tuple[int], np.dtype[np.intp]], ...]:
+    def cells_within(self, geometry: BaseGeometry) -> Cells:
         """Rows and columns of the cells inside the area whose centres lie in a geometry (mission frame)."""
-        west, south, east, north = geometry.bounds
-        near = self.inside & (self.x_m >= west) & (self.x_m <= east) & (self.y_m >= south) & (self.y_m <= north)
-        rows, columns = np.nonzero(near)
-        within = shapely.contains_xy(geometry, self.x_m[rows, columns], self.y_m[rows, columns])
+        near_rows, near_columns = self._around(geometry)
+        rows, columns = np.nonzero(self.inside[near_rows, near_columns])
+        rows, columns = rows + near_rows.start, columns + near_columns.start
+        x_m, y_m = self.grid.frame.to_mission(self.grid.across_m[columns], self.grid.along_m[rows])
+        within = shapely.contains_xy(geometry, x_m, y_m)
         return rows[within], columns[within]
+
+    def _around(self, geometry: BaseGeometry) -> tuple[slice, slice]:
+        """The rows and columns of the grid that a geometry's bounding box may reach: of a large grid but a few."""
+        if geometry.is_empty:
+            return slice(0, 0), slice(0, 0)
+        west_m, south_m, east_m, north_m = geometry.bounds
+        across_m, along_m = self.grid.frame.to_sweep(
+            np.array([west_m, east_m, east_m, west_m]), np.array([south_m, south_m, north_m, north_m])
+        )
+        cell_m = self.grid.cell_m
+        return _span(along_m / cell_m - 0.5, self.grid.rows), _span(across_m / cell_m, self.grid.columns)
 
     @cached_property
     def _centres(self) -> tuple[FloatArray, FloatArray]:
         return self.grid.frame.to_mission(self.grid.across_m[np.newaxis, :], self.grid.along_m[:, np.newaxis])
+
+
+def _span(places: FloatArray, count: int) -> slice:
+    """Of a number of cells, whose centres lie at 0, 1 and so on, those from the first of some places to the last."""
+    return slice(max(0, math.floor(places.min())), max(0, min(count, math.ceil(places.max()) + 1)))

@@ -59,6 +59,7 @@ def fate(strip: StripRecord, before: RiskMap, after: RiskMap) -> Fate:
     """A strip's fate; `before` and `after`: the risk at the end by the primaries alone and by all."""
     last = strip.history[-1]
     ended = last.state in (StripState.DONE, StripState.FAILED, StripState.WITHDRAWN)
+    cells = after.cells_within(strip.polygon)
     return Fate(
         number=strip.number,
         css=FATE_CLASS[strip.state],
@@ -69,7 +70,7 @@ def fate(strip: StripRecord, before: RiskMap, after: RiskMap) -> Fate:
         ended_s=last.t_s if ended else None,
         length_m=strip.strip.length_m,
         width_m=strip.strip.width_m,
-        risk_before=before.mean_within(strip.polygon),
-        risk_after=after.mean_within(strip.polygon),
+        risk_before=before.mean_of(cells),
+        risk_after=after.mean_of(cells),
         history=[(event.t_s, event.reason or event.state.value.replace("_", " ")) for event in strip.history],
     )

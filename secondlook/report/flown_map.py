@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import shapely
 
 from comms.messages import StripState
+from planner.types import Point
 from secondlook.recorded import PathRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
 from secondlook.report.axis import ticks
 from secondlook.report.fates import FATE_CLASS, fate_in_words
@@ -38,7 +40,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         *(_path(frame, path, kinds.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
         *(_strip(frame, strip, ids) for strip in strips),
-        *(_number(frame, strip, place) for strip, place in _places(strips, LABEL_PX * unit_m)),
+        *(_number(frame, strip, place_m) for strip, place_m in number_places(strips, LABEL_PX * unit_m)),
         *_names(frame, [(path, kinds.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
         *_scale(frame, unit_m),
     ]
@@ -67,18 +69,20 @@ def _track(frame: MapFrame, track: TrackRecord, unit_m: float) -> Element:
     )
 
 
-def _places(strips: Sequence[StripRecord], apart_m: float) -> Iterator[tuple[StripRecord, shapely.Point]]:
-    """Every strip with the place of its number: on the centre line where it keeps apart from those before it."""
-    taken: list[shapely.Point] = []
-    for strip in strips:
-        places = [strip.centre_line.interpolate(share, normalized=True) for share in ALONG]
-        place = max(places, key=lambda here: min((apart_m, *(here.distance(other) for other in taken))))
-        taken.append(place)
-        yield strip, place
+def number_places(strips: Sequence[StripRecord], apart_m: float) -> Iterator[tuple[StripRecord, Point]]:
+    """Every strip with the place of its number: on the centre line where it keeps apart from those before it, where
+    `apart_m` is far enough."""
+    taken_m = np.full((2, len(strips)), np.inf)
+    for number, strip in enumerate(strips):
+        start_m, end_m = np.array(strip.strip.start), np.array(strip.strip.end)
+        places_m = [start_m + share * (end_m - start_m) for share in ALONG]
+        room_m = [np.hypot(*(taken_m - place_m[:, np.newaxis])).min(initial=apart_m) for place_m in places_m]
+        taken_m[:, number] = place_m = places_m[int(np.argmax(room_m))]
+        yield strip, (float(place_m[0]), float(place_m[1]))
 
 
-def _number(frame: MapFrame, strip: StripRecord, place: shapely.Point) -> Element:
-    x, y = frame.place(place.x, place.y)
+def _number(frame: MapFrame, strip: StripRecord, place_m: Point) -> Element:
+    x, y = frame.place(*place_m)
     return element(
         "a",
         element("title", f"strip {strip.number}: {fate_in_words(strip)}"),

@@ -58,10 +58,10 @@ def report_page(mission: RecordedMission) -> str:
 
 
 def _flown(mission: RecordedMission) -> dict[str, Any]:
-    before, after = mission.risk(vehicles=mission.primaries), mission.risk()
+    series = risk_series(mission)
+    before, after = series.before, series.after
     log = log_lines(mission)
     mattered = moments(mission, log)
-    samples = risk_series(mission)
     done = mission.activities
     vehicles = [one.vehicle for one in mission.run.vehicles]
     helped = bool(mission.helpers)
@@ -75,7 +75,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "flown_map": markup(flown_map(mission, after, STRIP_ON_MAP)),
         "on_map": STRIP_ON_MAP,
         "moments": mattered,
-        "risk_chart": _at_both_widths(lambda width_px: risk_chart(samples, mattered, width_px)),
+        "risk_chart": _at_both_widths(lambda width_px: risk_chart(series.samples, mattered, width_px)),
         "histogram": _at_both_widths(lambda width_px: histogram(before, after if helped else None, width_px)),
         "timeline": _at_both_widths(lambda width_px: timeline(vehicles, mission.helpers, done, width_px)),
         "tracks": mission.tracks,

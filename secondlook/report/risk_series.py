@@ -1,4 +1,4 @@
-"""The residual risk over the mission."""
+"""The residual risk over the mission and at its end, in one pass over the tiles: of a large map these are many."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from comms.messages import CoverageTile, RunInfo
 from secondlook.metrics import Metrics
-from secondlook.recorded import RecordedMission
+from secondlook.recorded import RecordedMission, RiskMap
 
 MOST_SAMPLES, FEWEST_SAMPLES = 240, 30
 CELLS_TO_SUM_UP = 20_000_000  # over all samples: about a second
@@ -24,8 +24,18 @@ class RiskSample:
     unseen_share: float
 
 
-def risk_series(mission: RecordedMission) -> list[RiskSample]:
-    """Samples from the start to the end, evenly spaced; fewer of a map with very many cells."""
+@dataclass(frozen=True)
+class RiskSeries:
+    """`samples`: from the start to the end, evenly spaced; fewer of a map with very many cells. `before`, `after`: the
+    map at the end by the primaries alone and by all."""
+
+    samples: list[RiskSample]
+    before: RiskMap
+    after: RiskMap
+
+
+def risk_series(mission: RecordedMission) -> RiskSeries:
+    """The residual risk of a mission."""
     cells = mission.run.grid.columns * mission.run.grid.rows
     count = max(FEWEST_SAMPLES, min(MOST_SAMPLES, CELLS_TO_SUM_UP // cells))
     times_s = list(np.linspace(0.0, mission.end_s, count + 1))
@@ -35,7 +45,9 @@ def risk_series(mission: RecordedMission) -> list[RiskSample]:
         while received.header.sent_ms / 1000 > times_s[len(samples)]:
             samples.append(_sample(metrics, times_s[len(samples)]))
         metrics.take(received)
-    return samples + [_sample(metrics, t_s) for t_s in times_s[len(samples) :]]
+    samples += [_sample(metrics, t_s) for t_s in times_s[len(samples) :]]
+    before, after = (RiskMap.of(mission.end_s, metrics, vehicles) for vehicles in (mission.primaries, None))
+    return RiskSeries(samples, before, after)
 
 
 def _sample(metrics: Metrics, t_s: float) -> RiskSample:

@@ -15,7 +15,11 @@ import msgpack
 import numpy as np
 import pytest
 import shapely
+import shapely.affinity
 from flights import events
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 import secondlook
 from comms.messages import AgentState, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
@@ -125,6 +129,21 @@ def test_cells_know_their_places() -> None:
     assert one.mean_within(shapely.box(100, 30, 120, 60)) == pytest.approx((0 + 1 + 2 + 3) / 40)
     assert math.isnan(one.mean_within(shapely.box(0, 0, 10, 10)))
     assert one.statistics == risk_statistics(one.risk, one.seen, one.inside)
+
+
+@given(st.floats(0, 6.28), st.floats(0.5, 7.0), st.floats(-30, 90), st.floats(-30, 90), st.floats(0, 6.28), st.data())
+def test_cells_within_are_all_whose_centres_lie_there(
+    track_heading_rad: float, cell_m: float, x_m: float, y_m: float, heading_rad: float, data: st.DataObject
+) -> None:
+    grid = GridSpec(SweepFrame(20.0, 10.0, track_heading_rad), cell_m, columns=12, rows=9)
+    inside = data.draw(arrays(np.bool_, grid.shape))
+    one = RiskMap(0.0, grid, np.ones(grid.shape), inside, inside)
+    strip = shapely.affinity.rotate(shapely.box(x_m, y_m, x_m + 8.0, y_m + 40.0), heading_rad, use_radians=True)
+    for geometry in (strip, strip.centroid.buffer(3 * cell_m), strip.union(shapely.Point(0, 0).buffer(2 * cell_m))):
+        rows, columns = one.cells_within(geometry)
+        expected = inside & shapely.contains_xy(geometry, one.x_m, one.y_m)
+        assert list(zip(rows, columns, strict=True)) == list(zip(*np.nonzero(expected), strict=True))
+    assert math.isnan(one.mean_within(shapely.Polygon()))
 
 
 def test_tracks_and_paths_are_those_of_the_summary(mission: RecordedMission, summary: dict[str, Any]) -> None:

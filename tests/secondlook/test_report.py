@@ -21,13 +21,14 @@ from hypothesis import strategies as st
 import secondlook
 from comms.codec import Header, encode
 from comms.messages import Mode, StripState
-from planner.types import GridSpec, SweepFrame
+from planner.types import GridSpec, Strip, SweepFrame
 from secondlook import cli
 from secondlook.fleet import build_fleet
 from secondlook.mission import RunOptions, run_mission
-from secondlook.recorded import Activity, RecordedMission, RiskMap
+from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
 from secondlook.report import report_page
 from secondlook.report.axis import ticks
+from secondlook.report.flown_map import number_places
 from secondlook.report.histogram import shares
 from secondlook.report.map_frame import MOST_PIXELS, MapFrame
 from secondlook.report.moments import Moment, log_lines, moments
@@ -212,13 +213,20 @@ def test_a_mission_by_the_wall_clock_is_flown_again_by_it() -> None:
 
 
 def test_the_series_is_the_risk_at_each_time(mission: RecordedMission) -> None:
-    samples = risk_series(mission)
+    series = risk_series(mission)
+    samples = series.samples
     assert [samples[0].t_s, samples[-1].t_s] == [0.0, mission.end_s]
     assert (samples[0].mean, samples[0].unseen_share) == (1.0, 1.0)
     for sample in samples[:: len(samples) // 5]:
         told = mission.risk(sample.t_s).statistics
         assert (sample.mean, sample.worst30_mean) == (told.mean, told.worst30_mean)
         assert sample.unseen_share == told.uncovered_share
+    alone, whole = mission.risk(vehicles=mission.primaries), mission.risk()
+    for found, expected in ((series.before, alone), (series.after, whole)):
+        assert found.t_s == expected.t_s == mission.end_s
+        np.testing.assert_array_equal(found.risk, expected.risk)
+        np.testing.assert_array_equal(found.seen, expected.seen)
+        np.testing.assert_array_equal(found.inside, expected.inside)
 
 
 def test_moments_are_in_order_and_end_with_the_mission(mission: RecordedMission) -> None:
@@ -310,6 +318,16 @@ def test_a_map_of_very_many_cells_is_drawn_with_fewer_pixels() -> None:
     # Each pixel is three cells high.
     _, _, _, down, _, _ = map(float, re.findall(r"[-\d.e]+", drawn.attrib["transform"]))
     assert down == pytest.approx(-30.0)
+
+
+def test_numbers_of_strips_keep_apart() -> None:
+    def strip(number: int, x_m: float) -> StripRecord:
+        return StripRecord(Strip(number, (x_m, 0.0), 0.0, 100.0, 8.0), StripState.OPEN, "", 1.0, ())
+
+    # The second keeps 32 m off the first a fifth of its way up, the third 30 m at four fifths; the fourth has room.
+    places = number_places([strip(1, 0), strip(2, 10), strip(3, 0), strip(4, 100)], 40.0)
+    found = [(one.number, round(x_m, 9), round(y_m, 9)) for one, (x_m, y_m) in places]
+    assert found == [(1, 0, 50), (2, 10, 20), (3, 0, 80), (4, 100, 50)]
 
 
 def test_colours_tell_risk_unseen_and_outside_apart() -> None:
