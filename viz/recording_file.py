@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 from pathlib import Path
 
@@ -11,6 +12,10 @@ from viz.viewer_program import PROGRAM, ViewerError, quiet_environment
 BEGINS_WITH = b"RRF2"
 ENDS_WITH = b"RRF2FOOT"
 FOOTER_BYTES = 12
+# Behind a header of its own a file has messages, each behind its kind and its length: entries, and what tells of them.
+HEADER_BYTES = 12
+MESSAGE_HEAD = struct.Struct("<QQ")
+ENTRY = 2
 
 
 def is_recording(path: Path) -> bool:
@@ -25,6 +30,22 @@ def is_whole(path: Path) -> bool:
         size = file.seek(0, 2)
         file.seek(max(0, size - FOOTER_BYTES))
         return file.read().startswith(ENDS_WITH)
+
+
+def is_empty(path: Path) -> bool:
+    """Whether a file may have become a recording, but has no whole entry: its recorder was killed that early."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        if not BEGINS_WITH.startswith(file.read(len(BEGINS_WITH))):
+            return False
+        end = HEADER_BYTES
+        while end + MESSAGE_HEAD.size <= size:
+            file.seek(end)
+            kind, length = MESSAGE_HEAD.unpack(file.read(MESSAGE_HEAD.size))
+            end += MESSAGE_HEAD.size + length
+            if kind == ENTRY:
+                return bool(end > size)
+    return True
 
 
 def repair(recording: Path, repaired: Path) -> None:

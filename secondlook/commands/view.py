@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from secondlook.errors import UserError
-from viz.recording_file import is_recording, is_whole, repair
+from viz.recording_file import is_empty, is_recording, is_whole, repair
 from viz.recording_viewer import RecordingViewer
 from viz.viewer_program import ViewerError, check_display
 
@@ -44,6 +44,9 @@ def _recording(run: Path) -> Path:
     if not run.is_dir():
         raise UserError(f"{run}: there is no such folder; must be the folder of a run")
     try:
+        if is_empty(recording):
+            why = "its recorder was killed before it had written anything, or is about to write"
+            raise UserError(f"{recording}: holds nothing yet: {why}")
         if is_recording(recording):
             return recording
     except FileNotFoundError as error:

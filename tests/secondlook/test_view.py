@@ -20,8 +20,10 @@ from flights import LONG, flight, until
 from secondlook import cli
 from tests.viz.recordings import verify
 from tests.viz.test_recording_file import counted, ends_of_messages
+from viz.recording_file import is_empty
 
 PAGE = re.compile(r"The mission is shown at (http://127\.0\.0\.1:\d+/\S+); Ctrl-C ends it\n")
+ROOT = Path(__file__).parents[2]
 COMMAND = [sys.executable, "-P", "-c", "from secondlook.entry import main; main()", "view"]
 
 
@@ -72,6 +74,36 @@ def test_a_recording_whose_recorder_was_killed_is_repaired_with_all_it_had(tmp_p
     assert sorted(path.name for path in run.glob("mission.rrd*")) == ["mission.rrd"]
 
 
+KILLED_EARLY = """
+import os, pathlib, signal, sys
+from tests.viz.mission_stream import mission
+from viz.recorder import Recorder
+from viz.recorder_config import RecorderConfig
+messages = mission(tracks=1)
+recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1])))
+for received in messages[:int(sys.argv[2])]:
+    recorder.on_message(received)
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize("told", [0, 1, 100])
+def test_a_recording_whose_recorder_was_killed_at_once_is_shown_or_refused(
+    tmp_path: Path, told: int, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = tmp_path / "mission.rrd"
+    (tmp_path / "summary.json").write_text("{}")
+    command = [sys.executable, "-c", KILLED_EARLY, str(recording), str(told)]
+    assert subprocess.run(command, cwd=ROOT, check=False).returncode == -signal.SIGKILL
+    if is_empty(recording):  # that depends on how soon the writing thread came to it
+        assert run_here(monkeypatch, str(tmp_path), "--web") == 2
+        assert capsys.readouterr().err == HOLDS_NOTHING.format(run=tmp_path) + "\n"
+    else:
+        with viewing(tmp_path) as (_, page), urllib.request.urlopen(page, timeout=30) as answer:
+            assert answer.status == 200
+        assert verify(recording).returncode == 0
+
+
 def test_of_a_mission_that_goes_on_a_copy_is_shown(brief_copy: Path) -> None:
     (brief_copy / "summary.json").unlink()
     recording = brief_copy / "mission.rrd"
@@ -82,6 +114,9 @@ def test_of_a_mission_that_goes_on_a_copy_is_shown(brief_copy: Path) -> None:
     assert recording.read_bytes() == cut
 
 
+HOLDS_NOTHING = (
+    "{run}/mission.rrd: holds nothing yet: its recorder was killed before it had written anything, or is about to write"
+)
 SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
     "no folder": (shutil.rmtree, "{run}: there is no such folder; must be the folder of a run"),
     "no recording": (
@@ -92,6 +127,11 @@ SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda run: (run / "mission.rrd").write_text("Hello"),
         "{run}/mission.rrd: is not a recording; must be as the run wrote it",
     ),
+    "its first words alone": (
+        lambda run: (run / "mission.rrd").write_bytes((run / "mission.rrd").read_bytes()[:100]),
+        HOLDS_NOTHING,
+    ),
+    "nothing": (lambda run: (run / "mission.rrd").write_bytes(b""), HOLDS_NOTHING),
     "a folder in its place": (
         lambda run: (run / "mission.rrd").rename(run / "moved").with_name("mission.rrd").mkdir(),
         "{run}/mission.rrd: cannot be read: Is a directory",

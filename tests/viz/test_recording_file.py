@@ -11,7 +11,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tests.viz.recordings import entities, rows, timelines, verify
-from viz.recording_file import is_recording, is_whole, repair
+from viz.recording_file import is_empty, is_recording, is_whole, repair
 from viz.viewer_program import ViewerError
 
 SHOWN = (
@@ -76,6 +76,19 @@ def test_a_whole_recording_is_known(recording: Path, tmp_path: Path) -> None:
         text.write_text(content)
         assert not is_recording(text)
         assert not is_whole(text)
+
+
+def test_a_recording_without_an_entry_is_known(recording: Path, tmp_path: Path) -> None:
+    whole = recording.read_bytes()
+    ends = ends_of_messages(whole)
+    kinds = [struct.unpack_from("<Q", whole, end)[0] for end in ends[:-1]]
+    with_entry = ends[kinds.index(2) + 1]
+    cut = tmp_path / "cut.rrd"
+    for end in (*range(ends[1] + 20), *(end + more for end in ends[:30] for more in (-1, 0, 1)), len(whole)):
+        cut.write_bytes(whole[:end])
+        assert is_empty(cut) == (end < with_entry), end
+    cut.write_text("Hello")
+    assert not is_empty(cut)
 
 
 def test_what_cannot_be_repaired_is_told(recording: Path, tmp_path: Path) -> None:
