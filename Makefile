@@ -34,7 +34,7 @@ pictures: .venv/.test-ready
 		echo "No picture of the report: that needs Chromium (Debian, Ubuntu: chromium)." >&2; exit 1; }
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run headland --out runs/pictures
-	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 4670 --out docs/headland.png
+	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 4995 --out docs/headland.png
 
 # The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
 GOLDEN := tests/secondlook/golden

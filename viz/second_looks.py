@@ -91,9 +91,10 @@ class SecondLooks:
         shows = wide or strip.state in IN_HAND
         if shows or number in self._labelled:
             self._labelled.add(number)
+            told = wide and strip.state is not StripState.DONE
             label = rr.Points3D.from_fields(
                 positions=[label_place(strip, number, STRIP_Z_M)] if lies_new else None,
-                labels=_words(strip, number) if wide else str(number),
+                labels=f"{number}: {strip.removable_m2:.0f} m²" if told else str(number),  # its colour tells its state
             )
             self._canvas.put(time_ms, f"{path}/label", label, *([_label_look(shows, strip.state)] if looks_new else []))
 
