@@ -20,14 +20,29 @@ MARGIN_PX = 30.0
 PATH_STEP_PX = 0.5  # how far a drawn path may lie off the flown one
 LABEL_PX, LINE_PX = 40.0, 14.0
 ALONG = (0.5, 0.35, 0.65, 0.2, 0.8)  # where on a strip its number may stand, the best first
+NUMBER_PX = 20.0  # nearer to each other numbers cannot be read
+NAME_PX = 70.0  # what a vehicle's name takes up
+MOST_STRIPS = 100  # with numbers; of more those that were withdrawn would hide the others
 ROUND_NUMBERS = 8  # the scale bar is about an eighth of the width
+
+
+def are_many(strips: Sequence[StripRecord]) -> bool:
+    """Whether there are so many strips that not all can be told apart at a look."""
+    return len(strips) > MOST_STRIPS
+
+
+def strips_on_map(strips: Sequence[StripRecord]) -> list[StripRecord]:
+    """Those that the map shows."""
+    return [one for one in strips if one.state is not StripState.WITHDRAWN or not are_many(strips)]
 
 
 def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     """What was flown over the risk that is left. A strip's element has the id `ids` with its number."""
     paths, tracks = mission.paths, mission.tracks
-    # What was withdrawn lies below the others.
-    strips = sorted(mission.strips, key=lambda strip: strip.state is not StripState.WITHDRAWN)
+    many = are_many(mission.strips)
+    # What was withdrawn lies below the others, and has its number where they leave room.
+    strips = sorted(strips_on_map(mission.strips), key=lambda strip: strip.state is not StripState.WITHDRAWN)
+    numbered = [] if many else sorted(strips, key=lambda strip: strip.state is StripState.WITHDRAWN)
     all_of_it = [mission.area, *(path.line for path in paths.values()), *(strip.polygon for strip in strips)]
     shown = shapely.GeometryCollection(all_of_it)
     west_m, south_m, east_m, north_m = shown.bounds
@@ -40,12 +55,22 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         *(_path(frame, path, kinds.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
         *(_strip(frame, strip, ids) for strip in strips),
-        *(_number(frame, strip, place_m) for strip, place_m in number_places(strips, LABEL_PX * unit_m)),
+        *(
+            _number(frame, strip, place_m)
+            for strip, place_m in number_places(numbered, NUMBER_PX * unit_m, LABEL_PX * unit_m)
+        ),
         *_names(frame, [(path, kinds.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
         *_scale(frame, unit_m),
     ]
     label = "The area from above with tracks, paths and strips"
-    return drawing(frame.width_m, frame.height_m, label, children, class_="map flown", style=f"--u:{unit_m:.4g}")
+    return drawing(
+        frame.width_m,
+        frame.height_m,
+        label,
+        children,
+        class_="map flown many" if many else "map flown",
+        style=f"--u:{unit_m:.4g}",
+    )
 
 
 def _path(frame: MapFrame, path: PathRecord, kind: str, unit_m: float) -> Element:
@@ -69,16 +94,18 @@ def _track(frame: MapFrame, track: TrackRecord, unit_m: float) -> Element:
     )
 
 
-def number_places(strips: Sequence[StripRecord], apart_m: float) -> Iterator[tuple[StripRecord, Point]]:
-    """Every strip with the place of its number: on the centre line where it keeps apart from those before it, where
-    `apart_m` is far enough."""
+def number_places(strips: Sequence[StripRecord], least_m: float, apart_m: float) -> Iterator[tuple[StripRecord, Point]]:
+    """The strips that have a number, with its place: on the centre line where it keeps apart from those before it,
+    where `apart_m` is far enough. One that cannot keep `least_m` has none."""
     taken_m = np.full((2, len(strips)), np.inf)
     for number, strip in enumerate(strips):
         start_m, end_m = np.array(strip.strip.start), np.array(strip.strip.end)
         places_m = [start_m + share * (end_m - start_m) for share in ALONG]
         room_m = [np.hypot(*(taken_m - place_m[:, np.newaxis])).min(initial=apart_m) for place_m in places_m]
-        taken_m[:, number] = place_m = places_m[int(np.argmax(room_m))]
-        yield strip, (float(place_m[0]), float(place_m[1]))
+        best = int(np.argmax(room_m))
+        if room_m[best] >= least_m:
+            taken_m[:, number] = place_m = places_m[best]
+            yield strip, (float(place_m[0]), float(place_m[1]))
 
 
 def _number(frame: MapFrame, strip: StripRecord, place_m: Point) -> Element:
@@ -111,11 +138,12 @@ def _names(frame: MapFrame, paths: Sequence[tuple[PathRecord, str]], unit_m: flo
         x, y = frame.place(path.x_m[0], path.y_m[0])
         text_y = max([y, *(below + LINE_PX * unit_m for near, below in lowest if abs(near - x) < 80 * unit_m)])
         lowest.append((x, text_y))
+        has_room = x + NAME_PX * unit_m <= frame.width_m
         yield element(
             "g",
             element("circle", cx=x, cy=y, r=3.5 * unit_m),
-            element("text", path.vehicle, x=x + 7 * unit_m, y=text_y + 4 * unit_m),
-            class_=f"start {kind}",
+            element("text", path.vehicle, x=x + (7 if has_room else -7) * unit_m, y=text_y + 4 * unit_m),
+            class_=f"start {kind}{'' if has_room else ' before'}",
         )
 
 

@@ -16,7 +16,7 @@ from markupsafe import Markup
 
 from secondlook.recorded import RecordedMission, RiskMap
 from secondlook.report.fates import fate
-from secondlook.report.flown_map import flown_map
+from secondlook.report.flown_map import are_many, flown_map, strips_on_map
 from secondlook.report.histogram import histogram
 from secondlook.report.moments import log_lines, moments
 from secondlook.report.png import data_url, indexed_png
@@ -74,6 +74,8 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "scale": Markup(data_url(indexed_png(np.arange(LEVELS, dtype=np.uint8)[np.newaxis], palette()))),
         "flown_map": markup(flown_map(mission, after, STRIP_ON_MAP)),
         "on_map": STRIP_ON_MAP,
+        "shown_strips": {strip.number for strip in strips_on_map(mission.strips)},
+        "many_strips": are_many(mission.strips),
         "moments": mattered,
         "risk_chart": _at_both_widths(lambda width_px: risk_chart(series.samples, mattered, width_px)),
         "histogram": _at_both_widths(lambda width_px: histogram(before, after if helped else None, width_px)),
@@ -97,9 +99,10 @@ def _targets(mission: RecordedMission, after: RiskMap) -> TargetFigures | None:
     targets = mission.targets
     if not targets:
         return None
-    found_by = Counter(target.found_by for target in targets if target.found_by is not None)
+    counts = Counter(target.found_by for target in targets if target.found_by is not None)
+    found_by = {one.vehicle: counts[one.vehicle] for one in mission.run.vehicles if counts[one.vehicle]}
     at_targets = [float(after.at(target.point.x, target.point.y)) for target in targets]
-    return TargetFigures(len(targets), dict(found_by), len(targets) - found_by.total(), statistics.fmean(at_targets))
+    return TargetFigures(len(targets), found_by, len(targets) - counts.total(), statistics.fmean(at_targets))
 
 
 def _settings(mission: RecordedMission) -> str:

@@ -325,9 +325,11 @@ def test_numbers_of_strips_keep_apart() -> None:
         return StripRecord(Strip(number, (x_m, 0.0), 0.0, 100.0, 8.0), StripState.OPEN, "", 1.0, ())
 
     # The second keeps 32 m off the first a fifth of its way up, the third 30 m at four fifths; the fourth has room.
-    places = number_places([strip(1, 0), strip(2, 10), strip(3, 0), strip(4, 100)], 40.0)
+    side_by_side = [strip(1, 0), strip(2, 10), strip(3, 0), strip(4, 100)]
+    places = number_places(side_by_side, 30.0, 40.0)
     found = [(one.number, round(x_m, 9), round(y_m, 9)) for one, (x_m, y_m) in places]
     assert found == [(1, 0, 50), (2, 10, 20), (3, 0, 80), (4, 100, 50)]
+    assert [one.number for one, _ in number_places(side_by_side, 30.1, 40.0)] == [1, 2, 4]
 
 
 def test_colours_tell_risk_unseen_and_outside_apart() -> None:

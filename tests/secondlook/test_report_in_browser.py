@@ -11,7 +11,8 @@ from browser import risk_colours, visit
 from playwright.sync_api import Browser, Page
 
 import secondlook
-from secondlook.report import report_page
+from comms.messages import StripState
+from secondlook.report import flown_map, report_page
 
 IN_VIEW = "(node) => { const box = node.getBoundingClientRect(); return box.bottom > 0 && box.top < innerHeight; }"
 BACKGROUND = "(node) => getComputedStyle(node).backgroundColor"
@@ -82,6 +83,31 @@ def test_it_fits_the_width_of_a_phone(browser: Browser, report: str, strip: int,
         page.locator(f"a.strip.number[href='#strip-{strip}'] text").click()
         page.wait_for_url(re.compile(f"#strip-{strip}$"))
         assert in_view(page, f"#strip-{strip}")
+        fate, row = (page.locator(f"#strip-{strip}{part}").bounding_box() for part in (" td:nth-child(2)", ""))
+        assert fate is not None
+        assert row is not None
+        assert (fate["width"] > 0.8 * row["width"]) is phone  # a card's whole width, or a column beside others
+
+
+def test_of_many_strips_the_table_is_folded_and_opens_for_the_one_asked_for(
+    browser: Browser, brief_run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(flown_map, "MOST_STRIPS", 0)
+    mission = secondlook.load(brief_run)
+    shown = [one.number for one in mission.strips if one.state is not StripState.WITHDRAWN]
+    path = tmp_path / "many.html"
+    path.write_text(report_page(mission), encoding="utf-8")
+    with visit(browser, path.as_uri(), width=390) as seen:
+        page = seen.page
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        assert page.locator("a.strip").count() == page.locator(".back a").count() == len(shown)
+        assert page.locator("a.strip text").count() == 0
+        row = page.locator(f"#strip-{shown[0]}")
+        assert not row.is_visible()
+        page.evaluate(f"location.hash = 'strip-{shown[0]}'")
+        row.wait_for(state="visible")
+        page.locator("#strips summary").click()
+        row.wait_for(state="hidden")
 
 
 LUMINANCE = """
