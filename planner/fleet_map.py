@@ -42,8 +42,11 @@ class FleetMap:
     @property
     def risk(self) -> FloatArray:
         """The fleet's residual risk, 1 where nobody has looked; shape `grid.shape`."""
-        for window in self._changed.values():
-            self._risk[window] = residual_risk(*self._joined(window, self.layers.values()), self.rho)
+        for place, window in self._changed.items():
+            layers = [
+                layer for layer in self.layers.values() if place in layer.versions
+            ]  # the others tell nothing of it
+            self._risk[window] = residual_risk(*self._joined(window, layers), self.rho)
         self._changed.clear()
         return self._risk
 
