@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -28,6 +27,7 @@ from comms.messages import (
 )
 from comms.node import Publication, Received, Step
 from comms.topics import MISSION_OVER, STRIP, TASK
+from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cutter import Cutter
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
@@ -35,11 +35,9 @@ from coordinator.offers import checked_offers, offers_let_through
 from coordinator.priorities import weights_over
 from coordinator.right_of_way import Order, RightOfWay, Underway
 from coordinator.service import service
-from coordinator.situation import Helper, OpenStrip, Situation
-from coordinator.strips import Cut, CuttingRules, Window, strip_of
+from coordinator.situation import Helper, Situation
+from coordinator.strips import Cut, CuttingRules, Window
 from coordinator.vehicles import KnownVehicle, Offer
-from coordinator.worth import Supply, worth_later_m2ps
-from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.risk import NATS_PER_LEVEL, LevelArray
@@ -72,6 +70,7 @@ class Coordinator:
         self._primaries: dict[str, KnownVehicle] = {}
         self._inside: BoolArray
         self._cutter: Cutter | None = None  # where there are helpers
+        self._briefing: Briefing  # there, too
         self._tasks = 0
         self._outbox: list[Publication] = []
         self._to_cut = False
@@ -158,6 +157,7 @@ class Coordinator:
                 max_strip_m=self.config.max_strip_m,
             )
             self._cutter = Cutter(self.map, self._inside, rules, weights_over(spec, self.config.priorities))
+            self._briefing = Briefing(self.config, spec, self.ledger, self.vehicles, self._cutter)
 
     def _take_tile(self, received: Received, tile: CoverageTile, now_ms: int) -> None:
         assert self.map is not None
@@ -374,7 +374,7 @@ class Coordinator:
         if cutter is None:
             return
         under_way = {name: one.track_under_way for name, one in self._primaries.items()}
-        ground = cutter.look(under_way, self._sweeps_m2(now_ms), self._looked_at())
+        ground = cutter.look(under_way, self._briefing.sweeps_m2(now_ms), self._looked_at())
         columns = ground.columns
         unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
         self._coming = [cut for cut in self._coming if not columns[cut.window.columns].any()]
@@ -392,14 +392,6 @@ class Coordinator:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
         cutter.remember(self._looked_at())
 
-    def _sweeps_m2(self, now_ms: int) -> float:
-        """What helpers have time to sweep until the mission ends; infinite while nobody can tell."""
-        deadline_s = self._expected_deadline_s()
-        if math.isinf(deadline_s):
-            return math.inf
-        helpers = self._helpers(now_ms)
-        return SWEEPING_SHARE * sum(max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m for one in helpers)
-
     def _looked_at(self) -> list[Window]:
         """What is a strip's that is open or with a vehicle, or will be one's."""
         records = self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
@@ -407,22 +399,18 @@ class Coordinator:
 
     def _open(self, cut: Cut, now_ms: int) -> StripRecord:
         number = self.ledger.next_number
-        record = self.ledger.open(self._strip_of(cut, number), cut, now_ms, "badly seen")
+        record = self.ledger.open(self._briefing.strip_of(cut, number), cut, now_ms, "badly seen")
         self._publish_strip(record)
         return record
-
-    def _strip_of(self, cut: Cut, number: int) -> Strip:
-        assert self.map is not None
-        return strip_of(self.map.grid, cut.window, number, descending=cut.descending)
 
     def _open_what_is_ripe(self, now_ms: int) -> None:
         """Opens a strip that is still settling when a free helper that sets out now will not overtake the survey."""
         self._ripe_ms = None
-        free = [helper for helper in self._helpers(now_ms) if helper.task is None] if self._coming else []
+        free = [helper for helper in self._briefing.helpers(now_ms) if helper.task is None] if self._coming else []
         if not free:
             return
         for cut in [*self._coming]:
-            one = self._coming_strip(cut)
+            one = self._briefing.coming_strip(cut)
             leaves_ms = min(math.floor(service(one, helper).leaves_s * 1000) for helper in free)
             if leaves_ms <= now_ms:
                 self._coming.remove(cut)
@@ -438,17 +426,19 @@ class Coordinator:
         change_m2 = abs(cut.counts_m2 - record.cut.counts_m2)
         if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
             return
-        self.ledger.revise(record, self._strip_of(cut, record.strip.number), cut)
+        self.ledger.revise(record, self._briefing.strip_of(cut, record.strip.number), cut)
         for vehicle in self.vehicles.values():
             vehicle.refused.discard(record.strip.number)
         self._publish_strip(record)
 
     def _assign(self, now_ms: int) -> None:
+        if self._cutter is None:
+            return
         self._open_what_is_ripe(now_ms)
         self._clear_ms = None
         for name, numbers in self._gave_way.items():
             self.vehicles[name].refused -= numbers
-        situation = self._situation(now_ms)
+        situation = self._briefing.situation(now_ms, self._coming)
         if not situation.strips or not situation.helpers:
             return
         right, allocator = self._right_of_way, self.config.allocator
@@ -478,7 +468,7 @@ class Coordinator:
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
 
     def _offer_of(self, record: StripRecord, helper: Helper, vehicle: KnownVehicle, now_ms: int) -> Offer:
-        expected = service(self._open_strip(record), helper)
+        expected = service(self._briefing.open_strip(record), helper)
         ends_ms = round(expected.ends_s * 1000)
         due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
         return Offer(record.strip, record.cut, expected, due_ms, self._levels(vehicle, record.window))
@@ -507,103 +497,10 @@ class Coordinator:
         column, row = round(across_m / grid.cell_m), math.floor(along_m / grid.cell_m)
         return 0 <= column < grid.columns and 0 <= row < grid.rows and bool(self._inside[row, column])
 
-    def _situation(self, now_ms: int) -> Situation:
-        helpers = self._helpers(now_ms)
-        deadline_s = self._expected_deadline_s()
-        under_way = (one.track_under_way for one in self._primaries.values())
-        ends_s = [one.ends_s for one in under_way if one is not None]
-        return Situation(
-            now_s=now_ms / 1000,
-            deadline_s=deadline_s,
-            strips=tuple(self._open_strip(record) for record in self.ledger.in_state(StripState.OPEN)),
-            helpers=helpers,
-            coming=tuple(self._coming_strip(cut) for cut in self._coming),
-            switch_margin=self.config.switch_margin,
-            later_m2ps=self._worth_later_m2ps(helpers, deadline_s),
-            later_s=min(ends_s, default=math.inf),
-        )
-
-    def _worth_later_m2ps(self, helpers: Sequence[Helper], deadline_s: float) -> float:
-        """Of what is open, and of what is to come if the rest of the area is like what has settled."""
-        if not helpers or math.isinf(deadline_s):
-            return 0.0
-        assert self.map is not None
-        assert self._cutter is not None
-        speed_mps = sum(one.speed_mps for one in helpers) / len(helpers)
-        cell_m, overhead_m, to_come = self.map.grid.cell_m, self._cutter.rules.overhead_m, self._cutter.more_to_come
-
-        def supply(cut: Cut, count: float) -> Supply:
-            length_m = (cut.window.end_row - cut.window.first_row) * cell_m
-            return Supply(cut.counts_m2, (length_m + overhead_m) / speed_mps, count)
-
-        supplies = [supply(cut, 1.0 + to_come) for cut in self._coming]
-        for record in self.ledger:
-            if record.state is not StripState.WITHDRAWN:
-                there = 1.0 if record.state is StripState.OPEN else 0.0
-                supplies.append(supply(record.cut, there + to_come))
-        return worth_later_m2ps(supplies, sum(max(0.0, deadline_s - one.free_s) for one in helpers))
-
-    def _expected_deadline_s(self) -> float:
-        ends_ms = [one.expected_end_ms for one in self._primaries.values()]
-        known_ms = [end_ms for end_ms in ends_ms if end_ms is not None]
-        if not known_ms or len(known_ms) < len(ends_ms):
-            return math.inf
-        return max(known_ms) * self.config.deadline_factor / 1000
-
-    def _coming_strip(self, cut: Cut) -> OpenStrip:
-        return OpenStrip(self._strip_of(cut, 0), self._risk_m2(cut), cut.settles_s)
-
-    def _open_strip(self, record: StripRecord) -> OpenStrip:
-        return OpenStrip(record.strip, self._risk_m2(record.cut), record.cut.settles_s)
-
-    def _risk_m2(self, cut: Cut) -> float:
-        assert self._cutter is not None
-        return cut.counts_m2 / self._cutter.rules.p_detect
-
     def _say(self, action: TaskAction, strip: Strip, vehicle: str) -> None:
         self._tasks += 1
         task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
         self._outbox.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
-
-    def _helpers(self, now_ms: int) -> tuple[Helper, ...]:
-        """Those that can be given something, by name."""
-        found = (self._helper(vehicle, now_ms) for _, vehicle in sorted(self.vehicles.items()))
-        return tuple(helper for helper in found if helper is not None)
-
-    def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
-        """A helper as an allocator sees it; None where it is lost or can be given nothing."""
-        state, entry = vehicle.state, vehicle.entry
-        stays_away = vehicle.is_finished and not vehicle.is_idle
-        if not entry.role.revisits or vehicle.lost or state is None or stays_away or not vehicle.is_trusted:
-            return None
-        records = [one for one in self.ledger.in_state(*WITH_A_VEHICLE) if one.vehicle == entry.vehicle]
-        if not records and not vehicle.is_idle:
-            return None
-        pose = Pose(state.x_m, state.y_m, state.heading_rad)
-        free_at, free_ms = pose, now_ms
-        if records:
-            expected = vehicle.offers[records[0].strip.number].service
-            ends_ms = round(expected.free_s * 1000)
-            if state.works_on == records[0].strip.number and state.expected_end_ms > 0:
-                ends_ms = state.expected_end_ms
-            free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
-        return Helper(
-            vehicle=entry.vehicle,
-            pose=pose,
-            free_at=free_at,
-            free_s=free_ms / 1000,
-            task=self._open_strip(records[0]) if records else None,
-            speed_mps=entry.speed_mps,
-            turn_radius_m=entry.turn_radius_m,
-            run_in_m=entry.run_in_m,
-            swath_m=entry.strip_width_m,
-            p_detect=entry.p_detect,
-            lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
-            sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
-            refused=frozenset(
-                record.strip.number for record in self.ledger.in_state(StripState.OPEN) if vehicle.is_not_for_it(record)
-            ),
-        )
 
     def _find_end(self, now_ms: int) -> None:
         ends = [one.finished_ms for one in self._primaries.values()]
