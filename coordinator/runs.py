@@ -56,7 +56,10 @@ class Runs:
     def side_by_side(self, dearer: float) -> list[Run]:
         """The runs in windows that do not overlap which together bring most, if all costs so much more; best first."""
         rows_cost = (self._end_row - self._first_row) * self._row_cost
-        profit = (self._value - (dearer - 1.0) * rows_cost - dearer * self._fixed_cost).tolist()
+        profits = self._value - (dearer - 1.0) * rows_cost - dearer * self._fixed_cost
+        if not (profits > 0).any():
+            return []
+        profit = profits.tolist()
         most = [0.0] * (self._windows + self._width)  # behind so many zeros: the most up to a window
         for place, here in enumerate(profit, start=self._width):
             most[place] = max(most[place - 1], most[place - self._width] + here)
