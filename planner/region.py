@@ -10,6 +10,7 @@ import numpy as np
 import shapely
 
 from planner.area import SurveyArea
+from planner.lattice import points_inside
 from planner.types import BoolArray, GridSpec, Point, Strip
 
 ON_BOUNDARY_M = 1e-6
@@ -89,7 +90,9 @@ class Region:
 
     def inside(self, grid: GridSpec) -> BoolArray:
         """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""
-        x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
         with_boundary = self.polygon.buffer(ON_BOUNDARY_M, join_style="mitre")
-        shapely.prepare(with_boundary)
-        return np.asarray(shapely.contains_xy(with_boundary, x_m, y_m), dtype=np.bool_)
+        found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
+        for ring in shapely.get_rings(with_boundary):  # what a hole's ring holds is in the outline's, too
+            across_m, along_m = grid.frame.to_sweep(*ring.coords.xy)
+            found ^= points_inside(across_m[:-1], along_m[:-1], grid.across_m, grid.along_m)
+        return found
