@@ -23,9 +23,11 @@ RUN = next(received for received in mission(tracks=1) if isinstance(received.mes
 STRIP = StripStatus(1, StripState.OPEN, 300.0, 50.0, 0.0, 100.0, 60.0, 1000.0, "", "")
 
 
-def says(time_s: float, number: int, state: StripState, worth_m2: float, length_m: float = 100.0) -> Received:
+def says(
+    time_s: float, number: int, state: StripState, worth_m2: float, length_m: float = 100.0, revision: int = 1
+) -> Received:
     """A strip as it is from a time on."""
-    strip = replace(STRIP, state=state, removable_m2=worth_m2, length_m=length_m)
+    strip = replace(STRIP, revision=revision, state=state, removable_m2=worth_m2, length_m=length_m)
     return Received(
         topics.STRIP.key(number=number), topics.STRIP, "", Header("coordinator", 0, 0, round(time_s * 1000)), strip
     )
@@ -47,6 +49,18 @@ def outlines(recording: Path, number: int) -> list[tuple[float, float]]:
     """When a strip's outline was drawn, in seconds, and how long it was."""
     drawn = rows(recording, f"/strips/{number}", "LineStrips3D:strips")
     return [(time_ms / 1000, outline[1][1] - outline[0][1]) for time_ms, (outline,) in drawn]
+
+
+def test_a_word_that_comes_late_replaces_none_that_is_newer(record: Record, tmp_path: Path) -> None:
+    is_open = StripState.OPEN
+    path = record([
+        RUN,
+        says(10, 1, is_open, 100),
+        says(30, 1, is_open, 300, revision=3),
+        says(20, 1, is_open, 200, revision=2),
+        passes(90),
+    ], tmp_path / "strips.rrd")  # fmt: skip
+    assert sorted(worths(path, 1)) == [(10, "100"), (20, "200"), (30, "300")]
 
 
 def test_changes_of_open_strips_are_drawn_once_a_minute(record: Record, tmp_path: Path) -> None:
