@@ -91,14 +91,6 @@ class Row:
             )
 
 
-def check_modelled(scenario: Scenario) -> None:
-    """Raises UserError for a scenario whose objective is another than the clairvoyant's."""
-    if scenario.mission.rho > 0:
-        raise UserError(f"mission.rho: {scenario.mission.rho:g} is not allowed here; must be 0, looks independent")
-    if scenario.area.priorities:
-        raise UserError("area.priorities: not allowed here; must be [], all ground counts alike")
-
-
 def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seconds: float) -> Row:
     """Bound and best schedule of one mission; the search knows what was flown, by allocator, None for a failure."""
     if mission.risk.size > LARGEST_GRID_CELLS:
@@ -144,7 +136,6 @@ def one_seed(scenario: Scenario, allocators: list[str], seconds: float) -> Row:
 def one_run(folder: Path, seconds: float) -> Row:
     """Solves a recorded run."""
     scenario = load_scenario(str(folder / "scenario.yaml"))
-    check_modelled(scenario)
     clairvoyance, legs = Clairvoyance(scenario), FlownLegs()
     for received in secondlook.load(folder).received():
         clairvoyance.take(received)
@@ -201,7 +192,6 @@ def _arguments() -> argparse.Namespace:
 
 def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
     scenario = load_scenario(arguments.scenario, arguments.set)
-    check_modelled(scenario)
     if not scenario.revisit_vehicles:
         raise UserError(f"{arguments.scenario}: has no helper whose schedule could be compared")
     allocators = arguments.allocators.split(",") if arguments.allocators else [scenario.coordinator.allocator]

@@ -13,6 +13,7 @@ from comms.node import Received
 from planner.dubins import Pose
 from planner.footprint import look_on_grid
 from planner.types import BoolArray, FloatArray, GridSpec
+from secondlook.errors import UserError
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics
 from secondlook.scenario import Scenario
@@ -78,12 +79,22 @@ class Removable:
 
 @dataclass
 class Clairvoyance:
-    """Told every message of a mission, it knows afterwards what there was to remove."""
+    """Told every message of a mission, it knows afterwards what there was to remove.
+
+    Raises UserError for a scenario whose objective is another than the clairvoyant's.
+    """
 
     scenario: Scenario
     metrics: Metrics = field(default_factory=Metrics)
     _looked_s: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     _settled_s: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        rho = self.scenario.mission.rho
+        if rho > 0:
+            raise UserError(f"mission.rho: {rho:g} is not allowed here; must be 0, looks independent of each other")
+        if self.scenario.area.priorities:
+            raise UserError("area.priorities: not allowed here; must be [], all ground counts alike")
 
     def take(self, received: Received) -> None:
         """Takes one message, in the order of sending."""
