@@ -13,11 +13,10 @@ from planner.types import SweepFrame
 from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapping, check_pair, refused
 
 LARGEST_GRID_CELLS = 20_000_000
+SMALLEST_PRIORITY_M2 = 1.0
 
 Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(check_pair), Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=1000)]
-
-Outlines = tuple[tuple[Point, ...], ...]
 
 
 def _check_word(value: object) -> object:
@@ -43,6 +42,8 @@ class Priority(Mapping):
     @classmethod
     def _check_polygon(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
         _check_outline(polygon_m)
+        if Polygon(polygon_m).area < SMALLEST_PRIORITY_M2:
+            raise refused(f"must have an area of at least {SMALLEST_PRIORITY_M2:g} m2")
         return polygon_m
 
 
@@ -88,10 +89,10 @@ class Area(Mapping):
     @field_validator("priorities")
     @classmethod
     def _check_priorities(cls, priorities: tuple[Priority, ...], info: ValidationInfo) -> tuple[Priority, ...]:
-        if "polygon_m" in info.data:
-            area = Polygon(info.data["polygon_m"])
+        if "polygon_m" in info.data and "holes_m" in info.data:
+            area = Polygon(info.data["polygon_m"], info.data["holes_m"])
             if any(area.intersection(Polygon(one.polygon_m)).area < TOLERANCE for one in priorities):
-                raise refused("must each share ground with polygon_m")
+                raise refused("must each share ground with what is surveyed")
         return priorities
 
     @field_validator("cell_m")

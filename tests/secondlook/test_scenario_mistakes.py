@@ -261,7 +261,25 @@ MISTAKES = {
         POLYGON + "\n  priorities: [{polygon_m: [[900, 0], [950, 0], [950, 50]], weight: 3}]",
         [
             'bad.yaml:4: area.priorities: [{"polygon_m": [[900, 0], [950, 0], [950, 50]], "weight":... is not allowed; '
-            "must each share ground with polygon_m"
+            "must each share ground with what is surveyed"
+        ],
+    ),
+    "priority in a hole": (
+        POLYGON,
+        POLYGON
+        + "\n  holes_m: [[[10, 10], [60, 10], [60, 60], [10, 60]]]"
+        + "\n  priorities: [{polygon_m: [[20, 20], [30, 20], [30, 30]], weight: 3}]",
+        [
+            'bad.yaml:5: area.priorities: [{"polygon_m": [[20, 20], [30, 20], [30, 30]], "weight": 3}] is not allowed; '
+            "must each share ground with what is surveyed"
+        ],
+    ),
+    "priority of no size": (
+        POLYGON,
+        POLYGON + "\n  priorities: [{polygon_m: [[0, 0], [400, 0], [400, 0.000001]], weight: 3}]",
+        [
+            "bad.yaml:4: area.priorities[0].polygon_m: [[0, 0], [400, 0], [400, 1e-06]] is not allowed; "
+            "must have an area of at least 1 m2"
         ],
     ),
     "priority of negative weight": (
