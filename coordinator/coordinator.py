@@ -50,7 +50,6 @@ WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is
 ANSWER_WITHIN_MS = 10_000
 GIVEN_UP_AFTER = 10  # times as long as for a lost vehicle must a primary be silent before the mission ends without it
 CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
-SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on the way
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen anew for the map to agree that it is done
 LATE_SHARE = 0.5  # of the time that a service was expected to take, that it may take longer
 LATE_MS = 60_000  # and so much more
@@ -156,7 +155,9 @@ class Coordinator:
                 min_strip_m=self.config.min_strip_m,
                 max_strip_m=self.config.max_strip_m,
             )
-            self._cutter = Cutter(self.map, self._inside, rules, weights_over(spec, self.config.priorities))
+            self._cutter = Cutter(
+                self.map, self._inside, rules, weights_over(spec, self._inside, self.config.priorities)
+            )
             self._briefing = Briefing(self.config, spec, self.ledger, self.vehicles, self._cutter)
 
     def _take_tile(self, received: Received, tile: CoverageTile, now_ms: int) -> None:

@@ -39,6 +39,7 @@ class Cutter:
     def __init__(self, fleet: FleetMap, inside: BoolArray, rules: CuttingRules, weights: FloatArray) -> None:
         self.rules = rules
         self._weights = weights
+        self._least_weight = min(1.0, float(weights[weights > 0].min(initial=1.0)))
         self.more_to_come = 0.0
         """Area that is still to settle, as a multiple of what has."""
         self._most_worth_risk = rules.worth_risk
@@ -79,7 +80,7 @@ class Cutter:
         if math.isfinite(sweeps_m2):
             cells = sweeps_m2 / fleet.grid.cell_area_m2 / (1.0 + self.more_to_come)
             counts = risk * self._weights
-            marginal = worth_risk(counts[counts > 0], cells)
+            marginal = worth_risk(counts[counts > 0], cells, self._least_weight)
             worth = min(self._most_worth_risk, marginal)
             self.rules = replace(self.rules, worth_risk=worth, marginal_risk=marginal)
         columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, looked_at)

@@ -33,11 +33,12 @@ def worth_later_m2ps(supplies: Iterable[Supply], helpers_s: float) -> float:
     return 0.0
 
 
-def worth_risk(risk: FloatArray, cells: float) -> float:
+def worth_risk(risk: FloatArray, cells: float, least_weight: float = 1.0) -> float:
     """Residual risk from which a cell is worth a second look, if helpers have time for so many: rounded down to a step,
-    at least one. `risk`: of the cells that may be looked at."""
+    at least one, of what counts least. `risk`: as it counts, of the cells that may be looked at."""
     count = int(cells)
+    least_step = RISK_STEP * least_weight
     if count >= risk.size:
-        return RISK_STEP
+        return least_step
     least = float(np.partition(risk, risk.size - 1 - count)[risk.size - 1 - count])
-    return max(RISK_STEP, int(least / RISK_STEP + 1e-9) * RISK_STEP)
+    return max(least_step, int(least / RISK_STEP + 1e-9) * RISK_STEP)
