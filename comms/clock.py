@@ -42,7 +42,7 @@ class Said(Protocol):
 
 
 class Sent(NamedTuple):
-    """The same, as a node's process tells the clock of it."""
+    """One message that a node has published, as its process tells the clock of it."""
 
     key: str
     size: int

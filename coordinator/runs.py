@@ -54,7 +54,11 @@ class Runs:
         return [self._run(int((self._value >= best * (1 - TOLERANCE)).argmax()))] if best > self._fixed_cost else []
 
     def side_by_side(self, dearer: float) -> list[Run]:
-        """The runs in windows that do not overlap which together bring most, if all costs so much more; best first."""
+        """The runs in windows that do not overlap which together bring most, if all costs so much more; best first.
+
+        Their rows are those of the best runs at the price as it is. Each is then moved to the middle of what it holds,
+        where it may overlap the next one on what holds nothing, or is looked at twice.
+        """
         rows_cost = (self._end_row - self._first_row) * self._row_cost
         profits = self._value - (dearer - 1.0) * rows_cost - dearer * self._fixed_cost
         if not (profits > 0).any():

@@ -9,7 +9,7 @@ at, and the search goes on.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -146,29 +146,31 @@ def cut_strips(
         if not found or len(cuts) >= MOST_STRIPS_A_CUT:
             break
         chosen = [Window(one.first_row, one.end_row, one.first_column, one.first_column + width) for one in found]
+        no_strips = []
         for run in chosen:
             beside = slice(max(0, run.first_row - 1), run.end_row + 1), run.columns
             least = longest if open_cells[beside].any() else shortest
             if run.rows < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
+                no_strips.append(run)
                 counts[run.cells] = 0.0  # the search goes on elsewhere, and others are chosen
-                runs.look(run.columns)
-                break
-        else:
-            for run in chosen:
-                for begin, end in _pieces(run.first_row, run.end_row, shortest, longest):
-                    window = Window(begin, end, run.first_column, run.end_column)
-                    settles_s = float(growth.settles_s[window.cells].max())
-                    descending = bool(growth.descending[window.cells].any())
-                    removed_m2, counts_m2 = (float(each[window.cells].sum()) for each in (removable, counts))
-                    if counts_m2 > (end - begin) * row_cost + fixed_cost:
-                        cuts.append(Cut(window, removed_m2, counts_m2, settles_s, descending))
-                        looked_at.append(window)
-                        removable[window.cells] *= 1.0 - rules.p_detect
-                        counts[window.cells] *= 1.0 - rules.p_detect
-                    else:
-                        counts[window.cells] = 0.0
-            for stretch in _together([run.columns for run in chosen]):
-                runs.look(stretch)
+        for run in [] if no_strips else chosen:
+            for begin, end in _pieces(run.first_row, run.end_row, shortest, longest):
+                window = Window(begin, end, run.first_column, run.end_column)
+                settles_s = float(growth.settles_s[window.cells].max())
+                descending = bool(growth.descending[window.cells].any())
+                removed_m2, counts_m2 = (float(each[window.cells].sum()) for each in (removable, counts))
+                if counts_m2 > ((end - begin) * row_cost + fixed_cost) * (1 + TOLERANCE):
+                    cuts.append(Cut(window, removed_m2, counts_m2, settles_s, descending))
+                    looked_at.append(window)
+                    removable[window.cells] *= 1.0 - rules.p_detect
+                    counts[window.cells] *= 1.0 - rules.p_detect
+                else:
+                    counts[window.cells] = 0.0
+        changed = np.zeros(grid.columns, dtype=np.bool_)
+        for run in no_strips or chosen:
+            changed[run.columns] = True
+        for stretch in stretches(changed):
+            runs.look(stretch)
     return cuts
 
 
@@ -180,7 +182,7 @@ def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = 
         heading_rad = (heading_rad + math.pi) % (2 * math.pi)
     x_m, y_m = grid.frame.to_mission(across_m, (window.end_row if descending else window.first_row) * grid.cell_m)
     start: Point = (float(x_m), float(y_m))
-    length_m = (window.end_row - window.first_row) * grid.cell_m
+    length_m = window.rows * grid.cell_m
     width_m = (window.end_column - window.first_column) * grid.cell_m
     return Strip(number, start, heading_rad, length_m, width_m)
 
@@ -194,17 +196,6 @@ def stretches(columns: BoolArray) -> list[slice]:
     """The stretches of neighbouring columns that are set."""
     edges = np.flatnonzero(np.diff(columns, prepend=False, append=False)).tolist()
     return [slice(first, end) for first, end in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _together(columns: Iterable[slice]) -> list[slice]:
-    """The columns in as few stretches as hold them."""
-    found: list[slice] = []
-    for one in sorted(columns, key=lambda one: one.start):
-        if found and one.start <= found[-1].stop:
-            found[-1] = slice(found[-1].start, max(found[-1].stop, one.stop))
-        else:
-            found.append(one)
-    return found
 
 
 def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:

@@ -52,6 +52,11 @@ def test_the_column_of_a_cell_has_and_those_two_swaths_beside_within_the_grid(la
     assert changed(last, with_risk(3, 39)) == [0, 1, 2, 3, 37, 38, 39]
 
 
+def test_nothing_has_where_time_alone_is_worth_another(last: LastCut) -> None:
+    assert changed(last, rules=replace(RULES, marginal_risk=0.8)) == []
+    assert changed(last, rules=replace(RULES, worth_risk=0.4)) == [*range(40)]
+
+
 def test_a_wider_swath_reaches_farther(last: LastCut) -> None:
     wider = replace(RULES, swath_m=10)
     changed(last, rules=wider)
