@@ -52,12 +52,12 @@ class SecondLooks:
         before = self._states.get(number)
         self._states[number] = strip.state
         if before is strip.state is StripState.OPEN:
-            held_ms, held = self._held.get(number, (time_ms, strip))
+            _, held = self._held.get(number, (time_ms, strip))
             if strip.revision < held.revision:  # it comes late
-                time_ms, held_ms, strip, held = held_ms, time_ms, held, strip
-                self._draw(held_ms, number, held)
-            self._held[number] = (time_ms, strip)
-            self._pace.note(time_ms)
+                self._draw(time_ms, number, strip)
+            else:
+                self._held[number] = (time_ms, strip)
+                self._pace.note(time_ms)
         else:
             self._held.pop(number, None)  # what was said before is out of date
             self._draw(time_ms, number, strip)
