@@ -142,7 +142,7 @@ def serve_nodes(
                 if grant.node_id in coordinators:
                     latency.sending(outgoing, time.perf_counter())
                 line.publish(outgoing)
-                answers.append((grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing]))
+                answers.append((grant.node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing]))
             line.say(pack_answers(answers))
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import zenoh
 
-from comms.clock import Grant, LockstepClock, Round, Sent
+from comms.clock import Grant, LockstepClock, Round
 from comms.codec import CLOCK
 from comms.control import (
     ControlError,
@@ -117,7 +117,7 @@ class Hub:
         self._wait(lambda: self._ready >= self._hosts, lambda: _no("start", self._hosts - self._ready))
         stamp = Stamp(CLOCK, self._routing)
         announced = stamp(RUN.key(), run_info, 0)
-        self._clock.publish(CLOCK, [Sent(announced.key, len(announced.payload))])
+        self._clock.publish(CLOCK, [announced])
         self._publish([announced])
         while (turn := self._clock.next_round()) is not None:
             self._show_life()
@@ -148,7 +148,7 @@ class Hub:
                 if grant.node_id in self._coordinators:
                     self._latency.sending(outgoing, time.perf_counter())
                 self._publish(outgoing)
-                self._clock.answer(grant.node_id, wake_ms, [Sent(one.key, len(one.payload)) for one in outgoing])
+                self._clock.answer(grant.node_id, wake_ms, outgoing)
         self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
 
     def _happen(self, happening: Happening) -> None:
