@@ -47,22 +47,25 @@ class NodeGroup:
         route = self._routing.route(key)
         if route is None:
             return self.intake.open(key, payload)
-        readers = [self.runners[name] for name in route.readers if name in self.runners]
+        readers = self._readers(route)
         if not readers:
             return None
         for runner in readers:
             runner.arrived[route.writer] += 1
         received = self.intake.open(key, payload)
         if received is not None:
-            self.deliver(received, route)
+            self._hand_out(received, readers)
         return received
 
     def deliver(self, received: Received, route: Route) -> None:
         """Puts a message that is open already into the mailboxes of those here that read it, as far as faults let."""
-        for name in route.readers:
-            runner = self.runners.get(name)
-            if runner is None:
-                continue
+        self._hand_out(received, self._readers(route))
+
+    def _readers(self, route: Route) -> list[NodeRunner]:
+        return [self.runners[name] for name in route.readers if name in self.runners]
+
+    def _hand_out(self, received: Received, readers: list[NodeRunner]) -> None:
+        for runner in readers:
             if self._faults:
                 self._deliver_with_faults(runner, received)
             else:
