@@ -6,7 +6,7 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
 from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates
 
 from planner.types import SweepFrame
@@ -17,6 +17,20 @@ SMALLEST_PRIORITY_M2 = 1.0
 
 Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(check_pair), Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=1000)]
+
+
+def _check_outline(corners: tuple[Point, ...]) -> tuple[Point, ...]:
+    for index, point in enumerate(corners):
+        if point in corners[:index]:
+            raise refused(f"must be the corners in order, each once, but ({point[0]:g}, {point[1]:g}) is repeated")
+    if MultiPoint(corners).convex_hull.area < TOLERANCE:
+        raise refused("must have an area, but all corners lie on one line")
+    if not Polygon(corners).is_valid:
+        raise refused("must be the corners in order, but its sides cross")
+    return corners
+
+
+Outline = Annotated[Corners, AfterValidator(_check_outline)]
 
 
 def _check_word(value: object) -> object:
@@ -35,13 +49,12 @@ TrackHeading = Annotated[
 class Priority(Mapping):
     """Ground whose residual risk counts `weight` times when second looks are planned."""
 
-    polygon_m: Corners
+    polygon_m: Outline
     weight: Annotated[float, Field(ge=0, le=100)]
 
     @field_validator("polygon_m")
     @classmethod
-    def _check_polygon(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
-        _check_outline(polygon_m)
+    def _check_size(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
         if Polygon(polygon_m).area < SMALLEST_PRIORITY_M2:
             raise refused(f"must have an area of at least {SMALLEST_PRIORITY_M2:g} m2")
         return polygon_m
@@ -51,7 +64,7 @@ class Area(Mapping):
     """A polygon in the mission frame, convex or not, and holes in it that are not surveyed; the compass heading of the
     tracks, `auto` for the one that needs the fewest; the map's cell; and ground that counts more in second looks."""
 
-    polygon_m: Corners
+    polygon_m: Outline
     holes_m: Annotated[tuple[Corners, ...], Field(strict=False, max_length=20)] = ()
     track_heading_deg: TrackHeading = 0.0
     cell_m: Annotated[Bin, Field(validate_default=True)] = 5.0
@@ -61,12 +74,6 @@ class Area(Mapping):
     def extent_m(self) -> tuple[float, float]:
         """Extent across and along the tracks; of the narrowest rectangle about it where their heading is `auto`."""
         return _extent_m(self.polygon_m, self.track_heading_deg)
-
-    @field_validator("polygon_m")
-    @classmethod
-    def _check_polygon(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
-        _check_outline(polygon_m)
-        return polygon_m
 
     @field_validator("holes_m")
     @classmethod
@@ -107,16 +114,6 @@ class Area(Mapping):
         if across_m * along_m / cell_m**2 > LARGEST_GRID_CELLS:
             raise refused(f"must be larger, the map would have more than {LARGEST_GRID_CELLS} cells")
         return cell_m
-
-
-def _check_outline(corners: tuple[Point, ...]) -> None:
-    for index, point in enumerate(corners):
-        if point in corners[:index]:
-            raise refused(f"must be the corners in order, each once, but ({point[0]:g}, {point[1]:g}) is repeated")
-    if MultiPoint(corners).convex_hull.area < TOLERANCE:
-        raise refused("must have an area, but all corners lie on one line")
-    if not Polygon(corners).is_valid:
-        raise refused("must be the corners in order, but its sides cross")
 
 
 def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["auto"]) -> tuple[float, float]:
