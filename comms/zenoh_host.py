@@ -6,7 +6,7 @@ import contextlib
 import queue
 import time
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import zenoh
@@ -21,10 +21,11 @@ from comms.messages import Role
 from comms.node import Listener, Node, Received
 from comms.routing import Routing
 from comms.runner import Intake, NodeError, Outgoing
-from comms.zenoh_session import put, subscribe
+from comms.zenoh_session import Mailbox, put, subscribe
 
 HELLO_EVERY_S = 0.2
 GOODBYE_WITHIN_S = 5.0
+MAIL_EVERY_S = 0.005  # so often is looked for mail that a word tells of and that has not come
 _Mail = tuple[str, bytes]
 
 
@@ -33,65 +34,62 @@ class Interrupted(Exception):  # noqa: N818 - not an error: the launcher has ask
 
 
 class _Line:
-    """The line to the hub: mail and the clock's words in one queue, in order of arrival."""
+    """The line to the hub: the clock's words in a queue, and the mail, which waits until a word tells of it."""
 
     def __init__(self, session: zenoh.Session, keys: RunKeys, host: str, expressions: list[str]) -> None:
-        self.queue: queue.SimpleQueue[_Mail | None] = queue.SimpleQueue()
+        self._words: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._session = session
         self._keys = keys
         self._host = host
-        self._words_key = keys.to_host(host)
         # The clock's words are subscribed to last: when they arrive, the hub knows of all the others.
-        self._subscribers = subscribe(session, map(keys.topic, expressions), self._enqueue)
-        self._subscribers += subscribe(session, [self._words_key], self._enqueue)
+        self._mailbox = Mailbox(session, map(keys.topic, expressions))
+        self._subscribers = subscribe(session, [keys.to_host(host)], lambda _, words: self._words.put(words))
         self._token = session.liveliness().declare_token(keys.alive(host))
-
-    def _enqueue(self, key: str, payload: bytes) -> None:
-        self.queue.put((key, payload))
 
     def say(self, words: bytes) -> None:
         """A word to the clock."""
         put(self._session, self._keys.from_host(self._host), words)
 
     def publish(self, outgoing: list[Outgoing]) -> None:
-        """Sends a node's messages."""
+        """Sends a node's messages; they go out with the next word."""
         for one in outgoing:
-            put(self._session, self._keys.topic(one.key), one.payload)
+            put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
 
     def shake_hands(self) -> None:
         """Says hello until the hub's welcome shows that it hears and is heard."""
-        while True:
+        words: list[Any] = []
+        while words[:1] != ["welcome"]:
             self.say(pack("hello"))
-            try:
-                item = self.queue.get(timeout=HELLO_EVERY_S)
-            except queue.Empty:
-                continue
-            if item is None:
-                raise Interrupted
-            if item[0] == self._words_key and unpack(item[1])[0] == "welcome":
-                self.say(pack("ready"))
-                return
+            words = self.words(HELLO_EVERY_S)
+        self.say(pack("ready"))
 
     def part(self, words: bytes) -> None:
         """A last word; returns when the hub has heard it, or is gone. The session may be closed then: the news of its
         end cannot overtake the word."""
         self.say(words)
         deadline_s = time.monotonic() + GOODBYE_WITHIN_S
-        with contextlib.suppress(queue.Empty):
-            while True:
-                item = self.queue.get(timeout=max(0.0, deadline_s - time.monotonic()))
-                if item is None or (item[0] == self._words_key and unpack(item[1])[0] == "goodbye"):
-                    return
+        with contextlib.suppress(Interrupted):
+            while (left_s := deadline_s - time.monotonic()) > 0 and self.words(left_s)[:1] != ["goodbye"]:
+                pass
 
-    def get(self) -> tuple[list[Any] | None, _Mail | None]:
-        """The next item: the clock's words, or mail (key below the run id, payload)."""
-        item = self.queue.get()
-        if item is None:
+    def words(self, within_s: float | None) -> list[Any]:
+        """The clock's next words; none where they do not come within that time. Raises Interrupted."""
+        try:
+            words = self._words.get(timeout=within_s)
+        except queue.Empty:
+            return []
+        if words is None:
             raise Interrupted
-        key, payload = item
-        if key == self._words_key:
-            return unpack(payload), None
-        return None, (key.removeprefix(self._keys.root), payload)
+        return unpack(words)
+
+    def mail(self) -> Iterator[_Mail]:
+        """Key below the run id and payload of what has come. The mail that a word tells of comes before it, but for
+        what took another way to the hub."""
+        return ((key.removeprefix(self._keys.root), payload) for key, payload in self._mailbox.take())
+
+    def interrupt(self) -> None:
+        """From any thread: whoever waits for words, or does so next, gets Interrupted."""
+        self._words.put(None)
 
 
 def serve_nodes(
@@ -114,16 +112,16 @@ def serve_nodes(
     line.shake_hands()
     granted: tuple[int, list[Grant]] | None = None
     while True:
-        words, mail = line.get()
-        if mail is not None:
+        words = line.words(None if granted is None else MAIL_EVERY_S)
+        for mail in line.mail():
             received = group.receive(*mail)
             if received is not None and group.holds(coordinators):
                 latency.arrived(received, time.perf_counter())
-        elif words is not None and words[0] == "grant":
+        if words[:1] == ["grant"]:
             granted = unpack_grants(words)
-        elif words is not None and words[0] == "kept":
+        elif words[:1] == ["kept"]:
             group.give_kept(*words[1:])
-        elif words is not None and words[0] in ("last_word", "finish"):
+        elif words[:1] in (["last_word"], ["finish"]):
             final = pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds})
             if words[0] == "finish":
                 line.part(final)
@@ -166,7 +164,7 @@ class ListenerHost:
 
     def interrupt(self) -> None:
         """Ends the run early."""
-        self._line.queue.put(None)
+        self._line.interrupt()
 
     def run(self) -> None:
         """Listens to the end of the run."""
@@ -175,6 +173,7 @@ class ListenerHost:
                 self._listen()
                 finished = True
             except Interrupted:
+                self._take_mail()
                 # Without a mark nobody knows whether earlier messages are still missing: what there is, in order.
                 self._release(up_to_ms=None)
                 finished = False
@@ -190,10 +189,9 @@ class ListenerHost:
         mark: list[Any] | None = None
         self._line.shake_hands()
         while True:
-            words, mail = self._line.get()
-            if mail is not None:
-                self._receive(*mail)
-            elif words is not None and words[0] in ("mark", "finish"):
+            words = self._line.words(None if mark is None else MAIL_EVERY_S)
+            self._take_mail()
+            if words[:1] in (["mark"], ["finish"]):
                 mark = words
             if mark is None or not self._has_all(mark[3]):
                 continue
@@ -203,13 +201,14 @@ class ListenerHost:
             self._line.say(pack("ack", mark[1]))
             mark = None
 
-    def _receive(self, key: str, payload: bytes) -> None:
-        route = self._routing.route(key)
-        if route is not None:
-            self._arrived[route.writer] += 1
-        received = self._intake.open(key, payload)
-        if received is not None:
-            self._held.append(received)
+    def _take_mail(self) -> None:
+        for key, payload in self._line.mail():
+            route = self._routing.route(key)
+            if route is not None:
+                self._arrived[route.writer] += 1
+            received = self._intake.open(key, payload)
+            if received is not None:
+                self._held.append(received)
 
     def _has_all(self, expected: dict[str, int]) -> bool:
         return all(self._arrived[sender] >= count for sender, count in expected.items())

@@ -182,7 +182,7 @@ class Hub:
 
     def _publish(self, outgoing: list[Outgoing]) -> None:
         for one in outgoing:
-            put(self._session, self._keys.topic(one.key), one.payload)
+            put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
 
     def _say(self, host: str, words: bytes) -> None:
         put(self._session, self._keys.to_host(host), words)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ import zenoh
 CONNECT_TIMEOUT_S = 10.0
 PATIENCE_S = 60.0
 LARGEST_MESSAGE_BYTES = 4 << 20
+MOST_MAIL = 1 << 20
 
 
 class ConnectionFailedError(Exception):
@@ -66,15 +67,18 @@ def open_client(
         raise ConnectionFailedError(f"no connection to the hub at {endpoint} as {user}") from error
 
 
-def put(session: zenoh.Session, key: str, payload: bytes) -> None:
-    """Publishes reliably and at once. No declared publisher: one would drop what it sends before it has heard of a
-    subscriber, while a plain put always goes to the hub."""
+def put(session: zenoh.Session, key: str, payload: bytes, *, at_once: bool = True) -> None:
+    """Publishes reliably. No declared publisher: one would drop what it sends before it has heard of a subscriber,
+    while a plain put always goes to the hub.
+
+    `at_once`: whether it goes out in a packet of its own, with what still waits before it. What is not shares its
+    packet with what is put right after it, and so what a packet costs its receiver: most of what a message costs."""
     session.put(
         key,
         payload,
         congestion_control=zenoh.CongestionControl.BLOCK,
         priority=zenoh.Priority.REAL_TIME,
-        express=True,
+        express=at_once,
     )
 
 
@@ -85,13 +89,40 @@ def subscribe(
 
     An expression that another one includes is left out, so that no message comes twice.
     """
-    wanted = [zenoh.KeyExpr(one) for one in dict.fromkeys(expressions)]
-    needed = [one for one in wanted if not any(other != one and other.includes(one) for other in wanted)]
 
     def forward(sample: zenoh.Sample) -> None:
         handler(str(sample.key_expr), sample.payload.to_bytes())
 
-    return [session.declare_subscriber(one, zenoh.handlers.Callback(forward, indirect=False)) for one in needed]
+    return [
+        session.declare_subscriber(one, zenoh.handlers.Callback(forward, indirect=False))
+        for one in _needed(expressions)
+    ]
+
+
+class Mailbox:
+    """Subscribes to all expressions and keeps what comes until it is taken: of a message that waits there no thread of
+    Python is woken, which costs more than the rest of receiving it.
+
+    An expression that another one includes is left out. A mailbox that is full would hold up all that comes to the
+    session; it has room for far more than the clock lets anyone fall behind.
+    """
+
+    def __init__(self, session: zenoh.Session, expressions: Iterable[str]) -> None:
+        self._subscribers = [
+            session.declare_subscriber(one, zenoh.handlers.FifoChannel(MOST_MAIL)) for one in _needed(expressions)
+        ]
+
+    def take(self) -> Iterator[tuple[str, bytes]]:
+        """Key and payload of what has come, of each sender in the order of sending; then it is gone from here."""
+        for one in self._subscribers:
+            while (sample := one.try_recv()) is not None:
+                # A copy: as long as a sample is there, so is the whole packet that it came in.
+                yield str(sample.key_expr), sample.payload.to_bytes()
+
+
+def _needed(expressions: Iterable[str]) -> list[zenoh.KeyExpr]:
+    wanted = [zenoh.KeyExpr(one) for one in dict.fromkeys(expressions)]
+    return [one for one in wanted if not any(other != one and other.includes(one) for other in wanted)]
 
 
 def _config(mode: str, patience_s: float, *, listen: Iterable[str] = (), connect: Iterable[str] = ()) -> zenoh.Config:
