@@ -8,8 +8,9 @@ memory are read from /proc (so Linux alone) twenty times a second until it ends.
 cells, and `tellaro` at a tenth of its vehicles' speeds, which takes ten times as long over the same map. `wide` takes
 long: name it. `--without`: flies each once more with --no-record.
 
-`--replay`: flies nothing, but opens the messages of a run that was flown and records them anew. What it takes to get
-them over Zenoh is left out; it takes a minute where flying `wide` at 1 m cells takes most of an hour.
+`--replay`: flies nothing, but says over Zenoh, at 100 times real time, what was said in a run that was flown, to a
+recorder in a process of its own. That takes minutes where flying `wide` at 1 m cells takes most of an hour, and is the
+speed that the limits are told for: at a slower one messages come less close together, and each costs more.
 
 `of a core at 100 x`: the recorder's CPU time over a hundredth of the mission's. `memory at`: its resident memory when a
 tenth of its CPU time is spent, half of it, and at the end.
@@ -25,15 +26,21 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
 import secondlook
+from bench.replayed import ReplayedConfig
+from comms.node import Received
+from secondlook.fleet import build_fleet
+from secondlook.host_plans import RECORDER
+from secondlook.node_spec import NodeSpec
+from secondlook.processes import Processes
 from secondlook.scenario import load_scenario
-from viz.recorder import Recorder
 from viz.recorder_config import RecorderConfig
 
 SLOW = "tellaro:vehicles.primary.speed_mps=0.15:vehicles.helper.speed_mps=0.2:vehicles.primary.endurance_s=360000"
@@ -90,22 +97,43 @@ def fly(scenario: str, sets: list[str], folder: Path, *, record: bool) -> Flight
 
 
 def replay(run: Path) -> bool:
-    """Records the messages of a run anew and prints what that costs; whether the limits are held."""
-    mission = secondlook.load(run)
+    """Has the messages of a run recorded anew and prints what that costs; whether the limits are held."""
+    mission, scenario = secondlook.load(run), load_scenario(str(run / "scenario.yaml"))
+    fleet = build_fleet(scenario, record=True)
+    again = {node_id: NodeSpec("bench.replayed:Replayed", ReplayedConfig(node_id, run)) for node_id in fleet.specs}
     with tempfile.TemporaryDirectory(prefix="secondlook-cost-") as folder:
         recording = Path(folder) / "mission.rrd"
-        began_s = time.process_time()
-        recorder = Recorder(RecorderConfig(recording, thresholds=load_scenario(str(run / "scenario.yaml")).thresholds))
-        for received in mission.received():
-            recorder.on_message(received)
-        recorder.close()
-        cpu_s = time.process_time() - began_s
+        recorder = NodeSpec("viz.recorder:Recorder", RecorderConfig(recording, thresholds=scenario.thresholds))
+        processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), recorder, processes=1)
+        samples: list[Sample] = []
+        with processes, ThreadPoolExecutor(1) as beside:
+            running = beside.submit(processes.run)
+            while not running.done():
+                recorder_id = processes.process_ids.get(RECORDER)
+                sample = _sample(recorder_id) if recorder_id is not None else None
+                if sample is not None:
+                    samples.append(sample)
+                time.sleep(POLL_S)
+            running.result()
         recording_mb = recording.stat().st_size / 1e6
+    cpu_s = samples[-1].cpu_s
     share, mb_an_hour = _share(cpu_s, mission.end_s), recording_mb / (mission.end_s / 3600)
     cell_m = mission.run.grid.cell_m
+    memory = ", ".join(f"{_memory_at(samples, part):.0f}" for part in (0.1, 0.5, 1.0))
     print(f"{mission.run.scenario}, {cell_m:g} m cells, {mission.end_s:.0f} s: {cpu_s:.1f} s of CPU time,"
-          f" {share:.1%} of a core at 100 x; {recording_mb:.1f} MB, {mb_an_hour:.1f} MB an hour")  # fmt: skip
+          f" {share:.1%} of a core at 100 x; memory {memory} MB; {recording_mb:.1f} MB,"
+          f" {mb_an_hour:.1f} MB an hour")  # fmt: skip
     return share <= MOST_SHARE and mb_an_hour <= _most_mb_an_hour(cell_m)
+
+
+class _Nobody:
+    """An observer that takes no note."""
+
+    def on_message(self, received: Received) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
 
 
 def _share(cpu_s: float, mission_s: float) -> float:
