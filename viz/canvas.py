@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable
 from pathlib import Path
 
@@ -15,31 +16,57 @@ from viz.paths import TIMELINE
 
 Build = Callable[[FloatArray], Iterable[rr.ComponentColumn]]
 
-TOGETHER_S = 1.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
+TOGETHER_S = 2.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
+LIVE_EVERY_S = 0.25  # of the wall clock; how long a live view waits for columns
 
 
 class Column:
-    """Rows of numbers of one entity, held until the canvas sends them: a call a row would cost far more."""
+    """Rows of numbers of one entity, held until they are sent: a call a row would cost far more."""
 
-    def __init__(self, path: str, build: Build) -> None:
-        self.path = path
+    def __init__(self, path: str, build: Build, sheets: Iterable[_Sheet]) -> None:
+        self._path = path
         self._build = build
-        self._times_ms: list[int] = []
-        self._rows: list[tuple[float, ...]] = []
+        self._held: dict[_Sheet, tuple[list[int], list[tuple[float, ...]]]] = {sheet: ([], []) for sheet in sheets}
 
     def add(self, time_ms: int, *numbers: float) -> None:
         """Holds one row."""
-        self._times_ms.append(time_ms)
-        self._rows.append(numbers)
+        for times_ms, rows in self._held.values():
+            times_ms.append(time_ms)
+            rows.append(numbers)
 
-    def send(self, streams: Iterable[rr.RecordingStream]) -> None:
-        """Sends what is held."""
-        if self._times_ms:
-            times = np.array(self._times_ms, dtype="timedelta64[ms]")
-            rows = np.array(self._rows, dtype=np.float64)
-            for stream in streams:
-                stream.send_columns(self.path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(rows))
-            self._times_ms, self._rows = [], []
+    def send(self, sheet: _Sheet) -> None:
+        """Sends what is held for it."""
+        times_ms, rows = self._held[sheet]
+        if times_ms:
+            times = np.array(times_ms, dtype="timedelta64[ms]")
+            numbers = np.array(rows, dtype=np.float64)
+            sheet.stream.send_columns(self._path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(numbers))
+            self._held[sheet] = ([], [])
+
+
+class _Sheet:
+    """One stream of the recording, and when columns are sent to it: once so much simulated time, and so much of the
+    wall clock, has passed since they were last."""
+
+    def __init__(self, stream: rr.RecordingStream, piece_ms: int, every_s: float) -> None:
+        self.stream = stream
+        self._piece_ms = piece_ms
+        self._every_s = every_s
+        self._sent_ms = 0
+        self._sent_s = time.monotonic()
+        self._drawn_ms: int | None = None
+
+    def put(self, time_ms: int, path: str, *parts: rr.AsComponents) -> None:
+        if time_ms != self._drawn_ms:
+            self._drawn_ms = time_ms
+            self.stream.set_time(TIMELINE, duration=time_ms / 1000)
+        self.stream.log(path, parts[0], *parts[1:])
+
+    def is_due(self, time_ms: int) -> bool:
+        if abs(time_ms - self._sent_ms) < self._piece_ms or time.monotonic() - self._sent_s < self._every_s:
+            return False
+        self._sent_ms, self._sent_s = time_ms, time.monotonic()
+        return True
 
 
 class Canvas:
@@ -47,60 +74,62 @@ class Canvas:
 
     Its only timeline is the simulated time.
 
-    `piece_ms`: how much simulated time the columns hold back at most; so much is lost if the process is killed.
+    `piece_ms`: how much simulated time the columns hold back for the file; so much is lost if the process is killed,
+    beside what came in the last TOGETHER_S.
     """
 
     def __init__(self, path: Path, recording_id: str, piece_ms: int, live_pipe: Path | None) -> None:
-        self._file = new_stream(recording_id, rr.ChunkBatcherConfig(flush_tick=TOGETHER_S))
-        self._file.save(path)
+        file = new_stream(recording_id, rr.ChunkBatcherConfig(flush_tick=TOGETHER_S))
+        file.save(path)
         self._live = LiveFeed(live_pipe, recording_id) if live_pipe else None
         # Two streams of one id: in one stream, a viewer that stalls would hold up the file too.
-        self._streams = (self._file, self._live.stream) if self._live else (self._file,)
+        self._sheets = [_Sheet(file, piece_ms, 0.0)]
+        if self._live is not None:
+            self._sheets.append(_Sheet(self._live.stream, 0, LIVE_EVERY_S))
         # A name from the start: without any entry the file would not get the footer that completes it.
-        for stream in self._streams:
-            stream.send_recording_name(recording_id)
-        self._piece_ms = piece_ms
-        self._piece_from_ms = 0
+        for sheet in self._sheets:
+            sheet.stream.send_recording_name(recording_id)
         self._columns: list[Column] = []
 
     def present(self, name: str, blueprint: rrb.Blueprint, mission: rr.AnyValues) -> None:
         """Says what the recording is called, how it is laid out and what mission it is of."""
-        for stream in self._streams:
-            stream.send_recording_name(name)
-            stream.send_property("mission", mission)
-            stream.send_blueprint(blueprint)
+        for sheet in self._sheets:
+            sheet.stream.send_recording_name(name)
+            sheet.stream.send_property("mission", mission)
+            sheet.stream.send_blueprint(blueprint)
 
     def put(self, time_ms: int, path: str, *parts: rr.AsComponents) -> None:
         """Logs one entry at a simulated time."""
-        for stream in self._streams:
-            stream.set_time(TIMELINE, duration=np.timedelta64(time_ms, "ms"))
-            stream.log(path, parts[0], *parts[1:])
+        for sheet in self._sheets:
+            sheet.put(time_ms, path, *parts)
 
     def put_static(self, path: str, *parts: rr.AsComponents) -> None:
         """Logs what holds at all times."""
-        for stream in self._streams:
-            stream.log(path, parts[0], *parts[1:], static=True)
+        for sheet in self._sheets:
+            sheet.stream.log(path, parts[0], *parts[1:], static=True)
 
     def column(self, path: str, build: Build) -> Column:
         """A column that is sent in pieces; `build` makes its components from an array of shape (rows, numbers)."""
-        column = Column(path, build)
+        column = Column(path, build, self._sheets)
         self._columns.append(column)
         return column
 
     def advance(self, time_ms: int) -> None:
-        """Sends the columns if they hold a whole piece."""
-        if abs(time_ms - self._piece_from_ms) >= self._piece_ms:
-            self._piece_from_ms = time_ms
-            self._send()
+        """Sends the columns where a whole piece is held."""
+        for sheet in self._sheets:
+            if sheet.is_due(time_ms):
+                self._send(sheet)
 
     def close(self) -> None:
         """Sends what is held and completes the file."""
-        self._send()
-        self._file.flush()
-        self._file.disconnect()
+        for sheet in self._sheets:
+            self._send(sheet)
+        file = self._sheets[0].stream
+        file.flush()
+        file.disconnect()
         if self._live is not None:
             self._live.close()
 
-    def _send(self) -> None:
+    def _send(self, sheet: _Sheet) -> None:
         for column in self._columns:
-            column.send(self._streams)
+            column.send(sheet)

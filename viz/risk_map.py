@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import rerun as rr
 
@@ -28,6 +30,14 @@ METRICS = {
     paths.WORST_RISK: ("mean over the worst 30 %", palette.WORST_RISK),
     paths.COVERED_SHARE: ("share of the area seen", palette.COVERED),
 }
+
+
+def _pixel(*colour: int) -> np.uint32:
+    """A colour's four bytes as one number, so that a cell is one."""
+    return np.uint32(int.from_bytes(bytes(colour), sys.byteorder))
+
+
+_UNSEEN, _OUTSIDE, _CLEAR = _pixel(*palette.UNSEEN, 255), _pixel(*palette.BACKGROUND, 255), _pixel(0, 0, 0, 0)
 
 
 class RiskMap:
@@ -99,10 +109,8 @@ class RiskMap:
             self._cover_block(time_ms, block)
 
     def _cover_block(self, time_ms: int, block: Block) -> None:
-        risk = self._map.risk[block.window]
-        cover = np.zeros((*risk.shape, 4), dtype=np.uint8)
-        cover[risk[::-1] == 1.0] = (*palette.UNSEEN, 255)
-        cover[~self._inside[block.window][::-1]] = (*palette.BACKGROUND, 255)  # cells outside count for nothing
+        unseen = np.where(self._map.risk[block.window] == 1.0, _UNSEEN, _CLEAR)
+        cover = np.where(self._inside[block.window], unseen, _OUTSIDE)[::-1]  # cells outside count for nothing
         self._canvas.put(time_ms, f"{paths.UNSEEN}/{block.name}", rr.GridMap.from_fields(data=cover.tobytes()))
 
     def _add_statistics(self, time_ms: int) -> None:
