@@ -40,8 +40,8 @@ from secondlook.fleet import build_fleet
 from secondlook.host_plans import RECORDER
 from secondlook.node_spec import NodeSpec
 from secondlook.processes import Processes
+from secondlook.recorder_config import recorder_config
 from secondlook.scenario import load_scenario
-from viz.recorder_config import RecorderConfig
 
 SLOW = "tellaro:vehicles.primary.speed_mps=0.15:vehicles.helper.speed_mps=0.2:vehicles.primary.endurance_s=360000"
 DEFAULT = (
@@ -103,7 +103,7 @@ def replay(run: Path) -> bool:
     again = {node_id: NodeSpec("bench.replayed:Replayed", ReplayedConfig(node_id, run)) for node_id in fleet.specs}
     with tempfile.TemporaryDirectory(prefix="secondlook-cost-") as folder:
         recording = Path(folder) / "mission.rrd"
-        recorder = NodeSpec("viz.recorder:Recorder", RecorderConfig(recording, thresholds=scenario.thresholds))
+        recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, recording))
         processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), recorder, processes=1)
         samples: list[Sample] = []
         with processes, ThreadPoolExecutor(1) as beside:

@@ -26,11 +26,11 @@ from secondlook.log_file import log_to_file
 from secondlook.node_spec import NodeSpec, make_node, make_nodes
 from secondlook.observer import Observer, Progress, RunStopped, Watch
 from secondlook.processes import Processes, RunFailedError
+from secondlook.recorder_config import recorder_config
 from secondlook.scenario import Scenario
 from secondlook.signals import signals_interrupt
 from secondlook.summary import summarise
 from secondlook.watchdog import NoReturn, Watchdog, WatchedNode
-from viz.recorder_config import RecorderConfig
 
 log = logging.getLogger("secondlook.mission")
 
@@ -124,9 +124,7 @@ class _Run:
         self._fleet = fleet
         self._observer = observer
         self._options = options
-        config = RecorderConfig(
-            options.folder / "mission.rrd", live_pipe=options.live_pipe, thresholds=scenario.thresholds
-        )
+        config = recorder_config(scenario, options.folder / "mission.rrd", options.live_pipe)
         self._recorder = {RECORDER: NodeSpec("viz.recorder:Recorder", config)} if options.record else {}
 
     def on_local(self) -> BusResult:

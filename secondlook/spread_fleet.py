@@ -31,11 +31,11 @@ from secondlook.host_plans import OBSERVER, RECORDER
 from secondlook.mission import not_over
 from secondlook.node_spec import NodeSpec, make_nodes
 from secondlook.observer import Observer
+from secondlook.recorder_config import recorder_config
 from secondlook.report import write_report
 from secondlook.run_display import closing_table
 from secondlook.scenario import Scenario
 from secondlook.summary import summarise
-from viz.recorder_config import RecorderConfig
 
 FAILED = 1
 ROUTER = "router"
@@ -116,7 +116,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     fleet = build_fleet(scenario, record=True, factor=1.0)
     (folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(folder, with_messages=True)
-    recorder = NodeSpec("viz.recorder:Recorder", RecorderConfig(folder / "mission.rrd", thresholds=scenario.thresholds))
+    recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, folder / "mission.rrd"))
     part = _Part()
     try:
         listeners = {OBSERVER: observer, **make_nodes({RECORDER: recorder})}

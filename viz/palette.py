@@ -9,6 +9,7 @@ from comms.messages import Mode, Role, RosterVehicle, StripState, TaskState
 Colour = tuple[int, int, int]
 
 OUTLINE: Colour = (200, 205, 212)
+PRIORITY: Colour = (90, 230, 255)
 UNSEEN: Colour = (38, 44, 54)
 BACKGROUND: Colour = (13, 16, 21)
 PLANNED: Colour = (140, 170, 205)

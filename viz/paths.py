@@ -5,6 +5,7 @@ from __future__ import annotations
 TIMELINE = "sim_time"
 
 OUTLINE = "/area/outline"
+PRIORITIES = "/area/priorities"
 RISK = "/area/risk"
 UNSEEN = "/area/unseen"
 SCALE = "/area/scale"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import rerun as rr
@@ -29,6 +29,7 @@ from viz.blueprint import mission_blueprint
 from viz.canvas import Canvas
 from viz.curves import Curves
 from viz.fleet import Fleet
+from viz.priorities import put_priorities
 from viz.recorder_config import RecorderConfig
 from viz.risk_map import RiskMap
 from viz.second_looks import SecondLooks
@@ -48,8 +49,7 @@ class Recorder:
     def __init__(self, config: RecorderConfig) -> None:
         recording_id = config.recording_id or config.path.absolute().parent.name
         self._canvas = Canvas(config.path, recording_id, round(config.piece_s * 1000), config.live_pipe)
-        self._draw_every_ms = round(config.draw_every_s * 1000)
-        self._thresholds = config.thresholds
+        self._config = config
         self._mission: _Mission | None = None
         self._early: list[Received] = []
 
@@ -58,7 +58,7 @@ class Recorder:
         if self._mission is not None:
             self._mission.draw(received)
         elif isinstance(received.message, RunInfo):
-            self._mission = _Mission(self._canvas, received.message, self._draw_every_ms, self._thresholds)
+            self._mission = _Mission(self._canvas, received.message, self._config)
             self._mission.draw(received)
             for early in self._early:
                 self._mission.draw(early)
@@ -76,17 +76,18 @@ class Recorder:
 class _Mission:
     """Everything that is drawn of one mission, once area, grid and roster are known."""
 
-    def __init__(self, canvas: Canvas, run: RunInfo, draw_every_ms: int, thresholds: Mapping[str, float]) -> None:
+    def __init__(self, canvas: Canvas, run: RunInfo, config: RecorderConfig) -> None:
         self._canvas = canvas
         extent = extent_of(run)
         told = rr.AnyValues(scenario=run.scenario, seed=run.seed)
         canvas.present(run.scenario, mission_blueprint(extent, run), told)
-        self._map = RiskMap(canvas, run, extent, draw_every_ms)
+        self._map = RiskMap(canvas, run, extent, round(config.draw_every_s * 1000))
+        put_priorities(canvas, config.priorities)
         self._story = Story()
         self._table = TaskTable(canvas, run)
         self._second_looks = SecondLooks(canvas, extent)
         self._time_ms = -1
-        fleet, curves, truth = Fleet(canvas, run, extent), Curves(canvas, run, thresholds), Truth(canvas)
+        fleet, curves, truth = Fleet(canvas, run, extent), Curves(canvas, run, config.thresholds), Truth(canvas)
         self._draw: dict[type[Message], tuple[Callable[[Received, Any], None], ...]] = {
             CoverageTile: (self._map.on_tile,),
             Nav: (fleet.on_nav,),

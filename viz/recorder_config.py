@@ -6,6 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from planner.types import Point
+
+
+@dataclass(frozen=True)
+class PriorityGround:
+    """Ground, by its corners in the mission frame, whose risk counts `weight` times in second looks."""
+
+    polygon_m: tuple[Point, ...]
+    weight: float
+
 
 @dataclass(frozen=True)
 class RecorderConfig:
@@ -16,7 +26,8 @@ class RecorderConfig:
     `draw_every_s`: the risk map is drawn at most once in so much simulated time, a very large one once a minute.
     `piece_s`: positions and statistics are held back for so much simulated time and written together; a live view does
     not wait for that. `thresholds`:
-    each survey vehicle's P_d from which data is admissible, drawn with its P(y) where it is told.
+    each survey vehicle's P_d from which data is admissible, drawn with its P(y) where it is told. `priorities`: drawn
+    on the map.
     """
 
     path: Path
@@ -25,3 +36,4 @@ class RecorderConfig:
     draw_every_s: float = 10.0
     piece_s: float = 60.0
     thresholds: Mapping[str, float] = field(default_factory=dict)
+    priorities: tuple[PriorityGround, ...] = ()

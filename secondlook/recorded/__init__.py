@@ -6,6 +6,7 @@ from secondlook.recorded.hotspots import HotspotRecord
 from secondlook.recorded.load import load_run
 from secondlook.recorded.mission import RecordedMission
 from secondlook.recorded.paths import PathRecord
+from secondlook.recorded.priorities import PriorityRecord
 from secondlook.recorded.risk_map import RiskMap
 from secondlook.recorded.said import Said
 from secondlook.recorded.strips import StripEvent, StripRecord
@@ -18,6 +19,7 @@ __all__ = [
     "GeographicOrigin",
     "HotspotRecord",
     "PathRecord",
+    "PriorityRecord",
     "RecordedMission",
     "RiskMap",
     "Said",

@@ -31,6 +31,7 @@ from secondlook.recorded.activities import Activity, activities
 from secondlook.recorded.hotspots import HotspotRecord, hotspots
 from secondlook.recorded.key_pattern import key_matcher
 from secondlook.recorded.paths import PathRecord, paths
+from secondlook.recorded.priorities import PriorityRecord, priorities
 from secondlook.recorded.risk_map import RiskMap
 from secondlook.recorded.said import M, Said
 from secondlook.recorded.strips import StripRecord, strips
@@ -112,6 +113,11 @@ class RecordedMission:
     def area(self) -> shapely.Polygon:
         """The survey area."""
         return shapely.Polygon(self.run.outline, self.run.hole_outlines)
+
+    @cached_property
+    def priorities(self) -> list[PriorityRecord]:
+        """Ground of the area whose risk counts for more or less in second looks, as the scenario says."""
+        return priorities(self.scenario, self.area, self.folder)
 
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.

@@ -9,7 +9,7 @@ import shapely
 
 from comms.messages import StripState
 from planner.types import Point
-from secondlook.recorded import PathRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
+from secondlook.recorded import PathRecord, PriorityRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
 from secondlook.report.axis import ticks
 from secondlook.report.fates import FATE_CLASS, fate_in_words
 from secondlook.report.map_frame import MapFrame
@@ -52,6 +52,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     children = [
         frame.risk(risk),
         element("path", d=frame.line(mission.area), class_="area"),
+        *(_priority(frame, one) for one in mission.priorities),
         *(_path(frame, path, kinds.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
         *(_strip(frame, strip, ids) for strip in strips),
@@ -59,6 +60,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
             _number(frame, strip, place_m)
             for strip, place_m in number_places(numbered, NUMBER_PX * unit_m, LABEL_PX * unit_m)
         ),
+        *(_weight(frame, one, unit_m) for one in mission.priorities),
         *_names(frame, [(path, kinds.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
         *_scale(frame, unit_m),
     ]
@@ -71,6 +73,30 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         class_="map flown many" if many else "map flown",
         style=f"--u:{unit_m:.4g}",
     )
+
+
+def _priority(frame: MapFrame, priority: PriorityRecord) -> Element:
+    line = frame.line(priority.ground)
+    return element(
+        "g",
+        element("title", _counts(priority)),
+        element("path", d=line, class_="casing"),
+        element("path", d=line, class_="outline"),
+        class_="priority",
+    )
+
+
+def _weight(frame: MapFrame, priority: PriorityRecord, unit_m: float) -> Element:
+    """What the ground counts, in its northernmost corner, where strips seldom have their numbers."""
+    corners = shapely.get_coordinates(priority.ground)
+    x_m, y_m = min(corners.tolist(), key=lambda corner: (-corner[1], corner[0]))
+    x, y = frame.place(x_m, y_m)
+    text = element("text", f"× {priority.weight:g}", x=x + 5 * unit_m, y=y + LINE_PX * unit_m)
+    return element("g", element("title", _counts(priority)), text, class_="priority")
+
+
+def _counts(priority: PriorityRecord) -> str:
+    return f"risk counts {priority.weight:g} times here"
 
 
 def _path(frame: MapFrame, path: PathRecord, kind: str, unit_m: float) -> Element:

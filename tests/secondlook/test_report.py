@@ -23,6 +23,7 @@ from comms.codec import Header, encode
 from comms.messages import Mode, StripState
 from planner.types import GridSpec, Strip, SweepFrame
 from secondlook import cli
+from secondlook.errors import UserError
 from secondlook.fleet import build_fleet
 from secondlook.mission import RunOptions, run_mission
 from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
@@ -160,6 +161,32 @@ def test_a_failure_comes_first(brief_copy: Path) -> None:
         page = Page(report_page(secondlook.load(brief_copy)))
         assert f"{told} helper has died. What follows is what had happened until then." in page.told
         assert "The digest is a hash" not in page.told
+
+
+def test_ground_that_counts_more_is_told_on_the_map(brief_copy: Path) -> None:
+    scenario = yaml.safe_load((brief_copy / "scenario.yaml").read_text())
+    (west_m, south_m), *_, (east_m, north_m) = sorted(scenario["area"]["polygon_m"])
+    corner = [[west_m - 50, south_m - 50], [west_m + 20, south_m - 50], [west_m + 20, south_m + 10]]
+    far = [[east_m + 10, north_m], [east_m + 90, north_m], [east_m + 90, north_m + 50]]
+    scenario["area"]["priorities"] = [{"polygon_m": corner, "weight": 2.5}, {"polygon_m": far, "weight": 7}]
+    (brief_copy / "scenario.yaml").write_text(yaml.safe_dump(scenario))
+    mission = secondlook.load(brief_copy)
+    page = Page(report_page(mission))
+    assert page.words.count("× 2.5") == 1
+    assert page.words.count("risk counts 2.5 times here") == 2
+    assert "× 7" not in page.words  # it lies beyond the area
+    (told,) = mission.priorities
+    assert told.ground.within(mission.area)
+    # The triangle's slanting side rises by 6 in 7: past the area's corner it leaves (20 - (50/6 * 7 - 50)) wide.
+    assert told.ground.area == pytest.approx((20 - (50 / 6 * 7 - 50)) * 10 / 2)
+
+
+def test_priorities_that_no_run_has_written_are_refused(brief_copy: Path) -> None:
+    scenario = yaml.safe_load((brief_copy / "scenario.yaml").read_text())
+    scenario["area"]["priorities"] = [{"polygon_m": [[0, 0]], "weight": "heavy"}]
+    (brief_copy / "scenario.yaml").write_text(yaml.safe_dump(scenario))
+    with pytest.raises(UserError, match=r"scenario\.yaml: area\.priorities must be as the run wrote them$"):
+        report_page(secondlook.load(brief_copy))
 
 
 def test_a_mission_without_a_helper_has_one_map(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ from tests.viz.mission_stream import HELPER, PRIMARY, mission
 from tests.viz.recordings import entities, rows, rows_so_far, static, timelines, verify
 from viz import palette
 from viz.recorder import Recorder
-from viz.recorder_config import RecorderConfig
+from viz.recorder_config import PriorityGround, RecorderConfig
 from viz.task_table import HEAD
 
 Record = Callable[[list[Received], Path], Path]
@@ -130,6 +130,18 @@ def test_cells_outside_the_area_look_like_the_background(
     assert outside[in_hole].all()
     assert np.count_nonzero(outside) == np.count_nonzero(in_hole)
     assert len(static(drawn, "/area/outline", "LineStrips3D:strips")) == 2
+
+
+def test_ground_that_counts_more_is_told_on_the_map(messages: list[Received], tmp_path: Path) -> None:
+    corners = ((100.0, 50.0), (200.0, 50.0), (200.0, 90.0))
+    recorder = Recorder(RecorderConfig(tmp_path / "one.rrd", priorities=(PriorityGround(corners, 2.5),)))
+    for received in messages[:50]:
+        recorder.on_message(received)
+    recorder.close()
+    (outline,) = static(tmp_path / "one.rrd", "/area/priorities", "LineStrips3D:strips")
+    assert [tuple(round(part, 3) for part in corner[:2]) for corner in outline] == [*corners, corners[0]]
+    labels = static(tmp_path / "one.rrd", "/area/priorities", "LineStrips3D:labels")
+    assert labels == ["risk counts 2.5 times here"]
 
 
 @pytest.mark.parametrize("every_s", [10, 60])
@@ -367,7 +379,7 @@ def test_what_was_written_before_a_kill_is_readable(tmp_path: Path) -> None:
 import pathlib, signal, sys
 from tests.viz.mission_stream import mission
 from viz.recorder import Recorder
-from viz.recorder_config import RecorderConfig
+from viz.recorder_config import PriorityGround, RecorderConfig
 recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1])))
 for received in mission(tracks=1):
     recorder.on_message(received)
