@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import select
 import signal
@@ -21,8 +22,9 @@ import rerun as rr
 from rerun.experimental import ViewerClient
 
 from comms.node import Received
-from tests.viz.recordings import entities, rows, verify
-from viz import live_server, viewer_program
+from tests.viz.mission_stream import PRIMARY
+from tests.viz.recordings import entities, rows, rows_so_far, verify
+from viz import canvas, live_server, viewer_program
 from viz.live_feed import LiveFeed
 from viz.live_server import LiveServer
 from viz.recorder import Recorder
@@ -200,6 +202,33 @@ def test_the_pipe_stays_open_as_long_as_the_window(monkeypatch: pytest.MonkeyPat
     closed_at_last = ends.poll(0) == [(reader, select.POLLHUP)]
     os.close(reader)
     assert (open_afterwards, serves_afterwards, closed_at_last) == (True, True, True)
+
+
+def test_a_live_view_does_not_wait_for_the_pieces_of_the_file(
+    messages: list[Received], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(canvas, "LIVE_EVERY_S", 0.0)
+    pipe, shown, poses = tmp_path / "pipe", tmp_path / "shown.rrd", f"/fleet/{PRIMARY}"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", live_pipe=pipe, piece_s=60.0))
+    until_ms = messages[0].header.sent_ms + 30_000
+    for received in messages:
+        if received.header.sent_ms <= until_ms:
+            recorder.on_message(received)
+
+    def is_shown() -> bool:
+        with shown.open("ab") as file, contextlib.suppress(BlockingIOError):
+            while piece := os.read(reader, 1 << 16):
+                file.write(piece)
+        return rows_so_far(shown, poses) > 20
+
+    wait_until(is_shown)
+    in_file = rows_so_far(tmp_path / "mission.rrd", poses)
+    recorder.close()
+    os.close(reader)
+    assert in_file == 0
+    assert rows_so_far(tmp_path / "mission.rrd", poses) > 20
 
 
 @pytest.mark.usefixtures("drawable")
