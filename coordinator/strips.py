@@ -9,7 +9,7 @@ at, and the search goes on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -150,7 +150,7 @@ def cut_strips(
         for run in chosen:
             beside = slice(max(0, run.first_row - 1), run.end_row + 1), run.columns
             least = longest if open_cells[beside].any() else shortest
-            if run.rows < least or any(run.shared(other) >= SAME_PLACE * run.size for other in looked_at):
+            if run.rows < least or _is_one_of(run, looked_at):
                 no_strips.append(run)
                 counts[run.cells] = 0.0  # the search goes on elsewhere, and others are chosen
         for run in [] if no_strips else chosen:
@@ -159,7 +159,8 @@ def cut_strips(
                 settles_s = float(growth.settles_s[window.cells].max())
                 descending = bool(growth.descending[window.cells].any())
                 removed_m2, counts_m2 = (float(each[window.cells].sum()) for each in (removable, counts))
-                if counts_m2 > ((end - begin) * row_cost + fixed_cost) * (1 + TOLERANCE):
+                pays = counts_m2 > ((end - begin) * row_cost + fixed_cost) * (1 + TOLERANCE)
+                if pays and not _is_one_of(window, looked_at):
                     cuts.append(Cut(window, removed_m2, counts_m2, settles_s, descending))
                     looked_at.append(window)
                     removable[window.cells] *= 1.0 - rules.p_detect
@@ -172,6 +173,11 @@ def cut_strips(
         for stretch in stretches(changed):
             runs.look(stretch)
     return cuts
+
+
+def _is_one_of(window: Window, others: Iterable[Window]) -> bool:
+    """Whether one of these is at the same place."""
+    return any(window.shared(other) >= SAME_PLACE * window.size for other in others)
 
 
 def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = False) -> Strip:

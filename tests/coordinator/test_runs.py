@@ -27,6 +27,7 @@ class TestByHand:
         runs = looked_at(self.ROWS, 2)
         assert runs.best() == [Run(0, 2, 1)]  # leaves a column of 3 and one of 4
         assert runs.side_by_side(1.0) == [Run(0, 2, 2), Run(0, 2, 0)]  # the better first
+        assert looked_at(self.ROWS[:, ::-1], 2).side_by_side(1.0) == [Run(0, 2, 0), Run(0, 2, 2)]
 
     def test_what_costs_more_is_left_out(self) -> None:
         # A row costs 2, a strip 3. Four times as much: 25 - 16 - 12 < 0. Three times: 18 - 12 - 9 < 0, 21 - 12 - 9 = 0,

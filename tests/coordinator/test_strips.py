@@ -147,6 +147,21 @@ class TestByHand:
         assert [one.window for one in beside] == [Window(10, 40, 10, 20)]
         assert beside[0].removable_m2 == pytest.approx(30 * (6 + 4 * 0.6) * 25 * 0.4)
 
+    def test_a_piece_of_a_band_is_cut_once_too(self) -> None:
+        # A look leaves 0.3 of all, which is worth another one; the band is to be cut in two.
+        rules = replace(RULES, max_strip_m=150)
+        assert [one.window for one in cut(hot(np.s_[:, 10:20]), rules)] == [
+            Window(0, 30, 10, 20),
+            Window(30, 60, 10, 20),
+        ]
+
+    def test_a_piece_that_does_not_pay_does_not_hide_what_lies_elsewhere(self) -> None:
+        # Half of the band is all hot and goes. What is left of both, 0.7 and 0.3 at most, would be the best run again,
+        # of which neither half is a strip.
+        rules = replace(RULES, p_detect=0.3, max_strip_m=150)
+        risk = hot(np.s_[:30, 0:10]) + hot(np.s_[30:, 0:10], risk=0.3) + hot(np.s_[10:40, 25:35], risk=0.6)
+        assert [one.window for one in cut(risk, rules)] == [Window(0, 30, 0, 10), Window(10, 40, 25, 35)]
+
     def test_the_swath_is_never_wider_than_the_sensor_sees(self) -> None:
         grid = GridSpec(EAST, 3.4, 40, 60)
         cuts = cut_strips(grid, np.ones(grid.shape), np.zeros(grid.shape, dtype=np.bool_), RULES)
@@ -226,6 +241,40 @@ class TestEveryMap:
             left[one.window.cells] *= 1 - rules.p_detect
             values.append(value(one, rules, SMALL))
         assert all(later <= earlier + 1e-6 for earlier, later in pairwise(values))
+
+    @settings(max_examples=100, deadline=None)
+    @given(
+        risk=risks,
+        open_cells=masks,
+        weights=arrays.arrays(np.float64, SMALL.shape, elements=st.sampled_from([0.0, 0.5, 1.0, 3.0])),
+        rules=rules_of_all_kinds,
+        marginal_risk=st.sampled_from([0.0, 0.4, 0.7]),
+        first_column=st.integers(0, 5),
+    )
+    def test_each_tells_what_those_before_it_and_those_that_are_taken_leave(
+        self,
+        risk: FloatArray,
+        open_cells: BoolArray,
+        weights: FloatArray,
+        rules: CuttingRules,
+        marginal_risk: float,
+        first_column: int,
+    ) -> None:
+        rules = replace(rules, marginal_risk=marginal_risk)
+        taken = Window(2, 7, first_column, first_column + rules.columns(SMALL))
+        looked_at = [taken]
+        left = risk * rules.p_detect * SMALL.cell_area_m2
+        left[taken.cells] *= 1 - rules.p_detect
+        for one in cut_strips(SMALL, risk, open_cells, rules, [taken], weights=weights):
+            assert one.removable_m2 == pytest.approx(left[one.window.cells].sum())
+            counts_m2 = (left * weights)[one.window.cells].sum()
+            assert one.counts_m2 <= counts_m2 * (1 + 1e-9)  # what has led to no strip is left out
+            row_m2 = rules.worth_risk * rules.p_detect * rules.columns(SMALL) * SMALL.cell_area_m2
+            assert counts_m2 > row_m2 * (one.window.rows + rules.overhead_m / SMALL.cell_m)
+            left[one.window.cells] *= 1 - rules.p_detect
+            shared = max(one.window.shared(other) for other in looked_at)
+            assert shared < 0.75 * one.window.size
+            looked_at.append(one.window)
 
     @settings(max_examples=80, deadline=None)
     @given(risk=risks, open_cells=masks, rules=rules_of_all_kinds, marginal_risk=st.sampled_from([0.0, 0.4, 0.7]))
