@@ -9,6 +9,7 @@ list of processes.
 
 from __future__ import annotations
 
+import gc
 import json
 import logging
 import os
@@ -92,6 +93,12 @@ class _LauncherWatch:
         self.act()
 
 
+def _make_nodes(order: ChildOrder) -> dict[str, Any]:
+    nodes = make_nodes(order.specs)
+    gc.freeze()  # what there is by now stays: no use in looking through all modules for garbage again and again
+    return nodes
+
+
 def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
     assert order.run_info is not None
     watch = _LauncherWatch()
@@ -100,7 +107,7 @@ def _be_hub(order: ChildOrder, tell: Callable[..., None]) -> None:
         tell(change=change.value, host=host)
         watch.lines.get()
 
-    nodes = make_nodes(order.specs)
+    nodes = _make_nodes(order)
     if order.factor is not None:
         _tell_result(run_hub(order, nodes, tell), tell)
         return
@@ -130,7 +137,7 @@ def _tell_result(result: BusResult, tell: Callable[..., None]) -> None:
 
 
 def _be_host(order: ChildOrder) -> None:
-    nodes = make_nodes(order.specs)
+    nodes = _make_nodes(order)
     endpoint = _read_endpoint(sys.stdin.buffer)
     _LauncherWatch()
     if order.factor is not None:
@@ -141,7 +148,7 @@ def _be_host(order: ChildOrder) -> None:
 
 
 def _be_listener(order: ChildOrder) -> None:
-    ((node_id, listener),) = make_nodes(order.specs).items()
+    ((node_id, listener),) = _make_nodes(order).items()
     endpoint = _read_endpoint(sys.stdin.buffer)
     watch = _LauncherWatch()
     if order.factor is not None:

@@ -74,8 +74,8 @@ class Canvas:
 
     Its only timeline is the simulated time.
 
-    `piece_ms`: how much simulated time the columns hold back for the file; so much is lost if the process is killed,
-    beside what came in the last TOGETHER_S.
+    `piece_ms`: how much simulated time the columns hold back for the file, and TOGETHER_S of the wall clock at least;
+    so much is lost if the process is killed.
     """
 
     def __init__(self, path: Path, recording_id: str, piece_ms: int, live_pipe: Path | None) -> None:
@@ -83,7 +83,7 @@ class Canvas:
         file.save(path)
         self._live = LiveFeed(live_pipe, recording_id) if live_pipe else None
         # Two streams of one id: in one stream, a viewer that stalls would hold up the file too.
-        self._sheets = [_Sheet(file, piece_ms, 0.0)]
+        self._sheets = [_Sheet(file, piece_ms, TOGETHER_S)]
         if self._live is not None:
             self._sheets.append(_Sheet(self._live.stream, 0, LIVE_EVERY_S))
         # A name from the start: without any entry the file would not get the footer that completes it.

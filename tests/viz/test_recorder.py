@@ -378,8 +378,10 @@ def test_what_was_written_before_a_kill_is_readable(tmp_path: Path) -> None:
     program = """
 import pathlib, signal, sys
 from tests.viz.mission_stream import mission
+from viz import canvas
 from viz.recorder import Recorder
-from viz.recorder_config import PriorityGround, RecorderConfig
+from viz.recorder_config import RecorderConfig
+canvas.TOGETHER_S = 0.01  # the mission is over within less than it is
 recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1])))
 for received in mission(tracks=1):
     recorder.on_message(received)
