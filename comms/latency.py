@@ -1,5 +1,5 @@
 """Wall-clock latency from a strip's publication to its acceptance, stamped where the coordinator's process sends and
-receives, outside payload and digest."""
+where it takes up what has come, outside payload and digest."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class StripLatency:
                 self._published_s.setdefault(task.strip, wall_s)
 
     def arrived(self, received: Received, wall_s: float) -> None:
-        """A message that has reached the coordinator's process."""
+        """A message that the coordinator's process takes up, which in its own it does at the clock's next word."""
         status = received.message
         if isinstance(status, TaskStatus) and status.state is TaskState.ACCEPTED:
             published_s = self._published_s.pop(status.strip, None)

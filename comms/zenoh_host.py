@@ -26,6 +26,7 @@ from comms.zenoh_session import Mailbox, put, subscribe
 HELLO_EVERY_S = 0.2
 GOODBYE_WITHIN_S = 5.0
 MAIL_EVERY_S = 0.005  # so often is looked for mail that a word tells of and that has not come
+TAKE_EVERY_S = 1.0  # so often is mail taken where no word comes: what waits holds the packets that it came in
 _Mail = tuple[str, bytes]
 
 
@@ -51,7 +52,7 @@ class _Line:
         put(self._session, self._keys.from_host(self._host), words)
 
     def publish(self, outgoing: list[Outgoing]) -> None:
-        """Sends a node's messages; they go out with the next word."""
+        """Sends a node's messages; they go out with the next word at the latest."""
         for one in outgoing:
             put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
 
@@ -72,7 +73,7 @@ class _Line:
             while (left_s := deadline_s - time.monotonic()) > 0 and self.words(left_s)[:1] != ["goodbye"]:
                 pass
 
-    def words(self, within_s: float | None) -> list[Any]:
+    def words(self, within_s: float) -> list[Any]:
         """The clock's next words; none where they do not come within that time. Raises Interrupted."""
         try:
             words = self._words.get(timeout=within_s)
@@ -83,12 +84,12 @@ class _Line:
         return unpack(words)
 
     def mail(self) -> Iterator[_Mail]:
-        """Key below the run id and payload of what has come. The mail that a word tells of comes before it, but for
-        what took another way to the hub."""
+        """Key below the run id and payload of what has come. What a word tells of has come before it as long as both
+        took the same way; whoever waits for it looks again."""
         return ((key.removeprefix(self._keys.root), payload) for key, payload in self._mailbox.take())
 
     def interrupt(self) -> None:
-        """From any thread: whoever waits for words, or does so next, gets Interrupted."""
+        """From any thread: whoever waits for words gets Interrupted, after those that are there already."""
         self._words.put(None)
 
 
@@ -112,7 +113,7 @@ def serve_nodes(
     line.shake_hands()
     granted: tuple[int, list[Grant]] | None = None
     while True:
-        words = line.words(None if granted is None else MAIL_EVERY_S)
+        words = line.words(TAKE_EVERY_S if granted is None else MAIL_EVERY_S)
         for mail in line.mail():
             received = group.receive(*mail)
             if received is not None and group.holds(coordinators):
@@ -189,7 +190,7 @@ class ListenerHost:
         mark: list[Any] | None = None
         self._line.shake_hands()
         while True:
-            words = self._line.words(None if mark is None else MAIL_EVERY_S)
+            words = self._line.words(TAKE_EVERY_S if mark is None else MAIL_EVERY_S)
             self._take_mail()
             if words[:1] in (["mark"], ["finish"]):
                 mark = words

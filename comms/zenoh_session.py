@@ -103,8 +103,8 @@ class Mailbox:
     """Subscribes to all expressions and keeps what comes until it is taken: of a message that waits there no thread of
     Python is woken, which costs more than the rest of receiving it.
 
-    An expression that another one includes is left out. A mailbox that is full would hold up all that comes to the
-    session; it has room for far more than the clock lets anyone fall behind.
+    An expression that another one includes is left out. What waits holds the whole packet that it came in, and a
+    mailbox that is full holds up all that comes to the session: it is to be emptied from time to time.
     """
 
     def __init__(self, session: zenoh.Session, expressions: Iterable[str]) -> None:
@@ -113,10 +113,9 @@ class Mailbox:
         ]
 
     def take(self) -> Iterator[tuple[str, bytes]]:
-        """Key and payload of what has come, of each sender in the order of sending; then it is gone from here."""
+        """Key and payload of what has come, of each expression in the order of arrival; then it is gone from here."""
         for one in self._subscribers:
             while (sample := one.try_recv()) is not None:
-                # A copy: as long as a sample is there, so is the whole packet that it came in.
                 yield str(sample.key_expr), sample.payload.to_bytes()
 
 
