@@ -24,9 +24,10 @@ import os
 import subprocess
 import sys
 import tempfile
+import threading
 import time
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -105,16 +106,8 @@ def replay(run: Path) -> bool:
         recording = Path(folder) / "mission.rrd"
         recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, recording))
         processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), recorder, processes=1)
-        samples: list[Sample] = []
-        with processes, ThreadPoolExecutor(1) as beside:
-            running = beside.submit(processes.run)
-            while not running.done():
-                recorder_id = processes.process_ids.get(RECORDER)
-                sample = _sample(recorder_id) if recorder_id is not None else None
-                if sample is not None:
-                    samples.append(sample)
-                time.sleep(POLL_S)
-            running.result()
+        with processes, _sampling(processes) as samples:
+            processes.run()
         recording_mb = recording.stat().st_size / 1e6
     cpu_s = samples[-1].cpu_s
     share, mb_an_hour = _share(cpu_s, mission.end_s), recording_mb / (mission.end_s / 3600)
@@ -124,6 +117,28 @@ def replay(run: Path) -> bool:
           f" {share:.1%} of a core at 100 x; memory {memory} MB; {recording_mb:.1f} MB,"
           f" {mb_an_hour:.1f} MB an hour")  # fmt: skip
     return share <= MOST_SHARE and mb_an_hour <= _most_mb_an_hour(cell_m)
+
+
+@contextmanager
+def _sampling(processes: Processes) -> Iterator[list[Sample]]:
+    """Samples the recorder's process, from a thread of its own, as long as the context is there."""
+    samples: list[Sample] = []
+    over = threading.Event()
+
+    def run() -> None:
+        while not over.wait(POLL_S):
+            recorder_id = processes.process_ids.get(RECORDER)
+            sample = _sample(recorder_id) if recorder_id is not None else None
+            if sample is not None:
+                samples.append(sample)
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
+    try:
+        yield samples
+    finally:
+        over.set()
+        thread.join()
 
 
 class _Nobody:

@@ -91,7 +91,7 @@ class Processes:
     @property
     def process_ids(self) -> dict[str, int]:
         """Of each child process, by host."""
-        return {host: child.pid for host, child in self._children.items()}
+        return {host: child.pid for host, child in list(self._children.items())}
 
     def run(self) -> BusResult:
         """Starts all, waits for the run's end; raises RunFailedError, and RunStopped where the observer does."""
