@@ -72,7 +72,7 @@ class _Sheet:
 class Canvas:
     """One recording, written to a file, and shown live where there is a `live_pipe` (see LiveFeed).
 
-    Its only timeline is the simulated time.
+    Its only timeline is the simulated time. It is drawn on by one thread.
 
     `piece_ms`: how much simulated time the columns hold back for the file, and TOGETHER_S of the wall clock at least;
     so much is lost if the process is killed.

@@ -14,15 +14,15 @@ from viz.shapes import OUTLINE_Z_M, ring
 
 
 def put_priorities(canvas: Canvas, priorities: Sequence[PriorityGround]) -> None:
-    """Draws each as an outline that tells its weight; nothing where there are none."""
-    if priorities:
+    """Draws each under its own entity, with what it counts."""
+    for number, one in enumerate(priorities, start=1):
         canvas.put_static(
-            paths.PRIORITIES,
+            f"{paths.PRIORITIES}/{number}",
             rr.LineStrips3D(
-                [ring([Vertex(*corner) for corner in one.polygon_m], OUTLINE_Z_M) for one in priorities],
+                [ring([Vertex(*corner) for corner in outline], OUTLINE_Z_M) for outline in one.outlines_m],
                 colors=[palette.PRIORITY],
                 radii=rr.Radius.ui_points(1.5),
-                labels=[f"risk counts {one.weight:g} times here" for one in priorities],
+                labels=f"risk counts {one.weight:g} times here",
                 show_labels=True,
             ),
         )

@@ -11,9 +11,9 @@ from planner.types import Point
 
 @dataclass(frozen=True)
 class PriorityGround:
-    """Ground, by its corners in the mission frame, whose risk counts `weight` times in second looks."""
+    """Ground whose risk counts `weight` times in second looks, by the corners of its outlines in the mission frame."""
 
-    polygon_m: tuple[Point, ...]
+    outlines_m: tuple[tuple[Point, ...], ...]
     weight: float
 
 

@@ -9,20 +9,19 @@ from typing import Any
 
 import shapely
 from pydantic import TypeAdapter, ValidationError
-from shapely.geometry.base import BaseGeometry
 
 from secondlook.errors import UserError
-from secondlook.scenario.area import Priority
+from secondlook.scenario.area import Priority, priority_grounds
 
 _PRIORITIES = TypeAdapter(list[Priority])
 
 
 @dataclass(frozen=True)
 class PriorityRecord:
-    """One such ground, as far as it lies in the area, mission frame, a polygon or several; its risk counts `weight`
+    """One such ground, as far as it lies in the area and under no later one, mission frame; its risk counts `weight`
     times."""
 
-    ground: BaseGeometry
+    ground: shapely.MultiPolygon
     weight: float
 
 
@@ -33,5 +32,4 @@ def priorities(scenario: Mapping[str, Any], area: shapely.Polygon, folder: Path)
         read = _PRIORITIES.validate_python(told.get("priorities", []) if isinstance(told, dict) else [])
     except ValidationError:
         raise UserError(f"{folder / 'scenario.yaml'}: area.priorities must be as the run wrote them") from None
-    within = [PriorityRecord(shapely.Polygon(one.polygon_m).intersection(area), one.weight) for one in read]
-    return [one for one in within if one.ground.area > 0]
+    return [PriorityRecord(ground, weight) for ground, weight in priority_grounds(area, read)]

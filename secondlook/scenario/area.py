@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
-from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates
+from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates, get_parts
+from shapely.geometry.base import BaseGeometry
 
 from planner.types import SweepFrame
 from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapping, check_pair, refused
@@ -124,3 +126,17 @@ def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["
     corners = np.array(polygon_m)
     across_m, along_m = SweepFrame(0, 0, math.radians(track_heading_deg)).to_sweep(corners[:, 0], corners[:, 1])
     return float(np.ptp(across_m)), float(np.ptp(along_m))
+
+
+def priority_grounds(area: Polygon, priorities: Sequence[Priority]) -> list[tuple[MultiPolygon, float]]:
+    """What counts more or less of an area, with its weight: where several overlap the last one alone."""
+    found: list[tuple[MultiPolygon, float]] = []
+    left: BaseGeometry = area
+    for one in reversed(priorities):
+        outline = Polygon(one.polygon_m)
+        # Where they only touch it is a line or a point.
+        parts = [part for part in get_parts(outline.intersection(left)) if isinstance(part, Polygon) and part.area]
+        if parts:
+            found.append((MultiPolygon(parts), one.weight))
+        left = left.difference(outline)
+    return found[::-1]

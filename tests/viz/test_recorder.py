@@ -134,13 +134,13 @@ def test_cells_outside_the_area_look_like_the_background(
 
 def test_ground_that_counts_more_is_told_on_the_map(messages: list[Received], tmp_path: Path) -> None:
     corners = ((100.0, 50.0), (200.0, 50.0), (200.0, 90.0))
-    recorder = Recorder(RecorderConfig(tmp_path / "one.rrd", priorities=(PriorityGround(corners, 2.5),)))
+    recorder = Recorder(RecorderConfig(tmp_path / "one.rrd", priorities=(PriorityGround((corners,), 2.5),)))
     for received in messages[:50]:
         recorder.on_message(received)
     recorder.close()
-    (outline,) = static(tmp_path / "one.rrd", "/area/priorities", "LineStrips3D:strips")
+    (outline,) = static(tmp_path / "one.rrd", "/area/priorities/1", "LineStrips3D:strips")
     assert [tuple(round(part, 3) for part in corner[:2]) for corner in outline] == [*corners, corners[0]]
-    labels = static(tmp_path / "one.rrd", "/area/priorities", "LineStrips3D:labels")
+    labels = static(tmp_path / "one.rrd", "/area/priorities/1", "LineStrips3D:labels")
     assert labels == ["risk counts 2.5 times here"]
 
 
