@@ -25,8 +25,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -80,17 +79,11 @@ def fly(scenario: str, sets: list[str], folder: Path, *, record: bool) -> Flight
     command += [word for one in sets for word in ("--set", one)] + ([] if record else ["--no-record"])
     before = os.times()
     run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    samples: list[Sample] = []
-    recorder: int | None = None
-    while run.poll() is None:
-        recorder = recorder or (_recorder_of(run.pid) if record else None)
-        sample = _sample(recorder) if recorder else None
-        if sample is not None:
-            samples.append(sample)
-        time.sleep(POLL_S)
+    with _sampling(lambda: _recorder_of(run.pid) if record else None) as samples:
+        _, said = run.communicate()
     after = os.times()
     if run.returncode != 0:
-        raise RuntimeError(f"{scenario}: {run.stderr.read() if run.stderr else ''}")
+        raise RuntimeError(f"{scenario}: {said}")
     mission_s = json.loads((folder / "summary.json").read_text())["time"]["mission_s"]
     recording = folder / "mission.rrd"
     cpu_s = after.children_user + after.children_system - before.children_user - before.children_system
@@ -106,29 +99,29 @@ def replay(run: Path) -> bool:
         recording = Path(folder) / "mission.rrd"
         recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, recording))
         processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), recorder, processes=1)
-        with processes, _sampling(processes) as samples:
+        with processes, _sampling(lambda: processes.process_ids.get(RECORDER)) as samples:
             processes.run()
         recording_mb = recording.stat().st_size / 1e6
     cpu_s = samples[-1].cpu_s
     share, mb_an_hour = _share(cpu_s, mission.end_s), recording_mb / (mission.end_s / 3600)
     cell_m = mission.run.grid.cell_m
-    memory = ", ".join(f"{_memory_at(samples, part):.0f}" for part in (0.1, 0.5, 1.0))
     print(f"{mission.run.scenario}, {cell_m:g} m cells, {mission.end_s:.0f} s: {cpu_s:.1f} s of CPU time,"
-          f" {share:.1%} of a core at 100 x; memory {memory} MB; {recording_mb:.1f} MB,"
+          f" {share:.1%} of a core at 100 x; memory {_memory(samples)} MB; {recording_mb:.1f} MB,"
           f" {mb_an_hour:.1f} MB an hour")  # fmt: skip
     return share <= MOST_SHARE and mb_an_hour <= _most_mb_an_hour(cell_m)
 
 
 @contextmanager
-def _sampling(processes: Processes) -> Iterator[list[Sample]]:
-    """Samples the recorder's process, from a thread of its own, as long as the context is there."""
+def _sampling(recorder: Callable[[], int | None]) -> Iterator[list[Sample]]:
+    """Samples the recorder's process, once `recorder` knows its id, from a thread of its own until the context ends."""
     samples: list[Sample] = []
     over = threading.Event()
 
     def run() -> None:
+        process = None
         while not over.wait(POLL_S):
-            recorder_id = processes.process_ids.get(RECORDER)
-            sample = _sample(recorder_id) if recorder_id is not None else None
+            process = process or recorder()
+            sample = _sample(process) if process else None
             if sample is not None:
                 samples.append(sample)
 
@@ -191,9 +184,10 @@ def _sample(process: int) -> Sample | None:
     return Sample((int(fields[11]) + int(fields[12])) / TICKS_A_SECOND, pages * os.sysconf("SC_PAGE_SIZE") / 1e6)
 
 
-def _memory_at(samples: list[Sample], share: float) -> float:
-    until_s = share * samples[-1].cpu_s
-    return next(one.memory_mb for one in samples if one.cpu_s >= until_s)
+def _memory(samples: list[Sample]) -> str:
+    """Resident memory in MB when a tenth of the CPU time is spent, half of it, and all."""
+    at_s = [share * samples[-1].cpu_s for share in (0.1, 0.5, 1.0)]
+    return ", ".join(f"{next(one.memory_mb for one in samples if one.cpu_s >= until_s):.0f}" for until_s in at_s)
 
 
 def main() -> int:
@@ -221,10 +215,9 @@ def _fly_all(missions: Sequence[str], *, without: bool) -> bool:
         share, mb_an_hour = _share(last.cpu_s, flight.mission_s), flight.recording_mb / hours
         cell_m = 1 if "area.cell_m=1" in sets else 5
         held = held and share <= MOST_SHARE and mb_an_hour <= _most_mb_an_hour(cell_m)
-        memory = ", ".join(f"{_memory_at(flight.samples, part):.0f}" for part in (0.1, 0.5, 1.0))
         name = " ".join([scenario, *(one.rpartition(".")[2] for one in sets)])
-        table.add_row(name, f"{hours:.2f}", f"{last.cpu_s:.1f}", f"{share:.0%}", memory, f"{flight.recording_mb:.1f}",
-                      f"{mb_an_hour:.1f}", f"{flight.all_cpu_s:.0f}",
+        table.add_row(name, f"{hours:.2f}", f"{last.cpu_s:.1f}", f"{share:.0%}", _memory(flight.samples),
+                      f"{flight.recording_mb:.1f}", f"{mb_an_hour:.1f}", f"{flight.all_cpu_s:.0f}",
                       f"{alone.all_cpu_s:.0f}" if alone else "")  # fmt: skip
     Console(width=140).print(table)
     return held

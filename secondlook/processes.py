@@ -90,7 +90,7 @@ class Processes:
 
     @property
     def process_ids(self) -> dict[str, int]:
-        """Of each child process, by host."""
+        """Of each child process that is there by now, by host; may be asked from any thread."""
         return {host: child.pid for host, child in list(self._children.items())}
 
     def run(self) -> BusResult:
