@@ -6,12 +6,13 @@ joining is commutative, associative and idempotent: lost, repeated, late and reo
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
-from planner.risk import LevelArray, residual_risk
+from planner.risk import MOST_LEVELS, LevelArray, residual_risk
 from planner.tiles import tile_shape
 from planner.types import BoolArray, FloatArray, GridSpec
 
@@ -43,10 +44,8 @@ class FleetMap:
     def risk(self) -> FloatArray:
         """The fleet's residual risk, 1 where nobody has looked; shape `grid.shape`."""
         for place, window in self._changed.items():
-            layers = [
-                layer for layer in self.layers.values() if place in layer.versions
-            ]  # the others tell nothing of it
-            self._risk[window] = residual_risk(*self._joined(window, layers), self.rho)
+            layers = [one for one in self.layers.values() if place in one.versions]  # the others tell nothing of it
+            self._risk[window], _ = self._joined(window, layers)
         self._changed.clear()
         return self._risk
 
@@ -122,16 +121,23 @@ class FleetMap:
     def risk_of_layers(self, layers: Iterable[VehicleLayer]) -> tuple[FloatArray, BoolArray]:
         """The same from these layers, of this map or as they once were."""
         everywhere = (slice(None), slice(None))
-        sums, largest = self._joined(everywhere, layers)
-        return residual_risk(sums, largest, self.rho), sums > 0
+        risk, sums = self._joined(everywhere, list(layers))
+        return risk, sums > 0
+
+    def risk_within(self, window: tuple[slice, slice], vehicles: Iterable[str]) -> FloatArray:
+        """`risk` in a window of which these vehicles alone have told, worked out anew."""
+        return self._joined(window, [self.layers[vehicle] for vehicle in vehicles])[0]
 
     def _joined(
-        self, window: tuple[slice, slice], layers: Iterable[VehicleLayer]
-    ) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.int64]], np.ndarray[tuple[int, ...], np.dtype[np.int64]]]:
-        shape = self._risk[window].shape
-        sums = np.zeros(shape, dtype=np.int64)
-        largest = np.zeros(shape, dtype=np.int64)
+        self, window: tuple[slice, slice], layers: Sequence[VehicleLayer]
+    ) -> tuple[FloatArray, NDArray[np.unsignedinteger]]:
+        """Residual risk and summed levels from these layers."""
+        sums = np.zeros(self._risk[window].shape, dtype=np.min_scalar_type(MOST_LEVELS * len(layers)))
         for layer in layers:
             sums += layer.sum_levels[window]
-            np.maximum(largest, layer.largest_levels[window], out=largest)
-        return sums, largest
+        largest = sums
+        if self.rho > 0.0:  # else the sums alone count
+            largest = np.zeros(sums.shape, dtype=np.uint8)
+            for layer in layers:
+                np.maximum(largest, layer.largest_levels[window], out=largest)
+        return residual_risk(sums, largest, self.rho), sums

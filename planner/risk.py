@@ -7,6 +7,7 @@ decided on, is in whole levels of 0.02, so that everyone sees one map.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,6 +65,8 @@ def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.in
     if not 0.0 <= rho <= 1.0:
         raise ValueError(f"rho must lie in [0, 1], not {rho}")
     if rho == 0.0:
+        if sum_levels.dtype in (np.uint8, np.uint16):
+            return _risk_of_levels(np.iinfo(sum_levels.dtype).max).take(sum_levels)
         return _exp(-NATS_PER_LEVEL * sum_levels.astype(np.float64))
     largest = largest_levels.astype(np.float64)
     return _exp(-NATS_PER_LEVEL * (largest + (1.0 - rho) * (sum_levels - largest)))
@@ -72,6 +75,11 @@ def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.in
 def _exp(exponents: FloatArray) -> FloatArray:
     powers: FloatArray = np.exp(exponents)
     return powers
+
+
+@cache
+def _risk_of_levels(most: int) -> FloatArray:
+    return _exp(-NATS_PER_LEVEL * np.arange(most + 1.0))
 
 
 @dataclass(frozen=True)

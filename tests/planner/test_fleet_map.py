@@ -130,6 +130,17 @@ def test_what_is_seen_is_what_has_a_risk_below_1(told: list[TileNews], rho: floa
     np.testing.assert_array_equal(seen, fleet.seen())
 
 
+@given(published(), st.sampled_from([0.0, 0.3]))
+def test_a_window_alone_has_the_risk_that_it_has_in_the_whole(told: list[TileNews], rho: float) -> None:
+    fleet = FleetMap(GRID, rho)
+    for news in told:
+        news.give(fleet)
+    for row, column, rows, columns in PLACES:
+        window = (slice(row, row + rows), slice(column, column + columns))
+        vehicles = {news.vehicle for news in told if news.place[:2] == (row, column)}
+        np.testing.assert_array_equal(fleet.risk_within(window, vehicles), fleet.risk[window])
+
+
 @given(published())
 def test_what_is_known_already_is_no_news(told: list[TileNews]) -> None:
     fleet = FleetMap(GRID)

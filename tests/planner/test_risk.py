@@ -124,6 +124,11 @@ class TestResidualRisk:
         assert residual_risk(sums, largest) == pytest.approx([math.exp(-8)])
         assert residual_risk(sums, largest, 0.5) == pytest.approx([math.exp(-6)])
 
+    @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
+    def test_small_numbers_of_levels_are_looked_up_and_tell_the_same(self, kind: type[np.unsignedinteger]) -> None:
+        every = np.arange(np.iinfo(kind).max + 1)
+        np.testing.assert_array_equal(residual_risk(every.astype(kind), every), residual_risk(every, every))
+
     @given(looks)
     def test_is_the_papers_product_where_looks_are_independent(self, p_detect: list[FloatArray]) -> None:
         layer = layer_of(*p_detect)
