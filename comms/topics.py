@@ -186,6 +186,17 @@ TOPICS: tuple[Topic, ...] = (
 )  # fmt: skip
 
 
+def _shape(key: str) -> tuple[str, int]:
+    """What tells most topics' keys apart: the first chunk, and how many there are."""
+    return key.partition("/")[0], key.count("/")
+
+
+_TOPICS_OF_SHAPE: dict[tuple[str, int], tuple[Topic, ...]] = {
+    shape: tuple(topic for topic in TOPICS if _shape(topic.pattern) == shape)
+    for shape in {_shape(topic.pattern) for topic in TOPICS}
+}
+
+
 def number_of(key: str) -> int:
     """The number that a key ends in, of topics whose keys do."""
     return int(key.rpartition("/")[2])
@@ -193,7 +204,7 @@ def number_of(key: str) -> int:
 
 def topic_of(key: str) -> tuple[Topic, str] | None:
     """The topic of a key below the run id and the vehicle it names ("" for none); None for a key of no topic."""
-    for topic in TOPICS:
+    for topic in _TOPICS_OF_SHAPE.get(_shape(key), ()):
         match = topic.regex.fullmatch(key)
         if match:
             return topic, match.group("vehicle") if topic.has_vehicle else ""

@@ -12,7 +12,7 @@ import re
 import reprlib
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -204,7 +204,7 @@ class Packed:
         size = _size_of(shape, self.most)
         if size * self._dtype.itemsize != len(packed):
             raise WireError(f"{len(packed)} bytes do not fill the shape {shape}")
-        array = np.frombuffer(packed, dtype=self._dtype).reshape(shape)
+        array: NDArray[Any] = np.ndarray(shape, self._dtype, packed)
         if self.steps_per_unit is None:
             return array
         values = array / self.steps_per_unit
@@ -237,10 +237,15 @@ class Mask:
         size = _size_of(shape, self.most)
         if len(packed) != (size + 7) // 8:
             raise WireError(f"{len(packed)} bytes do not fill the shape {shape}")
-        bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=size)  # each 0 or 1, as a truth value is
-        mask = bits.view(np.bool_).reshape(shape)
-        mask.setflags(write=False)
-        return mask
+        return _unpacked(*shape, packed)
+
+
+@lru_cache(maxsize=1024)  # most masks are one of few: all true, or all false
+def _unpacked(rows: int, columns: int, packed: bytes) -> NDArray[np.bool_]:
+    bits = np.unpackbits(np.frombuffer(packed, dtype=np.uint8), count=rows * columns)  # each 0 or 1, as a bool is
+    mask = bits.view(np.bool_).reshape(rows, columns)
+    mask.setflags(write=False)
+    return mask
 
 
 def _size_of(shape: list[Any], most: int) -> int:

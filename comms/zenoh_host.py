@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import queue
 import time
@@ -86,7 +87,8 @@ class _Line:
     def mail(self) -> Iterator[_Mail]:
         """Key below the run id and payload of what has come. What a word tells of has come before it as long as both
         took the same way; whoever waits for it looks again."""
-        return ((key.removeprefix(self._keys.root), payload) for key, payload in self._mailbox.take())
+        root = self._keys.root
+        return ((key.removeprefix(root), payload) for key, payload in self._mailbox.take())
 
     def interrupt(self) -> None:
         """From any thread: whoever waits for words gets Interrupted, after those that are there already."""
@@ -216,10 +218,9 @@ class ListenerHost:
 
     def _release(self, *, up_to_ms: int | None) -> None:
         self._held.sort(key=lambda one: one.header.order)
-        ready = self._held
-        self._held = []
+        count = len(self._held)
         if up_to_ms is not None:
-            self._held = [one for one in ready if one.header.sent_ms > up_to_ms]
-            ready = [one for one in ready if one.header.sent_ms <= up_to_ms]
+            count = bisect.bisect_right(self._held, up_to_ms, key=lambda one: one.header.sent_ms)
+        ready, self._held = self._held[:count], self._held[count:]
         for one in ready:
             self._listener.on_message(one)

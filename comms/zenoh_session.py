@@ -14,6 +14,8 @@ import zenoh
 CONNECT_TIMEOUT_S = 10.0
 PATIENCE_S = 60.0
 LARGEST_MESSAGE_BYTES = 4 << 20
+PACKET_BYTES = 8 << 10  # each has its memory cleared before it is received, however little comes
+MOST_PACKETS = 16  # that may wait to be sent; the most there may be
 MOST_MAIL = 1 << 20
 
 
@@ -65,6 +67,13 @@ def open_client(
         return zenoh.open(config)
     except zenoh.ZError as error:
         raise ConnectionFailedError(f"no connection to the hub at {endpoint} as {user}") from error
+
+
+def read_where_packets_are_awaited() -> None:
+    """Lets the thread that waits for packets read them, where else it wakes another one for each. To be called before
+    the first session, in a process that holds nothing but a client: where it held the hub too, that would keep itself
+    from reading when it waits for its own client."""
+    os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: app))")
 
 
 def put(session: zenoh.Session, key: str, payload: bytes, *, at_once: bool = True) -> None:
@@ -135,6 +144,8 @@ def _config(mode: str, patience_s: float, *, listen: Iterable[str] = (), connect
     set_config(config, "transport/shared_memory/enabled", False)  # a killed process would leave segments behind
     set_config(config, "transport/link/rx/max_message_size", LARGEST_MESSAGE_BYTES)
     set_config(config, "transport/link/tx/lease", round(patience_s * 1000))
+    set_config(config, "transport/link/tx/batch_size", PACKET_BYTES)
+    set_config(config, "transport/link/tx/queue/size/real_time", MOST_PACKETS)
     block_us = round(patience_s * 1e6)
     set_config(config, "transport/link/tx/queue/congestion_control/block/wait_before_close", block_us)
     return config

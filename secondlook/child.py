@@ -32,13 +32,15 @@ from comms.wall_host import RefusedError
 from comms.wall_seats import ListenerSeat, NodeSeat
 from comms.zenoh_host import ListenerHost, serve_nodes
 from comms.zenoh_hub import FleetError, HostLostError, Hub
-from comms.zenoh_session import ConnectionFailedError, open_client, open_hub
+from comms.zenoh_session import ConnectionFailedError, open_client, open_hub, read_where_packets_are_awaited
 from secondlook.child_order import STATUS_FD, ChildOrder, read_order
 from secondlook.node_spec import make_nodes
 from secondlook.wall_child import run_host, run_hub
 
 FAILED = 1  # exit codes: after a sentence for the launcher, and when the launcher is gone
 ORPHANED = 3
+
+YOUNG_OBJECTS = 20_000  # so many are looked through for garbage together: hardly any is, as messages hold no circles
 
 
 def main() -> int:
@@ -54,7 +56,9 @@ def main() -> int:
     try:
         if order.is_hub:
             _be_hub(order, tell)
-        elif order.is_listener:
+            return 0
+        read_where_packets_are_awaited()
+        if order.is_listener:
             _be_listener(order)
         else:
             _be_host(order)
@@ -96,6 +100,7 @@ class _LauncherWatch:
 def _make_nodes(order: ChildOrder) -> dict[str, Any]:
     nodes = make_nodes(order.specs)
     gc.freeze()  # what there is by now stays: no use in looking through all modules for garbage again and again
+    gc.set_threshold(YOUNG_OBJECTS)
     return nodes
 
 
