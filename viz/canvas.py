@@ -3,44 +3,43 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from planner.types import FloatArray
 from viz.live_feed import LiveFeed, new_stream
 from viz.paths import TIMELINE
 
-Build = Callable[[FloatArray], Iterable[rr.ComponentColumn]]
+Build = Callable[[Sequence[Any]], Iterable[rr.ComponentColumn]]
 
 TOGETHER_S = 2.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
 LIVE_EVERY_S = 0.25  # of the wall clock; how long a live view waits for columns
 
 
 class Column:
-    """Rows of numbers of one entity, held until they are sent: a call a row would cost far more."""
+    """Rows of one entity, held until they are sent: a call a row would cost far more."""
 
     def __init__(self, path: str, build: Build, sheets: Iterable[_Sheet]) -> None:
         self._path = path
         self._build = build
-        self._held: dict[_Sheet, tuple[list[int], list[tuple[float, ...]]]] = {sheet: ([], []) for sheet in sheets}
+        self._held: dict[_Sheet, tuple[list[int], list[Any]]] = {sheet: ([], []) for sheet in sheets}
 
-    def add(self, time_ms: int, *numbers: float) -> None:
+    def add(self, time_ms: int, row: Any) -> None:
         """Holds one row."""
         for times_ms, rows in self._held.values():
             times_ms.append(time_ms)
-            rows.append(numbers)
+            rows.append(row)
 
     def send(self, sheet: _Sheet) -> None:
         """Sends what is held for it."""
         times_ms, rows = self._held[sheet]
         if times_ms:
             times = np.array(times_ms, dtype="timedelta64[ms]")
-            numbers = np.array(rows, dtype=np.float64)
-            sheet.stream.send_columns(self._path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(numbers))
+            sheet.stream.send_columns(self._path, [rr.TimeColumn(TIMELINE, duration=times)], self._build(rows))
             self._held[sheet] = ([], [])
 
 
@@ -89,7 +88,7 @@ class Canvas:
         # A name from the start: without any entry the file would not get the footer that completes it.
         for sheet in self._sheets:
             sheet.stream.send_recording_name(recording_id)
-        self._columns: list[Column] = []
+        self._columns: dict[str, Column] = {}
 
     def present(self, name: str, blueprint: rrb.Blueprint, mission: rr.AnyValues) -> None:
         """Says what the recording is called, how it is laid out and what mission it is of."""
@@ -109,10 +108,10 @@ class Canvas:
             sheet.stream.log(path, parts[0], *parts[1:], static=True)
 
     def column(self, path: str, build: Build) -> Column:
-        """A column that is sent in pieces; `build` makes its components from an array of shape (rows, numbers)."""
-        column = Column(path, build, self._sheets)
-        self._columns.append(column)
-        return column
+        """The column of an entity, which is sent in pieces; `build` makes its components from a piece's rows."""
+        if path not in self._columns:
+            self._columns[path] = Column(path, build, self._sheets)
+        return self._columns[path]
 
     def advance(self, time_ms: int) -> None:
         """Sends the columns where a whole piece is held."""
@@ -131,5 +130,5 @@ class Canvas:
             self._live.close()
 
     def _send(self, sheet: _Sheet) -> None:
-        for column in self._columns:
+        for column in self._columns.values():
             column.send(sheet)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import cache
+
 import numpy as np
 import rerun as rr
 
 from comms.messages import AgentState, Contact, Mode, Nav, Plan, RosterVehicle, RunInfo, TaskState, TaskStatus
 from comms.node import Received
-from planner.types import FloatArray
 from viz import palette, paths
 from viz.canvas import Canvas, Column
 from viz.shapes import FLOWN_Z_M, PLAN_Z_M, POINT_Z_M, VEHICLE_Z_M, Extent, body_quaternions, glyph, swath
@@ -40,7 +42,7 @@ class Fleet:
         vehicle, time_ms = received.vehicle, received.header.sent_ms
         if vehicle not in self._poses:
             self._introduce(vehicle)
-        self._poses[vehicle].add(time_ms, nav.x_m, nav.y_m, nav.heading_rad)
+        self._poses[vehicle].add(time_ms, (nav.x_m, nav.y_m, nav.heading_rad))
         self._trails[vehicle].add(time_ms, nav.x_m, nav.y_m)
 
     def on_plan(self, received: Received, plan: Plan) -> None:
@@ -72,28 +74,20 @@ class Fleet:
             self._doing[vehicle] = (state.mode, state.works_on)
             what = "strip" if state.mode is Mode.REVISIT else "track"
             doing = f"{state.mode.value}{f' of {what} {state.works_on}' if state.works_on else ''}"
-            told = rr.AnyValues(doing=doing, battery_share=round(state.battery, 3))
-            self._canvas.put(time_ms, f"{paths.pose(vehicle)}/glyph", told)
+            self._canvas.column(f"{paths.pose(vehicle)}/glyph", _doings).add(time_ms, (doing, round(state.battery, 3)))
         if state.mode is before:
             return
         self._modes[vehicle] = state.mode
-        self._canvas.put(time_ms, paths.mode(vehicle), rr.StateChange(state=state.mode.value))
+        self._canvas.column(paths.mode(vehicle), _changes).add(time_ms, state.mode.value)
         if vehicle in self._roster and (state.mode in SONAR_ON) is not (before in SONAR_ON):
             known = self._roster[vehicle]
-            lines = swath(known.nadir_gap_m, known.swath_m) if state.mode in SONAR_ON else []
-            self._canvas.put(
-                time_ms,
-                f"{paths.pose(vehicle)}/swath",
-                rr.LineStrips3D(lines, colors=[self._colours[vehicle]], radii=rr.Radius.ui_points(1.5)),
-            )
+            self._canvas.put(time_ms, f"{paths.pose(vehicle)}/swath", _beam(known if state.mode in SONAR_ON else None))
 
     def on_task_status(self, received: Received, status: TaskStatus) -> None:
         """Notes how the vehicle's task stands when that changes."""
         if status.state is not self._tasks.get(received.vehicle):
             self._tasks[received.vehicle] = status.state
-            self._canvas.put(
-                received.header.sent_ms, paths.task(received.vehicle), rr.StateChange(state=status.state.value)
-            )
+            self._canvas.column(paths.task(received.vehicle), _changes).add(received.header.sent_ms, status.state.value)
 
     def on_contact(self, received: Received, contact: Contact) -> None:
         """Marks a detection where the vehicle places it; the view keeps all that came before."""
@@ -119,6 +113,8 @@ class Fleet:
                 [[0.0, 0.0, 0.0]], labels=vehicle, show_labels=True, colors=[colour], radii=rr.Radius.ui_points(1.0)
             ),
         )
+        beam = rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(1.5))
+        self._canvas.put_static(f"{here}/swath", beam)
         flown = f"{paths.FLOWN}/{vehicle}"
         self._canvas.put_static(
             flown, rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(self._trail_points))
@@ -146,17 +142,33 @@ class Trail:
             return
         last_ms, last_x_m, last_y_m = self._last
         if abs(time_ms - last_ms) >= TRAIL_STEP_MS:
-            self._column.add(time_ms, last_x_m, last_y_m, FLOWN_Z_M, x_m, y_m, FLOWN_Z_M)
+            self._column.add(time_ms, ((last_x_m, last_y_m, FLOWN_Z_M), (x_m, y_m, FLOWN_Z_M)))
             self._last = (time_ms, x_m, y_m)
 
 
-def _poses(rows: FloatArray) -> rr.ComponentColumnList:
-    places = np.column_stack([rows[:, :2], np.full(len(rows), VEHICLE_Z_M)])
-    return rr.Transform3D.columns(translation=places, quaternion=body_quaternions(rows[:, 2]))
+def _poses(rows: Sequence[tuple[float, float, float]]) -> rr.ComponentColumnList:
+    x_m, y_m, heading_rad = np.array(rows).T
+    places = np.column_stack([x_m, y_m, np.full(len(rows), VEHICLE_Z_M)])
+    return rr.Transform3D.columns(translation=places, quaternion=body_quaternions(heading_rad))
 
 
-def _segments(rows: FloatArray) -> rr.ComponentColumnList:
-    return rr.LineStrips3D.columns(strips=rows.reshape(-1, 2, 3).astype(np.float32))
+def _segments(rows: Sequence[Sequence[tuple[float, float, float]]]) -> rr.ComponentColumnList:
+    return rr.LineStrips3D.columns(strips=np.array(rows, dtype=np.float32))
+
+
+@cache
+def _beam(vehicle: RosterVehicle | None) -> rr.LineStrips3D:
+    """What a vehicle sees at once; made once, which takes longer than to draw it. None while its sonar is off."""
+    return rr.LineStrips3D.from_fields(strips=swath(vehicle.nadir_gap_m, vehicle.swath_m) if vehicle else [])
+
+
+def _changes(states: Sequence[str]) -> rr.ComponentColumnList:
+    return rr.StateChange.columns(state=states)
+
+
+def _doings(rows: Sequence[tuple[str, float]]) -> rr.ComponentColumnList:
+    doing, battery_share = zip(*rows, strict=True)
+    return rr.AnyValues.columns(doing=doing, battery_share=battery_share)
 
 
 def _states(colours: dict[Mode, palette.Colour] | dict[TaskState, palette.Colour]) -> rr.StateConfiguration:

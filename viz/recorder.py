@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import rerun as rr
@@ -34,7 +34,7 @@ from viz.recorder_config import RecorderConfig
 from viz.risk_map import RiskMap
 from viz.second_looks import SecondLooks
 from viz.shapes import extent_of
-from viz.story import Line, Story
+from viz.story import TELLING, Line, Story
 from viz.task_table import TaskTable
 from viz.truth import Truth
 
@@ -102,19 +102,21 @@ class _Mission:
             TruthLook: (truth.on_look,),
             TruthPose: (truth.on_pose,),
         }
+        for one in TELLING:
+            self._draw[one] = (*self._draw.get(one, ()), self._tell)
 
     def draw(self, received: Received) -> None:
         if received.header.sent_ms != self._time_ms:
             self._advance(received.header.sent_ms)
         for draw in self._draw.get(type(received.message), ()):
             draw(received, received.message)
-        self._put_lines(self._story.tell(received))
 
     def _advance(self, time_ms: int) -> None:
         self._time_ms = time_ms
         self._map.advance(time_ms)
         self._second_looks.advance(time_ms)
         self._table.advance(time_ms)
+        self._put_lines(self._story.rest(before_ms=time_ms))
         self._canvas.advance(time_ms)
 
     def finish(self) -> None:
@@ -123,13 +125,19 @@ class _Mission:
         self._table.finish()
         self._put_lines(self._story.rest())
 
+    def _tell(self, received: Received, message: Message) -> None:
+        self._put_lines(self._story.tell(received))
+
     def _put_lines(self, lines: Iterable[Line]) -> None:
         for line in lines:
-            text = f"{line.sender}: {line.text}"
-            # Plain lines have no colour of their own, so that they are legible in a light viewer and in a dark one.
-            words = (
-                rr.TextLog(text, level=rr.TextLogLevel.WARN, color=palette.WARNING)
-                if line.warns
-                else rr.TextLog(text, level=rr.TextLogLevel.INFO)
-            )
-            self._canvas.put(line.time_ms, f"{paths.LOG}/{line.sender}", words)
+            path, text = f"{paths.LOG}/{line.sender}", f"{line.sender}: {line.text}"
+            if line.warns:
+                warning = rr.TextLog(text, level=rr.TextLogLevel.WARN, color=palette.WARNING)
+                self._canvas.put(line.time_ms, path, warning)
+            else:
+                self._canvas.column(path, _plain_lines).add(line.time_ms, text)
+
+
+def _plain_lines(texts: Sequence[str]) -> rr.ComponentColumnList:
+    # They have no colour of their own, so that they are legible in a light viewer and in a dark one.
+    return rr.TextLog.columns(text=texts, level=[rr.TextLogLevel.INFO] * len(texts))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import defaultdict
 
 import numpy as np
 import rerun as rr
@@ -11,7 +12,7 @@ from comms.messages import CoverageTile, RunInfo
 from comms.node import Received
 from planner.fleet_map import FleetMap
 from planner.region import Region
-from planner.types import BoolArray
+from planner.types import BoolArray, FloatArray
 from viz import palette, paths
 from viz.blocks import Block, Blocks
 from viz.canvas import Canvas
@@ -53,20 +54,23 @@ class RiskMap:
         self._map = FleetMap(run.grid.spec, run.rho)
         self._inside = _inside(run)
         self._blocks = Blocks(run.grid.spec)
+        self._whole = {index for index, block in enumerate(self._blocks.all) if self._inside[block.window].all()}
         self._tally = RiskTally(len(self._blocks.all))
         self._pace = Pace(max(draw_every_ms, LARGE_EVERY_MS if self._blocks.are_large else 0))
+        self._lookers: defaultdict[int, set[str]] = defaultdict(set)  # who has told of a block
         self._changed: set[int] = set()
         self._now_ms = 0
         self._statistics = {
-            path: canvas.column(path, lambda rows: rr.Scalars.columns(scalars=rows[:, 0])) for path in METRICS
+            path: canvas.column(path, lambda rows: rr.Scalars.columns(scalars=rows)) for path in METRICS
         }
         for path, (name, colour) in METRICS.items():
             canvas.put_static(path, rr.SeriesLines(colors=[colour], names=[name], widths=[2.0]))
         self._put_frame(run, extent)
         for index, block in enumerate(self._blocks.all):
             self._put_place(block, run.grid.spec.cell_m)
-            self._tally.replace(index, self._map.risk[block.window][self._inside[block.window]])
-            self._cover_block(0, block)
+            nobody = np.ones_like(self._inside[block.window], dtype=np.float64)
+            self._count(index, nobody)
+            self._cover_block(0, block, nobody)
         self._add_statistics(0)
 
     def on_tile(self, received: Received, tile: CoverageTile) -> None:
@@ -78,7 +82,9 @@ class RiskMap:
         except ValueError:
             return
         if news:
-            self._changed.add(self._blocks.index_at(*place))
+            index = self._blocks.index_at(*place)
+            self._lookers[index].add(received.vehicle)
+            self._changed.add(index)
             self._pace.note(received.header.sent_ms)
 
     def advance(self, time_ms: int) -> None:
@@ -101,15 +107,20 @@ class RiskMap:
 
     def _draw_block(self, time_ms: int, index: int) -> None:
         block = self._blocks.all[index]
-        risk = self._map.risk[block.window]
+        risk = self._map.risk_within(block.window, self._lookers[index])
         # The first row of an image is drawn at the far end of the along axis.
         levels = np.rint(risk[::-1] * 255).astype(np.uint8)
         self._canvas.put(time_ms, f"{paths.RISK}/{block.name}", rr.GridMap.from_fields(data=levels.tobytes()))
-        if self._tally.replace(index, risk[self._inside[block.window]]):
-            self._cover_block(time_ms, block)
+        if self._count(index, risk):
+            self._cover_block(time_ms, block, risk)
 
-    def _cover_block(self, time_ms: int, block: Block) -> None:
-        unseen = np.where(self._map.risk[block.window] == 1.0, _UNSEEN, _CLEAR)
+    def _count(self, index: int, risk: FloatArray) -> bool:
+        """Counts a block's risk; whether another number of its cells is seen now."""
+        inside = self._inside[self._blocks.all[index].window]
+        return self._tally.replace(index, risk.ravel() if index in self._whole else risk[inside])
+
+    def _cover_block(self, time_ms: int, block: Block, risk: FloatArray) -> None:
+        unseen = np.where(risk == 1.0, _UNSEEN, _CLEAR)
         cover = np.where(self._inside[block.window], unseen, _OUTSIDE)[::-1]  # cells outside count for nothing
         self._canvas.put(time_ms, f"{paths.UNSEEN}/{block.name}", rr.GridMap.from_fields(data=cover.tobytes()))
 
@@ -136,7 +147,7 @@ class RiskMap:
         self._put_scale(extent)
 
     def _put_place(self, block: Block, cell_m: float) -> None:
-        rows, columns = self._map.risk[block.window].shape
+        rows, columns = self._inside[block.window].shape
         place = rr.Transform3D(translation=[block.first_column * cell_m, block.first_row * cell_m, 0.0])
         self._canvas.put_static(f"{paths.RISK}/{block.name}", place, _levels(columns, rows, cell_m))
         self._canvas.put_static(f"{paths.UNSEEN}/{block.name}", place, _cover(columns, rows, cell_m))

@@ -14,18 +14,16 @@ class RiskTally:
     """Counts cells and sums their risk, per block and step of risk."""
 
     def __init__(self, blocks: int) -> None:
-        self._cells = np.zeros((blocks, STEPS), dtype=np.int32)
-        self._sums = np.zeros((blocks, STEPS))
-        self._seen = np.zeros(blocks, dtype=np.int64)
+        self._cells = np.zeros((blocks, STEPS + 1), dtype=np.int32)  # the last step is that of what nobody has seen
+        self._sums = np.zeros((blocks, STEPS + 1))
 
     def replace(self, block: int, risk: FloatArray) -> bool:
         """Takes the risk of a block's cells that count, shape (n,); whether another number of them is seen now."""
-        step = np.minimum((risk * STEPS).astype(np.intp), STEPS - 1)
-        self._cells[block] = np.bincount(step, minlength=STEPS)
-        self._sums[block] = np.bincount(step, weights=risk, minlength=STEPS)
-        before = self._seen[block]
-        self._seen[block] = np.count_nonzero(risk < 1.0)
-        return bool(self._seen[block] != before)
+        step = (risk * STEPS).astype(np.intp)
+        before = self._cells[block, STEPS]
+        self._cells[block] = np.bincount(step, minlength=STEPS + 1)
+        self._sums[block] = np.bincount(step, weights=risk, minlength=STEPS + 1)
+        return bool(self._cells[block, STEPS] != before)
 
     def statistics(self) -> RiskStatistics:
         """As `planner.risk.risk_statistics` has them. Raises ValueError where no cell counts."""
@@ -40,5 +38,5 @@ class RiskTally:
             cells=count,
             mean=float(sums.sum()) / count,
             worst30_mean=worst_sum / worst,
-            uncovered_share=1.0 - int(self._seen.sum()) / count,
+            uncovered_share=int(cells[0]) / count,
         )

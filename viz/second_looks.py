@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 
 import rerun as rr
 
@@ -15,27 +16,63 @@ from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each
 IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
-OPEN_EVERY_MS = 60_000
+OFTEN_EVERY_MS = 60_000
 
 
 class SecondLooks:
     """Draws each hotspot and each strip under its own entity; what is withdrawn disappears.
 
-    A change of a strip's state is drawn at once. As long as it is open its place and its worth often change: such
-    changes of all strips are drawn together, at most once a minute, of each strip the latest, at the time it was said.
+    A change of state is drawn at once. As long as a hotspot is active, or a strip open, it changes often: such changes
+    are drawn together, at most once a minute, of each the latest, at the time it was said.
     """
 
     def __init__(self, canvas: Canvas, extent: Extent) -> None:
         self._canvas = canvas
         self._labelled_m = LABELLED_SHARE * max(extent.width_m, extent.height_m)
-        self._pace = Pace(OPEN_EVERY_MS)
-        self._states: dict[int, StripState] = {}
-        self._held: dict[int, tuple[int, StripStatus]] = {}
+        self._pace = Pace(OFTEN_EVERY_MS)
+        self._states: dict[str, HotspotState | StripState] = {}
+        self._held: dict[str, tuple[int, Callable[[], None]]] = {}
         self._drawn: dict[int, tuple[object, object]] = {}
         self._labelled: set[int] = set()
 
     def on_hotspot(self, received: Received, hotspot: Hotspot) -> None:
-        """Draws the outline as it is now."""
+        """Draws the outline, with its number and its mean risk."""
+        often = hotspot.state is HotspotState.ACTIVE
+        self._take(received, hotspot.state, often, partial(self._draw_hotspot, received, hotspot))
+
+    def on_strip(self, received: Received, strip: StripStatus) -> None:
+        """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
+        draw = partial(self._draw_strip, received.header.sent_ms, received.number, strip)
+        self._take(received, strip.state, strip.state is StripState.OPEN, draw)
+
+    def advance(self, time_ms: int) -> None:
+        """Draws what was held back if its minute is over."""
+        if self._held and self._pace.due(time_ms) is not None:
+            self.finish()
+
+    def finish(self) -> None:
+        """Draws what was held back."""
+        for _, draw in self._held.values():
+            draw()
+        self._held.clear()
+
+    def _take(
+        self, received: Received, state: HotspotState | StripState, often: bool, draw: Callable[[], None]
+    ) -> None:
+        """Draws what a message says, or holds it back if it tells no new state and what it is of changes often."""
+        key, time_ms = received.key, received.header.sent_ms
+        before = self._states.get(key)
+        self._states[key] = state
+        if before is not state or not often:
+            self._held.pop(key, None)  # what was said before is out of date
+            draw()
+        elif key in self._held and time_ms < self._held[key][0]:  # it comes late
+            draw()
+        else:
+            self._held[key] = (time_ms, draw)
+            self._pace.note(time_ms)
+
+    def _draw_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         path = f"{paths.HOTSPOTS}/{received.vehicle}/{received.number}"
         if hotspot.state is HotspotState.WITHDRAWN:
             self._canvas.put(received.header.sent_ms, path, rr.Clear(recursive=False))
@@ -46,34 +83,7 @@ class SecondLooks:
         )
         self._canvas.put(received.header.sent_ms, path, outline, _hotspot_look())
 
-    def on_strip(self, received: Received, strip: StripStatus) -> None:
-        """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
-        number, time_ms = received.number, received.header.sent_ms
-        before = self._states.get(number)
-        self._states[number] = strip.state
-        if before is strip.state is StripState.OPEN:
-            _, held = self._held.get(number, (time_ms, strip))
-            if strip.revision < held.revision:  # it comes late
-                self._draw(time_ms, number, strip)
-            else:
-                self._held[number] = (time_ms, strip)
-                self._pace.note(time_ms)
-        else:
-            self._held.pop(number, None)  # what was said before is out of date
-            self._draw(time_ms, number, strip)
-
-    def advance(self, time_ms: int) -> None:
-        """Draws what was held back if its minute is over."""
-        if self._held and self._pace.due(time_ms) is not None:
-            self.finish()
-
-    def finish(self) -> None:
-        """Draws what was held back."""
-        for number, (time_ms, strip) in self._held.items():
-            self._draw(time_ms, number, strip)
-        self._held.clear()
-
-    def _draw(self, time_ms: int, number: int, strip: StripStatus) -> None:
+    def _draw_strip(self, time_ms: int, number: int, strip: StripStatus) -> None:
         path = f"{paths.STRIPS}/{number}"
         drawn_look, drawn_place = self._drawn.pop(number, (None, None))
         if strip.state is StripState.WITHDRAWN:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import rerun as rr
@@ -30,7 +31,7 @@ class TaskTable:
     """Writes the table anew whenever a task or the count of strips changes, once for all that is said at one time."""
 
     def __init__(self, canvas: Canvas, run: RunInfo) -> None:
-        self._canvas = canvas
+        self._column = canvas.column(paths.TASKS, _documents)
         self._in_hand: dict[str, _Row | None] = {one.vehicle: None for one in run.vehicles if one.role.revisits}
         self._ended: deque[_Row] = deque(maxlen=MOST_ENDED)
         self._strips: dict[int, StripStatus] = {}
@@ -75,8 +76,7 @@ class TaskTable:
 
     def _write(self, changed_ms: int | None) -> None:
         if changed_ms is not None:
-            words = rr.TextDocument(self._words(), media_type=rr.MediaType.MARKDOWN)
-            self._canvas.put(changed_ms, paths.TASKS, words)
+            self._column.add(changed_ms, self._words())
 
     def _words(self) -> str:
         if not self._in_hand:
@@ -96,3 +96,7 @@ class TaskTable:
         ends = f"about {status.ends_ms / 1000:.0f} s" if status.state in IN_HAND else f"{row.time_ms / 1000:.0f} s"
         state = status.state.value.replace("_", " ")
         return f"| {row.vehicle} | {status.strip} | {state} | {risk} | {ends} |"
+
+
+def _documents(texts: Sequence[str]) -> rr.ComponentColumnList:
+    return rr.TextDocument.columns(text=texts, media_type=[rr.MediaType.MARKDOWN] * len(texts))

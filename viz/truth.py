@@ -45,7 +45,7 @@ class Truth:
             look = rr.Points3D.from_fields(colors=[palette.TRUE_POSE], radii=rr.Radius.ui_points(3.0))
             self._canvas.put_static(path, look)
             self._poses[vehicle] = self._canvas.column(path, lambda rows: rr.Points3D.columns(positions=rows))
-        self._poses[vehicle].add(received.header.sent_ms, pose.x_m, pose.y_m, POINT_Z_M)
+        self._poses[vehicle].add(received.header.sent_ms, (pose.x_m, pose.y_m, POINT_Z_M))
 
     def _put_targets(self, received: Received, path: str, places: FloatArray, colour: palette.Colour) -> None:
         points = rr.Points3D(places, colors=[colour], radii=rr.Radius.ui_points(TARGET_POINTS))

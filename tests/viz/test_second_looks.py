@@ -1,4 +1,4 @@
-"""How often strips are drawn: changes of state at once, the changes of open strips once a minute."""
+"""How often hotspots and strips are drawn: changes of state at once, those of what is active or open once a minute."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from comms import topics
 from comms.codec import Header
-from comms.messages import MissionOver, RunInfo, StripState, StripStatus
+from comms.messages import Hotspot, HotspotState, MissionOver, RunInfo, StripState, StripStatus, Vertex
 from comms.node import Received
 from tests.viz.mission_stream import mission
 from tests.viz.recordings import rows
@@ -31,6 +31,14 @@ def says(
     return Received(
         topics.STRIP.key(number=number), topics.STRIP, "", Header("coordinator", 0, 0, round(time_s * 1000)), strip
     )
+
+
+def spots(time_s: float, mean_risk: float, state: HotspotState = HotspotState.ACTIVE) -> Received:
+    """The primary's hotspot 1 as it is from a time on."""
+    corners = tuple(Vertex(x_m, y_m) for x_m, y_m in ((0.0, 0.0), (20.0, 0.0), (0.0, 20.0)))
+    hotspot = Hotspot(1, state, corners, mean_risk, 8, growing=False, merged_into=0)
+    header = Header("primary", 0, 0, round(time_s * 1000))
+    return Received(topics.HOTSPOT.key(vehicle="primary", number=1), topics.HOTSPOT, "primary", header, hotspot)
 
 
 def passes(time_s: float) -> Received:
@@ -103,6 +111,17 @@ def test_what_is_held_back_is_drawn_when_its_minute_is_over(record: Record, tmp_
     path = record(said, tmp_path / "delayed.rrd")
     assert worths(path, 1) == [(0, "1"), (1, "2"), (3, "3")]
     assert worths(path, 2) == [(124, "5"), (125, "6"), (127, "7")]
+
+
+def test_changes_of_an_active_hotspot_are_drawn_once_a_minute(record: Record, tmp_path: Path) -> None:
+    gone = HotspotState.WITHDRAWN
+    stream = [spots(10, 0.9), spots(20, 0.8), passes(21), spots(30, 0.7), spots(40, 0.6), passes(81), spots(82, 0.5)]
+    stream += [spots(90, 0.5, gone), spots(100, 0.4), spots(110, 0.3)]
+    path = record([RUN, *stream], tmp_path / "hotspots.rrd")
+    told = rows(path, "/hotspots/primary/1", "LineStrips3D:labels")
+    risks = [(time_ms / 1000, text.rpartition(" ")[2]) for time_ms, (text,) in told]
+    assert risks == [(10, "0.90"), (20, "0.80"), (40, "0.60"), (100, "0.40"), (110, "0.30")]
+    assert [time_ms for time_ms, _ in rows(path, "/hotspots/primary/1", "Clear:is_recursive")] == [90_000]
 
 
 STATES = st.sampled_from([StripState.OPEN] * 6 + [StripState.OFFERED, StripState.WITHDRAWN])
