@@ -10,7 +10,9 @@ long: name it. `--without`: flies each once more with --no-record.
 
 `--replay`: flies nothing, but says over Zenoh, at 100 times real time, what was said in a run that was flown, to a
 recorder in a process of its own. That takes minutes where flying `wide` at 1 m cells takes most of an hour, and is the
-speed that the limits are told for: at a slower one messages come less close together, and each costs more.
+speed that the limits are told for: at a slower one messages come less close together, and each costs more. Beside it a
+reference is timed, as a machine may be twice as fast in one minute as in another: what msgpack alone takes to unpack as
+many messages, measured a thousand of them at a time all along.
 
 `of a core at 100 x`: the recorder's CPU time over a hundredth of the mission's. `memory at`: its resident memory when a
 tenth of its CPU time is spent, half of it, and at the end.
@@ -25,11 +27,13 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgpack
 from rich.console import Console
 from rich.table import Table
 
@@ -51,6 +55,7 @@ DEFAULT = (
 )
 TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 POLL_S = 0.05
+SAMPLED = 1000  # messages that the reference is timed for at once
 MOST_SHARE, MOST_MB_AN_HOUR_5M, MOST_MB_AN_HOUR_1M = 0.25, 20.0, 200.0
 
 
@@ -90,16 +95,40 @@ def fly(scenario: str, sets: list[str], folder: Path, *, record: bool) -> Flight
     return Flight(mission_s, cpu_s, samples, recording.stat().st_size / 1e6 if record else 0.0)
 
 
+class Unpacking:
+    """The reference: how long msgpack takes for a message, on average over what it was timed for."""
+
+    def __init__(self, payloads: Sequence[bytes]) -> None:
+        self._payloads = payloads[:: max(1, len(payloads) // SAMPLED)]
+        self._times = 0
+        self._cpu_s = 0.0
+
+    def __call__(self) -> None:
+        """Times it once more."""
+        before_s = time.thread_time()
+        for payload in self._payloads:
+            msgpack.unpackb(payload)
+        self._cpu_s += time.thread_time() - before_s
+        self._times += len(self._payloads)
+
+    @property
+    def a_message_s(self) -> float:
+        """CPU time for one message."""
+        return self._cpu_s / self._times
+
+
 def replay(run: Path) -> bool:
     """Has the messages of a run recorded anew and prints what that costs; whether the limits are held."""
     mission, scenario = secondlook.load(run), load_scenario(str(run / "scenario.yaml"))
     fleet = build_fleet(scenario, record=True)
+    payloads = [received.payload for received in mission.received()]
+    reference = Unpacking(payloads)
     again = {node_id: NodeSpec("bench.replayed:Replayed", ReplayedConfig(node_id, run)) for node_id in fleet.specs}
     with tempfile.TemporaryDirectory(prefix="secondlook-cost-") as folder:
         recording = Path(folder) / "mission.rrd"
         recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, recording))
         processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), recorder, processes=1)
-        with processes, _sampling(lambda: processes.process_ids.get(RECORDER)) as samples:
+        with processes, _sampling(lambda: processes.process_ids.get(RECORDER), reference) as samples:
             processes.run()
         recording_mb = recording.stat().st_size / 1e6
     cpu_s = samples[-1].cpu_s
@@ -108,12 +137,17 @@ def replay(run: Path) -> bool:
     print(f"{mission.run.scenario}, {cell_m:g} m cells, {mission.end_s:.0f} s: {cpu_s:.1f} s of CPU time,"
           f" {share:.1%} of a core at 100 x; memory {_memory(samples)} MB; {recording_mb:.1f} MB,"
           f" {mb_an_hour:.1f} MB an hour")  # fmt: skip
+    print(f"{cpu_s / (reference.a_message_s * len(payloads)):.0f} times what msgpack takes to unpack the"
+          f" {len(payloads)} messages, {reference.a_message_s * 1e6:.2f} us each")  # fmt: skip
     return share <= MOST_SHARE and mb_an_hour <= _most_mb_an_hour(cell_m)
 
 
 @contextmanager
-def _sampling(recorder: Callable[[], int | None]) -> Iterator[list[Sample]]:
-    """Samples the recorder's process, once `recorder` knows its id, from a thread of its own until the context ends."""
+def _sampling(
+    recorder: Callable[[], int | None], reference: Callable[[], None] = lambda: None
+) -> Iterator[list[Sample]]:
+    """Samples the recorder's process, once `recorder` knows its id, and has the `reference` timed each time, from a
+    thread of its own until the context ends."""
     samples: list[Sample] = []
     over = threading.Event()
 
@@ -124,6 +158,7 @@ def _sampling(recorder: Callable[[], int | None]) -> Iterator[list[Sample]]:
             sample = _sample(process) if process else None
             if sample is not None:
                 samples.append(sample)
+                reference()
 
     thread = threading.Thread(target=run, daemon=True)
     thread.start()

@@ -8,8 +8,9 @@ from collections import Counter
 import pytest
 from hypothesis import HealthCheck, settings
 
-# Whoever starts the tests in the background may have made them deaf to Ctrl-C, and what they start with them.
+# Whoever starts the tests in the background may have made them deaf to Ctrl-C and hang-ups, and what they start too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("secondlook", deadline=None, suppress_health_check=[HealthCheck.too_slow])
