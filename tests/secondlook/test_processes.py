@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from flights import BRIEF, LONG, Flight, events, flight, has_ended, until
+from flights import BRIEF, LONG, SLOW, Flight, events, flight, has_ended, until
 
 from comms.codec import decode
 from comms.node import Received
@@ -71,7 +71,7 @@ def assert_failed(flying: Flight, code: int, out: str, err: str, said: str) -> N
     assert re.fullmatch(said, summary["failure"])
     assert summary["ending"] == ("interrupted" if said == INTERRUPTED else "failed")
     assert summary["digest"] is None
-    assert 0 < summary["time"]["mission_s"] < 4000
+    assert 0 < summary["time"]["mission_s"] < 40_000
     assert sum(summary["messages"].values()) == len(read_messages(flying.folder / "messages.mpk"))
 
 
@@ -104,7 +104,7 @@ def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path, numbe
 
 
 def test_a_run_on_the_local_bus_is_interrupted_alike(tmp_path: Path) -> None:
-    with flight(tmp_path / "out", *LONG, "--bus", "local", "--set", "vehicles.primary.speed_mps=0.1") as flying:
+    with flight(tmp_path / "out", *LONG, "--bus", "local") as flying:
         assert until(flying.is_under_way)
         flying.press_ctrl_c()
         printed = flying.finish(SOON_S)
@@ -160,7 +160,7 @@ class Saboteur:
 
 @pytest.fixture
 def fleet() -> Fleet:
-    return build_fleet(load_scenario(str(BRIEF), LONG[1:]), record=True)
+    return build_fleet(load_scenario(str(BRIEF), SLOW), record=True)
 
 
 RECORDER_THAT_LISTENS = NodeSpec("faulty_nodes:ListenerThatFails", 10**9)

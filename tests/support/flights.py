@@ -18,7 +18,8 @@ from typing import Any
 
 BRIEF = Path(__file__).with_name("brief.yaml")
 # The same mission at a walking pace: it goes on for some seconds of wall time, long enough to be cut off.
-LONG = ("--set", "vehicles.primary.speed_mps=0.2")
+SLOW = ("vehicles.primary.speed_mps=0.02", "vehicles.primary.endurance_s=360000", "mission.time_limit_s=100000")
+LONG = tuple(word for one in SLOW for word in ("--set", one))  # 44,600 s of the mission, ten of wall time
 MARKER = "SECONDLOOK_TEST_RUN"
 
 
