@@ -16,6 +16,7 @@ from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each
 IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
+CHANGES_OFTEN = (HotspotState.ACTIVE, StripState.OPEN)
 OFTEN_EVERY_MS = 60_000
 
 
@@ -37,13 +38,11 @@ class SecondLooks:
 
     def on_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         """Draws the outline, with its number and its mean risk."""
-        often = hotspot.state is HotspotState.ACTIVE
-        self._take(received, hotspot.state, often, partial(self._draw_hotspot, received, hotspot))
+        self._take(received, hotspot.state, partial(self._draw_hotspot, received, hotspot))
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
-        draw = partial(self._draw_strip, received.header.sent_ms, received.number, strip)
-        self._take(received, strip.state, strip.state is StripState.OPEN, draw)
+        self._take(received, strip.state, partial(self._draw_strip, received, strip))
 
     def advance(self, time_ms: int) -> None:
         """Draws what was held back if its minute is over."""
@@ -56,14 +55,12 @@ class SecondLooks:
             draw()
         self._held.clear()
 
-    def _take(
-        self, received: Received, state: HotspotState | StripState, often: bool, draw: Callable[[], None]
-    ) -> None:
+    def _take(self, received: Received, state: HotspotState | StripState, draw: Callable[[], None]) -> None:
         """Draws what a message says, or holds it back if it tells no new state and what it is of changes often."""
         key, time_ms = received.key, received.header.sent_ms
         before = self._states.get(key)
         self._states[key] = state
-        if before is not state or not often:
+        if before is not state or state not in CHANGES_OFTEN:
             self._held.pop(key, None)  # what was said before is out of date
             draw()
         elif key in self._held and time_ms < self._held[key][0]:  # it comes late
@@ -83,7 +80,8 @@ class SecondLooks:
         )
         self._canvas.put(received.header.sent_ms, path, outline, _hotspot_look())
 
-    def _draw_strip(self, time_ms: int, number: int, strip: StripStatus) -> None:
+    def _draw_strip(self, received: Received, strip: StripStatus) -> None:
+        number, time_ms = received.number, received.header.sent_ms
         path = f"{paths.STRIPS}/{number}"
         drawn_look, drawn_place = self._drawn.pop(number, (None, None))
         if strip.state is StripState.WITHDRAWN:
