@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ import pytest
 import rerun as rr
 from rerun.experimental import ViewerClient
 
+from comms.messages import Hotspot, Nav, RunInfo
 from comms.node import Received
 from tests.viz.mission_stream import PRIMARY
 from tests.viz.recordings import entities, rows, rows_so_far, verify
@@ -204,31 +205,51 @@ def test_the_pipe_stays_open_as_long_as_the_window(monkeypatch: pytest.MonkeyPat
     assert (open_afterwards, serves_afterwards, closed_at_last) == (True, True, True)
 
 
-def test_a_live_view_does_not_wait_for_the_pieces_of_the_file(
-    messages: list[Received], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@contextmanager
+def recorded_live(
+    stream: Iterable[Received], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Callable[[str], int]]:
+    """Within it a recorder has had a stream and goes on; tells how many rows of an entity a live view has by now."""
     monkeypatch.setattr(canvas, "LIVE_EVERY_S", 0.0)
-    pipe, shown, poses = tmp_path / "pipe", tmp_path / "shown.rrd", f"/fleet/{PRIMARY}"
+    pipe, shown = tmp_path / "pipe", tmp_path / "shown.rrd"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", live_pipe=pipe, piece_s=60.0))
-    until_ms = messages[0].header.sent_ms + 30_000
-    for received in messages:
-        if received.header.sent_ms <= until_ms:
-            recorder.on_message(received)
+    for received in stream:
+        recorder.on_message(received)
 
-    def is_shown() -> bool:
+    def rows_shown(entity: str) -> int:
         with shown.open("ab") as file, contextlib.suppress(BlockingIOError):
             while piece := os.read(reader, 1 << 16):
                 file.write(piece)
-        return rows_so_far(shown, poses) > 20
+        return rows_so_far(shown, entity)
 
-    wait_until(is_shown)
-    in_file = rows_so_far(tmp_path / "mission.rrd", poses)
-    recorder.close()
-    os.close(reader)
+    try:
+        yield rows_shown
+    finally:
+        recorder.close()
+        os.close(reader)
+
+
+def test_a_live_view_does_not_wait_for_the_pieces_of_the_file(
+    messages: list[Received], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    until_ms, poses = messages[0].header.sent_ms + 30_000, f"/fleet/{PRIMARY}"
+    stream = (received for received in messages if received.header.sent_ms <= until_ms)
+    with recorded_live(stream, tmp_path, monkeypatch) as rows_shown:
+        wait_until(lambda: rows_shown(poses) > 20)
+        in_file = rows_so_far(tmp_path / "mission.rrd", poses)
     assert in_file == 0
     assert rows_so_far(tmp_path / "mission.rrd", poses) > 20
+
+
+def test_hotspots_are_told_as_soon_as_all_of_their_time_are_in(
+    messages: list[Received], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, hotspot = (next(one for one in messages if isinstance(one.message, kind)) for kind in (RunInfo, Hotspot))
+    after = [one for one in messages if isinstance(one.message, Nav) and one.header.order > hotspot.header.order]
+    with recorded_live([run, hotspot, *after[:10]], tmp_path, monkeypatch) as rows_shown:
+        wait_until(lambda: rows_shown(f"/log/{PRIMARY}") == 1)
 
 
 @pytest.mark.usefixtures("drawable")

@@ -41,6 +41,7 @@ from comms.messages import (
 )
 from comms.node import Received
 from comms.topics import TOPICS
+from planner.region import Region
 from tests.viz.mission_stream import HELPER, PRIMARY, mission
 from tests.viz.recordings import entities, rows, rows_so_far, static, timelines, verify
 from viz import palette
@@ -259,6 +260,21 @@ def test_statistics_are_those_of_the_map_drawn(messages: list[Received], recordi
         assert metrics["mean_risk"][place][1][0] == pytest.approx(risk.mean())
         assert metrics["worst30_mean"][place][1][0] == pytest.approx(worst.mean())
         assert metrics["covered_share"][place][1][0] == pytest.approx(np.count_nonzero(risk < 1) / risk.size)
+
+
+def test_cells_outside_the_area_count_for_nothing(messages: list[Received], record: Record, tmp_path: Path) -> None:
+    run = next(received for received in messages if isinstance(received.message, RunInfo))
+    assert isinstance(run.message, RunInfo)
+    one, other, far, near = run.message.area
+    half = (one, *(Vertex((a.x_m + b.x_m) / 2, (a.y_m + b.y_m) / 2) for a, b in ((one, other), (far, near))), near)
+    smaller = replace(run.message, area=half)
+    rest = [received for received in messages if received is not run]
+    path = record([run._replace(message=smaller), *rest], tmp_path / "half.rrd")
+    inside = Region(smaller.outline).inside(smaller.grid.spec)
+    assert 0.4 < inside.mean() < 0.6
+    for name, at_last in (("mean_risk", np.mean), ("covered_share", lambda risk: np.mean(risk < 1))):
+        time_ms, (told,) = rows(path, f"/metrics/{name}", "Scalars:scalars")[-1]
+        assert told == pytest.approx(at_last(risk_of(messages, time_ms)[inside]))
 
 
 def changes(said: list[tuple[int, Any]], value: Callable[[Any], str]) -> list[tuple[int, list[str]]]:
