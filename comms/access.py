@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, Literal
 
 from comms.control import HostPlan, RunKeys
@@ -17,7 +17,11 @@ def access_rules(routing: Routing, hosts: tuple[HostPlan, ...], keys: RunKeys) -
     """Zenoh's `access_control` configuration for these hosts in lockstep: all that is not allowed here is denied."""
     allowed = {}
     for plan in hosts:
-        writes, reads = topic_keys(routing, plan, keys)
+        listening = [node for node in plan.nodes if routing.nodes[node].listens_only]
+        acting = [node for node in plan.nodes if node not in listening]
+        writes, reads = topic_keys(routing, acting, keys)
+        writes += [keys.parcel("*", node) for node in acting]
+        reads += [keys.parcel(some, "*") for some in routing.audiences if not set(listening).isdisjoint(some)]
         reads.append(keys.to_host(plan.host))
         allowed[plan.host] = {
             "writes": (["ingress"], ["put"], [*writes, keys.from_host(plan.host)]),
@@ -28,10 +32,10 @@ def access_rules(routing: Routing, hosts: tuple[HostPlan, ...], keys: RunKeys) -
     return access_control(allowed, "usernames")
 
 
-def topic_keys(routing: Routing, plan: HostPlan, keys: RunKeys) -> tuple[list[str], list[str]]:
-    """Full key expressions of what the nodes of a host may write, and may read."""
-    writes = [keys.topic(one) for node in plan.nodes for one in routing.publications(node)]
-    reads = [keys.topic(one) for node in plan.nodes for one in routing.subscriptions(node)]
+def topic_keys(routing: Routing, nodes: Collection[str], keys: RunKeys) -> tuple[list[str], list[str]]:
+    """Full key expressions of what these nodes may write, and may read."""
+    writes = [keys.topic(one) for node in nodes for one in routing.publications(node)]
+    reads = [keys.topic(one) for node in nodes for one in routing.subscriptions(node)]
     return writes, reads
 
 

@@ -6,6 +6,7 @@ A process is a host: it holds some of the nodes, or one listener. Hub to host: `
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -34,6 +35,10 @@ class RunKeys:
     def topic(self, key: str) -> str:
         """The full key, or key expression, of one below the run id."""
         return self.root + key
+
+    def parcel(self, listeners: Iterable[str], sender: str) -> str:
+        """Where a node sends what these listeners read of it (see `comms.parcels`); no id has a `+`."""
+        return f"{self.root}parcel/{'+'.join(listeners)}/{sender}"
 
     def to_host(self, host: str) -> str:
         """Where the clock speaks to a host."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from comms.messages import Role
 from comms.topics import TOPICS, Reach, Topic, topic_of
@@ -27,7 +28,7 @@ class RosterNode:
 @dataclass(frozen=True, slots=True)
 class Route:
     """What becomes of one key: its topic, the vehicle it names ("" for none), its only writer, and the nodes that read
-    it (the writer left out)."""
+    it (the writer left out), those that act and those that only listen."""
 
     topic: Topic
     vehicle: str
@@ -55,6 +56,12 @@ class Routing:
                 writers = self._who(topic, topic.writers, vehicle)
                 if len(writers) > 1:
                     raise ValueError(f"{topic.name} of {vehicle or 'the fleet'} has two writers: {', '.join(writers)}")
+
+    @cached_property
+    def audiences(self) -> frozenset[tuple[str, ...]]:
+        """All that `Route.watchers` may be."""
+        listening = [node for node in self.roster if node.listens_only]
+        return frozenset(tuple(node.node_id for node in listening if node.role in topic.readers) for topic in TOPICS)
 
     def route(self, key: str) -> Route | None:
         """The key's route; None where it belongs to no topic, names no vehicle of the fleet, or nobody may write it."""

@@ -20,7 +20,7 @@ def wall_access_rules(
     """
     allowed = {}
     for plan in hosts:
-        writes, reads = topic_keys(routing, plan, keys)
+        writes, reads = topic_keys(routing, plan.nodes, keys)
         says = [keys.from_host(plan.host), *(keys.beat(node) for node in plan.nodes)]
         hears = [keys.to_host(plan.host), keys.time, keys.beat("*")]
         allowed[plan.host] = {

@@ -7,7 +7,7 @@ import contextlib
 import queue
 import time
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import zenoh
@@ -20,8 +20,11 @@ from comms.kept_listener import KeptListener, close_all
 from comms.latency import STRIP_TO_TASK, StripLatency
 from comms.messages import Role
 from comms.node import Listener, Node, Received
+from comms.parcels import unpacked
 from comms.routing import Routing
-from comms.runner import Intake, NodeError, Outgoing
+from comms.runner import Intake, NodeError
+from comms.wire import WireError
+from comms.zenoh_post import ZenohPost
 from comms.zenoh_session import Mailbox, put, subscribe
 
 HELLO_EVERY_S = 0.2
@@ -36,26 +39,24 @@ class Interrupted(Exception):  # noqa: N818 - not an error: the launcher has ask
 
 
 class _Line:
-    """The line to the hub: the clock's words in a queue, and the mail, which waits until a word tells of it."""
+    """The line to the hub: the clock's words in a queue, and the mail, which waits until a word tells of it.
 
-    def __init__(self, session: zenoh.Session, keys: RunKeys, host: str, expressions: list[str]) -> None:
+    `expressions`: full keys, or key expressions, of the mail.
+    """
+
+    def __init__(self, session: zenoh.Session, keys: RunKeys, host: str, expressions: Iterable[str]) -> None:
         self._words: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._session = session
         self._keys = keys
         self._host = host
         # The clock's words are subscribed to last: when they arrive, the hub knows of all the others.
-        self._mailbox = Mailbox(session, map(keys.topic, expressions))
+        self._mailbox = Mailbox(session, expressions)
         self._subscribers = subscribe(session, [keys.to_host(host)], lambda _, words: self._words.put(words))
         self._token = session.liveliness().declare_token(keys.alive(host))
 
     def say(self, words: bytes) -> None:
         """A word to the clock."""
         put(self._session, self._keys.from_host(self._host), words)
-
-    def publish(self, outgoing: list[Outgoing]) -> None:
-        """Sends a node's messages; they go out with the next word at the latest."""
-        for one in outgoing:
-            put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
 
     def shake_hands(self) -> None:
         """Says hello until the hub's welcome shows that it hears and is heard."""
@@ -108,8 +109,9 @@ def serve_nodes(
     A node that fails is reported to the hub, and NodeError raised.
     """
     group = NodeGroup(nodes, routing, faults, plan.incarnation)
-    expressions = [one for node_id in nodes for one in routing.subscriptions(node_id)]
+    expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
     line = _Line(session, keys, plan.host, expressions)
+    post = ZenohPost(session, keys)
     latency = StripLatency()
     coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
     line.shake_hands()
@@ -142,7 +144,7 @@ def serve_nodes(
                     raise
                 if grant.node_id in coordinators:
                     latency.sending(outgoing, time.perf_counter())
-                line.publish(outgoing)
+                post.publish(grant.node_id, outgoing)
                 answers.append((grant.node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing]))
             line.say(pack_answers(answers))
 
@@ -158,12 +160,16 @@ class ListenerHost:
     def __init__(
         self, session: zenoh.Session, keys: RunKeys, host: str, node_id: str, listener: Listener, routing: Routing
     ) -> None:
+        self._node_id = node_id
         self._listener = KeptListener(node_id, listener)
         self._routing = routing
         self._intake = Intake(routing)
         self._arrived: Counter[str] = Counter()
         self._held: list[Received] = []
-        self._line = _Line(session, keys, host, list(routing.subscriptions(node_id)))
+        senders = [node.node_id for node in routing.roster if not node.listens_only]
+        # Keys and no expressions: which of these a message fits is looked up anew for each that comes.
+        mail = [keys.parcel(some, sender) for some in routing.audiences if node_id in some for sender in senders]
+        self._line = _Line(session, keys, host, mail)
 
     def interrupt(self) -> None:
         """Ends the run early."""
@@ -205,13 +211,25 @@ class ListenerHost:
             mark = None
 
     def _take_mail(self) -> None:
-        for key, payload in self._line.mail():
-            route = self._routing.route(key)
-            if route is not None:
-                self._arrived[route.writer] += 1
-            received = self._intake.open(key, payload)
-            if received is not None:
-                self._held.append(received)
+        for key, parcel in self._line.mail():
+            sender = key.rpartition("/")[2]
+            try:
+                said = unpacked(parcel)
+            except WireError as error:
+                self._intake.drop("malformed", sender, f"{key}: {error}")
+                continue
+            for below, payload in said:
+                self._take(sender, below, payload)
+
+    def _take(self, sender: str, key: str, payload: bytes) -> None:
+        route = self._routing.route(key)
+        if route is None or route.writer != sender or self._node_id not in route.watchers:
+            self._intake.drop("not for here", sender, key)
+            return
+        self._arrived[sender] += 1
+        received = self._intake.open(key, payload)
+        if received is not None:
+            self._held.append(received)
 
     def _has_all(self, expected: dict[str, int]) -> bool:
         return all(self._arrived[sender] >= count for sender, count in expected.items())

@@ -33,8 +33,9 @@ from comms.node import Node
 from comms.pacing import MOST_BEHIND_BYTES, Pacing
 from comms.result import BusResult
 from comms.routing import Routing
-from comms.runner import Outgoing, SenderDigest, Stamp, fleet_digest
+from comms.runner import SenderDigest, Stamp, fleet_digest
 from comms.topics import RUN
+from comms.zenoh_post import ZenohPost
 from comms.zenoh_session import PATIENCE_S, put, subscribe
 
 SIGN_OF_LIFE_EVERY_S = 0.5
@@ -90,6 +91,7 @@ class Hub:
         self._change = carry_out
         self._clock = LockstepClock(routing, time_limit_ms, events)
         self._group = NodeGroup(nodes, routing, faults)
+        self._post = ZenohPost(session, keys)
         self._kept = {node_id: KeptMessages(node_id, routing) for node_id in self._clock.said_to_joiners}
         self._latency = StripLatency()
         self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
@@ -118,7 +120,7 @@ class Hub:
         stamp = Stamp(CLOCK, self._routing)
         announced = stamp(RUN.key(), run_info, 0)
         self._clock.publish(CLOCK, [announced])
-        self._publish([announced])
+        self._post.publish(CLOCK, [announced])
         while (turn := self._clock.next_round()) is not None:
             self._show_life()
             while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
@@ -147,7 +149,7 @@ class Hub:
                 wake_ms, outgoing = self._group.act(grant, turn.now_ms)
                 if grant.node_id in self._coordinators:
                     self._latency.sending(outgoing, time.perf_counter())
-                self._publish(outgoing)
+                self._post.publish(grant.node_id, outgoing)
                 self._clock.answer(grant.node_id, wake_ms, outgoing)
         self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
 
@@ -179,10 +181,6 @@ class Hub:
         kept, said = self._kept[node_id], self._clock.said_to_joiners[node_id]
         self._wait(lambda: kept.has_all(said), lambda: f"mail is missing that was kept for {node_id}")
         self._say(host, pack("kept", node_id, kept.messages(), self._clock.now_ms + JOINER_DELAY_MS))
-
-    def _publish(self, outgoing: list[Outgoing]) -> None:
-        for one in outgoing:
-            put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
 
     def _say(self, host: str, words: bytes) -> None:
         put(self._session, self._keys.to_host(host), words)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from typing import Any
 
+import msgpack
 import pytest
 import zenoh
 from fleets import EACH_ALONE, KEYS, ROSTER, Notes, fleet_that_talks, nav, on_local, over_zenoh, password, state
@@ -29,6 +30,12 @@ TOPIC_KEYS = sorted(
     {topic.key(vehicle=vehicle, number=7, tile="0-1") for topic in TOPICS for vehicle in ("alpha", "beta", "gamma")}
 )
 
+PARCEL_KEYS = [
+    KEYS.parcel(some, sender).removeprefix(KEYS.root)
+    for some in routing.audiences
+    for sender in ("alpha", "coordinator", "gamma", "world")
+]
+
 
 def allowed(rules: dict[str, Any], host: str, flow: str, message: str, key: str) -> bool:
     """What Zenoh makes of the rules."""
@@ -44,15 +51,19 @@ def allowed(rules: dict[str, Any], host: str, flow: str, message: str, key: str)
 
 
 def may_write(plan: HostPlan, key: str) -> bool:
-    """What the routing lets the nodes of a host write, and the clock's part."""
+    """What the routing lets the nodes of a host write, for those that only listen in parcels, and the clock's part."""
+    if key.startswith("parcel/"):
+        return key.rpartition("/")[2] in plan.nodes
     route = routing.route(key)
     return key == f"clock/from/{plan.host}" or (route is not None and route.writer in plan.nodes)
 
 
 def may_read(plan: HostPlan, key: str) -> bool:
-    """What the routing lets the nodes of a host read, and the clock's part."""
+    """What the routing lets the nodes of a host read, those that only listen in parcels, and the clock's part."""
+    if key.startswith("parcel/"):
+        return not set(key.split("/")[1].split("+")).isdisjoint(plan.nodes)
     route = routing.route(key)
-    readers = () if route is None else (*route.readers, *route.watchers)
+    readers = () if route is None else route.readers
     return key == f"clock/to/{plan.host}" or any(node in readers for node in plan.nodes)
 
 
@@ -80,7 +91,7 @@ def test_the_rules_of_any_grouping_allow_what_the_routing_says_and_nothing_more(
     hosts = [plan.host for plan in plans]
     clock_keys = [f"clock/{way}/{host}" for way in ("to", "from", "alive") for host in (*hosts, "world")]
     for plan in plans:
-        for key in (*(key for key in TOPIC_KEYS if routing.route(key)), *clock_keys):
+        for key in (*(key for key in TOPIC_KEYS if routing.route(key)), *PARCEL_KEYS, *clock_keys):
             full = KEYS.topic(key)
             assert allowed(rules, plan.host, "ingress", "put", full) == may_write(plan, key)
             assert allowed(rules, plan.host, "egress", "put", full) == may_read(plan, key)
@@ -139,7 +150,7 @@ class Ears:
             return self._news.wait_for(lambda: self._ended, timeout_s)
 
 
-WILD_KEYS = ["**", "agent/**", "agent/*/state", "*/alpha/**", "world/truth/**", "clock/**", "clock/from/*"]
+WILD_KEYS = ["**", "agent/**", "agent/*/state", "*/alpha/**", "world/truth/**", "clock/**", "clock/from/*", "parcel/**"]
 CLOCK_KEYS = [f"clock/{way}/{host}" for way in ("to", "from", "alive") for host in (*HOSTED, "world")]
 
 
@@ -148,7 +159,7 @@ def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: Ho
     ears = Ears(guarded.hub, ["**"])
     client = guarded.client(plan.host)
     last = f"clock/from/{plan.host}"
-    keys = [key for key in (*TOPIC_KEYS, *CLOCK_KEYS) if key != last]
+    keys = [key for key in (*TOPIC_KEYS, *PARCEL_KEYS, *CLOCK_KEYS) if key != last]
     for key in (*WILD_KEYS, *keys):
         put(client, KEYS.topic(key), b"x")
         client.delete(KEYS.topic(key))
@@ -160,7 +171,7 @@ def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: Ho
 
 @pytest.mark.parametrize("plan", EACH_ALONE, ids=lambda plan: plan.host)
 def test_the_hub_tells_a_host_what_it_may_read_alone(guarded: Guarded, plan: HostPlan) -> None:
-    keys = [key for key in TOPIC_KEYS if routing.route(key)] + CLOCK_KEYS
+    keys = [key for key in TOPIC_KEYS if routing.route(key)] + PARCEL_KEYS + CLOCK_KEYS
     last = f"clock/to/{plan.host}"
     client = guarded.client(plan.host)
     # Every key by itself, so that one refused subscription does not hide the others; `last` is declared last.
@@ -242,7 +253,10 @@ class Intruder:
             ("world", "veh/beta/nav", nav(666.0)),
             ("world", "world/truth/pose/beta", TruthPose(0, 0, 0)),
         ):
-            put(self._session, KEYS.topic(key), encode(Header(sender, 0, 0, now_ms), message))
+            payload = encode(Header(sender, 0, 0, now_ms), message)
+            put(self._session, KEYS.topic(key), payload)
+            for some in routing.audiences:
+                put(self._session, KEYS.parcel(some, sender), msgpack.packb([key, payload]))
         put(self._session, KEYS.to_host("beta"), pack("finish", 0, 0, {}))
         put(self._session, KEYS.from_host("beta"), pack("answer", [["beta", None, []]]))
         put(self._session, KEYS.from_host("coordinator"), pack("failed", "no more"))

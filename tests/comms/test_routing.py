@@ -74,6 +74,11 @@ def test_a_key_has_the_writer_and_the_readers_that_the_table_says(topic: Topic) 
         assert len(set(route.readers)) == len(route.readers)
 
 
+def test_the_audiences_are_who_listens_to_any_key() -> None:
+    routes = [route for route in map(routing.route, ALL_KEYS) if route is not None]
+    assert routing.audiences == {route.watchers for route in routes} == {("recorder", "observer"), ("observer",)}
+
+
 @by_topic
 def test_a_key_belongs_to_one_topic(topic: Topic) -> None:
     for vehicle, key in keys_of(topic):

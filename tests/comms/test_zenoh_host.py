@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import pytest
 import zenoh
-from fleets import EACH_ALONE, KEYS, ROSTER, Notes, Scripted, nav, password, says
+from fleets import EACH_ALONE, KEYS, ROSTER, Notes, Scripted, nav, password, says, state
 from flights import until
 
 from comms.clock import Grant
@@ -18,8 +18,9 @@ from comms.control import HostPlan, pack, pack_grants, unpack, unpack_answers
 from comms.messages import Message
 from comms.routing import Routing
 from comms.runner import Outgoing, Stamp
-from comms.topics import NAV
+from comms.topics import NAV, STATE
 from comms.zenoh_host import ListenerHost, serve_nodes
+from comms.zenoh_post import ZenohPost
 from comms.zenoh_session import Mailbox, open_client, open_hub, put, subscribe
 
 PATIENCE_S = 20.0
@@ -45,6 +46,9 @@ class HubByHand:
 
     def sends(self, one: Outgoing) -> None:
         put(self.session, KEYS.topic(one.key), one.payload, at_once=False)
+
+    def sends_parcels(self, *said: Outgoing) -> None:
+        ZenohPost(self.session, KEYS).publish("world", said)
 
     def welcomes(self, host: str) -> None:
         self.hears("hello")
@@ -111,8 +115,8 @@ def test_a_mark_that_comes_before_its_mail_is_acknowledged_when_all_is_there(hub
         hub.welcomes("observer")
         hub.say("observer", "mark", 1, 1000, {"world": 2})
         assert until(lambda: len(takes) > 2, PATIENCE_S)  # it looks for what is missing
-        hub.sends(second)
-        hub.sends(first)
+        hub.sends_parcels(second)
+        hub.sends_parcels(first)
         assert hub.hears("ack") == ["ack", 1]
         assert [one.header.sequence for one in notes.heard] == [0, 1]
         hub.say("observer", "finish", 1, 1000, {"world": 2})
@@ -131,7 +135,7 @@ def test_mail_that_no_word_has_told_of_is_not_lost_by_an_interrupt(hub: HubByHan
         running = Aside.run(host.run)
         hub.welcomes("observer")
         for one in said:
-            hub.sends(one)
+            hub.sends_parcels(one)
         put(hub.session, "told", b"")
         told.get(timeout=PATIENCE_S)  # it came the same way as the mail, after it
         host.interrupt()
@@ -139,6 +143,26 @@ def test_mail_that_no_word_has_told_of_is_not_lost_by_an_interrupt(hub: HubByHan
         del listens
     assert [one.header.sequence for one in notes.heard] == [0, 1, 2, 3, 4]
     assert notes.closed == 1
+
+
+def test_parcels_that_do_not_fit_are_counted_and_dropped(hub: HubByHand) -> None:
+    notes, (first, second) = Notes(), positions(2)
+    alphas = Stamp("alpha", Routing(ROSTER))(STATE.key(vehicle="alpha"), state(), 0)
+    here = next(iter(Routing(ROSTER).audiences))
+    with open_client(hub.endpoint, "observer", password("observer")) as session:
+        host = ListenerHost(session, KEYS, "observer", "observer", notes, Routing(ROSTER))
+        running = Aside.run(host.run)
+        hub.welcomes("observer")
+        hub.sends_parcels(first)
+        put(hub.session, KEYS.parcel(here, "world"), b"no parcel", at_once=False)
+        hub.sends_parcels(alphas)  # in the name of the world
+        hub.sends_parcels(second)
+        hub.say("observer", "finish", 1, 1000, {"world": 2})
+        final = hub.hears("final")
+        hub.say("observer", "goodbye")
+        running.end()
+    assert [(one.key, one.header.sequence) for one in notes.heard] == [(first.key, 0), (second.key, 1)]
+    assert final[2] == {"malformed": 1, "not for here": 1}
 
 
 def test_a_grant_that_comes_before_its_mail_is_carried_out_when_all_is_there(hub: HubByHand, takes: list[None]) -> None:

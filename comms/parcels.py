@@ -1,0 +1,47 @@
+"""What several messages of one sender look like in one, for those that only listen: a parcel costs its way as much as a
+message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import msgpack
+
+from comms.runner import Outgoing
+from comms.wire import WireError
+
+MOST_BYTES = 7000  # of messages in a parcel, unless a single one has more: so it fits into one packet
+
+_pack = msgpack.Packer().pack
+
+
+def parcels(outgoing: Iterable[Outgoing]) -> Iterator[tuple[tuple[str, ...], bytes]]:
+    """Parcels of the messages, in order, and the listeners that each is for."""
+    held: dict[tuple[str, ...], list[str | bytes]] = {}
+    sizes: dict[tuple[str, ...], int] = {}
+    for one in outgoing:
+        watchers = one.route.watchers
+        if not watchers:
+            continue
+        if watchers in held and sizes[watchers] + one.size > MOST_BYTES:
+            yield watchers, _pack(held.pop(watchers))
+        if watchers not in held:
+            held[watchers], sizes[watchers] = [], 0
+        held[watchers] += (one.key, one.payload)
+        sizes[watchers] += one.size
+    for watchers, messages in held.items():
+        yield watchers, _pack(messages)
+
+
+def unpacked(parcel: bytes) -> Iterator[tuple[str, bytes]]:
+    """Key below the run id and payload of each message; raises WireError, and nothing else, where this is no parcel."""
+    try:
+        parts = msgpack.unpackb(parcel)
+    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
+        raise WireError(f"not MessagePack: {error}") from None
+    if type(parts) is not list or len(parts) % 2:
+        raise WireError("not a list of keys and payloads")
+    keys, payloads = parts[::2], parts[1::2]
+    if not ({str}.issuperset(map(type, keys)) and {bytes}.issuperset(map(type, payloads))):
+        raise WireError("not a list of keys and payloads")
+    return zip(keys, payloads, strict=True)

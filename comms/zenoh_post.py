@@ -1,0 +1,28 @@
+"""How a node's messages go out in a lockstep run over Zenoh: each to those that act, in parcels to the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import zenoh
+
+from comms.control import RunKeys
+from comms.parcels import parcels
+from comms.runner import Outgoing
+from comms.zenoh_session import put
+
+
+class ZenohPost:
+    """Sends what the nodes of one process say."""
+
+    def __init__(self, session: zenoh.Session, keys: RunKeys) -> None:
+        self._session = session
+        self._keys = keys
+
+    def publish(self, sender: str, outgoing: Iterable[Outgoing]) -> None:
+        """Sends messages of one node; they go out with the next word at the latest."""
+        for one in outgoing:
+            if one.route.readers:
+                put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
+        for watchers, parcel in parcels(outgoing):
+            put(self._session, self._keys.parcel(watchers, sender), parcel, at_once=False)
