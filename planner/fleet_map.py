@@ -12,9 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.risk import MOST_LEVELS, LevelArray, residual_risk
+from planner.risk import MOST_LEVELS, LevelArray, residual_risk, risk_of_levels
 from planner.tiles import tile_shape
 from planner.types import BoolArray, FloatArray, GridSpec
+
+PARTS = 16  # of a level: half of one is less than a thousandth of the residual risk
 
 
 @dataclass
@@ -124,20 +126,39 @@ class FleetMap:
         risk, sums = self._joined(everywhere, list(layers))
         return risk, sums > 0
 
-    def risk_within(self, window: tuple[slice, slice], vehicles: Iterable[str]) -> FloatArray:
-        """`risk` in a window of which these vehicles alone have told, worked out anew."""
-        return self._joined(window, [self.layers[vehicle] for vehicle in vehicles])[0]
+    def levels_within(
+        self, window: tuple[slice, slice], vehicles: Iterable[str]
+    ) -> tuple[NDArray[np.intp], FloatArray]:
+        """Levels in a window of which these vehicles alone have told, and the residual risk of each level from 0 on:
+        `risk` there, worked out anew, in a form that is quickly counted and coloured.
+
+        With a `rho` above 0 levels count less the more of them tell the same; they are then in parts of a level.
+        """
+        layers = [self.layers[vehicle] for vehicle in vehicles]
+        sums, largest = self._summed(window, layers)
+        most = MOST_LEVELS * len(layers)
+        if self.rho == 0.0:
+            return sums.astype(np.intp), risk_of_levels(most)
+        counting = self.rho * largest + (1.0 - self.rho) * sums
+        return np.rint(PARTS * counting).astype(np.intp), risk_of_levels(most, PARTS)
 
     def _joined(
         self, window: tuple[slice, slice], layers: Sequence[VehicleLayer]
     ) -> tuple[FloatArray, NDArray[np.unsignedinteger]]:
         """Residual risk and summed levels from these layers."""
+        sums, largest = self._summed(window, layers)
+        return residual_risk(sums, largest, self.rho), sums
+
+    def _summed(
+        self, window: tuple[slice, slice], layers: Sequence[VehicleLayer]
+    ) -> tuple[NDArray[np.unsignedinteger], NDArray[np.unsignedinteger]]:
+        """Sums and maxima of these layers' levels; without a `rho` the sums alone count, and stand for both."""
         sums = np.zeros(self._risk[window].shape, dtype=np.min_scalar_type(MOST_LEVELS * len(layers)))
         for layer in layers:
             sums += layer.sum_levels[window]
-        largest = sums
-        if self.rho > 0.0:  # else the sums alone count
-            largest = np.zeros(sums.shape, dtype=np.uint8)
-            for layer in layers:
-                np.maximum(largest, layer.largest_levels[window], out=largest)
-        return residual_risk(sums, largest, self.rho), sums
+        if self.rho == 0.0:
+            return sums, sums
+        largest = np.zeros(sums.shape, dtype=np.uint8)
+        for layer in layers:
+            np.maximum(largest, layer.largest_levels[window], out=largest)
+        return sums, largest

@@ -66,7 +66,7 @@ def residual_risk(sum_levels: NDArray[np.integer], largest_levels: NDArray[np.in
         raise ValueError(f"rho must lie in [0, 1], not {rho}")
     if rho == 0.0:
         if sum_levels.dtype in (np.uint8, np.uint16):
-            return _risk_of_levels(np.iinfo(sum_levels.dtype).max).take(sum_levels)
+            return risk_of_levels(np.iinfo(sum_levels.dtype).max).take(sum_levels)
         return _exp(-NATS_PER_LEVEL * sum_levels.astype(np.float64))
     largest = largest_levels.astype(np.float64)
     return _exp(-NATS_PER_LEVEL * (largest + (1.0 - rho) * (sum_levels - largest)))
@@ -78,8 +78,9 @@ def _exp(exponents: FloatArray) -> FloatArray:
 
 
 @cache
-def _risk_of_levels(most: int) -> FloatArray:
-    return _exp(-NATS_PER_LEVEL * np.arange(most + 1.0))
+def risk_of_levels(most: int, parts: int = 1) -> FloatArray:
+    """Residual risk of 0 to `most` levels in steps of one over `parts` of a level; not to be written to."""
+    return _exp(-NATS_PER_LEVEL / parts * np.arange(most * parts + 1.0))
 
 
 @dataclass(frozen=True)

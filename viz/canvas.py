@@ -16,7 +16,7 @@ from viz.paths import TIMELINE
 
 Build = Callable[[Sequence[Any]], Iterable[rr.ComponentColumn]]
 
-TOGETHER_S = 2.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
+TOGETHER_S = 4.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
 LIVE_EVERY_S = 0.25  # of the wall clock; how long a live view waits for columns
 
 

@@ -7,6 +7,7 @@ from collections import defaultdict
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from comms.messages import CoverageTile, RunInfo
 from comms.node import Received
@@ -68,8 +69,8 @@ class RiskMap:
         self._put_frame(run, extent)
         for index, block in enumerate(self._blocks.all):
             self._put_place(block, run.grid.spec.cell_m)
-            nobody = np.ones_like(self._inside[block.window], dtype=np.float64)
-            self._count(index, nobody)
+            nobody, certain = self._map.levels_within(block.window, ())
+            self._count(index, nobody, certain)
             self._cover_block(0, block, nobody)
         self._add_statistics(0)
 
@@ -107,20 +108,21 @@ class RiskMap:
 
     def _draw_block(self, time_ms: int, index: int) -> None:
         block = self._blocks.all[index]
-        risk = self._map.risk_within(block.window, self._lookers[index])
+        levels, risk = self._map.levels_within(block.window, self._lookers[index])
         # The first row of an image is drawn at the far end of the along axis.
-        levels = np.rint(risk[::-1] * 255).astype(np.uint8)
-        self._canvas.put(time_ms, f"{paths.RISK}/{block.name}", rr.GridMap.from_fields(data=levels.tobytes()))
-        if self._count(index, risk):
-            self._cover_block(time_ms, block, risk)
+        image = np.rint(risk * 255).astype(np.uint8).take(levels)[::-1]
+        self._canvas.put(time_ms, f"{paths.RISK}/{block.name}", rr.GridMap.from_fields(data=image.tobytes()))
+        if self._count(index, levels, risk):
+            self._cover_block(time_ms, block, levels)
 
-    def _count(self, index: int, risk: FloatArray) -> bool:
+    def _count(self, index: int, levels: NDArray[np.intp], risk: FloatArray) -> bool:
         """Counts a block's risk; whether another number of its cells is seen now."""
         inside = self._inside[self._blocks.all[index].window]
-        return self._tally.replace(index, risk.ravel() if index in self._whole else risk[inside])
+        counting = levels.ravel() if index in self._whole else levels[inside]
+        return self._tally.replace(index, np.bincount(counting, minlength=len(risk)), risk)
 
-    def _cover_block(self, time_ms: int, block: Block, risk: FloatArray) -> None:
-        unseen = np.where(risk == 1.0, _UNSEEN, _CLEAR)
+    def _cover_block(self, time_ms: int, block: Block, levels: NDArray[np.intp]) -> None:
+        unseen = np.where(levels == 0, _UNSEEN, _CLEAR)
         cover = np.where(self._inside[block.window], unseen, _OUTSIDE)[::-1]  # cells outside count for nothing
         self._canvas.put(time_ms, f"{paths.UNSEEN}/{block.name}", rr.GridMap.from_fields(data=cover.tobytes()))
 

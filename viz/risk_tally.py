@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planner.risk import RiskStatistics
 from planner.types import FloatArray
@@ -17,12 +18,12 @@ class RiskTally:
         self._cells = np.zeros((blocks, STEPS + 1), dtype=np.int32)  # the last step is that of what nobody has seen
         self._sums = np.zeros((blocks, STEPS + 1))
 
-    def replace(self, block: int, risk: FloatArray) -> bool:
-        """Takes the risk of a block's cells that count, shape (n,); whether another number of them is seen now."""
+    def replace(self, block: int, cells: NDArray[np.intp], risk: FloatArray) -> bool:
+        """Takes how many of a block's cells have each of these risks; whether another number of them is seen now."""
         step = (risk * STEPS).astype(np.intp)
         before = self._cells[block, STEPS]
-        self._cells[block] = np.bincount(step, minlength=STEPS + 1)
-        self._sums[block] = np.bincount(step, weights=risk, minlength=STEPS + 1)
+        self._cells[block] = np.bincount(step, weights=cells, minlength=STEPS + 1)
+        self._sums[block] = np.bincount(step, weights=cells * risk, minlength=STEPS + 1)
         return bool(self._cells[block, STEPS] != before)
 
     def statistics(self) -> RiskStatistics:
