@@ -6,12 +6,13 @@ was said before; the clock grants nothing while one of them is too far behind.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from comms.clock import LockstepClock
 
-MARK_EVERY_MS = 10_000  # simulated time between two marks, at the most
-MARKS_A_BOUND = 16  # so often is a listener marked on its way to the bound
+MARK_EVERY_S = 0.5  # of the wall clock: a listener works with cold caches after each wait, and costs more by the mark
+MARKS_A_BOUND = 8  # so often is a listener marked on its way to the bound
 MOST_BEHIND_BYTES = 4 << 20
 
 
@@ -22,22 +23,23 @@ class Pacing:
         self.mark = 0
         self._clock = clock
         self._most_behind_bytes = most_behind_bytes
-        self._mark_ms = 0
+        self._mark_s = -math.inf
         self._marked_bytes = dict.fromkeys(listeners, 0)
         self._acknowledged_bytes = dict(self._marked_bytes)
         self._bytes_at: dict[str, dict[int, int]] = {node: {} for node in self._marked_bytes}
 
-    def next_mark(self) -> bool:
-        """Whether it is time for a mark; if so `mark` is its number, and it holds for all said so far."""
+    def next_mark(self, now_s: float) -> bool:
+        """Whether it is time for a mark; if so `mark` is its number, and it holds for all said so far. `now_s`: of a
+        clock that never goes back."""
         said = self._clock.watched_bytes
         unmarked = max((said[node] - marked for node, marked in self._marked_bytes.items()), default=0)
         if (
-            self._clock.now_ms - self._mark_ms < MARK_EVERY_MS
+            now_s - self._mark_s < MARK_EVERY_S
             and unmarked * MARKS_A_BOUND < self._most_behind_bytes
         ):  # fmt: skip
             return False
         self.mark += 1
-        self._mark_ms = self._clock.now_ms
+        self._mark_s = now_s
         for node in self._marked_bytes:
             self._marked_bytes[node] = self._bytes_at[node][self.mark] = said[node]
         return True

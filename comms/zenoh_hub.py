@@ -128,7 +128,7 @@ class Hub:
             for happening in turn.happenings:
                 self._happen(happening)
             self._carry_out(turn)
-            if self._pacing.next_mark():
+            if self._pacing.next_mark(time.monotonic()):
                 self._mark_listeners()
         return self._finish()
 

@@ -53,7 +53,7 @@ def test_the_clock_waits_for_a_listener_that_is_too_far_behind_and_says_the_same
 
     result = over_zenoh(fleet_that_talks(50_000), slow, most_behind_bytes=1600, alive=alive)
     said_bytes = sum(len(one.payload) for one in prompt.heard if one.header.sent_ms <= seen_ms[-1])
-    assert 1600 <= said_bytes <= 1800  # the bound, a sixteenth of it and a round
+    assert 1600 <= said_bytes <= 1900  # the bound, an eighth of it and a round
     assert sum(len(one.payload) for one in prompt.heard) > 4 * 1600
     assert (result.digest, result.messages) == (expected.digest, expected.messages)
     assert [(one.key, one.payload) for one in slow.heard] == [(one.key, one.payload) for one in prompt.heard]
