@@ -14,6 +14,7 @@ from comms.zenoh_session import LARGEST_MESSAGE_BYTES, ConnectionFailedError, se
 
 LEASE_S = 4.0  # a link of which nothing is heard for so long, not even a sign of life, is given up
 BLOCK_S = 1.0  # so long a message waits for a link that takes nothing, before that is given up
+DROP_S = 0.02  # so long what may be left out waits for room: on a busy machine it takes a while to be made
 RETRY_S = (0.2, 1.0)  # a lost link is tried again after the first of these, in the end every second one
 
 
@@ -99,6 +100,7 @@ def _config(
         "transport/shared_memory/enabled": False,
         "transport/link/rx/max_message_size": LARGEST_MESSAGE_BYTES,
         "transport/link/tx/lease": round(LEASE_S * 1000),
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
         "transport/link/tx/queue/congestion_control/block/wait_before_close": round(BLOCK_S * 1e6),
     }  # fmt: skip
     if certificates is not None:

@@ -27,7 +27,8 @@ class Standing:
     Residual risk, mean over the area and over the worst 30 % of it, when the last primary had surveyed all, at 1.05
     times that, and at the mission's end, which is `ends_at` times that. `served`: strips done. `removed_m2`: see
     `Flight`. `wins`, `losses`: on how many seeds its mean risk at the end is lower or higher than the first
-    contender's, of those that both have flown. `failed`: missions that failed.
+    contender's, of those that both have flown; with `worst30_` the same over the worst 30 %. `failed`: missions that
+    failed.
     """
 
     name: str
@@ -45,6 +46,8 @@ class Standing:
     removed_m2: Spread
     wins: int
     losses: int
+    worst30_wins: int
+    worst30_losses: int
 
 
 def standings(flown: Flown) -> list[Standing]:
@@ -89,7 +92,7 @@ def _standing(name: str, flights: Sequence[Flight], failed: int, first: dict[int
         values = np.array([what(one) for one in flights], dtype=np.float64)
         return Spread(float(values.mean()), float(values.std(ddof=1)) if values.size > 1 else 0.0)
 
-    both = [(one.at_end.mean, first[one.seed].at_end.mean) for one in flights if one.seed in first]
+    both = [(one.at_end, first[one.seed].at_end) for one in flights if one.seed in first]
     return Standing(
         name=name,
         flown=len(flights),
@@ -104,6 +107,8 @@ def _standing(name: str, flights: Sequence[Flight], failed: int, first: dict[int
         worst30_mean_end=spread(lambda one: one.at_end.worst30_mean),
         served=spread(lambda one: float(one.served)),
         removed_m2=spread(lambda one: one.removed_m2),
-        wins=sum(own < other for own, other in both),
-        losses=sum(own > other for own, other in both),
+        wins=sum(own.mean < other.mean for own, other in both),
+        losses=sum(own.mean > other.mean for own, other in both),
+        worst30_wins=sum(own.worst30_mean < other.worst30_mean for own, other in both),
+        worst30_losses=sum(own.worst30_mean > other.worst30_mean for own, other in both),
     )

@@ -27,7 +27,8 @@ def table(standings: Sequence[Standing], title: str) -> Table:
         *(("mission ends:\nat", "\nmean", "\nworst 30 %") if ends_later else ()),
         "strips\nserved",
         "risk removed\nm²",
-        "better, worse\nthan the first",
+        "better, worse than\nthe first: mean",
+        "\nworst 30 %",
         *(("\nfailed",) if some_failed else ()),
     ):
         made.add_column(name, justify="right", no_wrap=True)
@@ -39,6 +40,7 @@ def table(standings: Sequence[Standing], title: str) -> Table:
             f"{one.served.mean:.1f} ± {one.served.deviation:.1f}",
             f"{one.removed_m2.mean:.0f} ± {one.removed_m2.deviation:.0f}",
             f"{one.wins}, {one.losses} of {one.flown}" if index else "",
+            f"{one.worst30_wins}, {one.worst30_losses}" if index else "",
             *((str(one.failed),) if some_failed else ()),
         )
     return made

@@ -30,10 +30,10 @@ from secondlook.parts import ALLOCATOR
 from secondlook.scenario import load_scenario
 
 
-def flight(seed: int, end: float, *, served: int = 3, ends_at: float = 1.05) -> Flight:
-    """A mission over 1000 s of survey, with this mean risk from then on."""
-    then, later = Risk(1000, end, end + 0.2), Risk(1050, end, end + 0.2)
-    at_end = Risk(1000 * ends_at, end, end + 0.2)
+def flight(seed: int, end: float, *, served: int = 3, ends_at: float = 1.05, worse: float = 0.2) -> Flight:
+    """A mission over 1000 s of survey, with this mean risk from then on, and so much more over the worst 30 %."""
+    then, later = Risk(1000, end, end + worse), Risk(1050, end, end + worse)
+    at_end = Risk(1000 * ends_at, end, end + worse)
     return Flight(seed, "", 1000, then, later, at_end, 0.7, (0.7 - end) * 100, served, (Risk(500, 0.9, 1.0), at_end))
 
 
@@ -77,7 +77,7 @@ class TestWhoIsCompared:
 
 FLOWN: Flown = {
     "first": {1: flight(1, 0.40), 2: flight(2, 0.50), 3: flight(3, 0.30)},
-    "other": {1: flight(1, 0.42), 2: flight(2, 0.46), 3: FailedFlight(3, "it failed")},
+    "other": {1: flight(1, 0.42, worse=0.1), 2: flight(2, 0.46), 3: FailedFlight(3, "it failed")},
     "equal": {1: flight(1, 0.40)},
     "nothing yet": {},
 }
@@ -96,6 +96,8 @@ class TestStandings:
     def test_wins_and_losses_count_the_seeds_that_both_have_flown(self) -> None:
         first, other, equal = standings(FLOWN)
         assert [(one.wins, one.losses) for one in (first, other, equal)] == [(0, 0), (1, 1), (0, 0)]
+        worst = [(one.worst30_wins, one.worst30_losses) for one in (first, other, equal)]
+        assert worst == [(0, 0), (2, 0), (0, 0)]
 
     def test_what_failed_is_counted_and_told(self) -> None:
         assert standings(FLOWN)[1].failed == 1
@@ -105,7 +107,7 @@ class TestStandings:
         full = table(standings(FLOWN), "")
         fewer = table(standings({"first": FLOWN["first"]}), "")
         longer = table(standings({"first": {1: flight(1, 0.4, ends_at=2)}}), "")
-        assert [len(one.columns) for one in (fewer, full, longer)] == [8, 9, 11]
+        assert [len(one.columns) for one in (fewer, full, longer)] == [9, 10, 12]
 
 
 def test_a_mission_is_flown_as_by_run(tmp_path: Path) -> None:
