@@ -39,12 +39,15 @@ class FleetMap:
         self.rho = rho
         self.layers: dict[str, VehicleLayer] = {}
         self.changes = 0
-        self._risk: FloatArray = np.ones(grid.shape)
+        self._unseen: LevelArray = np.broadcast_to(np.uint8(0), grid.shape)  # takes no memory
+        self._risk: FloatArray | None = None  # that of a large map is only held where it is asked for
         self._changed: dict[tuple[int, int], tuple[slice, slice]] = {}  # windows of tiles that _risk does not tell yet
 
     @property
     def risk(self) -> FloatArray:
         """The fleet's residual risk, 1 where nobody has looked; shape `grid.shape`."""
+        if self._risk is None:
+            self._risk = np.ones(self.grid.shape)
         for place, window in self._changed.items():
             layers = [one for one in self.layers.values() if place in one.versions]  # the others tell nothing of it
             self._risk[window], _ = self._joined(window, layers)
@@ -153,12 +156,12 @@ class FleetMap:
         self, window: tuple[slice, slice], layers: Sequence[VehicleLayer]
     ) -> tuple[NDArray[np.unsignedinteger], NDArray[np.unsignedinteger]]:
         """Sums and maxima of these layers' levels; without a `rho` the sums alone count, and stand for both."""
-        sums = np.zeros(self._risk[window].shape, dtype=np.min_scalar_type(MOST_LEVELS * len(layers)))
+        sums = self._unseen[window].astype(np.min_scalar_type(MOST_LEVELS * len(layers)))
         for layer in layers:
             sums += layer.sum_levels[window]
         if self.rho == 0.0:
             return sums, sums
-        largest = np.zeros(sums.shape, dtype=np.uint8)
+        largest = self._unseen[window].copy()
         for layer in layers:
             np.maximum(largest, layer.largest_levels[window], out=largest)
         return sums, largest
