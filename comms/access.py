@@ -1,4 +1,6 @@
-"""The hub's access rules, made from the topic table: what a process may not write or read, the hub drops."""
+"""The hub's access rules, made from the topic table: what a process may not write or read, the hub drops.
+
+Whether what is in a parcel is its sender's to say, and for this listener, the listener looks itself."""
 
 from __future__ import annotations
 
@@ -20,8 +22,8 @@ def access_rules(routing: Routing, hosts: tuple[HostPlan, ...], keys: RunKeys) -
         listening = [node for node in plan.nodes if routing.nodes[node].listens_only]
         acting = [node for node in plan.nodes if node not in listening]
         writes, reads = topic_keys(routing, acting, keys)
-        writes += [keys.parcel("*", node) for node in acting]
-        reads += [keys.parcel(some, "*") for some in routing.audiences if not set(listening).isdisjoint(some)]
+        writes += [keys.parcel(watchers, node) for watchers in routing.audiences if watchers for node in acting]
+        reads += [keys.parcel(watchers, "*") for watchers in routing.audiences if {*watchers} & {*listening}]
         reads.append(keys.to_host(plan.host))
         allowed[plan.host] = {
             "writes": (["ingress"], ["put"], [*writes, keys.from_host(plan.host)]),

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 from comms.clock import LockstepClock
 
-MARK_EVERY_S = 0.5  # of the wall clock: a listener works with cold caches after each wait, and costs more by the mark
+MARK_EVERY_S = 0.5  # of the wall clock: the more a listener takes at once, the less each message costs it
 MARKS_A_BOUND = 8  # so often is a listener marked on its way to the bound
 MOST_BEHIND_BYTES = 4 << 20
 

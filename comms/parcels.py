@@ -10,7 +10,8 @@ import msgpack
 from comms.runner import Outgoing
 from comms.wire import WireError
 
-MOST_BYTES = 7000  # of messages in a parcel, unless a single one has more: so it fits into one packet
+MOST_BYTES = 7900  # of a parcel, unless a single message has more: so it fits into one packet with its own key
+HEAD_BYTES = 8  # that MessagePack puts before key and payload, at the most, and before all
 
 _pack = msgpack.Packer().pack
 
@@ -23,12 +24,13 @@ def parcels(outgoing: Iterable[Outgoing]) -> Iterator[tuple[tuple[str, ...], byt
         watchers = one.route.watchers
         if not watchers:
             continue
-        if watchers in held and sizes[watchers] + one.size > MOST_BYTES:
+        size = len(one.key) + one.size + HEAD_BYTES
+        if watchers in held and sizes[watchers] + size > MOST_BYTES:
             yield watchers, _pack(held.pop(watchers))
         if watchers not in held:
-            held[watchers], sizes[watchers] = [], 0
+            held[watchers], sizes[watchers] = [], HEAD_BYTES
         held[watchers] += (one.key, one.payload)
-        sizes[watchers] += one.size
+        sizes[watchers] += size
     for watchers, messages in held.items():
         yield watchers, _pack(messages)
 

@@ -86,10 +86,9 @@ class _Line:
         return unpack(words)
 
     def mail(self) -> Iterator[_Mail]:
-        """Key below the run id and payload of what has come. What a word tells of has come before it as long as both
+        """Full key and payload of what has come. What a word tells of has come before it as long as both
         took the same way; whoever waits for it looks again."""
-        root = self._keys.root
-        return ((key.removeprefix(root), payload) for key, payload in self._mailbox.take())
+        return self._mailbox.take()
 
     def interrupt(self) -> None:
         """From any thread: whoever waits for words gets Interrupted, after those that are there already."""
@@ -118,8 +117,8 @@ def serve_nodes(
     granted: tuple[int, list[Grant]] | None = None
     while True:
         words = line.words(TAKE_EVERY_S if granted is None else MAIL_EVERY_S)
-        for mail in line.mail():
-            received = group.receive(*mail)
+        for key, payload in line.mail():
+            received = group.receive(key.removeprefix(keys.root), payload)
             if received is not None and group.holds(coordinators):
                 latency.arrived(received, time.perf_counter())
         if words[:1] == ["grant"]:
@@ -160,7 +159,6 @@ class ListenerHost:
     def __init__(
         self, session: zenoh.Session, keys: RunKeys, host: str, node_id: str, listener: Listener, routing: Routing
     ) -> None:
-        self._node_id = node_id
         self._listener = KeptListener(node_id, listener)
         self._routing = routing
         self._intake = Intake(routing)
@@ -168,8 +166,13 @@ class ListenerHost:
         self._held: list[Received] = []
         senders = [node.node_id for node in routing.roster if not node.listens_only]
         # Keys and no expressions: which of these a message fits is looked up anew for each that comes.
-        mail = [keys.parcel(some, sender) for some in routing.audiences if node_id in some for sender in senders]
-        self._line = _Line(session, keys, host, mail)
+        self._parcels = {
+            keys.parcel(watchers, sender): (watchers, sender)
+            for watchers in routing.audiences
+            if node_id in watchers
+            for sender in senders
+        }
+        self._line = _Line(session, keys, host, self._parcels)
 
     def interrupt(self) -> None:
         """Ends the run early."""
@@ -212,24 +215,22 @@ class ListenerHost:
 
     def _take_mail(self) -> None:
         for key, parcel in self._line.mail():
-            sender = key.rpartition("/")[2]
+            # A key that is an expression comes to all whom it fits.
+            watchers, sender = self._parcels.get(key, ((), ""))
             try:
                 said = unpacked(parcel)
             except WireError as error:
                 self._intake.drop("malformed", sender, f"{key}: {error}")
                 continue
             for below, payload in said:
-                self._take(sender, below, payload)
-
-    def _take(self, sender: str, key: str, payload: bytes) -> None:
-        route = self._routing.route(key)
-        if route is None or route.writer != sender or self._node_id not in route.watchers:
-            self._intake.drop("not for here", sender, key)
-            return
-        self._arrived[sender] += 1
-        received = self._intake.open(key, payload)
-        if received is not None:
-            self._held.append(received)
+                route = self._routing.route(below)
+                if route is None or route.writer != sender or route.watchers != watchers:
+                    self._intake.drop("not for here", sender, f"{below[:100]!r} under {key}")
+                    continue
+                self._arrived[sender] += 1  # also if it does not fit: it is not to be waited for
+                received = self._intake.open(below, payload)
+                if received is not None:
+                    self._held.append(received)
 
     def _has_all(self, expected: dict[str, int]) -> bool:
         return all(self._arrived[sender] >= count for sender, count in expected.items())

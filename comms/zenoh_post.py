@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 import zenoh
 
@@ -19,7 +19,7 @@ class ZenohPost:
         self._session = session
         self._keys = keys
 
-    def publish(self, sender: str, outgoing: Iterable[Outgoing]) -> None:
+    def publish(self, sender: str, outgoing: Sequence[Outgoing]) -> None:
         """Sends messages of one node; they go out with the next word at the latest."""
         for one in outgoing:
             if one.route.readers:

@@ -80,7 +80,7 @@ def put(session: zenoh.Session, key: str, payload: bytes, *, at_once: bool = Tru
     """Publishes reliably. No declared publisher: one would drop what it sends before it has heard of a subscriber,
     while a plain put always goes to the hub.
 
-    `at_once`: whether it goes out in a packet of its own, with what still waits before it. What is not shares its
+    `at_once`: whether it goes out in a packet of its own, with what still waits before it. What is not may share its
     packet with what is put right after it, and so what a packet costs its receiver: most of what a message costs."""
     session.put(
         key,

@@ -79,8 +79,10 @@ def _exp(exponents: FloatArray) -> FloatArray:
 
 @cache
 def risk_of_levels(most: int, parts: int = 1) -> FloatArray:
-    """Residual risk of 0 to `most` levels in steps of one over `parts` of a level; not to be written to."""
-    return _exp(-NATS_PER_LEVEL / parts * np.arange(most * parts + 1.0))
+    """Residual risk of 0 to `most` levels in steps of one over `parts` of a level; read-only."""
+    risk = _exp(-NATS_PER_LEVEL / parts * np.arange(most * parts + 1.0))
+    risk.setflags(write=False)  # all who ask have the same one
+    return risk
 
 
 @dataclass(frozen=True)

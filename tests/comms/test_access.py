@@ -17,15 +17,16 @@ from hypothesis import strategies as st
 from comms.access import access_rules
 from comms.codec import Header, encode
 from comms.control import HostPlan, RunKeys, pack
-from comms.messages import Maneuver, ManeuverKind, Task, TaskAction, TruthPose
+from comms.messages import Maneuver, ManeuverKind, Role, Task, TaskAction, TruthPose
 from comms.node import Step
-from comms.routing import Routing
+from comms.routing import RosterNode, Routing
 from comms.topics import TOPICS
 from comms.zenoh_hub import FleetError
 from comms.zenoh_session import ConnectionFailedError, open_client, open_hub, put, subscribe
 
-routing = Routing(ROSTER)
-HOSTED = ("alpha", "beta", "coordinator", "observer")
+routing = Routing((*ROSTER, RosterNode("recorder", Role.RECORDER)))
+ALONE = (*EACH_ALONE, HostPlan("recorder", ("recorder",)))
+HOSTED = tuple(plan.host for plan in ALONE)
 TOPIC_KEYS = sorted(
     {topic.key(vehicle=vehicle, number=7, tile="0-1") for topic in TOPICS for vehicle in ("alpha", "beta", "gamma")}
 )
@@ -69,12 +70,12 @@ def may_read(plan: HostPlan, key: str) -> bool:
 
 @st.composite
 def groupings(draw: st.DrawFn) -> tuple[HostPlan, ...]:
-    """The three nodes that act, world apart, spread over up to three hosts and the hub's own; and the observer."""
+    """The three nodes that act, world apart, spread over up to three hosts and the hub's own; and those that listen."""
     places: dict[int, list[str]] = {}
     for node in ("alpha", "beta", "coordinator"):
         places.setdefault(draw(st.integers(0, 3)), []).append(node)
     places.pop(0, None)
-    return (*(HostPlan(f"host{place}", tuple(nodes)) for place, nodes in places.items()), EACH_ALONE[-1])
+    return (*(HostPlan(f"host{place}", tuple(nodes)) for place, nodes in places.items()), *ALONE[-2:])
 
 
 @given(groupings())
@@ -106,8 +107,8 @@ class Guarded:
 
     def __init__(self, sessions: ExitStack) -> None:
         self._sessions = sessions
-        users = {plan.host: password(plan.host) for plan in EACH_ALONE}
-        self.hub, self.endpoint = open_hub(users, access_rules(routing, EACH_ALONE, KEYS))
+        users = {plan.host: password(plan.host) for plan in ALONE}
+        self.hub, self.endpoint = open_hub(users, access_rules(routing, ALONE, KEYS))
         sessions.enter_context(self.hub)
 
     def client(self, user: str) -> zenoh.Session:
@@ -154,7 +155,7 @@ WILD_KEYS = ["**", "agent/**", "agent/*/state", "*/alpha/**", "world/truth/**", 
 CLOCK_KEYS = [f"clock/{way}/{host}" for way in ("to", "from", "alive") for host in (*HOSTED, "world")]
 
 
-@pytest.mark.parametrize("plan", EACH_ALONE, ids=lambda plan: plan.host)
+@pytest.mark.parametrize("plan", ALONE, ids=lambda plan: plan.host)
 def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: HostPlan) -> None:
     ears = Ears(guarded.hub, ["**"])
     client = guarded.client(plan.host)
@@ -169,7 +170,7 @@ def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: Ho
     assert sorted(ears.heard) == sorted({key for key in keys if may_write(plan, key)} | gammas | {last})
 
 
-@pytest.mark.parametrize("plan", EACH_ALONE, ids=lambda plan: plan.host)
+@pytest.mark.parametrize("plan", ALONE, ids=lambda plan: plan.host)
 def test_the_hub_tells_a_host_what_it_may_read_alone(guarded: Guarded, plan: HostPlan) -> None:
     keys = [key for key in TOPIC_KEYS if routing.route(key)] + PARCEL_KEYS + CLOCK_KEYS
     last = f"clock/to/{plan.host}"

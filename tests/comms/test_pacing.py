@@ -67,7 +67,9 @@ def test_a_listener_is_behind_from_the_bound_until_it_has_acknowledged_enough(cl
 
 def test_without_listeners_nobody_is_behind(clock: LockstepClock) -> None:
     pacing = Pacing(clock, [], 1600)
+    assert pacing.next_mark(0.0)
     say(clock, 5000, later_ms=10)
+    assert not pacing.next_mark(0.0)
     assert pacing.behind() == []
 
 

@@ -4,12 +4,25 @@ from __future__ import annotations
 
 import random
 import threading
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
 import msgpack
 import pytest
-from fleets import EACH_ALONE, KEYS, Bus, Notes, Scripted, fleet_that_talks, on_local, over_zenoh, password, says
+from fleets import (
+    EACH_ALONE,
+    KEYS,
+    Bus,
+    Notes,
+    Scripted,
+    fleet_that_talks,
+    on_local,
+    over_zenoh,
+    password,
+    say_nav,
+    says,
+)
 
 from comms.control import HostPlan, pack
 from comms.node import Received, Step
@@ -38,6 +51,27 @@ class Slow(Notes):
     def on_message(self, received: Received) -> None:
         assert self.released.wait(timeout=20)
         super().on_message(received)
+
+
+def test_a_listener_hears_of_a_mission_while_it_goes_on() -> None:
+    @dataclass
+    class First(Notes):
+        hears: threading.Event = field(default_factory=threading.Event)
+
+        def on_message(self, received: Received) -> None:
+            super().on_message(received)
+            if received.header.sent_ms > 0:
+                self.hears.set()
+
+    listener, until_s = First(), time.monotonic() + 20
+
+    def goes_on(now_ms: int) -> Step:
+        ends = listener.hears.is_set() or time.monotonic() > until_s
+        return says(say_nav("alpha"), wake_ms=None if ends else now_ms + 1)
+
+    world = Scripted(starts=lambda now_ms: says(wake_ms=1), wakes=goes_on)
+    over_zenoh({"world": world}, listener, time_limit_ms=10_000_000, most_behind_bytes=1 << 30)
+    assert time.monotonic() < until_s
 
 
 def test_the_clock_waits_for_a_listener_that_is_too_far_behind_and_says_the_same_as_without() -> None:

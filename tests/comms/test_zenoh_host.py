@@ -8,6 +8,8 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
+import msgpack
+import numpy as np
 import pytest
 import zenoh
 from fleets import EACH_ALONE, KEYS, ROSTER, Notes, Scripted, nav, password, says, state
@@ -15,15 +17,16 @@ from flights import until
 
 from comms.clock import Grant
 from comms.control import HostPlan, pack, pack_grants, unpack, unpack_answers
-from comms.messages import Message
-from comms.routing import Routing
+from comms.messages import Look, Message, Role, TruthPose
+from comms.routing import RosterNode, Routing
 from comms.runner import Outgoing, Stamp
-from comms.topics import NAV, STATE
+from comms.topics import LOOK, NAV, STATE, TRUTH_POSE
 from comms.zenoh_host import ListenerHost, serve_nodes
 from comms.zenoh_post import ZenohPost
 from comms.zenoh_session import Mailbox, open_client, open_hub, put, subscribe
 
 PATIENCE_S = 20.0
+WATCHED = Routing((*ROSTER, RosterNode("recorder", Role.RECORDER)))  # by two, of whom one may not read all
 
 
 @dataclass
@@ -68,7 +71,7 @@ def hub() -> Iterator[HubByHand]:
 
 def positions(count: int) -> list[Outgoing]:
     """So many positions of alpha, a second apart."""
-    stamp = Stamp("world", Routing(ROSTER))
+    stamp = Stamp("world", WATCHED)
     return [stamp(NAV.key(vehicle="alpha"), moved(number), 1000 * number) for number in range(count)]
 
 
@@ -110,7 +113,7 @@ def takes(monkeypatch: pytest.MonkeyPatch) -> list[None]:
 def test_a_mark_that_comes_before_its_mail_is_acknowledged_when_all_is_there(hub: HubByHand, takes: list[None]) -> None:
     notes, (first, second) = Notes(), positions(2)
     with open_client(hub.endpoint, "observer", password("observer")) as session:
-        host = ListenerHost(session, KEYS, "observer", "observer", notes, Routing(ROSTER))
+        host = ListenerHost(session, KEYS, "observer", "observer", notes, WATCHED)
         running = Aside.run(host.run)
         hub.welcomes("observer")
         hub.say("observer", "mark", 1, 1000, {"world": 2})
@@ -131,7 +134,7 @@ def test_mail_that_no_word_has_told_of_is_not_lost_by_an_interrupt(hub: HubByHan
     with open_client(hub.endpoint, "observer", password("observer")) as session:
         told: queue.SimpleQueue[None] = queue.SimpleQueue()
         listens = subscribe(session, ["told"], lambda *_: told.put(None))
-        host = ListenerHost(session, KEYS, "observer", "observer", notes, Routing(ROSTER))
+        host = ListenerHost(session, KEYS, "observer", "observer", notes, WATCHED)
         running = Aside.run(host.run)
         hub.welcomes("observer")
         for one in said:
@@ -145,24 +148,56 @@ def test_mail_that_no_word_has_told_of_is_not_lost_by_an_interrupt(hub: HubByHan
     assert notes.closed == 1
 
 
-def test_parcels_that_do_not_fit_are_counted_and_dropped(hub: HubByHand) -> None:
+def test_what_does_not_fit_is_counted_and_dropped_and_not_waited_for(hub: HubByHand) -> None:
     notes, (first, second) = Notes(), positions(2)
-    alphas = Stamp("alpha", Routing(ROSTER))(STATE.key(vehicle="alpha"), state(), 0)
-    here = next(iter(Routing(ROSTER).audiences))
+    alphas = Stamp("alpha", WATCHED)(STATE.key(vehicle="alpha"), state(), 0)
+    look = Outgoing(LOOK.key(vehicle="alpha"), first.route, first.message, first.payload, 0, first.header, [])
     with open_client(hub.endpoint, "observer", password("observer")) as session:
-        host = ListenerHost(session, KEYS, "observer", "observer", notes, Routing(ROSTER))
+        host = ListenerHost(session, KEYS, "observer", "observer", notes, WATCHED)
         running = Aside.run(host.run)
         hub.welcomes("observer")
         hub.sends_parcels(first)
-        put(hub.session, KEYS.parcel(here, "world"), b"no parcel", at_once=False)
+        put(hub.session, KEYS.parcel(first.route.watchers, "world"), b"no parcel", at_once=False)
+        put(hub.session, KEYS.parcel(first.route.watchers, "*"), msgpack.packb([first.key, first.payload]))
         hub.sends_parcels(alphas)  # in the name of the world
+        hub.sends_parcels(look)  # of which not all to whom the parcel goes may read
+        broken = msgpack.packb([first.key, b"broken"])
+        put(hub.session, KEYS.parcel(first.route.watchers, "world"), broken, at_once=False)
         hub.sends_parcels(second)
-        hub.say("observer", "finish", 1, 1000, {"world": 2})
+        hub.say("observer", "finish", 1, 1000, {"world": 3})
         final = hub.hears("final")
         hub.say("observer", "goodbye")
         running.end()
     assert [(one.key, one.header.sequence) for one in notes.heard] == [(first.key, 0), (second.key, 1)]
-    assert final[2] == {"malformed": 1, "not for here": 1}
+    senders = 5  # under the keys of each of which the expression comes once
+    assert final[2] == {"malformed": 2, "not for here": senders + 2}
+
+
+def test_a_listener_hears_what_it_shares_with_others_and_what_it_does_not(hub: HubByHand) -> None:
+    notes, stamp = Notes(), Stamp("world", WATCHED)
+    shared = stamp(NAV.key(vehicle="alpha"), nav(), 0)
+    looks = Look(1, 1, 0.0, 0.0, 0.0, 0.0, 5.0, 1.0, np.zeros((2, 1, 2)), 15.0, 0.0, True, ())
+    alone = stamp(LOOK.key(vehicle="alpha"), looks, 0)
+    assert (shared.route.watchers, alone.route.watchers) == (("observer", "recorder"), ("observer",))
+    with open_client(hub.endpoint, "observer", password("observer")) as session:
+        host = ListenerHost(session, KEYS, "observer", "observer", notes, WATCHED)
+        running = Aside.run(host.run)
+        hub.welcomes("observer")
+        hub.sends_parcels(shared, alone)
+        hub.say("observer", "finish", 1, 1000, {"world": 2})
+        hub.hears("final")
+        hub.say("observer", "goodbye")
+        running.end()
+    assert [one.key for one in notes.heard] == [shared.key, alone.key]
+
+
+def test_what_only_listeners_read_goes_out_in_a_parcel_alone(monkeypatch: pytest.MonkeyPatch, hub: HubByHand) -> None:
+    keys: list[str] = []
+    monkeypatch.setattr("comms.zenoh_post.put", lambda session, key, payload, at_once: keys.append(key))
+    stamp = Stamp("world", WATCHED)
+    pose = stamp(TRUTH_POSE.key(vehicle="alpha"), TruthPose(0, 0, 0), 0)
+    ZenohPost(hub.session, KEYS).publish("world", [pose, stamp(NAV.key(vehicle="alpha"), nav(), 0)])
+    assert keys == [KEYS.topic("veh/alpha/nav"), KEYS.parcel(("observer", "recorder"), "world")]
 
 
 def test_a_grant_that_comes_before_its_mail_is_carried_out_when_all_is_there(hub: HubByHand, takes: list[None]) -> None:
