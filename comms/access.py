@@ -1,6 +1,7 @@
 """The hub's access rules, made from the topic table: what a process may not write or read, the hub drops.
 
-Whether what is in a parcel is its sender's to say, and for this listener, the listener looks itself."""
+Whether what is in a parcel is its sender's to say, and for this listener, the listener looks itself.
+"""
 
 from __future__ import annotations
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import msgpack
-
+from comms.messagepack import pack, unpack
 from comms.messages import Message
 from comms.wire import IDENTIFIER, LARGEST_MS, WireError, record_of
 
@@ -14,8 +13,6 @@ HEADER_FIELDS = 6
 LARGEST_INCARNATION = 2**16 - 1
 LARGEST_SEQUENCE = 2**32 - 1
 CLOCK = "clock"  # the clock's id as a sender
-
-_pack = msgpack.Packer().pack  # one for all: making it takes as long as packing a message
 
 
 class Header(NamedTuple):
@@ -61,8 +58,7 @@ def message_of(body: Any, message_type: type[Message]) -> Message:
 def packed(header: Header, body: list[Any]) -> bytes:
     """The payload of a header and a body; raises WireError where the header does not fit."""
     _check(*header)
-    payload: bytes = _pack([SCHEMA_VERSION, *header, body])
-    return payload
+    return pack([SCHEMA_VERSION, *header, body])
 
 
 def header_of(payload: bytes) -> Header:
@@ -71,10 +67,7 @@ def header_of(payload: bytes) -> Header:
 
 
 def _parts(payload: bytes) -> tuple[Header, Any]:
-    try:
-        parts: Any = msgpack.unpackb(payload)
-    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        raise WireError(f"not MessagePack: {error}") from None
+    parts = unpack(payload)
     if type(parts) is not list or len(parts) != HEADER_FIELDS:
         raise WireError(f"not a list of {HEADER_FIELDS} parts")
     version, sender, incarnation, sequence, sent_ms, body = parts

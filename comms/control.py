@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-import msgpack
-
+from comms import messagepack
 from comms.clock import Grant, Sent
 from comms.runner import SenderDigest
 from comms.topics import KEY_ROOT
+from comms.wire import WireError
 
 
 class ControlError(Exception):
@@ -68,15 +68,14 @@ class HostPlan:
 
 def pack(*words: Any) -> bytes:
     """A control message: its name and its words."""
-    packed: bytes = msgpack.packb(words)
-    return packed
+    return messagepack.pack(words)
 
 
 def unpack(payload: bytes) -> list[Any]:
     """Name and words of a control message; raises ControlError where it is none."""
     try:
-        words = msgpack.unpackb(payload)
-    except (ValueError, TypeError, msgpack.UnpackException, RecursionError):
+        words = messagepack.unpack(payload)
+    except WireError:
         words = None
     if type(words) is not list or not words or type(words[0]) is not str:
         raise ControlError(f"{payload[:20]!r}")

@@ -33,10 +33,7 @@ class Pacing:
         clock that never goes back."""
         said = self._clock.watched_bytes
         unmarked = max((said[node] - marked for node, marked in self._marked_bytes.items()), default=0)
-        if (
-            now_s - self._mark_s < MARK_EVERY_S
-            and unmarked * MARKS_A_BOUND < self._most_behind_bytes
-        ):  # fmt: skip
+        if now_s - self._mark_s < MARK_EVERY_S and unmarked * MARKS_A_BOUND < self._most_behind_bytes:
             return False
         self.mark += 1
         self._mark_s = now_s

@@ -5,15 +5,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-import msgpack
-
+from comms.messagepack import pack, unpack
 from comms.runner import Outgoing
 from comms.wire import WireError
 
 MOST_BYTES = 7900  # of a parcel, unless a single message has more: so it fits into one packet with its own key
 HEAD_BYTES = 8  # that MessagePack puts before key and payload, at the most, and before all
-
-_pack = msgpack.Packer().pack
 
 
 def parcels(outgoing: Iterable[Outgoing]) -> Iterator[tuple[tuple[str, ...], bytes]]:
@@ -26,21 +23,18 @@ def parcels(outgoing: Iterable[Outgoing]) -> Iterator[tuple[tuple[str, ...], byt
             continue
         size = len(one.key) + one.size + HEAD_BYTES
         if watchers in held and sizes[watchers] + size > MOST_BYTES:
-            yield watchers, _pack(held.pop(watchers))
+            yield watchers, pack(held.pop(watchers))
         if watchers not in held:
             held[watchers], sizes[watchers] = [], HEAD_BYTES
         held[watchers] += (one.key, one.payload)
         sizes[watchers] += size
     for watchers, messages in held.items():
-        yield watchers, _pack(messages)
+        yield watchers, pack(messages)
 
 
 def unpacked(parcel: bytes) -> Iterator[tuple[str, bytes]]:
     """Key below the run id and payload of each message; raises WireError, and nothing else, where this is no parcel."""
-    try:
-        parts = msgpack.unpackb(parcel)
-    except (ValueError, TypeError, msgpack.UnpackException, RecursionError) as error:
-        raise WireError(f"not MessagePack: {error}") from None
+    parts = unpack(parcel)
     if type(parts) is not list or len(parts) % 2:
         raise WireError("not a list of keys and payloads")
     keys, payloads = parts[::2], parts[1::2]

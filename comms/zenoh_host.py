@@ -24,7 +24,7 @@ from comms.parcels import unpacked
 from comms.routing import Routing
 from comms.runner import Intake, NodeError
 from comms.wire import WireError
-from comms.zenoh_post import ZenohPost
+from comms.zenoh_post import publish
 from comms.zenoh_session import Mailbox, put, subscribe
 
 HELLO_EVERY_S = 0.2
@@ -86,8 +86,8 @@ class _Line:
         return unpack(words)
 
     def mail(self) -> Iterator[_Mail]:
-        """Full key and payload of what has come. What a word tells of has come before it as long as both
-        took the same way; whoever waits for it looks again."""
+        """Full key and payload of what has come. What a word tells of has come before it as long as both took the same
+        way; whoever waits for it looks again."""
         return self._mailbox.take()
 
     def interrupt(self) -> None:
@@ -110,7 +110,6 @@ def serve_nodes(
     group = NodeGroup(nodes, routing, faults, plan.incarnation)
     expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
     line = _Line(session, keys, plan.host, expressions)
-    post = ZenohPost(session, keys)
     latency = StripLatency()
     coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
     line.shake_hands()
@@ -143,7 +142,7 @@ def serve_nodes(
                     raise
                 if grant.node_id in coordinators:
                     latency.sending(outgoing, time.perf_counter())
-                post.publish(grant.node_id, outgoing)
+                publish(session, keys, grant.node_id, outgoing)
                 answers.append((grant.node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing]))
             line.say(pack_answers(answers))
 

@@ -35,7 +35,7 @@ from comms.result import BusResult
 from comms.routing import Routing
 from comms.runner import SenderDigest, Stamp, fleet_digest
 from comms.topics import RUN
-from comms.zenoh_post import ZenohPost
+from comms.zenoh_post import publish
 from comms.zenoh_session import PATIENCE_S, put, subscribe
 
 SIGN_OF_LIFE_EVERY_S = 0.5
@@ -91,7 +91,6 @@ class Hub:
         self._change = carry_out
         self._clock = LockstepClock(routing, time_limit_ms, events)
         self._group = NodeGroup(nodes, routing, faults)
-        self._post = ZenohPost(session, keys)
         self._kept = {node_id: KeptMessages(node_id, routing) for node_id in self._clock.said_to_joiners}
         self._latency = StripLatency()
         self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
@@ -120,7 +119,7 @@ class Hub:
         stamp = Stamp(CLOCK, self._routing)
         announced = stamp(RUN.key(), run_info, 0)
         self._clock.publish(CLOCK, [announced])
-        self._post.publish(CLOCK, [announced])
+        publish(self._session, self._keys, CLOCK, [announced])
         while (turn := self._clock.next_round()) is not None:
             self._show_life()
             while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
@@ -149,7 +148,7 @@ class Hub:
                 wake_ms, outgoing = self._group.act(grant, turn.now_ms)
                 if grant.node_id in self._coordinators:
                     self._latency.sending(outgoing, time.perf_counter())
-                self._post.publish(grant.node_id, outgoing)
+                publish(self._session, self._keys, grant.node_id, outgoing)
                 self._clock.answer(grant.node_id, wake_ms, outgoing)
         self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
 

@@ -12,17 +12,10 @@ from comms.runner import Outgoing
 from comms.zenoh_session import put
 
 
-class ZenohPost:
-    """Sends what the nodes of one process say."""
-
-    def __init__(self, session: zenoh.Session, keys: RunKeys) -> None:
-        self._session = session
-        self._keys = keys
-
-    def publish(self, sender: str, outgoing: Sequence[Outgoing]) -> None:
-        """Sends messages of one node; they go out with the next word at the latest."""
-        for one in outgoing:
-            if one.route.readers:
-                put(self._session, self._keys.topic(one.key), one.payload, at_once=False)
-        for watchers, parcel in parcels(outgoing):
-            put(self._session, self._keys.parcel(watchers, sender), parcel, at_once=False)
+def publish(session: zenoh.Session, keys: RunKeys, sender: str, outgoing: Sequence[Outgoing]) -> None:
+    """Sends messages of one node; they go out with the next word at the latest."""
+    for one in outgoing:
+        if one.route.readers:
+            put(session, keys.topic(one.key), one.payload, at_once=False)
+    for watchers, parcel in parcels(outgoing):
+        put(session, keys.parcel(watchers, sender), parcel, at_once=False)

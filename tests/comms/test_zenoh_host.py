@@ -22,7 +22,7 @@ from comms.routing import RosterNode, Routing
 from comms.runner import Outgoing, Stamp
 from comms.topics import LOOK, NAV, STATE, TRUTH_POSE
 from comms.zenoh_host import ListenerHost, serve_nodes
-from comms.zenoh_post import ZenohPost
+from comms.zenoh_post import publish
 from comms.zenoh_session import Mailbox, open_client, open_hub, put, subscribe
 
 PATIENCE_S = 20.0
@@ -51,7 +51,7 @@ class HubByHand:
         put(self.session, KEYS.topic(one.key), one.payload, at_once=False)
 
     def sends_parcels(self, *said: Outgoing) -> None:
-        ZenohPost(self.session, KEYS).publish("world", said)
+        publish(self.session, KEYS, "world", said)
 
     def welcomes(self, host: str) -> None:
         self.hears("hello")
@@ -196,7 +196,7 @@ def test_what_only_listeners_read_goes_out_in_a_parcel_alone(monkeypatch: pytest
     monkeypatch.setattr("comms.zenoh_post.put", lambda session, key, payload, at_once: keys.append(key))
     stamp = Stamp("world", WATCHED)
     pose = stamp(TRUTH_POSE.key(vehicle="alpha"), TruthPose(0, 0, 0), 0)
-    ZenohPost(hub.session, KEYS).publish("world", [pose, stamp(NAV.key(vehicle="alpha"), nav(), 0)])
+    publish(hub.session, KEYS, "world", [pose, stamp(NAV.key(vehicle="alpha"), nav(), 0)])
     assert keys == [KEYS.topic("veh/alpha/nav"), KEYS.parcel(("observer", "recorder"), "world")]
 
 
