@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 from bench.legs import Leg, Schedule
 from bench.removable import LegHelper
-from comms.messages import Look
 from comms.node import Received
+from comms.said.messages import Look
 from planner.types import GridSpec
 
 

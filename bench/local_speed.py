@@ -26,10 +26,10 @@ import msgpack
 
 import comms.runner
 import secondlook.mission
-from comms.clock import LockstepClock
-from comms.local_bus import run_local
+from comms.lockstep.clock import LockstepClock
+from comms.lockstep.local_bus import run_local
 from comms.node import Publication, Received, Step
-from comms.routing import Routing
+from comms.said.routing import Routing
 from coordinator.coordinator import Coordinator
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics

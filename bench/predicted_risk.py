@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from comms.local_bus import run_local
+from comms.lockstep.local_bus import run_local
 from comms.node import Received
-from comms.routing import Routing
+from comms.said.routing import Routing
 from planner.types import BoolArray, FloatArray
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bench.swath import Swath
-from comms.messages import CoverageTile, Look
 from comms.node import Received
+from comms.said.messages import CoverageTile, Look
 from planner.dubins import Pose
 from planner.footprint import look_on_grid
 from planner.types import BoolArray, FloatArray, GridSpec

@@ -18,13 +18,13 @@ from collections.abc import Sequence
 
 from comms.access import access_rules
 from comms.control import HostPlan, RunKeys
-from comms.messages import AgentState, ClockMode, Grid, Mode, Role, RunInfo
+from comms.lockstep.host import serve_nodes
+from comms.lockstep.hub import Hub
 from comms.node import Node, Publication, Received, Step
-from comms.routing import RosterNode, Routing
-from comms.topics import STATE
-from comms.zenoh_host import serve_nodes
-from comms.zenoh_hub import Hub
-from comms.zenoh_session import open_client, open_hub, put, subscribe
+from comms.said.messages import AgentState, ClockMode, Grid, Mode, Role, RunInfo
+from comms.said.routing import RosterNode, Routing
+from comms.said.topics import STATE
+from comms.session import open_client, open_hub, put, subscribe
 
 KEYS = RunKeys("bench")
 TICK, TOCK = KEYS.topic("tick"), KEYS.topic("tock")

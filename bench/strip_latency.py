@@ -19,8 +19,8 @@ import numpy as np
 from rich.progress import track
 
 from comms.latency import STRIP_TO_TASK
-from comms.messages import StripState, StripStatus
 from comms.node import Received
+from comms.said.messages import StripState, StripStatus
 from secondlook.errors import UserError
 from secondlook.fleet import build_fleet
 from secondlook.processes import Processes, RunFailedError

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping
 from typing import Any, Literal
 
 from comms.control import HostPlan, RunKeys
-from comms.routing import Routing
+from comms.said.routing import Routing
 
 Identity = Literal["usernames", "cert_common_names"]
 Allowed = tuple[list[str], list[str], list[str]]

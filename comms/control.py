@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from comms import messagepack
-from comms.clock import Grant, Sent
+from comms.lockstep.clock import Grant, Sent
 from comms.runner import SenderDigest
-from comms.topics import KEY_ROOT
-from comms.wire import WireError
+from comms.said import messagepack
+from comms.said.topics import KEY_ROOT
+from comms.said.wire import WireError
 
 
 class ControlError(Exception):
@@ -37,7 +37,7 @@ class RunKeys:
         return self.root + key
 
     def parcel(self, listeners: Iterable[str], sender: str) -> str:
-        """Where a node sends what these listeners read of it (see `comms.parcels`); no id has a `+`."""
+        """Where a node sends what these listeners read of it (see `comms.lockstep.parcels`); no id has a `+`."""
         return f"{self.root}parcel/{'+'.join(listeners)}/{sender}"
 
     def to_host(self, host: str) -> str:

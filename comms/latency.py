@@ -3,10 +3,10 @@ where it takes up what has come, outside payload and digest."""
 
 from __future__ import annotations
 
-from comms.messages import StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus
 from comms.node import Received
 from comms.runner import Outgoing
-from comms.topics import number_of
+from comms.said.messages import StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus
+from comms.said.topics import number_of
 
 STRIP_TO_TASK = "strip_to_task"
 

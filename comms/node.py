@@ -10,9 +10,9 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from comms.codec import Header
-from comms.messages import Message
-from comms.topics import Topic, number_of
+from comms.said.codec import Header
+from comms.said.messages import Message
+from comms.said.topics import Topic, number_of
 
 
 class Received(NamedTuple):

@@ -9,11 +9,11 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from comms.codec import CLOCK, Header, body_of, decode, message_of, packed
-from comms.messages import Message
 from comms.node import Node, Publication, Received, Step
-from comms.routing import Route, Routing
-from comms.wire import WireError
+from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
+from comms.said.messages import Message
+from comms.said.routing import Route, Routing
+from comms.said.wire import WireError
 
 log = logging.getLogger("secondlook.comms")
 

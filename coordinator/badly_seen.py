@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.messages import Hotspot, HotspotState
+from comms.said.messages import Hotspot, HotspotState
 from planner.fleet_map import FleetMap
 from planner.groups import neighbours
 from planner.lattice import points_inside

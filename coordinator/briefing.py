@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from comms.messages import StripState
+from comms.said.messages import StripState
 from coordinator.config import CoordinatorConfig
 from coordinator.cutter import Cutter
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord

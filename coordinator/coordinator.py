@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from comms.codec import Header
-from comms.messages import (
+from comms.node import Publication, Received, Step
+from comms.said.codec import Header
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,
@@ -25,8 +26,7 @@ from comms.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.node import Publication, Received, Step
-from comms.topics import MISSION_OVER, STRIP, TASK
+from comms.said.topics import MISSION_OVER, STRIP, TASK
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cutter import Cutter

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.messages import AgentState, Mode, Plan, RosterVehicle
+from comms.said.messages import AgentState, Mode, Plan, RosterVehicle
 from coordinator.expected_end import run_of
 from planner.dubins import DubinsPath, Pose, shortest_path
 from planner.sweep import Sweep, shifted

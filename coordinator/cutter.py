@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from comms.messages import Hotspot
+from comms.said.messages import Hotspot
 from coordinator.badly_seen import BadlySeen, Place, Revision
 from coordinator.expected_looks import ExpectedLooks
 from coordinator.growth import Growth, TrackUnderWay

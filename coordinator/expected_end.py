@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from comms.messages import AgentState, Mode, Plan, PlannedTrack, RosterVehicle
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, RosterVehicle
 from planner.dubins import Pose
 from planner.sweep import Run, distance_over, run_over
 

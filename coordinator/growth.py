@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.messages import PlannedTrack
+from comms.said.messages import PlannedTrack
 from planner.fleet_map import VehicleLayer
 from planner.types import BoolArray, FloatArray, GridSpec
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from comms.messages import StripState
+from comms.said.messages import StripState
 from coordinator.strips import Cut, Window
 from planner.types import Strip
 

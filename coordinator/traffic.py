@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from comms.messages import Mode
+from comms.said.messages import Mode
 from coordinator.courses import Course, course, lying_still, run_out_left_m, straight, survey_course, sweep_course
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose, shortest_path

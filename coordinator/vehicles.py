@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from comms.codec import Header
-from comms.messages import AgentState, Mode, Plan, Role, RosterVehicle
+from comms.said.codec import Header
+from comms.said.messages import AgentState, Mode, Plan, Role, RosterVehicle
 from coordinator.expected_end import expected_end_ms
 from coordinator.growth import TrackUnderWay
 from coordinator.ledger import StripRecord

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import secondlook
-from comms.messages import Plan, StripState
+from comms.said.messages import Plan, StripState
 from secondlook.recorded import to_geojson
 
 mission = secondlook.load(sys.argv[1])

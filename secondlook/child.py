@@ -22,17 +22,17 @@ from dataclasses import asdict
 from typing import IO, Any
 
 from comms.access import access_rules
-from comms.clock import RunawayError
 from comms.control import RunKeys
-from comms.events import Change
+from comms.lockstep.clock import RunawayError
+from comms.lockstep.events import Change
+from comms.lockstep.host import ListenerHost, serve_nodes
+from comms.lockstep.hub import FleetError, HostLostError, Hub
 from comms.result import BusResult
-from comms.routing import Routing
 from comms.runner import NodeError
-from comms.wall_host import RefusedError
-from comms.wall_seats import ListenerSeat, NodeSeat
-from comms.zenoh_host import ListenerHost, serve_nodes
-from comms.zenoh_hub import FleetError, HostLostError, Hub
-from comms.zenoh_session import ConnectionFailedError, open_client, open_hub, read_where_packets_are_awaited
+from comms.said.routing import Routing
+from comms.session import ConnectionFailedError, open_client, open_hub, read_where_packets_are_awaited
+from comms.wall.host import RefusedError
+from comms.wall.seats import ListenerSeat, NodeSeat
 from secondlook.child_order import STATUS_FD, ChildOrder, read_order
 from secondlook.node_spec import make_nodes
 from secondlook.wall_child import run_host, run_hub

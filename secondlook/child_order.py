@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from typing import IO
 
 from comms.control import HostPlan
-from comms.events import NodeEvent
-from comms.faults import NO_FAULTS, Faults
-from comms.messages import RunInfo
-from comms.routing import RosterNode
+from comms.lockstep.events import NodeEvent
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.said.messages import RunInfo
+from comms.said.routing import RosterNode
 from secondlook.node_spec import NodeSpec
 
 STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor for words to the launcher

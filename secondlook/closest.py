@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from comms.messages import Nav, TruthPose
 from comms.node import Received
+from comms.said.messages import Nav, TruthPose
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import ipaddress
 import re
 from pathlib import Path
 
-from comms.wall_session import Certificates
+from comms.wall.session import Certificates
 from secondlook.errors import UserError
 
 _FORM = re.compile(r"(?P<protocol>tcp|tls)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})")

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from comms.codec import CLOCK, SCHEMA_VERSION, Header, encode
-from comms.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
-from comms.routing import RosterNode
+from comms.said.codec import CLOCK, SCHEMA_VERSION, Header, encode
+from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
+from comms.said.routing import RosterNode
 from coordinator.config import CoordinatorConfig
 from coordinator.priorities import Priority
 from planner.region import Region

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from comms.control import HostPlan
-from comms.events import Change, Happening
-from comms.messages import Role
+from comms.lockstep.events import Change, Happening
+from comms.said.messages import Role
 from secondlook.fleet import Fleet
 
 HUB = "world"  # the world's process is the hub and holds the clock

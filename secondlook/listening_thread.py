@@ -6,13 +6,13 @@ import threading
 from typing import Any
 
 from comms.control import RunKeys
+from comms.lockstep.host import ListenerHost
 from comms.node import Listener
-from comms.routing import Routing
-from comms.wall_host import WallHost
-from comms.wall_seats import ListenerSeat
-from comms.wall_words import WallKeys
-from comms.zenoh_host import ListenerHost
-from comms.zenoh_session import open_client
+from comms.said.routing import Routing
+from comms.session import open_client
+from comms.wall.host import WallHost
+from comms.wall.seats import ListenerSeat
+from comms.wall.words import WallKeys
 from secondlook.fleet import Fleet
 from secondlook.observer import RunStopped
 

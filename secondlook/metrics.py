@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from comms.messages import (
+from comms.node import Received
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Look,
@@ -24,7 +25,6 @@ from comms.messages import (
     TruthPose,
     TruthTargets,
 )
-from comms.node import Received
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics

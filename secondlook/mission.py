@@ -10,15 +10,15 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from comms.clock import RunawayError
-from comms.events import NodeEvent, timeline
-from comms.faults import NO_FAULTS, Faults
-from comms.local_bus import run_local
+from comms.lockstep.clock import RunawayError
+from comms.lockstep.events import NodeEvent, timeline
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.lockstep.local_bus import run_local
 from comms.result import BusResult, Ending
-from comms.routing import Routing
 from comms.runner import NodeError
-from comms.wall_local import run_local_by_wall
-from comms.zenoh_session import PATIENCE_S
+from comms.said.routing import Routing
+from comms.session import PATIENCE_S
+from comms.wall.local_bus import run_local_by_wall
 from secondlook.errors import UserError
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER

@@ -12,9 +12,9 @@ from typing import Any, BinaryIO, Self, TextIO
 
 import msgpack
 
-from comms.codec import SCHEMA_VERSION
 from comms.node import Received
-from comms.topics import COVERAGE, LOOK, NAV
+from comms.said.codec import SCHEMA_VERSION
+from comms.said.topics import COVERAGE, LOOK, NAV
 from secondlook.errors import UserError
 
 FILE_FORMAT = "secondlook-messages"

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from comms.control import HostPlan, RunKeys
-from comms.events import Change, NodeEvent, timeline
-from comms.faults import NO_FAULTS, Faults
+from comms.lockstep.events import Change, NodeEvent, timeline
+from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.node import Listener
 from comms.result import BusResult, Ending
-from comms.routing import Routing
-from comms.zenoh_session import PATIENCE_S
+from comms.said.routing import Routing
+from comms.session import PATIENCE_S
 from secondlook.child_order import ChildOrder
 from secondlook.child_process import ChildProcess
 from secondlook.fleet import Fleet
@@ -39,9 +39,8 @@ class Processes:
 
     `logs`: a folder for what they print; no file is left there of those that print nothing. `recorder`: how to make the
     recorder in its process, None for none. `observer` lives in this process, and is closed on leaving the context at
-    the latest. `processes`: see `plan_hosts`. `faults` and `events`: see `comms.faults` and `comms.events`; raises
-    ValueError for events that do not fit. `patience_s`: wall time after which a process that should say something
-    and does not is given up.
+    the latest. `processes`: see `plan_hosts`. `faults` and `events`: see `comms.lockstep`; raises ValueError for events
+    that do not fit. `patience_s`: wall time after which a process that should say something and does not is given up.
     """
 
     def __init__(

@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from comms.clock import WRAP_UP_MS
-from comms.codec import decode
+from comms.lockstep.clock import WRAP_UP_MS
 from comms.node import Node, Received
-from comms.routing import Routing
 from comms.runner import Intake, NodeRunner, Outgoing
-from comms.topics import MISSION_OVER
+from comms.said.codec import decode
+from comms.said.routing import Routing
+from comms.said.topics import MISSION_OVER
 
 
 @dataclass(frozen=True)

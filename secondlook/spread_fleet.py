@@ -13,18 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from comms.control import HostPlan
-from comms.messages import Role
 from comms.result import BusResult, Ending
-from comms.routing import RosterNode, Routing
 from comms.runner import NodeError
-from comms.wall_access import wall_access_rules
-from comms.wall_host import RefusedError, WallHost
-from comms.wall_hub import WallHub
-from comms.wall_line import Interrupted
-from comms.wall_seats import ListenerSeat, NodeSeat, Seat
-from comms.wall_session import Certificates, open_guest, open_router
-from comms.wall_words import WallKeys
-from comms.zenoh_session import ConnectionFailedError
+from comms.said.messages import Role
+from comms.said.routing import RosterNode, Routing
+from comms.session import ConnectionFailedError
+from comms.wall.access import wall_access_rules
+from comms.wall.host import RefusedError, WallHost
+from comms.wall.hub import WallHub
+from comms.wall.line import Interrupted
+from comms.wall.seats import ListenerSeat, NodeSeat, Seat
+from comms.wall.session import Certificates, open_guest, open_router
+from comms.wall.words import WallKeys
 from secondlook.errors import UserError
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import OBSERVER, RECORDER

@@ -7,13 +7,13 @@ from typing import Any
 
 from comms.node import Node
 from comms.result import BusResult
-from comms.routing import Routing
-from comms.wall_access import wall_access_rules
-from comms.wall_host import WallHost
-from comms.wall_hub import WallHub
-from comms.wall_seats import NodeSeat, Seat
-from comms.wall_words import WallKeys
-from comms.zenoh_session import open_client, open_hub
+from comms.said.routing import Routing
+from comms.session import open_client, open_hub
+from comms.wall.access import wall_access_rules
+from comms.wall.host import WallHost
+from comms.wall.hub import WallHub
+from comms.wall.seats import NodeSeat, Seat
+from comms.wall.words import WallKeys
 from secondlook.child_order import ChildOrder
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from comms.messages import Maneuver, ManeuverStatus
 from comms.node import Publication
-from comms.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE
+from comms.said.messages import Maneuver, ManeuverStatus
+from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
 from sim_world.recogniser import Recogniser

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from comms.wire import IDENTIFIER
+from comms.said.wire import IDENTIFIER
 from planner.types import DetectionCurve, Point
 from sim_world.sonar_model import SonarModel
 

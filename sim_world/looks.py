@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from comms.messages import Look, LookContact, TruthLook
 from comms.node import random_stream
+from comms.said.messages import Look, LookContact, TruthLook
 from planner.types import FloatArray, Point
 from sim_world.config import VehicleConfig
 from sim_world.estimate import PDetectEstimate

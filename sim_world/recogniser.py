@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from comms.messages import LookContact
+from comms.said.messages import LookContact
 from planner.types import BoolArray, DetectionCurve, FloatArray
 from sim_world.swath import Swath
 from sim_world.targets import Passed

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from comms.messages import TruthTarget, TruthTargets
 from comms.node import random_stream
+from comms.said.messages import TruthTarget, TruthTargets
 from planner.types import FloatArray, Point
 from sim_world.area import uniform_points
 from sim_world.swath import Swath

@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from comms.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
 from comms.node import random_stream
+from comms.said.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
 from planner.dubins import Pose
 from planner.types import Point
 from sim_world.config import FARTHEST_M, VehicleConfig

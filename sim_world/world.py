@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from operator import itemgetter
 
-from comms.messages import Maneuver, MissionOver
 from comms.node import Publication, Received, Step
-from comms.topics import TRUTH_TARGETS
+from comms.said.messages import Maneuver, MissionOver
+from comms.said.topics import TRUTH_TARGETS
 from sim_world.body import Body
 from sim_world.config import WorldConfig
 from sim_world.seabed import make_seabed

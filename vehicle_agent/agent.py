@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 
-from comms.codec import Header
-from comms.messages import (
+from comms.node import Publication, Received, Step
+from comms.said.codec import Header
+from comms.said.messages import (
     AgentState,
     Contact,
     Look,
@@ -19,8 +20,7 @@ from comms.messages import (
     RunInfo,
     Task,
 )
-from comms.node import Publication, Received, Step
-from comms.topics import CONTACT, MANEUVER, STATE
+from comms.said.topics import CONTACT, MANEUVER, STATE
 from planner.region import Region
 from planner.types import Point, Strip, SweepFrame, Track
 from vehicle_agent.coverage import CoverageLayer

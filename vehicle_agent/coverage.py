@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from comms.messages import CoverageTile, Look
 from comms.node import Publication
-from comms.topics import COVERAGE
+from comms.said.messages import CoverageTile, Look
+from comms.said.topics import COVERAGE
 from planner.footprint import LookGeometry, look_on_grid
 from planner.risk import RiskLayer
 from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within

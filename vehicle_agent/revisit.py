@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from comms.messages import Look, ManeuverStatus, Mode, RunInfo, Task
+from comms.said.messages import Look, ManeuverStatus, Mode, RunInfo, Task
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import RevisitConfig
 from vehicle_agent.second_looks import SecondLooks

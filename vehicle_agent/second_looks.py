@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from comms.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
-from comms.topics import TASK_STATUS
+from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
+from comms.said.topics import TASK_STATUS
 from planner.dubins import Pose
 from planner.region import share_within
 from planner.sweep import shortest_sweep, sweeps_over

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from comms.messages import (
+from comms.said.messages import (
     Curve,
     Hotspot,
     HotspotState,
@@ -20,7 +20,7 @@ from comms.messages import (
     RunInfo,
     Vertex,
 )
-from comms.topics import CURVE, HOTSPOT, PLAN
+from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.curve import RangeTally, effective_range_m
 from planner.first_plan import parts_in_order
 from planner.hotspots import HotspotMap, update_hotspots

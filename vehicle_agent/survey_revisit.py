@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from comms.messages import Look, ManeuverStatus, Mode, Task
+from comms.said.messages import Look, ManeuverStatus, Mode, Task
 from vehicle_agent.config import SurveyRevisitConfig
 from vehicle_agent.second_looks import SecondLooks
 from vehicle_agent.survey import SurveyAgent

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import rerun as rr
 
-from comms.messages import Curve, Plan, RunInfo
 from comms.node import Received
+from comms.said.messages import Curve, Plan, RunInfo
 from viz import palette, paths
 from viz.canvas import Canvas
 

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import rerun as rr
 
-from comms.messages import AgentState, Contact, Mode, Nav, Plan, RosterVehicle, RunInfo, TaskState, TaskStatus
 from comms.node import Received
+from comms.said.messages import AgentState, Contact, Mode, Nav, Plan, RosterVehicle, RunInfo, TaskState, TaskStatus
 from viz import palette, paths
 from viz.canvas import Canvas, Column
 from viz.shapes import FLOWN_Z_M, PLAN_Z_M, POINT_Z_M, VEHICLE_Z_M, Extent, body_quaternions, glyph, swath

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from comms.messages import Mode, Role, RosterVehicle, StripState, TaskState
+from comms.said.messages import Mode, Role, RosterVehicle, StripState, TaskState
 
 Colour = tuple[int, int, int]
 

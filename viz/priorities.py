@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import rerun as rr
 
-from comms.messages import Vertex
+from comms.said.messages import Vertex
 from viz import palette, paths
 from viz.canvas import Canvas
 from viz.recorder_config import PriorityGround

@@ -7,7 +7,8 @@ from typing import Any
 
 import rerun as rr
 
-from comms.messages import (
+from comms.node import Received
+from comms.said.messages import (
     AgentState,
     Contact,
     CoverageTile,
@@ -23,7 +24,6 @@ from comms.messages import (
     TruthPose,
     TruthTargets,
 )
-from comms.node import Received
 from viz import palette, paths
 from viz.blueprint import mission_blueprint
 from viz.canvas import Canvas

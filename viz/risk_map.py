@@ -9,8 +9,8 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from comms.messages import CoverageTile, RunInfo
 from comms.node import Received
+from comms.said.messages import CoverageTile, RunInfo
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.types import BoolArray, FloatArray

@@ -7,8 +7,8 @@ from functools import cache, partial
 
 import rerun as rr
 
-from comms.messages import Hotspot, HotspotState, StripState, StripStatus
 from comms.node import Received
+from comms.said.messages import Hotspot, HotspotState, StripState, StripStatus
 from viz import palette, paths
 from viz.canvas import Canvas
 from viz.pace import Pace

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from comms.messages import RunInfo, StripStatus, Vertex
+from comms.said.messages import RunInfo, StripStatus, Vertex
 from planner.types import FloatArray
 
 # Heights in metres, far enough apart for the depth buffer, too little to shift anything seen from above.

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Hashable
 from dataclasses import dataclass, field
 
-from comms.messages import (
+from comms.node import Received
+from comms.said.messages import (
     Curve,
     Hotspot,
     HotspotState,
@@ -21,7 +22,6 @@ from comms.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.node import Received
 from planner.types import Point
 
 MOST_NAMED = 3

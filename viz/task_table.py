@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import rerun as rr
 
-from comms.messages import RunInfo, StripState, StripStatus, TaskState, TaskStatus
 from comms.node import Received
+from comms.said.messages import RunInfo, StripState, StripStatus, TaskState, TaskStatus
 from viz import paths
 from viz.canvas import Canvas
 from viz.pace import Pace

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import rerun as rr
 
-from comms.messages import TruthLook, TruthPose, TruthTargets
 from comms.node import Received
+from comms.said.messages import TruthLook, TruthPose, TruthTargets
 from planner.types import FloatArray
 from viz import palette, paths
 from viz.canvas import Canvas, Column

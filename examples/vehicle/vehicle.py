@@ -18,10 +18,10 @@ import msgpack
 import numpy as np
 import zenoh
 
-from comms.codec import Header, decode, encode
-from comms.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav
-from comms.mission_time import MissionTime
-from comms.wire import WireError
+from comms.said.codec import Header, decode, encode
+from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav
+from comms.said.wire import WireError
+from comms.wall.mission_time import MissionTime
 
 LOOK_M = 20.0
 ALONG_BIN_M = 5.0

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from comms.routing import Routing
 from comms.runner import NodeError
+from comms.said.routing import Routing
 from secondlook.errors import UserError
 from secondlook.fleet import build_fleet
 from secondlook.mission_files import read_messages

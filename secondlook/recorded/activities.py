@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from comms.messages import AgentState, Mode
+from comms.said.messages import AgentState, Mode
 from secondlook.recorded.said import Said
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from comms.messages import Hotspot, HotspotState
+from comms.said.messages import Hotspot, HotspotState
 from secondlook.recorded.said import Said
 
 

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple, TypeVar
 
 import shapely
 
-from comms.codec import decode, header_of
-from comms.messages import (
+from comms.node import Received
+from comms.said.codec import decode, header_of
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,
@@ -22,9 +23,8 @@ from comms.messages import (
     TruthLook,
     TruthTargets,
 )
-from comms.node import Received
-from comms.topics import Topic, topic_of
-from comms.wire import WireError
+from comms.said.topics import Topic, topic_of
+from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.metrics import Metrics
 from secondlook.recorded.activities import Activity, activities
@@ -67,12 +67,13 @@ class RecordedMission:
         """Every message whose key fits a pattern, in the order of sending.
 
         `pattern`: as in `agent/*/state` or `coord/**`: `*` is one chunk of a key or a part of it, `**` any number of
-        chunks. Keys are those of `comms.topics`, below the run id. Raises UserError for a message that cannot be read.
+        chunks. Keys are those of `comms.said.topics`, below the run id. Raises UserError for a message that cannot be
+        read.
         """
         return (_said(one, one.message) for one in self.received(pattern=pattern))
 
     def said(self, kind: type[M], pattern: str = "**") -> list[Said[M]]:
-        """The messages of one type, such as `comms.messages.Plan`, in the order of sending; `pattern` as above."""
+        """The messages of one type, such as `comms.said.messages.Plan`, in the order of sending; `pattern` as above."""
         opened = self.received(kind, pattern=pattern)
         return [_said(one, one.message) for one in opened if isinstance(one.message, kind)]
 

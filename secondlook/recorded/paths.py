@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from comms.messages import Nav
+from comms.said.messages import Nav
 from planner.types import FloatArray
 from secondlook.recorded.said import Said
 

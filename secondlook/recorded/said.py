@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from comms.messages import Message
-from comms.topics import number_of
+from comms.said.messages import Message
+from comms.said.topics import number_of
 
 M = TypeVar("M", bound=Message)
 

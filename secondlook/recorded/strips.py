@@ -9,7 +9,7 @@ from functools import cached_property
 
 import shapely
 
-from comms.messages import StripState, StripStatus
+from comms.said.messages import StripState, StripStatus
 from planner.types import Strip
 from secondlook.recorded.said import Said
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from comms.messages import TruthLook, TruthTargets
+from comms.said.messages import TruthLook, TruthTargets
 from secondlook.recorded.said import Said
 
 

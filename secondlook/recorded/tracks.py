@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from comms.messages import Mode, Plan
+from comms.said.messages import Mode, Plan
 from secondlook.recorded.activities import Activity
 from secondlook.recorded.said import Said
 

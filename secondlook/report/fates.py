@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from comms.messages import StripState
+from comms.said.messages import StripState
 from secondlook.recorded import RiskMap, StripRecord
 
 # The classes under which the style sheet knows the states.

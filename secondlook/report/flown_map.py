@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import shapely
 
-from comms.messages import StripState
+from comms.said.messages import StripState
 from planner.types import Point
 from secondlook.recorded import PathRecord, PriorityRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
 from secondlook.report.axis import ticks

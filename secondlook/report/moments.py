@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from comms.messages import Hotspot, MissionOver, Mode, Plan
+from comms.said.messages import Hotspot, MissionOver, Mode, Plan
 from secondlook.recorded import RecordedMission
 from viz.story import TELLING, Line, Story
 

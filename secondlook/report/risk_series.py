@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.messages import CoverageTile, RunInfo
+from comms.said.messages import CoverageTile, RunInfo
 from secondlook.metrics import Metrics
 from secondlook.recorded import RecordedMission, RiskMap
 

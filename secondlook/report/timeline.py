@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from comms.messages import Mode
+from comms.said.messages import Mode
 from secondlook.recorded import Activity
 from secondlook.report.axis import ticks
 from secondlook.report.svg import Element, drawing, element

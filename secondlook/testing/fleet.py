@@ -8,8 +8,8 @@ from itertools import count
 from pathlib import Path
 
 from comms.node import Received
-from comms.routing import Routing
-from comms.zenoh_session import PATIENCE_S
+from comms.said.routing import Routing
+from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.fleet import build_fleet
 from secondlook.mission import Bus, RunOptions, run_mission

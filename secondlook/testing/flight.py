@@ -7,11 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from comms.events import NodeEvent
-from comms.faults import NO_FAULTS, Faults
-from comms.messages import RunInfo
+from comms.lockstep.events import NodeEvent
+from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.node import Received
-from comms.routing import Routing
+from comms.said.messages import RunInfo
+from comms.said.routing import Routing
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray
 from secondlook.closest import Closest

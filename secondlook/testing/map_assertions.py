@@ -6,9 +6,9 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from comms.events import Kill
-from comms.messages import AgentState, CoverageTile, Look, MissionOver
+from comms.lockstep.events import Kill
 from comms.node import Received
+from comms.said.messages import AgentState, CoverageTile, Look, MissionOver
 from planner.fleet_map import FleetMap, VehicleLayer
 from secondlook.errors import UserError
 from secondlook.testing.fail import fail_if

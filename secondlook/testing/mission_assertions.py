@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from comms.group import LOST
-from comms.messages import AgentState, MissionOver, Mode
+from comms.lockstep.group import LOST
+from comms.said.messages import AgentState, MissionOver, Mode
 from secondlook.errors import UserError
 from secondlook.mission import Bus
 from secondlook.testing.fail import fail_if

@@ -6,7 +6,7 @@ import fnmatch
 import re
 from functools import cache
 
-from comms.topics import TOPICS
+from comms.said.topics import TOPICS
 from secondlook.errors import UserError
 
 _OF_NUMBERS = frozenset("0123456789-?")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from comms.clock import LATE_WORDS_MS, WRAP_UP_MS
-from comms.events import JOINER_DELAY_MS, Freeze, Join, Kill, absent_at_start
-from comms.kept_messages import KeptMessages
+from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
+from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, absent_at_start
+from comms.lockstep.kept_messages import KeptMessages
 from comms.node import Received
 from comms.runner import Intake
-from comms.topics import MISSION_OVER
+from comms.said.topics import MISSION_OVER
 from secondlook.testing.flight import Flight
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TypeVar
 
-from comms.events import Kill
-from comms.messages import (
+from comms.lockstep.events import Kill
+from comms.node import Received
+from comms.said.messages import (
     AgentState,
     Message,
     MissionOver,
@@ -19,7 +20,6 @@ from comms.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.node import Received
 from coordinator.coordinator import ANSWER_WITHIN_MS, NUMBERS_A_SECOND
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
 from secondlook.testing.fail import fail_if

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import math
 
-from comms.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
-from comms.faults import CutOff, FaultKind, Faults, MessageFault
-from comms.routing import Routing
+from comms.lockstep.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
+from comms.lockstep.faults import CutOff, FaultKind, Faults, MessageFault
+from comms.said.routing import Routing
 from secondlook.errors import UserError
 from secondlook.testing.patterns import key_pattern
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import pytest
 from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, say_status, says
 
-from comms import clock
-from comms.clock import RunawayError
-from comms.messages import RunInfo
+from comms.lockstep import clock
+from comms.lockstep.clock import RunawayError
 from comms.node import Step
 from comms.result import Ending
 from comms.runner import NodeError
-from comms.topics import TRUTH_TARGETS
+from comms.said.messages import RunInfo
+from comms.said.topics import TRUTH_TARGETS
 
 
 @pytest.fixture(params=BUSES)

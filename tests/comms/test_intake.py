@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from same_message import assert_same
 
-from comms.codec import Header, encode
-from comms.messages import Role
 from comms.node import Received
-from comms.routing import Routing
 from comms.runner import Intake, Stamp
-from comms.topics import NAV, STATE, TOPICS, Topic
-from comms.wire import LARGEST_MS
+from comms.said.codec import Header, encode
+from comms.said.messages import Role
+from comms.said.routing import Routing
+from comms.said.topics import NAV, STATE, TOPICS, Topic
+from comms.said.wire import LARGEST_MS
 from secondlook.testing.checks.any_message import any_message
 
 GOOD = encode(Header("world", 0, 0, 1000), nav(2.0))

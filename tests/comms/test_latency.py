@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from fleets import ROSTER
 
-from comms.codec import Header
 from comms.latency import StripLatency
-from comms.messages import Message, StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus
 from comms.node import Received
-from comms.routing import Routing
 from comms.runner import Outgoing
-from comms.topics import STRIP, TASK, TASK_STATUS
+from comms.said.codec import Header
+from comms.said.messages import Message, StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus
+from comms.said.routing import Routing
+from comms.said.topics import STRIP, TASK, TASK_STATUS
 
 routing = Routing(ROSTER)
 

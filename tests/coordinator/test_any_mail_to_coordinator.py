@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode, received
 
-from comms.messages import (
+from comms.node import Received
+from comms.said.messages import (
     AgentState,
     Hotspot,
     HotspotState,
@@ -23,8 +24,7 @@ from comms.messages import (
     TaskAction,
     Vertex,
 )
-from comms.node import Received
-from comms.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TASK_STATUS
+from comms.said.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TASK_STATUS
 from coordinator.allocation import GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator

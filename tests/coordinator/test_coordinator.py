@@ -26,7 +26,7 @@ from coordinator_by_hand import (
 )
 from one_node import OneNode, received
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,

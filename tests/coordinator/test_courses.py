@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from situations import helper, strip
 
-from comms.messages import AgentState, Mode, Plan, PlannedTrack, Role
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
 from coordinator.courses import STEP_S, Course, course, straight, survey_course, sweep_course
 from coordinator.separation import too_close
 from coordinator.service import service, sweeps

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from comms.messages import PlannedTrack
+from comms.said.messages import PlannedTrack
 from coordinator.growth import REPORTED_WITHIN_S, Growth, TrackUnderWay
 from coordinator.strips import CuttingRules, Window, cut_strips, strip_of
 from planner.fleet_map import VehicleLayer

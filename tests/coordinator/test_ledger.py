@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.messages import StripState
+from comms.said.messages import StripState
 from coordinator.ledger import ENDED, WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.strips import Cut, Window
 from planner.types import Strip

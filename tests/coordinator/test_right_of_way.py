@@ -9,7 +9,7 @@ import pytest
 from by_hand import vehicle
 from situations import helper, open_strip, situation, strip
 
-from comms.messages import AgentState, Mode, Plan, PlannedTrack, Role
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
 from coordinator.allocation import GreedyAllocator, NearestAllocator
 from coordinator.offers import ASKED_LATER_S, offers_let_through
 from coordinator.right_of_way import RightOfWay, Underway

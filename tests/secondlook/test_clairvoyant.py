@@ -20,8 +20,8 @@ from bench.legs import Leg, Simulator
 from bench.removable import Clairvoyance, LegHelper, LegSensor, Removable, leg_helpers
 from bench.row_packing import RowPacking
 from bench.swath import Swath
-from comms.messages import CoverageTile, Maneuver, ManeuverKind, StripState, StripStatus
 from comms.node import Received
+from comms.said.messages import CoverageTile, Maneuver, ManeuverKind, StripState, StripStatus
 from coordinator.strips import Window, strip_of
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap

@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from spread import PATIENT, loopback_endpoint, lost_of_what_is_kept, spread_fleet
 
-from comms.codec import Header, decode, encode
-from comms.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav, Role
-from comms.topics import topic_of
+from comms.said.codec import Header, decode, encode
+from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav, Role
+from comms.said.topics import topic_of
 from secondlook import cli
 from secondlook.fleet import build_fleet
 from secondlook.mission_files import read_messages

@@ -14,7 +14,7 @@ import pytest
 import yaml
 from flights import BRIEF
 
-from comms.messages import (
+from comms.said.messages import (
     MissionOver,
     StripState,
     StripStatus,

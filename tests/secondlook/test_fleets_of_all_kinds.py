@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from missions import Flown, fly_scenario
 
-from comms.messages import AgentState, CoverageTile, Hotspot, Mode, Plan, StripState, StripStatus, Task
 from comms.result import Ending
+from comms.said.messages import AgentState, CoverageTile, Hotspot, Mode, Plan, StripState, StripStatus, Task
 from secondlook.mission import RunOptions, run_mission
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.scenario.vehicle import Start

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from comms.codec import decode, encode
-from comms.topics import topic_of
+from comms.said.codec import decode, encode
+from comms.said.topics import topic_of
 from secondlook.cli import app
 from secondlook.mission_files import read_messages
 

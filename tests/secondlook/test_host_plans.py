@@ -8,8 +8,8 @@ from flights import BRIEF
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.messages import Role
-from comms.routing import RosterNode
+from comms.said.messages import Role
+from comms.said.routing import RosterNode
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import LONGEST_HOST, plan_hosts
 from secondlook.node_spec import NodeSpec

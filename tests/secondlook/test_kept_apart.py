@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
-from comms.messages import Nav, TruthPose
+from comms.said.messages import Nav, TruthPose
 from coordinator.allocators import ALLOCATORS
 from secondlook.closest import ClosestApproaches
 from secondlook.errors import UserError

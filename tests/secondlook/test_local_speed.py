@@ -9,10 +9,10 @@ import pytest
 
 from bench import local_speed
 from bench.local_speed import PARTS, Account, Reciter
-from comms.codec import Header
-from comms.messages import MissionOver
 from comms.node import Publication, Received
-from comms.topics import MISSION_OVER
+from comms.said.codec import Header
+from comms.said.messages import MissionOver
+from comms.said.topics import MISSION_OVER
 
 BRIEF = Path(__file__).parents[1] / "support" / "brief.yaml"
 

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Maneuver,

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from missions import Flown, bad_water, flown, fly_scenario
 
-from comms.faults import CutOff, Faults
-from comms.messages import (
+from comms.lockstep.faults import CutOff, Faults
+from comms.result import Ending
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,
@@ -23,7 +24,6 @@ from comms.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.result import Ending
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
 from secondlook.scenario import load_scenario
 

@@ -3,6 +3,8 @@
 import tomllib
 from pathlib import Path
 
+from setuptools import find_packages
+
 ROOT = Path(__file__).parents[2]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 ROOMS = PYPROJECT["tool"]["importlinter"]["root_packages"]
@@ -11,7 +13,8 @@ ROOMS = PYPROJECT["tool"]["importlinter"]["root_packages"]
 def test_every_package_is_listed_for_the_wheel() -> None:
     inits = [init.relative_to(ROOT) for room in ROOMS for init in (ROOT / room).rglob("__init__.py")]
     found = {".".join(init.parent.parts) for init in inits}
-    assert found == set(PYPROJECT["tool"]["setuptools"]["packages"])
+    listed = PYPROJECT["tool"]["setuptools"]["packages"]["find"]["include"]
+    assert found == set(find_packages(str(ROOT), include=listed))
 
 
 def test_every_room_is_type_checked() -> None:

@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 from flights import BRIEF, LONG, SLOW, Flight, events, flight, has_ended, until
 
-from comms.codec import decode
 from comms.node import Received
-from comms.topics import topic_of
+from comms.said.codec import decode
+from comms.said.topics import topic_of
 from secondlook import cli, mission, processes
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.host_plans import HUB, RECORDER

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 from flights import BRIEF, Flight, events, flight, has_ended, until
 
-from comms.codec import decode
-from comms.messages import ClockMode, RunInfo
-from comms.topics import topic_of
+from comms.said.codec import decode
+from comms.said.messages import ClockMode, RunInfo
+from comms.said.topics import topic_of
 from secondlook.cli import main
 from secondlook.mission_files import read_messages
 from secondlook.optional_value import with_number

@@ -22,7 +22,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import secondlook
-from comms.messages import AgentState, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError

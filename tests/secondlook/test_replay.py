@@ -9,8 +9,8 @@ import msgpack
 import pytest
 from typer.testing import CliRunner
 
-from comms.codec import decode, encode
-from comms.messages import StripStatus
+from comms.said.codec import decode, encode
+from comms.said.messages import StripStatus
 from secondlook.cli import app
 from secondlook.errors import UserError
 from secondlook.mission import RunOptions, run_mission

@@ -19,8 +19,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import secondlook
-from comms.codec import Header, encode
-from comms.messages import Mode, StripState
+from comms.said.codec import Header, encode
+from comms.said.messages import Mode, StripState
 from planner.types import GridSpec, Strip, SweepFrame
 from secondlook import cli
 from secondlook.errors import UserError

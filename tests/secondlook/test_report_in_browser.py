@@ -11,7 +11,7 @@ from browser import risk_colours, visit
 from playwright.sync_api import Browser, Page
 
 import secondlook
-from comms.messages import StripState
+from comms.said.messages import StripState
 from secondlook.report import flown_map, report_page
 
 IN_VIEW = "(node) => { const box = node.getBoundingClientRect(); return box.bottom > 0 && box.top < innerHeight; }"

@@ -18,10 +18,10 @@ import numpy as np
 import pytest
 from flights import BRIEF, events, flight
 
-from comms.codec import decode
 from comms.control import HostPlan
 from comms.result import BusResult
-from comms.topics import topic_of
+from comms.said.codec import decode
+from comms.said.topics import topic_of
 from secondlook import processes
 from secondlook.fleet import build_fleet
 from secondlook.host_plans import plan_hosts

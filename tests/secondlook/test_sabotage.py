@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
-from comms.events import Freeze, Join, Kill, NodeEvent
-from comms.faults import NO_FAULTS, FaultKind, Faults, MessageFault
+from comms.lockstep.events import Freeze, Join, Kill, NodeEvent
+from comms.lockstep.faults import NO_FAULTS, FaultKind, Faults, MessageFault
 from comms.result import Ending
 from secondlook.child_process import ChildProcess
 from secondlook.fleet import build_fleet

@@ -12,9 +12,10 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
-from comms.events import Join, Kill
-from comms.faults import CutOff, FaultKind, Faults, MessageFault
-from comms.messages import (
+from comms.lockstep.events import Join, Kill
+from comms.lockstep.faults import CutOff, FaultKind, Faults, MessageFault
+from comms.node import Received
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Look,
@@ -25,7 +26,6 @@ from comms.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.node import Received
 from coordinator.allocation import GreedyAllocator, NoAllocator
 from secondlook.errors import UserError
 from secondlook.testing import (

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from comms.messages import AgentState, Mode
 from comms.node import Publication, Step
+from comms.said.messages import AgentState, Mode
 from coordinator.allocation import GreedyAllocator
 from coordinator.coordinator import Coordinator
 from planner.spacing_planners import AdaptiveSpacing, SpacingDecision

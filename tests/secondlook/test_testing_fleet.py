@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from flights import BRIEF
 
-from comms.messages import Hotspot, StripState, StripStatus
+from comms.said.messages import Hotspot, StripState, StripStatus
 from coordinator.allocation import GreedyAllocator, NoAllocator
 from secondlook.errors import UserError
 from secondlook.mission import RunOptions, run_mission

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
-from comms.messages import AgentState
 from comms.node import Received
+from comms.said.messages import AgentState
 from secondlook.errors import UserError
 from secondlook.testing import Fleet, Flight, Heard
 

@@ -9,8 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from comms.codec import Header, encode
-from comms.messages import (
+from comms.node import Node, Publication, Received, Step
+from comms.said.codec import Header, encode
+from comms.said.messages import (
     Look,
     Maneuver,
     ManeuverKind,
@@ -24,9 +25,8 @@ from comms.messages import (
     TruthPose,
     TruthTargets,
 )
-from comms.node import Node, Publication, Received, Step
-from comms.routing import RosterNode, Routing
-from comms.topics import LOOK, MANEUVER, MANEUVER_STATUS, MISSION_OVER, TRUTH_LOOK, TRUTH_POSE, Topic
+from comms.said.routing import RosterNode, Routing
+from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, MISSION_OVER, TRUTH_LOOK, TRUTH_POSE, Topic
 from planner.types import DetectionCurve
 from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
 from sim_world.world import World

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from comms.messages import Task, TaskAction, TaskState, TaskStatus
-from comms.topics import TASK_STATUS
+from comms.said.messages import Task, TaskAction, TaskState, TaskStatus
+from comms.said.topics import TASK_STATUS
 from planner.types import Track
 from vehicle_agent.revisit import RevisitAgent
 

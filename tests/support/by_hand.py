@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from one_node import OneNode
 
-from comms.messages import (
+from comms.said.messages import (
     ClockMode,
     Grid,
     Look,

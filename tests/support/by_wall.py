@@ -11,18 +11,18 @@ from functools import partial
 from fleets import EACH_ALONE, ROSTER, RUN_INFO, Scripted, password
 
 from comms.control import HostPlan
-from comms.messages import ClockMode, Role
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.routing import Routing
 from comms.runner import NodeError
-from comms.wall_access import wall_access_rules
-from comms.wall_host import WallHost
-from comms.wall_hub import WallHub
-from comms.wall_local import run_local_by_wall
-from comms.wall_seats import ListenerSeat, NodeSeat
-from comms.wall_words import WallKeys
-from comms.zenoh_session import open_client, open_hub
+from comms.said.messages import ClockMode, Role
+from comms.said.routing import Routing
+from comms.session import open_client, open_hub
+from comms.wall.access import wall_access_rules
+from comms.wall.host import WallHost
+from comms.wall.hub import WallHub
+from comms.wall.local_bus import run_local_by_wall
+from comms.wall.seats import ListenerSeat, NodeSeat
+from comms.wall.words import WallKeys
 
 FACTOR = 100.0
 WALL_RUN = replace(RUN_INFO, mode=ClockMode.WALL)

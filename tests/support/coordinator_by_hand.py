@@ -9,7 +9,7 @@ import numpy as np
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
 from one_node import OneNode, Said
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from one_node import OneNode
 
-from comms.messages import Maneuver
+from comms.said.messages import Maneuver
 from secondlook.testing.checks.any_mail import Letter, about_last
 
 

@@ -11,10 +11,15 @@ from typing import Any
 
 from comms.access import access_rules
 from comms.control import HostPlan, RunKeys, pack
-from comms.events import Change, NodeEvent, timeline
-from comms.faults import NO_FAULTS, Faults
-from comms.local_bus import run_local
-from comms.messages import (
+from comms.lockstep.events import Change, NodeEvent, timeline
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.lockstep.host import ListenerHost, serve_nodes
+from comms.lockstep.hub import FleetError, Hub
+from comms.lockstep.local_bus import run_local
+from comms.node import Listener, Node, Publication, Received, Step
+from comms.result import BusResult
+from comms.runner import NodeError
+from comms.said.messages import (
     AgentState,
     ClockMode,
     Grid,
@@ -26,14 +31,9 @@ from comms.messages import (
     Role,
     RunInfo,
 )
-from comms.node import Listener, Node, Publication, Received, Step
-from comms.result import BusResult
-from comms.routing import RosterNode, Routing
-from comms.runner import NodeError
-from comms.topics import MANEUVER_STATUS, MISSION_OVER, NAV, STATE
-from comms.zenoh_host import ListenerHost, serve_nodes
-from comms.zenoh_hub import FleetError, Hub
-from comms.zenoh_session import open_client, open_hub, put
+from comms.said.routing import RosterNode, Routing
+from comms.said.topics import MANEUVER_STATUS, MISSION_OVER, NAV, STATE
+from comms.session import open_client, open_hub, put
 
 RUN_INFO = RunInfo(
     schema=1,

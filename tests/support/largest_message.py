@@ -9,9 +9,9 @@ from typing import Any, get_args, get_type_hints
 import numpy as np
 from hypothesis import strategies as st
 
-from comms.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, Header
-from comms.messages import Message
-from comms.wire import IDENTIFIER, LARGEST_MS, Flag, Mask, Packed, Scaled, Whole, Words
+from comms.said.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, Header
+from comms.said.messages import Message
+from comms.said.wire import IDENTIFIER, LARGEST_MS, Flag, Mask, Packed, Scaled, Whole, Words
 from secondlook.testing.checks.any_message import bounded_tuple, kind_of
 
 MESSAGE_TYPES: tuple[type[Any], ...] = get_args(Message)

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from functools import cache, partial
 from typing import Any, TypeVar
 
-from comms.faults import NO_FAULTS, FaultKind, Faults, MessageFault
-from comms.local_bus import run_local
+from comms.lockstep.faults import NO_FAULTS, FaultKind, Faults, MessageFault
+from comms.lockstep.local_bus import run_local
 from comms.node import Received
 from comms.result import BusResult
-from comms.routing import Routing
-from comms.topics import TOPICS
+from comms.said.routing import Routing
+from comms.said.topics import TOPICS
 from secondlook.fleet import build_fleet
 from secondlook.metrics import Metrics
 from secondlook.scenario import Scenario, load_scenario

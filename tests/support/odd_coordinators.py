@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from typing import ClassVar
 
-from comms.messages import MissionOver, Task, TaskAction
 from comms.node import Publication, Received, Step
-from comms.topics import MISSION_OVER, TASK
+from comms.said.messages import MissionOver, Task, TaskAction
+from comms.said.topics import MISSION_OVER, TASK
 
 END_MS = 60_000
 Place = tuple[float, float, float, float, float]

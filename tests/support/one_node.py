@@ -6,10 +6,10 @@ from collections import Counter
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from comms.codec import Header, decode, encode
-from comms.messages import Message, Role
 from comms.node import Node, Received, Step
-from comms.topics import number_of, topic_of
+from comms.said.codec import Header, decode, encode
+from comms.said.messages import Message, Role
+from comms.said.topics import number_of, topic_of
 
 M = TypeVar("M")
 

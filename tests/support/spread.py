@@ -16,7 +16,7 @@ from typing import Any
 
 from flights import BRIEF, until
 
-from comms.topics import TOPICS, Keep, topic_of
+from comms.said.topics import TOPICS, Keep, topic_of
 from secondlook.mission_files import read_messages
 
 # So that a slow machine does no harm: nobody is lost soon, and the helper has time for strips after the survey.

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode
 
-from comms.messages import AgentState, CoverageTile, Mode, Role, TaskState, TaskStatus
-from comms.topics import LOOK, MANEUVER_STATUS, MISSION_OVER, NAV, TASK
+from comms.said.messages import AgentState, CoverageTile, Mode, Role, TaskState, TaskStatus
+from comms.said.topics import LOOK, MANEUVER_STATUS, MISSION_OVER, NAV, TASK
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 from secondlook.testing.checks.any_mail import Letter, letters
 from vehicle_agent.config import RevisitConfig, SurveyConfig

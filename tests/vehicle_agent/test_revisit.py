@@ -9,7 +9,7 @@ import pytest
 from by_hand import HELPER, flat, fly, look, nav, run_info, tell_status, to_follow
 from one_node import OneNode, Said
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Maneuver,

@@ -24,7 +24,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode, Said
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     Contact,
     CoverageTile,

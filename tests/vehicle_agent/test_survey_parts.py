@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from one_node import OneNode
 from regions import regions
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     Grid,
     Hole,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from by_hand import PRIMARY, flat, fly, nav, run_info, tell_status, to_follow
 from one_node import OneNode
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     Maneuver,
     ManeuverKind,

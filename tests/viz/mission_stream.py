@@ -11,8 +11,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from comms.codec import Header, decode, encode
-from comms.messages import (
+from comms.node import Received
+from comms.said.codec import Header, decode, encode
+from comms.said.messages import (
     AgentState,
     ClockMode,
     Contact,
@@ -46,8 +47,7 @@ from comms.messages import (
     TruthTargets,
     Vertex,
 )
-from comms.node import Received
-from comms.topics import (
+from comms.said.topics import (
     CONTACT,
     COVERAGE,
     CURVE,

@@ -21,8 +21,8 @@ import pytest
 import rerun as rr
 from rerun.experimental import ViewerClient
 
-from comms.messages import Hotspot, Nav, RunInfo
 from comms.node import Received
+from comms.said.messages import Hotspot, Nav, RunInfo
 from tests.viz.mission_stream import PRIMARY
 from tests.viz.recordings import entities, rows, rows_so_far, verify
 from viz import canvas, live_server, viewer_program

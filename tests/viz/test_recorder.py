@@ -19,7 +19,8 @@ from flights import until
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from comms.messages import (
+from comms.node import Received
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Curve,
@@ -39,8 +40,7 @@ from comms.messages import (
     TruthTargets,
     Vertex,
 )
-from comms.node import Received
-from comms.topics import TOPICS
+from comms.said.topics import TOPICS
 from planner.region import Region
 from tests.viz.mission_stream import HELPER, PRIMARY, mission
 from tests.viz.recordings import entities, rows, rows_so_far, static, timelines, verify

@@ -10,10 +10,10 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from comms import topics
-from comms.codec import Header
-from comms.messages import Hotspot, HotspotState, MissionOver, RunInfo, StripState, StripStatus, Vertex
 from comms.node import Received
+from comms.said import topics
+from comms.said.codec import Header
+from comms.said.messages import Hotspot, HotspotState, MissionOver, RunInfo, StripState, StripStatus, Vertex
 from tests.viz.mission_stream import mission
 from tests.viz.recordings import rows
 from viz import palette

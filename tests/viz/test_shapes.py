@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, StripState, StripStatus, Vertex
+from comms.said.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, StripState, StripStatus, Vertex
 from viz.blueprint import FIELD_OF_VIEW_RAD, MARGIN, mission_blueprint
 from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring, swath
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from comms.codec import Header
-from comms.messages import (
+from comms.node import Received
+from comms.said.codec import Header
+from comms.said.messages import (
     AgentState,
     ClockMode,
     Curve,
@@ -32,8 +33,7 @@ from comms.messages import (
     TaskStatus,
     Vertex,
 )
-from comms.node import Received
-from comms.topics import (
+from comms.said.topics import (
     CURVE,
     HOTSPOT,
     MANEUVER_STATUS,

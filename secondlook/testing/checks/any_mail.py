@@ -8,8 +8,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from comms.messages import Look, Maneuver, ManeuverStatus
-from comms.topics import Topic
+from comms.said.messages import Look, Maneuver, ManeuverStatus
+from comms.said.topics import Topic
 from secondlook.testing.checks.likely_message import likely_message
 
 

@@ -9,7 +9,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import numpy as np
 from hypothesis import strategies as st
 
-from comms.wire import AtMost, Flag, Mask, Packed, Scaled, Whole, Words
+from comms.said.wire import AtMost, Flag, Mask, Packed, Scaled, Whole, Words
 
 MOST_DRAWN = 6  # entries of a tuple and elements along an axis: enough to differ, and quick to draw
 

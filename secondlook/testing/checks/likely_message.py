@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from comms.messages import (
+from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,

@@ -9,11 +9,11 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from comms.codec import CLOCK, Header, encode
-from comms.messages import Maneuver, Message
-from comms.routing import Routing
 from comms.runner import Intake, NodeError, NodeRunner, Outgoing
-from comms.topics import RUN, TOPICS, Reach, Topic
+from comms.said.codec import CLOCK, Header, encode
+from comms.said.messages import Maneuver, Message
+from comms.said.routing import Routing
+from comms.said.topics import RUN, TOPICS, Reach, Topic
 from secondlook.errors import UserError
 from secondlook.fleet import Fleet, build_fleet
 from secondlook.parts import NODE

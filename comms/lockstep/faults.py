@@ -1,0 +1,144 @@
+"""Faults on messages, injected on purpose: lost, repeated, late, reordered, corrupted; and vehicles cut off.
+
+Faults strike where a message is received, after it has been counted and before it is validated. What happens to a
+message depends on the seed, the receiver, the key and the payload alone, never on when or in which order it arrived:
+the same faults strike on every bus. What the clock says of the run reaches everyone.
+"""
+
+from __future__ import annotations
+
+import enum
+import fnmatch
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from comms.node import Received
+from comms.said.messages import Role
+from comms.said.routing import RosterNode, Routing
+
+
+class FaultKind(enum.Enum):
+    """What may happen to a message. DELAY adds `delay_ms`; REORDER adds 1 to `delay_ms` by chance, so that later ones
+    overtake; REPEAT delivers a second time `delay_ms` later; CORRUPT changes one byte."""
+
+    DROP = "drop"
+    REPEAT = "repeat"
+    DELAY = "delay"
+    REORDER = "reorder"
+    CORRUPT = "corrupt"
+
+
+@dataclass(frozen=True)
+class MessageFault:
+    """A fault that strikes messages by chance.
+
+    `keys`: below the run id, with `*` for any characters, e.g. `agent/*/coverage/*`. `probability`: in [0, 1], for each
+    message and receiver. `receiver`: a node id, empty for all. It strikes what is sent in [from_ms, until_ms), without
+    end where that is None. `delay_ms` >= 1 where the kind needs one.
+    """
+
+    kind: FaultKind
+    keys: str = "*"
+    probability: float = 1.0
+    receiver: str = ""
+    from_ms: int = 0
+    until_ms: int | None = None
+    delay_ms: int = 1000
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.probability <= 1.0:
+            raise ValueError(f"a fault's probability must be within 0 and 1, not {self.probability}")
+        if self.delay_ms < 1:
+            raise ValueError(f"a fault's delay must be at least 1 ms, not {self.delay_ms}")
+
+
+@dataclass(frozen=True)
+class CutOff:
+    """A vehicle whose water link is gone for what is sent in [from_ms, until_ms): all that crosses water, from its
+    agent and to it, is lost. Its agent and its body go on talking."""
+
+    vehicle: str
+    from_ms: int
+    until_ms: int
+
+
+@dataclass(frozen=True, slots=True)
+class Delivery:
+    """One delivery of a message: its payload, and how much later than its topic's delay it is due."""
+
+    payload: bytes
+    later_ms: int = 0
+
+
+class Faults:
+    """All faults of a run; `seed` decides where those with a probability strike."""
+
+    def __init__(self, seed: int, message_faults: Sequence[MessageFault] = (), cut_offs: Sequence[CutOff] = ()) -> None:
+        self._seed = seed
+        self._message_faults = tuple(message_faults)
+        self._cut_offs = tuple(cut_offs)
+
+    def __bool__(self) -> bool:
+        return bool(self._message_faults or self._cut_offs)
+
+    def deliveries(self, reader: str, received: Received, routing: Routing) -> list[Delivery]:
+        """What becomes of a message at one of its readers: its deliveries, none where it is lost.
+
+        Faults apply in their order, each to what those before it left.
+        """
+        receiver, writer = routing.nodes[reader], routing.nodes[received.header.sender]
+        key, payload, sent_ms = received.key, received.payload, received.header.sent_ms
+        if writer.role is Role.CLOCK:  # its announcement of the run is part of every start
+            return [Delivery(payload)]
+        if received.topic.crosses_water and any(
+            cut.from_ms <= sent_ms < cut.until_ms and _across(cut.vehicle, receiver, writer) for cut in self._cut_offs
+        ):
+            return []
+        deliveries = [Delivery(payload)]
+        for number, fault in enumerate(self._message_faults):
+            if _concerns(fault, receiver.node_id, key, sent_ms):
+                deliveries = [
+                    struck
+                    for place, one in enumerate(deliveries)
+                    for struck in self._strike(fault, one, f"{number} {place} {receiver.node_id} {key}")
+                ]
+        return deliveries
+
+    def _strike(self, fault: MessageFault, one: Delivery, place: str) -> list[Delivery]:
+        chance = hashlib.blake2b(one.payload, key=f"{self._seed} {place}".encode()[:64], digest_size=24).digest()
+        if int.from_bytes(chance[:8], "big") >= fault.probability * 2**64:
+            return [one]
+        size = int.from_bytes(chance[8:16], "big")
+        match fault.kind:
+            case FaultKind.DROP:
+                return []
+            case FaultKind.REPEAT:
+                return [one, Delivery(one.payload, one.later_ms + fault.delay_ms)]
+            case FaultKind.DELAY:
+                return [Delivery(one.payload, one.later_ms + fault.delay_ms)]
+            case FaultKind.REORDER:
+                return [Delivery(one.payload, one.later_ms + 1 + size % fault.delay_ms)]
+            case FaultKind.CORRUPT:
+                corrupt = bytearray(one.payload)
+                corrupt[size % len(corrupt)] ^= 1 + chance[16] % 255
+                return [Delivery(bytes(corrupt), one.later_ms)]
+
+
+def _concerns(fault: MessageFault, receiver: str, key: str, sent_ms: int) -> bool:
+    return (
+        fault.receiver in ("", receiver)
+        and fault.from_ms <= sent_ms
+        and (fault.until_ms is None or sent_ms < fault.until_ms)
+        and fnmatch.fnmatchcase(key, fault.keys)
+    )
+
+
+def _across(vehicle: str, receiver: RosterNode, writer: RosterNode) -> bool:
+    """Whether just one of the two sits on this vehicle. The world has no place in the water."""
+    if Role.WORLD in (receiver.role, writer.role):
+        return False
+    return (vehicle in receiver.vehicles) != (vehicle in writer.vehicles)
+
+
+NO_FAULTS = Faults(0)

@@ -1,0 +1,115 @@
+"""The nodes that share one process: mail is opened once and given to those that read it. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from comms.lockstep.clock import Grant
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.node import Node, Received
+from comms.runner import Intake, NodeRunner, Outgoing, SenderDigest
+from comms.said.routing import Route, Routing
+
+LOST = "lost by a fault"
+
+
+class NodeGroup:
+    """Runners for the nodes of one process, keyed by node id. `faults` strike what they are sent."""
+
+    def __init__(
+        self, nodes: Mapping[str, Node], routing: Routing, faults: Faults = NO_FAULTS, incarnation: int = 0
+    ) -> None:
+        self.intake = Intake(routing)
+        self.runners: dict[str, NodeRunner] = {}
+        self._routing = routing
+        self._faults = faults
+        self._departed: list[SenderDigest] = []
+        for node_id, node in nodes.items():
+            self.join(node_id, node, incarnation)
+
+    def join(self, node_id: str, node: Node, incarnation: int) -> None:
+        """From now on the node is here."""
+        self.runners[node_id] = NodeRunner(node_id, node, self._routing, incarnation)
+
+    def leave(self, node_id: str) -> None:
+        """From now on the node is not here any more; what it has said counts."""
+        self._departed.append(self.runners.pop(node_id).stamp.digest())
+
+    def holds(self, node_ids: set[str]) -> bool:
+        """Whether one of these nodes is here."""
+        return not node_ids.isdisjoint(self.runners)
+
+    def receive(self, key: str, payload: bytes) -> Received | None:
+        """Takes one message from the transport: counted before faults strike and before it is validated.
+
+        Returns it as it was sent; None where it is for nobody here or does not fit.
+        """
+        route = self._routing.route(key)
+        if route is None:
+            return self.intake.open(key, payload)
+        readers = self._readers(route)
+        if not readers:
+            return None
+        for runner in readers:
+            runner.arrived[route.writer] += 1
+        received = self.intake.open(key, payload)
+        if received is not None:
+            self._hand_out(received, readers)
+        return received
+
+    def deliver(self, received: Received, route: Route) -> None:
+        """Puts a message that is open already into the mailboxes of those here that read it, as far as faults let."""
+        self._hand_out(received, self._readers(route))
+
+    def _readers(self, route: Route) -> list[NodeRunner]:
+        return [self.runners[name] for name in route.readers if name in self.runners]
+
+    def _hand_out(self, received: Received, readers: list[NodeRunner]) -> None:
+        for runner in readers:
+            if self._faults:
+                self._deliver_with_faults(runner, received)
+            else:
+                runner.deliver(received)
+
+    def give_kept(self, node_id: str, messages: Iterable[tuple[str, bytes]], due_ms: int) -> None:
+        """What was kept for a node that joins."""
+        for key, payload in messages:
+            received = self.intake.open(key, payload)
+            if received is not None:
+                self.runners[node_id].deliver(received, due_ms)
+
+    def has_all(self, grants: list[Grant]) -> bool:
+        """Whether all the mail that the clock expects for these grants has arrived."""
+        return all(self.runners[grant.node_id].has_all(grant.expected) for grant in grants)
+
+    def missing(self, grants: list[Grant]) -> str:
+        """In words, what has not arrived."""
+        return "; ".join(
+            f"{grant.node_id} has {self.runners[grant.node_id].arrived[sender]} of {count} messages from {sender}"
+            for grant in grants
+            for sender, count in grant.expected.items()
+            if self.runners[grant.node_id].arrived[sender] < count
+        )
+
+    def digests(self) -> list[SenderDigest]:
+        """What the group's nodes have said so far, those that have left included."""
+        return [*self._departed, *(runner.stamp.digest() for runner in self.runners.values())]
+
+    def act(self, grant: Grant, now_ms: int) -> tuple[int | None, list[Outgoing]]:
+        """Lets one node act; see `NodeRunner.act`."""
+        return self.runners[grant.node_id].act(now_ms, start=grant.start)
+
+    def _deliver_with_faults(self, runner: NodeRunner, received: Received) -> None:
+        deliveries = self._faults.deliveries(runner.node_id, received, self._routing)
+        if not deliveries:
+            self.intake.dropped[LOST] += 1
+        for one in deliveries:
+            opened = received if one.payload is received.payload else self.intake.open(received.key, one.payload)
+            if opened is None:
+                continue
+            # When it is due depends on when it was sent, whatever a corrupt message says of that.
+            due_ms = received.header.sent_ms + received.topic.delay_ms + one.later_ms
+            if one.later_ms:
+                runner.deliver_late(opened, due_ms)
+            else:
+                runner.deliver(opened, due_ms)

@@ -1,0 +1,301 @@
+"""The hub of a lockstep run over Zenoh: it holds the clock, grants and collects, and the nodes of its own process."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import zenoh
+
+from comms.control import (
+    ControlError,
+    HostPlan,
+    RunKeys,
+    pack,
+    pack_grants,
+    unpack,
+    unpack_answers,
+    unpack_final,
+)
+from comms.latency import STRIP_TO_TASK, StripLatency
+from comms.lockstep.clock import Grant, LockstepClock, Round
+from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.lockstep.group import NodeGroup
+from comms.lockstep.kept_messages import KeptMessages
+from comms.lockstep.local_bus import ending_of
+from comms.lockstep.pacing import MOST_BEHIND_BYTES, Pacing
+from comms.lockstep.post import publish
+from comms.node import Node
+from comms.result import BusResult
+from comms.runner import SenderDigest, Stamp, fleet_digest
+from comms.said.codec import CLOCK
+from comms.said.messages import Role, RunInfo
+from comms.said.routing import Routing
+from comms.said.topics import RUN
+from comms.session import PATIENCE_S, put, subscribe
+
+SIGN_OF_LIFE_EVERY_S = 0.5
+
+
+class FleetError(Exception):
+    """A process of the fleet has failed or fallen silent; the text is one sentence that names it."""
+
+
+class HostLostError(FleetError):
+    """The connection to a process is gone: it has died, or for too long given no sign of life."""
+
+    def __init__(self, host: str, at_ms: int) -> None:
+        super().__init__(f"{host} was lost at {at_ms / 1000:.3f} s of the mission")
+        self.host = host
+        self.at_ms = at_ms
+
+
+class Hub:
+    """One run's clock over an open hub session.
+
+    `hosts`: the other processes. `nodes`: the nodes of this process. `run` waits for all, runs the fleet to its end and
+    returns the result; raises FleetError, NodeError, RunawayError.
+
+    `faults` strike what the nodes of this process are sent. `events` are planned changes of nodes, each alone in its
+    process; `carry_out` kills, freezes, thaws or lets in the process of a host, and returns when that is done.
+    `patience_s`: wall time without a word from a process that has to answer. `most_behind_bytes`: see `Pacing`.
+    `alive`: called with the simulated time every half second of wall time and sooner.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: RunKeys,
+        routing: Routing,
+        hosts: tuple[HostPlan, ...],
+        nodes: Mapping[str, Node],
+        time_limit_ms: int,
+        *,
+        faults: Faults = NO_FAULTS,
+        events: Iterable[NodeEvent] = (),
+        carry_out: Callable[[Change, str], None] = lambda change, host: None,
+        patience_s: float = PATIENCE_S,
+        most_behind_bytes: int = MOST_BEHIND_BYTES,
+        alive: Callable[[int], None] = lambda now_ms: None,
+    ) -> None:
+        self._session = session
+        self._keys = keys
+        self._routing = routing
+        self._patience_s = patience_s
+        self._alive = alive
+        self._alive_at_s = time.monotonic()
+        self._change = carry_out
+        self._clock = LockstepClock(routing, time_limit_ms, events)
+        self._group = NodeGroup(nodes, routing, faults)
+        self._kept = {node_id: KeptMessages(node_id, routing) for node_id in self._clock.said_to_joiners}
+        self._latency = StripLatency()
+        self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
+        listening = {node.node_id for node in routing.roster if node.listens_only}
+        self._host_of = {node: plan.host for plan in hosts for node in plan.nodes if not plan.joins}
+        self._joining = {(node, plan.incarnation): plan.host for plan in hosts for node in plan.nodes if plan.joins}
+        self._hosts = {plan.host for plan in hosts if not plan.joins}
+        self._killed: set[str] = set()
+        self._frozen: set[str] = set()
+        self._listeners = {node: host for node, host in self._host_of.items() if node in listening}
+        self._pacing = Pacing(self._clock, self._listeners, most_behind_bytes)
+        self._queue: queue.SimpleQueue[tuple[str, str, bytes]] = queue.SimpleQueue()
+        self._ready: set[str] = set()
+        self._asked: dict[str, set[str]] = {}
+        self._finals: dict[str, tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]] = {}
+        expressions = [keys.topic(one) for node_id in (*nodes, *self._kept) for one in routing.subscriptions(node_id)]
+        self._subscribers = subscribe(session, expressions, self._on_mail)
+        self._subscribers += subscribe(session, [keys.from_host("*")], self._on_words)
+        self._liveliness = session.liveliness().declare_subscriber(
+            keys.alive("*"), zenoh.handlers.Callback(self._on_token, indirect=False), history=True
+        )
+
+    def run(self, run_info: RunInfo) -> BusResult:
+        """See the class."""
+        self._wait(lambda: self._ready >= self._hosts, lambda: _no("start", self._hosts - self._ready))
+        stamp = Stamp(CLOCK, self._routing)
+        announced = stamp(RUN.key(), run_info, 0)
+        self._clock.publish(CLOCK, [announced])
+        publish(self._session, self._keys, CLOCK, [announced])
+        while (turn := self._clock.next_round()) is not None:
+            self._show_life()
+            while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
+                self._handle(*self._queue.get())
+            for happening in turn.happenings:
+                self._happen(happening)
+            self._carry_out(turn)
+            if self._pacing.next_mark(time.monotonic()):
+                self._mark_listeners()
+        return self._finish()
+
+    def _carry_out(self, turn: Round) -> None:
+        here: list[Grant] = []
+        away: dict[str, list[Grant]] = {}
+        for grant in turn.grants:
+            if grant.node_id in self._group.runners:
+                here.append(grant)
+            else:
+                away.setdefault(self._host_of[grant.node_id], []).append(grant)
+        for host, grants in away.items():
+            self._asked[host] = {grant.node_id for grant in grants}
+            self._say(host, pack_grants(turn.now_ms, grants))
+        if here:
+            self._wait(lambda: self._group.has_all(here), lambda: f"mail is missing: {self._group.missing(here)}")
+            for grant in here:
+                wake_ms, outgoing = self._group.act(grant, turn.now_ms)
+                if grant.node_id in self._coordinators:
+                    self._latency.sending(outgoing, time.perf_counter())
+                publish(self._session, self._keys, grant.node_id, outgoing)
+                self._clock.answer(grant.node_id, wake_ms, outgoing)
+        self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
+
+    def _happen(self, happening: Happening) -> None:
+        node_id = happening.node_id
+        match happening.change:
+            case Change.JOIN:
+                self._let_in(node_id, happening.incarnation)
+            case Change.KILL:
+                host = self._host_of[node_id]
+                self._say(host, pack("last_word"))
+                self._wait(lambda: host in self._finals, lambda: _no("last word", {host}))
+                self._killed.add(host)
+                self._change(Change.KILL, host)
+            case Change.FREEZE:
+                self._frozen.add(self._host_of[node_id])
+                self._change(Change.FREEZE, self._host_of[node_id])
+            case Change.THAW:
+                self._frozen.remove(self._host_of[node_id])
+                self._change(Change.THAW, self._host_of[node_id])
+
+    def _let_in(self, node_id: str, incarnation: int) -> None:
+        """Lets a node's process connect and hands it what was kept. As it connects between two rounds, nothing reaches
+        it twice."""
+        host = self._host_of[node_id] = self._joining[node_id, incarnation]
+        self._hosts.add(host)
+        self._change(Change.JOIN, host)
+        self._wait(lambda: host in self._ready, lambda: _no("start", {host}))
+        kept, said = self._kept[node_id], self._clock.said_to_joiners[node_id]
+        self._wait(lambda: kept.has_all(said), lambda: f"mail is missing that was kept for {node_id}")
+        self._say(host, pack("kept", node_id, kept.messages(), self._clock.now_ms + JOINER_DELAY_MS))
+
+    def _say(self, host: str, words: bytes) -> None:
+        put(self._session, self._keys.to_host(host), words)
+
+    def _mark_listeners(self) -> None:
+        for node, host in self._listeners.items():
+            self._say(host, pack("mark", self._pacing.mark, self._clock.now_ms, dict(self._clock.watched[node])))
+        self._wait(
+            lambda: not self._pacing.behind(),
+            lambda: _no("acknowledgement", {self._listeners[node] for node in self._pacing.behind()}),
+        )
+
+    def _finish(self) -> BusResult:
+        for host in self._frozen:
+            self._change(Change.THAW, host)
+        for host in self._hosts - self._killed:
+            nodes = [node for node, its_host in self._listeners.items() if its_host == host]
+            counts = dict(self._clock.watched[nodes[0]]) if nodes else {}
+            self._say(host, pack("finish", self._pacing.mark, self._clock.now_ms, counts))
+        self._wait(
+            lambda: self._finals.keys() >= self._hosts, lambda: _no("last word", self._hosts - self._finals.keys())
+        )
+        digests: list[SenderDigest] = self._group.digests()
+        dropped = Counter(self._group.intake.dropped)
+        latencies = list(self._latency.milliseconds)
+        for its_digests, its_dropped, its_latencies in self._finals.values():
+            digests.extend(its_digests)
+            dropped.update(its_dropped)
+            latencies.extend(its_latencies.get(STRIP_TO_TASK, ()))
+        clock = self._clock
+        return BusResult(
+            ending=ending_of(clock),
+            mission_ms=clock.now_ms if clock.over_ms is None else clock.over_ms,
+            digest=fleet_digest(digests),
+            rounds=clock.rounds,
+            messages=dict(clock.messages),
+            dropped=dict(dropped),
+            latencies_ms={STRIP_TO_TASK: latencies},
+        )
+
+    def _wait(self, done: Callable[[], bool], missing: Callable[[], str]) -> None:
+        """Handles what arrives until `done()`; FleetError when nothing arrives for too long."""
+        heard_at_s = time.monotonic()
+        while not done():
+            try:
+                kind, key, payload = self._queue.get(timeout=min(SIGN_OF_LIFE_EVERY_S, self._patience_s))
+            except queue.Empty:
+                if time.monotonic() - heard_at_s >= self._patience_s:
+                    at_s = self._clock.now_ms / 1000
+                    raise FleetError(
+                        f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission: {missing()}"
+                    ) from None
+            else:
+                heard_at_s = time.monotonic()
+                self._handle(kind, key, payload)
+            self._show_life()
+
+    def _show_life(self) -> None:
+        now_s = time.monotonic()
+        if now_s - self._alive_at_s >= SIGN_OF_LIFE_EVERY_S:
+            self._alive_at_s = now_s
+            self._alive(self._clock.now_ms)
+
+    def _handle(self, kind: str, key: str, payload: bytes) -> None:
+        if kind == "mail":
+            below = key.removeprefix(self._keys.root)
+            for kept in self._kept.values():
+                kept.take(below, payload)
+            received = self._group.receive(below, payload)
+            if received is not None and self._group.holds(self._coordinators):
+                self._latency.arrived(received, time.perf_counter())
+            return
+        host = key.rsplit("/", 1)[1]
+        if host not in self._hosts:
+            return
+        if kind == "gone":
+            if host not in self._finals:
+                raise HostLostError(host, self._clock.now_ms)
+            return
+        try:
+            self._take_words(host, unpack(payload))
+        except (ControlError, ValueError) as error:
+            raise FleetError(f"{host} has said what makes no sense to the clock: {error}") from error
+
+    def _take_words(self, host: str, words: list[Any]) -> None:
+        match words:
+            case ["hello"]:
+                self._say(host, pack("welcome"))
+            case ["ready"]:
+                self._ready.add(host)
+            case ["answer", *_]:
+                answers = unpack_answers(words)
+                if {node_id for node_id, _, _ in answers} != self._asked.pop(host, None):
+                    raise ControlError("an answer for nodes that were not asked")
+                for node_id, wake_ms, sent in answers:
+                    self._clock.answer(node_id, wake_ms, sent)
+            case ["ack", int(mark)]:
+                self._pacing.acknowledge(next((n for n, its in self._listeners.items() if its == host), host), mark)
+            case ["final", *_]:
+                self._finals[host] = unpack_final(words)
+                self._say(host, pack("goodbye"))
+            case ["failed", str(sentence)]:
+                raise FleetError(sentence)
+            case _:
+                raise ControlError(f"{words[0][:20]!r}")
+
+    def _on_mail(self, key: str, payload: bytes) -> None:
+        self._queue.put(("mail", key, payload))
+
+    def _on_words(self, key: str, payload: bytes) -> None:
+        self._queue.put(("words", key, payload))
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        if sample.kind == zenoh.SampleKind.DELETE:  # not `is`: each look at it makes a new one
+            self._queue.put(("gone", str(sample.key_expr), b""))
+
+
+def _no(what: str, hosts: Any) -> str:
+    return f"no {what} from {', '.join(sorted(hosts))}"

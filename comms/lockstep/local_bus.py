@@ -1,0 +1,114 @@
+"""The local bus: all nodes in one process, a discrete-event loop under the lockstep clock, no sockets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+
+from comms.kept_listener import KeptListener, close_all
+from comms.lockstep.clock import LockstepClock
+from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.lockstep.group import NodeGroup
+from comms.lockstep.kept_messages import KeptMessages
+from comms.node import Listener, Node
+from comms.result import BusResult, Ending
+from comms.runner import Outgoing, Stamp, fleet_digest
+from comms.said.codec import CLOCK
+from comms.said.messages import Message, RunInfo
+from comms.said.routing import Routing
+from comms.said.topics import RUN
+
+
+def run_local(
+    routing: Routing,
+    nodes: Mapping[str, Callable[[], Node]],
+    listeners: Mapping[str, Listener],
+    run_info: RunInfo,
+    time_limit_ms: int,
+    *,
+    faults: Faults = NO_FAULTS,
+    events: Iterable[NodeEvent] = (),
+) -> BusResult:
+    """Runs the fleet to its end and closes the listeners, also when a node fails.
+
+    `nodes` holds what makes each node, `listeners` each listener, keyed by node id and complete for the roster of
+    `routing`. Raises NodeError and RunawayError, and ValueError for events that do not fit.
+    """
+    kept = {name: KeptListener(name, listener) for name, listener in listeners.items()}
+    try:
+        return _Local(routing, nodes, kept, LockstepClock(routing, time_limit_ms, events), faults).run(run_info)
+    finally:
+        close_all(kept.values())
+
+
+class _Local:
+    def __init__(
+        self,
+        routing: Routing,
+        makers: Mapping[str, Callable[[], Node]],
+        listeners: Mapping[str, Listener],
+        clock: LockstepClock,
+        faults: Faults,
+    ) -> None:
+        self.clock = clock
+        self.makers = makers
+        self.group = NodeGroup({name: makers[name]() for name in clock.present()}, routing, faults)
+        self.listeners = listeners
+        self.announcer = Stamp(CLOCK, routing)
+        self.kept = {node_id: KeptMessages(node_id, routing) for node_id in clock.said_to_joiners}
+
+    def run(self, run_info: RunInfo) -> BusResult:
+        self._carry([self._announce(run_info)])
+        while (turn := self.clock.next_round()) is not None:
+            for happening in turn.happenings:
+                self._happen(happening)
+            sent: list[Outgoing] = []
+            for grant in turn.grants:
+                wake_ms, outgoing = self.group.act(grant, turn.now_ms)
+                self.clock.answer(grant.node_id, wake_ms, outgoing)
+                sent.extend(outgoing)
+            if len(turn.grants) > 1:
+                sent.sort(key=lambda one: one.route.writer)  # stable: a sender's own messages stay in order
+            self._carry(sent)
+        return BusResult(
+            ending=ending_of(self.clock),
+            mission_ms=self.clock.now_ms if self.clock.over_ms is None else self.clock.over_ms,
+            digest=fleet_digest(self.group.digests()),
+            rounds=self.clock.rounds,
+            messages=dict(self.clock.messages),
+            dropped=dict(self.group.intake.dropped),
+        )
+
+    def _announce(self, message: Message) -> Outgoing:
+        outgoing = self.announcer(RUN.key(), message, 0)
+        self.clock.publish(CLOCK, [outgoing])
+        return outgoing
+
+    def _happen(self, happening: Happening) -> None:
+        node_id = happening.node_id
+        match happening.change:
+            case Change.KILL:
+                self.group.leave(node_id)
+            case Change.JOIN:
+                self.group.join(node_id, self.makers[node_id](), happening.incarnation)
+                self.group.give_kept(node_id, self.kept[node_id].messages(), happening.at_ms + JOINER_DELAY_MS)
+            case Change.FREEZE | Change.THAW:
+                pass  # the clock alone knows
+
+    def _carry(self, sent: list[Outgoing]) -> None:
+        for one in sent:
+            received = one.opened()
+            self.group.deliver(received, one.route)
+            for kept in self.kept.values():
+                kept.take(one.key, one.payload)
+            for name in one.route.watchers:
+                listener = self.listeners.get(name)
+                if listener is not None:
+                    listener.on_message(received)
+
+
+def ending_of(clock: LockstepClock) -> Ending:
+    """Why the clock has no next round."""
+    if clock.over_ms is not None:
+        return Ending.OVER
+    return Ending.TIME_LIMIT if clock.timed_out else Ending.IDLE

@@ -1,0 +1,43 @@
+"""What several messages of one sender look like in one, for those that only listen: a parcel costs its way as much as a
+message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from comms.runner import Outgoing
+from comms.said.messagepack import pack, unpack
+from comms.said.wire import WireError
+
+MOST_BYTES = 7900  # of a parcel, unless a single message has more: so it fits into one packet with its own key
+HEAD_BYTES = 8  # that MessagePack puts before key and payload, at the most, and before all
+
+
+def parcels(outgoing: Iterable[Outgoing]) -> Iterator[tuple[tuple[str, ...], bytes]]:
+    """Parcels of the messages, in order, and the listeners that each is for."""
+    held: dict[tuple[str, ...], list[str | bytes]] = {}
+    sizes: dict[tuple[str, ...], int] = {}
+    for one in outgoing:
+        watchers = one.route.watchers
+        if not watchers:
+            continue
+        size = len(one.key) + one.size + HEAD_BYTES
+        if watchers in held and sizes[watchers] + size > MOST_BYTES:
+            yield watchers, pack(held.pop(watchers))
+        if watchers not in held:
+            held[watchers], sizes[watchers] = [], HEAD_BYTES
+        held[watchers] += (one.key, one.payload)
+        sizes[watchers] += size
+    for watchers, messages in held.items():
+        yield watchers, pack(messages)
+
+
+def unpacked(parcel: bytes) -> Iterator[tuple[str, bytes]]:
+    """Key below the run id and payload of each message; raises WireError, and nothing else, where this is no parcel."""
+    parts = unpack(parcel)
+    if type(parts) is not list or len(parts) % 2:
+        raise WireError("not a list of keys and payloads")
+    keys, payloads = parts[::2], parts[1::2]
+    if not ({str}.issuperset(map(type, keys)) and {bytes}.issuperset(map(type, payloads))):
+        raise WireError("not a list of keys and payloads")
+    return zip(keys, payloads, strict=True)

@@ -1,0 +1,483 @@
+"""Every message the nodes say, field by field, each with its unit in its name or its type.
+
+Positions are in the mission frame (ENU metres), headings are compass radians. Messages are values: frozen, compared
+by what they hold where they hold no arrays. Which key carries which message, and who may say it, is in `topics`.
+
+Annotations are not postponed here: the wire's codecs read them, and would have to compile each from its text.
+"""
+
+import enum
+from dataclasses import dataclass
+from typing import Annotated
+
+from comms.said.wire import (
+    AtMost,
+    CellMask,
+    Count,
+    Digest,
+    Identifier,
+    Levels,
+    Metres,
+    MetresPerSecond,
+    Milliseconds,
+    OptionalIdentifier,
+    Probability,
+    ProbabilityCurve,
+    ProbabilityLook,
+    Radians,
+    SquareMetres,
+    Text,
+    YesNo,
+)
+from planner.types import GridSpec, Point, SweepFrame
+
+
+class Role(enum.Enum):
+    """What a node is in the fleet."""
+
+    CLOCK = "clock"
+    WORLD = "world"
+    BODY = "body"
+    SURVEY = "survey"
+    REVISIT = "revisit"
+    COORDINATOR = "coordinator"
+    RECORDER = "recorder"
+    OBSERVER = "observer"
+    SURVEY_REVISIT = "survey_revisit"
+
+    @property
+    def surveys(self) -> bool:
+        """Whether it is the agent of a primary."""
+        return self in (Role.SURVEY, Role.SURVEY_REVISIT)
+
+    @property
+    def revisits(self) -> bool:
+        """Whether it takes strips: a helper's agent, or a primary's once it has surveyed all."""
+        return self in (Role.REVISIT, Role.SURVEY_REVISIT)
+
+
+class ClockMode(enum.Enum):
+    """Whether simulated time advances in lockstep or with the wall clock."""
+
+    LOCKSTEP = "lockstep"
+    WALL = "wall"
+
+
+@dataclass(frozen=True, slots=True)
+class RosterVehicle:
+    """One vehicle of the fleet, as everyone is told at the start.
+
+    `swath_m`: how far the sonar sees to each side; `p_detect`: its mean P_d from the nadir gap up to there. Both say
+    what a second look by this vehicle is expected to be worth.
+    """
+
+    vehicle: Identifier
+    role: Role
+    speed_mps: MetresPerSecond
+    turn_radius_m: Metres
+    run_in_m: Metres
+    nadir_gap_m: Metres
+    swath_m: Metres
+    p_detect: Probability
+    endurance_ms: Milliseconds
+
+    @property
+    def strip_width_m(self) -> float:
+        """The widest strip that one pass covers: with both sides, or with one where there is a nadir gap between."""
+        return self.swath_m - self.nadir_gap_m if self.nadir_gap_m > 0 else 2 * self.swath_m
+
+
+@dataclass(frozen=True, slots=True)
+class Vertex:
+    """A corner of an outline."""
+
+    x_m: Metres
+    y_m: Metres
+
+
+@dataclass(frozen=True, slots=True)
+class Grid:
+    """The residual-risk map's grid (`planner.types.GridSpec`): the sweep frame's origin and heading, cells."""
+
+    origin_x_m: Metres
+    origin_y_m: Metres
+    heading_rad: Radians
+    cell_m: Metres
+    columns: Count
+    rows: Count
+
+    @property
+    def spec(self) -> GridSpec:
+        """The grid as planning uses it."""
+        frame = SweepFrame(self.origin_x_m, self.origin_y_m, self.heading_rad)
+        return GridSpec(frame, self.cell_m, self.columns, self.rows)
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    """What is left out of an area: a hole's outline."""
+
+    outline: Annotated[tuple[Vertex, ...], AtMost(50)]
+
+
+@dataclass(frozen=True, slots=True)
+class RunInfo:
+    """What is run: published once by the clock before anything else. Everyone takes area, grid and roster from here.
+
+    `area`: the survey area's outline. `rho`: correlation of looks at one cell in the residual risk, 0 for none.
+    `holes`: what is not to be surveyed within the area.
+    """
+
+    schema: Count
+    scenario: Identifier
+    scenario_sha256: Digest
+    seed: Count
+    mode: ClockMode
+    area: Annotated[tuple[Vertex, ...], AtMost(500)]
+    grid: Grid
+    rho: Probability
+    vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(100)]
+    holes: Annotated[tuple[Hole, ...], AtMost(20)] = ()
+
+    @property
+    def outline(self) -> tuple[Point, ...]:
+        """The survey area's corners, mission frame."""
+        return tuple((corner.x_m, corner.y_m) for corner in self.area)
+
+    @property
+    def hole_outlines(self) -> tuple[tuple[Point, ...], ...]:
+        """The corners of each hole, mission frame."""
+        return tuple(tuple((corner.x_m, corner.y_m) for corner in hole.outline) for hole in self.holes)
+
+
+@dataclass(frozen=True, slots=True)
+class Nav:
+    """Where a vehicle believes it is."""
+
+    x_m: Metres
+    y_m: Metres
+    heading_rad: Radians
+    speed_mps: MetresPerSecond
+    altitude_m: Metres
+    position_sigma_m: Metres
+
+
+@dataclass(frozen=True, slots=True)
+class LookContact:
+    """A detection within a look: distance along the track from its origin, lateral range (port negative), score."""
+
+    along_m: Metres
+    lateral_m: Metres
+    score: Probability
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the sonar saw on a stretch of track.
+
+    The look's frame has its origin at the track's start, `along` pointing down the track. The look covers
+    `[first_along_m, first_along_m + bins * along_bin_m)`. `p_detect` has shape (2, along bins, range bins): side 0 is
+    port, side 1 starboard; range bin k is centred at `k * range_bin_m`; 0 where nothing was seen. `valid` is false in
+    turns and run-in.
+    """
+
+    number: Count
+    maneuver: Count
+    origin_x_m: Metres
+    origin_y_m: Metres
+    heading_rad: Radians
+    first_along_m: Metres
+    along_bin_m: Metres
+    range_bin_m: Metres
+    p_detect: ProbabilityLook
+    altitude_m: Metres
+    position_sigma_m: Metres
+    valid: YesNo
+    contacts: Annotated[tuple[LookContact, ...], AtMost(200)]
+
+
+class ManeuverKind(enum.Enum):
+    """What the vehicle is asked to do."""
+
+    FOLLOW = "follow"
+    GOTO = "goto"
+    HOLD = "hold"
+
+
+@dataclass(frozen=True, slots=True)
+class Maneuver:
+    """A command to the vehicle: follow the track from start to end with the sonar on, go to the end point, or hold.
+
+    `run_in_m`: straight run before the start and after the end of a followed track.
+    """
+
+    number: Count
+    kind: ManeuverKind
+    start_x_m: Metres
+    start_y_m: Metres
+    end_x_m: Metres
+    end_y_m: Metres
+    run_in_m: Metres
+
+
+class ManeuverState(enum.Enum):
+    """How far a manoeuvre got."""
+
+    ACCEPTED = "accepted"
+    ON_TRACK = "on_track"
+    DONE = "done"
+    REFUSED = "refused"
+
+
+@dataclass(frozen=True, slots=True)
+class ManeuverStatus:
+    """The vehicle's word on a manoeuvre; `ends_ms` is when it expects to be done (when it was, for DONE)."""
+
+    number: Count
+    state: ManeuverState
+    ends_ms: Milliseconds
+    reason: Text
+
+
+class Mode(enum.Enum):
+    """What an agent is doing."""
+
+    IDLE = "idle"
+    TRANSIT = "transit"
+    SURVEY = "survey"
+    REVISIT = "revisit"
+    FINISHED = "finished"
+
+
+@dataclass(frozen=True, slots=True)
+class AgentState:
+    """An agent's state: on change and every 10 s. `works_on` is the track or strip number, 0 for none; `battery` the
+    share of endurance left; `expected_end_ms` when it will be free or finished, 0 if not known."""
+
+    mode: Mode
+    works_on: Count
+    battery: Probability
+    expected_end_ms: Milliseconds
+    x_m: Metres
+    y_m: Metres
+    heading_rad: Radians
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedTrack:
+    """One track of a plan, from start to end; `across_m` is its offset in the sweep frame."""
+
+    number: Count
+    across_m: Metres
+    start_x_m: Metres
+    start_y_m: Metres
+    end_x_m: Metres
+    end_y_m: Metres
+    flown: YesNo
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Tracks flown and still planned. `r_adpt_m`: one range a planned pair so far; `r_eff_m`: one a track flown, 0
+    where no range is admissible. `note` says in words what changed."""
+
+    revision: Count
+    tracks: Annotated[tuple[PlannedTrack, ...], AtMost(2000)]
+    r_adpt_m: Annotated[tuple[Count, ...], AtMost(2000)]
+    r_eff_m: Annotated[tuple[Count, ...], AtMost(2000)]
+    note: Text
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """P(y) as estimated from one track, 0 being earlier missions: P_d at whole multiples of `range_bin_m` from 0;
+    `r_eff_m` is 0 for none."""
+
+    track: Count
+    range_bin_m: Metres
+    p_detect: ProbabilityCurve
+    r_eff_m: Count
+
+
+@dataclass(frozen=True, slots=True)
+class CoverageTile:
+    """One tile of a vehicle's own layer, whole.
+
+    `sum_levels` and `largest_levels`: sum and largest single look of -ln(1 - P_d), in steps of 0.02, shape
+    (rows, columns) of the tile at `first_row`, `first_column` of the grid. The newest (incarnation, version) wins.
+    """
+
+    version: Count
+    first_row: Count
+    first_column: Count
+    sum_levels: Levels
+    largest_levels: Levels
+    settled: CellMask
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """A detection: estimated position, its standard deviation, the recogniser's score, the look it comes from."""
+
+    x_m: Metres
+    y_m: Metres
+    sigma_m: Metres
+    score: Probability
+    look: Count
+
+
+class HotspotState(enum.Enum):
+    """Whether a hotspot stands."""
+
+    ACTIVE = "active"
+    WITHDRAWN = "withdrawn"
+
+
+@dataclass(frozen=True, slots=True)
+class Hotspot:
+    """An area whose cells are settled and badly seen. `growing`: it touches cells that are not settled yet.
+    `merged_into`: the hotspot that took a withdrawn one over, 0 for none."""
+
+    revision: Count
+    state: HotspotState
+    outline: Annotated[tuple[Vertex, ...], AtMost(60)]
+    mean_risk: Probability
+    cells: Count
+    growing: YesNo
+    merged_into: Count
+
+
+class StripState(enum.Enum):
+    """The life of a strip in the coordinator's ledger."""
+
+    OPEN = "open"
+    OFFERED = "offered"
+    ACCEPTED = "accepted"
+    UNDER_WAY = "under_way"
+    DONE = "done"
+    FAILED = "failed"
+    WITHDRAWN = "withdrawn"
+
+
+@dataclass(frozen=True, slots=True)
+class StripStatus:
+    """A strip and where it stands. `removable_m2`: the residual risk, summed over its cells and times their area, that
+    one look by the helper's sensor is expected to remove. `vehicle`: who it is with, empty for nobody."""
+
+    revision: Count
+    state: StripState
+    start_x_m: Metres
+    start_y_m: Metres
+    heading_rad: Radians
+    length_m: Metres
+    width_m: Metres
+    removable_m2: SquareMetres
+    vehicle: OptionalIdentifier
+    reason: Text
+
+
+class TaskAction(enum.Enum):
+    """What a task message asks. To stand aside is to go to its start point and wait there, without a strip."""
+
+    TAKE = "take"
+    GIVE_BACK = "give_back"
+    STAND_ASIDE = "stand_aside"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """The coordinator's word to one vehicle: take this strip, give it back, or stand aside. It suffices by itself."""
+
+    action: TaskAction
+    strip: Count
+    start_x_m: Metres
+    start_y_m: Metres
+    heading_rad: Radians
+    length_m: Metres
+    width_m: Metres
+
+
+class TaskState(enum.Enum):
+    """A vehicle's answer to a task."""
+
+    ACCEPTED = "accepted"
+    REFUSED = "refused"
+    UNDER_WAY = "under_way"
+    DONE = "done"
+    FAILED = "failed"
+    GIVEN_BACK = "given_back"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskStatus:
+    """How a task stands. `progress`: share of the strip's length swept; `ends_ms`: when it expects to be done."""
+
+    strip: Count
+    state: TaskState
+    progress: Probability
+    ends_ms: Milliseconds
+    reason: Text
+
+
+@dataclass(frozen=True, slots=True)
+class MissionOver:
+    """The coordinator's word that the mission is over, and why. Agents publish what they still hold."""
+
+    reason: Text
+
+
+@dataclass(frozen=True, slots=True)
+class TruthTarget:
+    """A target on the seabed, true position."""
+
+    x_m: Metres
+    y_m: Metres
+
+
+@dataclass(frozen=True, slots=True)
+class TruthTargets:
+    """All targets, published once. A target's number is its place here, from 0."""
+
+    targets: Annotated[tuple[TruthTarget, ...], AtMost(100_000)]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthLook:
+    """Which targets a look passed over with a chance of detection, the true P_d of each, and which it detected."""
+
+    vehicle: Identifier
+    look: Count
+    targets: Annotated[tuple[Count, ...], AtMost(1000)]
+    p_detect: ProbabilityCurve
+    detected: Annotated[tuple[Count, ...], AtMost(1000)]
+
+
+@dataclass(frozen=True, slots=True)
+class TruthPose:
+    """Where a vehicle truly is, beside where it believes it is."""
+
+    x_m: Metres
+    y_m: Metres
+    heading_rad: Radians
+
+
+Message = (
+    RunInfo
+    | Nav
+    | Look
+    | Maneuver
+    | ManeuverStatus
+    | AgentState
+    | Plan
+    | Curve
+    | CoverageTile
+    | Contact
+    | Hotspot
+    | StripStatus
+    | Task
+    | TaskStatus
+    | MissionOver
+    | TruthTargets
+    | TruthLook
+    | TruthPose
+)

@@ -1,0 +1,127 @@
+"""Who may write and who reads a key, for one roster of nodes: the topic table applied to a fleet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from comms.said.messages import Role
+from comms.said.topics import TOPICS, Reach, Topic, topic_of
+from comms.said.wire import IDENTIFIER
+
+
+@dataclass(frozen=True, slots=True)
+class RosterNode:
+    """One node of the fleet: its id, its role and the vehicles it acts for (none for coordinator and watchers)."""
+
+    node_id: str
+    role: Role
+    vehicles: tuple[str, ...] = ()
+
+    @property
+    def listens_only(self) -> bool:
+        """Whether the node only listens, so that no round waits for it."""
+        return self.role in (Role.RECORDER, Role.OBSERVER)
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """What becomes of one key: its topic, the vehicle it names ("" for none), its only writer, and the nodes that read
+    it (the writer left out), those that act and those that only listen."""
+
+    topic: Topic
+    vehicle: str
+    writer: str
+    readers: tuple[str, ...]
+    watchers: tuple[str, ...]
+
+
+class Routing:
+    """Answers for a fixed roster; keys are below the run id. Raises ValueError for an id that is no identifier, for two
+    nodes with one id, and for two that may write one topic of one vehicle."""
+
+    def __init__(self, roster: tuple[RosterNode, ...]) -> None:
+        self.roster = roster
+        self.nodes = {node.node_id: node for node in roster}
+        for name in (*self.nodes, *(vehicle for node in roster for vehicle in node.vehicles)):
+            if not IDENTIFIER.fullmatch(name):  # a `*` or `/` would let a node write and read what is not its own
+                raise ValueError(f"{name!r} is not an id: at most 40 of a-z, 0-9, _ and -")
+        if len(self.nodes) != len(roster):
+            raise ValueError("two nodes have the same id")
+        self._routes: dict[str, Route] = {}
+        self._routes_of: dict[tuple[Topic, str], Route] = {}
+        for topic in TOPICS:
+            for vehicle in {v for node in roster for v in node.vehicles} if topic.has_vehicle else {""}:
+                writers = self._who(topic, topic.writers, vehicle)
+                if len(writers) > 1:
+                    raise ValueError(f"{topic.name} of {vehicle or 'the fleet'} has two writers: {', '.join(writers)}")
+
+    @cached_property
+    def audiences(self) -> frozenset[tuple[str, ...]]:
+        """All that `Route.watchers` may be."""
+        listening = [node for node in self.roster if node.listens_only]
+        return frozenset(tuple(node.node_id for node in listening if node.role in topic.readers) for topic in TOPICS)
+
+    def route(self, key: str) -> Route | None:
+        """The key's route; None where it belongs to no topic, names no vehicle of the fleet, or nobody may write it."""
+        try:
+            return self._routes[key]
+        except KeyError:
+            found = self._find(key)
+            if found is not None:  # keys that lead nowhere are not kept: anyone may think of any number of them
+                self._routes[key] = found
+            return found
+
+    def subscriptions(self, node_id: str) -> tuple[str, ...]:
+        """Key expressions, below the run id, of all that a node reads."""
+        return self._expressions(node_id, writing=False)
+
+    def publications(self, node_id: str) -> tuple[str, ...]:
+        """Key expressions, below the run id, of all that a node may write."""
+        return self._expressions(node_id, writing=True)
+
+    def _find(self, key: str) -> Route | None:
+        found = topic_of(key)
+        if found is None:
+            return None
+        route = self._routes_of.get(found)
+        if route is None:
+            route = self._route_of(*found)
+            if route is not None:
+                self._routes_of[found] = route
+        return route
+
+    def _route_of(self, topic: Topic, vehicle: str) -> Route | None:
+        writers = self._who(topic, topic.writers, vehicle)
+        if not writers:
+            return None
+        everyone = [n for n in self._who(topic, topic.readers, vehicle) if n != writers[0]]
+        return Route(
+            topic=topic,
+            vehicle=vehicle,
+            writer=writers[0],
+            readers=tuple(n for n in everyone if not self.nodes[n].listens_only),
+            watchers=tuple(n for n in everyone if self.nodes[n].listens_only),
+        )
+
+    def _who(self, topic: Topic, table: Mapping[Role, Reach], vehicle: str) -> list[str]:
+        known = not topic.has_vehicle or any(vehicle in node.vehicles for node in self.roster)
+        return [
+            node.node_id
+            for node in self.roster
+            if known
+            and node.role in table
+            and (table[node.role] is Reach.ALL or not topic.has_vehicle or vehicle in node.vehicles)
+        ]
+
+    def _expressions(self, node_id: str, *, writing: bool) -> tuple[str, ...]:
+        node = self.nodes[node_id]
+        found: list[str] = []
+        for topic in TOPICS:
+            reach = (topic.writers if writing else topic.readers).get(node.role)
+            if reach is Reach.OWN and topic.has_vehicle:
+                found.extend(topic.expression(vehicle) for vehicle in node.vehicles)
+            elif reach is not None:
+                found.append(topic.expression())
+        return tuple(found)

@@ -1,0 +1,211 @@
+"""The topic table: for each key its message, its writers and readers, delay, size limit, rate and keeping.
+
+Publishers, subscriptions, validation, the hub's access rules and the tests all read this one table.
+"""
+
+from __future__ import annotations
+
+import enum
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from comms.said.messages import (
+    AgentState,
+    Contact,
+    CoverageTile,
+    Curve,
+    Hotspot,
+    Look,
+    Maneuver,
+    ManeuverStatus,
+    Message,
+    MissionOver,
+    Nav,
+    Plan,
+    Role,
+    RunInfo,
+    StripStatus,
+    Task,
+    TaskStatus,
+    TruthLook,
+    TruthPose,
+    TruthTargets,
+)
+
+KEY_ROOT = "secondlook/v1"
+
+
+class Reach(enum.Enum):
+    """Whose keys of a topic a role may write or read: its own vehicles' or all."""
+
+    OWN = "own"
+    ALL = "all"
+
+
+class Keep(enum.Enum):
+    """What a late joiner is given: the latest message of each key, every message in order, or nothing."""
+
+    LATEST = "latest"
+    EVENTS = "events"
+    NOTHING = "nothing"
+
+
+@dataclass(frozen=True, eq=False)
+class Topic:
+    """One row of the table; another topic with the same entries is another one.
+
+    `pattern`: the key below the run id; `{vehicle}`, `{number}` and `{tile}` stand for one chunk each.
+    `delay_ms`: from sending to delivery in lockstep, >= 1. `wakes`: whether a message that is due lets its reader act;
+    if not it waits until the reader acts for another reason. `max_bytes`: a larger payload is refused.
+    `rate_hz`: the most that one writer is expected to publish on average, over all its keys of the topic.
+    """
+
+    name: str
+    pattern: str
+    message: type[Message]
+    writers: Mapping[Role, Reach]
+    readers: Mapping[Role, Reach]
+    max_bytes: int
+    rate_hz: float
+    keep: Keep
+    crosses_water: bool
+    delay_ms: int = 1
+    wakes: bool = True
+
+    def key(self, *, vehicle: str = "", number: int = 0, tile: str = "") -> str:
+        """The key below the run id."""
+        return self.pattern.format(vehicle=vehicle, number=number, tile=tile)
+
+    @cached_property
+    def has_vehicle(self) -> bool:
+        """Whether the key names a vehicle."""
+        return "{vehicle}" in self.pattern
+
+    @cached_property
+    def regex(self) -> re.Pattern[str]:
+        """Matches the topic's keys; group `vehicle` where the key names one."""
+        chunk = re.escape(self.pattern)
+        chunk = chunk.replace(r"\{vehicle\}", r"(?P<vehicle>[a-z0-9_-]+)")
+        chunk = chunk.replace(r"\{number\}", r"(?P<number>[0-9]+)").replace(r"\{tile\}", r"(?P<tile>[a-z0-9_-]+)")
+        return re.compile(chunk)
+
+    def vehicle_of(self, key: str) -> str:
+        """The vehicle that a key of this topic names; "" where its keys name none."""
+        match = self.regex.fullmatch(key) if self.has_vehicle else None
+        return match.group("vehicle") if match else ""
+
+    def expression(self, vehicle: str = "*") -> str:
+        """The Zenoh key expression, below the run id, of this topic's keys for one vehicle or for all."""
+        return self.pattern.format(vehicle=vehicle, number="*", tile="*")
+
+
+_WATCHERS = {Role.RECORDER: Reach.ALL, Role.OBSERVER: Reach.ALL}
+_SURVEYORS_OWN = {role: Reach.OWN for role in Role if role.surveys}
+_HELPERS_OWN = {role: Reach.OWN for role in Role if role.revisits}
+_AGENTS_OWN = _SURVEYORS_OWN | _HELPERS_OWN
+_BODIES_OWN = {Role.WORLD: Reach.OWN, Role.BODY: Reach.OWN}
+_COORDINATOR = {Role.COORDINATOR: Reach.ALL}
+_EVERYONE = dict.fromkeys(Role, Reach.ALL)
+
+RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 30_000, 0.01, Keep.LATEST, crosses_water=False)
+NAV = Topic(
+    "nav", "veh/{vehicle}/nav", Nav, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 200, 1.0, Keep.LATEST, crosses_water=False,
+    wakes=False,
+)  # fmt: skip
+LOOK = Topic(
+    "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | {Role.OBSERVER: Reach.ALL}, 150_000, 0.2,
+    Keep.NOTHING, crosses_water=False,
+)  # fmt: skip
+MANEUVER_STATUS = Topic(
+    "maneuver_status", "veh/{vehicle}/maneuver_status", ManeuverStatus, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 400, 0.1,
+    Keep.LATEST, crosses_water=False,
+)  # fmt: skip
+MANEUVER = Topic(
+    "maneuver", "agent/{vehicle}/maneuver", Maneuver, _AGENTS_OWN, _BODIES_OWN | _WATCHERS, 200, 0.1, Keep.LATEST,
+    crosses_water=False,
+)  # fmt: skip
+STATE = Topic(
+    "state", "agent/{vehicle}/state", AgentState, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 200, 0.3, Keep.LATEST,
+    crosses_water=True,
+)  # fmt: skip
+PLAN = Topic(
+    "plan", "agent/{vehicle}/plan", Plan, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 150_000, 0.02,
+    Keep.LATEST, crosses_water=True,
+)  # fmt: skip
+CURVE = Topic(
+    "curve", "agent/{vehicle}/curve", Curve, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 9_000, 0.01,
+    Keep.LATEST, crosses_water=True,
+)  # fmt: skip
+COVERAGE = Topic(
+    "coverage", "agent/{vehicle}/coverage/{tile}", CoverageTile, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 1_000, 2.0,
+    Keep.LATEST, crosses_water=True,
+)  # fmt: skip
+CONTACT = Topic(
+    "contact", "agent/{vehicle}/contact/{number}", Contact, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 200, 0.2,
+    Keep.EVENTS, crosses_water=True,
+)  # fmt: skip
+HOTSPOT = Topic(
+    "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 1_000,
+    0.5, Keep.LATEST, crosses_water=True,
+)  # fmt: skip
+STRIP = Topic(
+    "strip", "coord/strip/{number}", StripStatus, _COORDINATOR, _WATCHERS, 1_000, 1.0, Keep.LATEST,
+    crosses_water=False,
+)  # fmt: skip
+TASK = Topic(
+    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _HELPERS_OWN | _WATCHERS, 64, 0.1,
+    Keep.EVENTS, crosses_water=True,
+)  # fmt: skip
+TASK_STATUS = Topic(
+    "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
+    _COORDINATOR | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
+)  # fmt: skip
+MISSION_OVER = Topic(
+    "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
+    dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _WATCHERS, 400, 0.001, Keep.LATEST,
+    crosses_water=True,
+)  # fmt: skip
+TRUTH_TARGETS = Topic(
+    "truth_targets", "world/truth/targets", TruthTargets, {Role.WORLD: Reach.ALL}, _WATCHERS, 2_000_000, 0.001,
+    Keep.LATEST, crosses_water=False,
+)  # fmt: skip
+TRUTH_LOOK = Topic(
+    "truth_look", "world/truth/look/{vehicle}", TruthLook, {Role.WORLD: Reach.OWN}, _WATCHERS, 20_000, 0.2,
+    Keep.EVENTS, crosses_water=False,
+)  # fmt: skip
+TRUTH_POSE = Topic(
+    "truth_pose", "world/truth/pose/{vehicle}", TruthPose, {Role.WORLD: Reach.OWN}, _WATCHERS, 200, 1.0, Keep.LATEST,
+    crosses_water=False,
+)  # fmt: skip
+
+TOPICS: tuple[Topic, ...] = (
+    RUN, NAV, LOOK, MANEUVER_STATUS, MANEUVER, STATE, PLAN, CURVE, COVERAGE, CONTACT, HOTSPOT, STRIP, TASK,
+    TASK_STATUS, MISSION_OVER, TRUTH_TARGETS, TRUTH_LOOK, TRUTH_POSE,
+)  # fmt: skip
+
+
+def _shape(key: str) -> tuple[str, int]:
+    """What tells most topics' keys apart: the first chunk, and how many there are."""
+    return key.partition("/")[0], key.count("/")
+
+
+_TOPICS_OF_SHAPE: dict[tuple[str, int], tuple[Topic, ...]] = {
+    shape: tuple(topic for topic in TOPICS if _shape(topic.pattern) == shape)
+    for shape in {_shape(topic.pattern) for topic in TOPICS}
+}
+
+
+def number_of(key: str) -> int:
+    """The number that a key ends in, of topics whose keys do."""
+    return int(key.rpartition("/")[2])
+
+
+def topic_of(key: str) -> tuple[Topic, str] | None:
+    """The topic of a key below the run id and the vehicle it names ("" for none); None for a key of no topic."""
+    for topic in _TOPICS_OF_SHAPE.get(_shape(key), ()):
+        match = topic.regex.fullmatch(key)
+        if match:
+            return topic, match.group("vehicle") if topic.has_vehicle else ""
+    return None

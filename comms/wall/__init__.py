@@ -1,0 +1,1 @@
+"""By the wall clock: nodes act on receipt, and whoever misses something asks for it."""

@@ -1,0 +1,246 @@
+"""A process of a fleet that the wall clock drives: what sits in it, its post, and its word with the clock."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import secrets
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from comms.control import ControlError, pack
+from comms.node import Received
+from comms.result import BusResult
+from comms.runner import NodeError
+from comms.said.codec import LARGEST_INCARNATION, SCHEMA_VERSION
+from comms.said.routing import Routing
+from comms.wall.line import Interrupted, WallLine
+from comms.wall.mission_time import MissionTime
+from comms.wall.post import WallPost, Words
+from comms.wall.seats import Seat
+from comms.wall.words import Hello, WallKeys, pack_hello, pack_last_word, unpack_finish, unpack_time
+
+HELLO_EVERY_S = 1.0
+FIRST_HELLO_EVERY_S = 0.1  # until the clock has answered
+BEAT_EVERY_S = 0.5
+GOODBYE_WITHIN_S = 5.0
+CLOCK_LOST_AFTER_S = 3.0  # of wall time without a time signal; there are four a second
+GIVES_UP_AFTER_S = 20.0  # of wall time beyond the mission's time limit
+COMPLETE_WITHIN_S = 5.0  # so long a listener waits at the end for what is still missing
+
+
+class RefusedError(Exception):
+    """The clock does not let this process take part, or does not answer; the text is one sentence that says why."""
+
+
+class WallHost:
+    """Runs what sits in this process, over an open session, until the clock ends the run or someone interrupts it.
+
+    `host`: under which it speaks with the clock, which is to answer within `answer_within_s`. A while after the time
+    limit it ends by itself, where a clock that is not heard any more cannot end it. `notice`: told in words what a
+    person should know. `interrupted`: whether someone has ended it.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: WallKeys,
+        host: str,
+        seat: Seat,
+        routing: Routing,
+        scenario_sha256: str,
+        time_limit_ms: int,
+        *,
+        answer_within_s: float = math.inf,
+        notice: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        self.interrupted = False
+        self._keys = keys
+        self._host = host
+        self._seat = seat
+        self._notice = notice
+        self._scenario_sha256 = scenario_sha256
+        self._time_limit_ms = time_limit_ms
+        self._instance = secrets.token_hex(8)
+        self._time = MissionTime()
+        self._incarnation = 0
+        self._early: list[Received] = []
+        self._welcomed = False
+        self._waits_for_start = False
+        self._result: BusResult | None = None
+        self._finish_by_s = 0.0
+        self._hello_at_s = self._beat_at_s = 0.0
+        self._answer_by_s = time.monotonic() + answer_within_s
+        self._clock_heard_s = time.monotonic()
+        self._clock_is_heard = True
+        self._to_me = f"clock/to/{host}"
+        # Last comes what the clock tells to this host: when that arrives the hub knows of all the rest.
+        self._line = WallLine(
+            session, keys, expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me], keeps=seat.keeps
+        )
+        self._post = WallPost(self._line, keys, routing)
+        # Before the first hello: whoever the clock has heard of is missed when it ends, however soon that is.
+        self._token = session.liveliness().declare_token(keys.life(host, self._instance))
+
+    @property
+    def factor(self) -> float:
+        """By how much the mission's time runs faster than the wall clock; 1 as long as it is not known."""
+        return self._time.factor
+
+    @property
+    def now_ms(self) -> int:
+        """The mission's time; 0 as long as it is not known."""
+        return self._time.now_ms(time.monotonic()) if self._time.known else 0
+
+    def interrupt(self) -> None:
+        """From another thread: ends the run here early; listeners keep what they have."""
+        self._line.interrupt()
+
+    def run(self) -> BusResult | None:
+        """Returns how the run has ended, None where nobody has told: interrupted, or no word from the clock.
+
+        Raises RefusedError, and NodeError after telling the clock.
+        """
+        try:
+            try:
+                self._live()
+            except Interrupted:
+                self.interrupted = True
+                return None
+            finally:
+                self._seat.close()
+        except NodeError as error:
+            self._say(pack("failed", str(error)))
+            raise
+        if self._result is not None:
+            with contextlib.suppress(Interrupted):
+                self._part()
+        return self._result
+
+    def _live(self) -> None:
+        while True:
+            now_s = time.monotonic()
+            self._speak(now_s)
+            self._listen_for_clock(now_s)
+            if not self._welcomed and now_s >= self._answer_by_s:
+                raise RefusedError(
+                    f"no answer from the router to {self._host} in run {self._keys.run}: the run there may be another, "
+                    "or the name in the certificate"
+                )
+            if self._time.known:
+                now_ms = self._time.now_ms(now_s)
+                self._post.publish(self._seat.act(now_ms))
+                if now_ms >= self._time_limit_ms + GIVES_UP_AFTER_S * 1000 * self._time.factor:
+                    return
+            if self._result is not None and (
+                not self._seat.listens or self._post.is_complete or now_s >= self._finish_by_s
+            ):
+                return
+            event = self._line.get(self._next_s(now_s) - time.monotonic())
+            if event is None:
+                continue
+            for item in self._post.take(event, self._seat.kept.values):
+                match item:
+                    case Received():
+                        self._take(item)
+                    case Words(key, words):
+                        self._hear(key, words)
+
+    def _next_s(self, now_s: float) -> float:
+        next_s = min(self._hello_at_s, self._beat_at_s)
+        next_ms = self._seat.next_ms if self._time.known else None
+        # A millisecond has begun when it is over that the floor of the time shows it.
+        return next_s if next_ms is None else max(now_s, min(next_s, self._time.local_s(next_ms)))
+
+    def _speak(self, now_s: float) -> None:
+        if now_s >= self._hello_at_s:
+            self._hello_at_s = now_s + (HELLO_EVERY_S if self._welcomed else FIRST_HELLO_EVERY_S)
+            now_ms = self._time.now_ms(now_s) if self._time.known else None
+            hello = Hello(self._instance, SCHEMA_VERSION, self._scenario_sha256, self._welcomed, now_ms)
+            self._say(pack_hello(hello))
+        if now_s >= self._beat_at_s:
+            self._beat_at_s = now_s + BEAT_EVERY_S
+            if self._time.known:
+                self._post.beat(self._incarnation, self._seat.kept)
+
+    def _listen_for_clock(self, now_s: float) -> None:
+        heard = now_s - self._clock_heard_s < CLOCK_LOST_AFTER_S
+        if heard != self._clock_is_heard:
+            self._clock_is_heard = heard
+            self._notice("the router is heard again" if heard else "the router is not heard")
+
+    def _take(self, received: Received) -> None:
+        if not self._time.known:
+            self._early.append(received)
+            return
+        now_ms = self._time.now_ms(time.monotonic())
+        if self._post.is_in_time(received, now_ms):
+            self._post.publish(self._seat.take(received, now_ms))
+
+    def _hear(self, key: str, words: list[Any]) -> None:
+        try:
+            if key == "clock/time":
+                self._hear_time(*unpack_time(words))
+            elif key == self._to_me:
+                self._hear_clock(words)
+        except ControlError as error:
+            self._post.intake.drop("senseless words", "clock", str(error))
+
+    def _hear_time(self, now_ms: int | None, factor: float, taken_up: bool) -> None:
+        self._clock_heard_s = time.monotonic()
+        if now_ms is None:
+            self._waits_for_start = True
+            return
+        if not self._welcomed:  # nobody acts who may yet be refused
+            return
+        first = not self._time.known
+        self._time.hear(now_ms, factor, time.monotonic())
+        if first:
+            # Who was there before the start is the first of its name; later ones are told apart by when they came. The
+            # wait for a clock that takes up a mission's time was no wait for the start.
+            is_first = self._waits_for_start and not taken_up
+            self._incarnation = 0 if is_first else incarnation_at(now_ms, self._time_limit_ms)
+            self._seat.begin(self._incarnation, factor)
+            self._notice("the mission begins" if is_first else f"the mission is at {now_ms / 1000:.0f} s")
+            early, self._early = self._early, []
+            for received in early:
+                self._take(received)
+
+    def _hear_clock(self, words: list[Any]) -> None:
+        match words:
+            case ["welcome"]:
+                if not self._welcomed:
+                    self._welcomed = True
+                    self._hello_at_s = 0.0
+            case ["refused", self._instance, str(sentence)]:  # not for another process of the same name
+                raise RefusedError(f"refused by the router: {sentence}")
+            case ["finish", *_]:
+                self._result = unpack_finish(words)
+                self._finish_by_s = self._finish_by_s or time.monotonic() + COMPLETE_WITHIN_S
+
+    def _part(self) -> None:
+        """Gives the last word; returns when the clock has heard it, or is gone. The session may be closed then: the
+        news of its end cannot overtake the word."""
+        self._post.beat(self._incarnation, self._seat.kept)
+        self._say(pack_last_word(self._seat.last_word(self._post.intake.dropped)))
+        deadline_s = time.monotonic() + GOODBYE_WITHIN_S
+        while (left_s := deadline_s - time.monotonic()) > 0:
+            event = self._line.get(left_s)
+            if event is None:
+                return
+            for item in self._post.take(event, self._seat.kept.values):  # others may still ask for what is kept
+                if isinstance(item, Words) and item.key == self._to_me and item.words[0] == "goodbye":
+                    return
+
+    def _say(self, words: bytes) -> None:
+        self._line.say(self._keys.from_host(self._host), words)
+
+
+def incarnation_at(now_ms: int, time_limit_ms: int) -> int:
+    """The incarnation of a node that is started in mid-mission: larger for each later second, in missions of more than
+    18 hours for a correspondingly longer time, for an incarnation has two bytes."""
+    step_ms = max(1000, math.ceil(time_limit_ms / (LARGEST_INCARNATION - 1)))
+    return min(1 + now_ms // step_ms, LARGEST_INCARNATION)

@@ -1,0 +1,193 @@
+"""The hub of a fleet that the wall clock drives: it holds the clock, announces the run, and may seat nodes itself."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any
+
+import zenoh
+
+from comms.control import ControlError, HostPlan
+from comms.lockstep.hub import SIGN_OF_LIFE_EVERY_S, FleetError, HostLostError
+from comms.node import Received
+from comms.result import BusResult
+from comms.runner import Stamp
+from comms.said.codec import CLOCK
+from comms.said.messages import RunInfo
+from comms.said.routing import Routing
+from comms.said.topics import MISSION_OVER, RUN
+from comms.session import PATIENCE_S
+from comms.wall.clock import Phase, WallClock
+from comms.wall.host import BEAT_EVERY_S
+from comms.wall.journal import Journal
+from comms.wall.line import Life, WallLine
+from comms.wall.post import WallPost, Words
+from comms.wall.seats import NodeSeat
+from comms.wall.words import LastWord, WallKeys, pack_time, unpack_hello, unpack_last_word
+
+TIME_EVERY_S = 0.25
+FROM = "clock/from/"
+
+
+class WallHub:
+    """The hub of one run over an open session.
+
+    `hosts`: the other processes it waits for. `seat`: the nodes of this process. `strict`: a process that is lost,
+    fails or is silent for `patience_s` ends the run; else the others go on without it. `alive`: called with the mission
+    time every half second. `notice`: told in words what a person should know.
+    """
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: WallKeys,
+        routing: Routing,
+        hosts: tuple[HostPlan, ...],
+        seat: NodeSeat,
+        run_info: RunInfo,
+        time_limit_ms: int,
+        factor: float,
+        *,
+        strict: bool,
+        patience_s: float = PATIENCE_S,
+        alive: Callable[[int], None] = lambda now_ms: None,
+        notice: Callable[[str], None] = lambda sentence: None,
+    ) -> None:
+        self._keys = keys
+        self._seat = seat
+        self._strict = strict
+        self._patience_s = patience_s
+        self._alive = alive
+        self._notice = notice
+        listens = {plan.host: all(routing.nodes[node].listens_only for node in plan.nodes) for plan in hosts}
+        self._clock = WallClock(listens, run_info.scenario_sha256, time_limit_ms, factor, time.monotonic())
+        self._announced = Stamp(CLOCK, routing)(RUN.key(), run_info, 0)
+        self._kept = Journal()
+        self._time_at_s = self._beat_at_s = self._alive_at_s = 0.0
+        self._under_way = False
+        self._seat_closed = False
+        self._line = WallLine(
+            session,
+            keys,
+            expressions=[*seat.reads, MISSION_OVER.expression(), "clock/beat/*", f"{FROM}*"],
+            keeps=[*seat.keeps, RUN.expression()],
+            watches_lives=True,
+        )
+        self._post = WallPost(self._line, keys, routing)
+
+    def interrupt(self) -> None:
+        """From another thread or a signal's handler: `run` raises Interrupted."""
+        self._line.interrupt()
+
+    def run(self) -> BusResult:
+        """Waits for all and runs the fleet to its end; raises FleetError, NodeError and Interrupted."""
+        clock = self._clock
+        while clock.phase is not Phase.ENDED:
+            now_s = time.monotonic()
+            clock.pass_time(now_s)
+            self._begin_or_end(now_s)
+            if self._under_way and not self._seat_closed:
+                self._post.publish(self._seat.act(clock.time.now_ms(now_s)))
+            self._speak(now_s)
+            event = self._line.get(self._next_s(now_s) - time.monotonic())
+            for item in [] if event is None else self._post.take(event, self._all_kept):
+                match item:
+                    case Received():
+                        self._take(item)
+                    case Words(key, words) if key.startswith(FROM):
+                        self._hear(key.removeprefix(FROM), words)
+                    case Life(host, instance, alive) if not alive:
+                        self._lose(host, instance)
+            self._send_words()
+        self._send_words()
+        return clock.result
+
+    def _begin_or_end(self, now_s: float) -> None:
+        clock = self._clock
+        if clock.phase is Phase.RUNNING and not self._under_way:
+            self._under_way = True
+            self._seat.begin(0, clock.factor)
+            self._send_time(now_s)
+            self._kept.add(self._announced)
+            self._post.publish([self._announced])
+        elif clock.phase not in (Phase.WAITING, Phase.RUNNING) and not self._seat_closed:
+            self._seat_closed = True
+            self._post.beat(0, self._seat.kept)
+            clock.done_here(self._seat.last_word(self._post.intake.dropped))
+            clock.done_here(LastWord({RUN.name: 1}, {}, {}))
+
+    def _next_s(self, now_s: float) -> float:
+        next_s = min(self._time_at_s, self._beat_at_s, now_s + 0.05)
+        next_ms = self._seat.next_ms if self._under_way and not self._seat_closed else None
+        return next_s if next_ms is None else max(now_s, min(next_s, self._clock.time.local_s(next_ms)))
+
+    def _speak(self, now_s: float) -> None:
+        if now_s >= self._time_at_s:
+            self._send_time(now_s)
+        if now_s >= self._beat_at_s:
+            self._beat_at_s = now_s + BEAT_EVERY_S
+            if self._under_way:
+                self._post.beat(0, {CLOCK: self._kept, **self._seat.kept})
+        if now_s >= self._alive_at_s:
+            self._alive_at_s = now_s + SIGN_OF_LIFE_EVERY_S
+            self._alive(self._now_ms(now_s))
+            if self._strict:
+                self._look_for_silent(now_s)
+        for notice in self._clock.notices:
+            self._notice(notice)
+        self._clock.notices.clear()
+
+    def _send_time(self, now_s: float) -> None:
+        self._time_at_s = now_s + TIME_EVERY_S
+        now_ms = self._clock.time.now_ms(time.monotonic()) if self._clock.time.known else None
+        signal = pack_time(now_ms, self._clock.factor, taken_up=self._clock.taken_up)
+        self._line.say(self._keys.time, signal, drop=True)
+
+    def _send_words(self) -> None:
+        if self._clock.words:
+            self._send_time(time.monotonic())  # who is welcomed before the start is to know that it was there
+        for host, words in self._clock.words:
+            self._line.say(self._keys.to_host(host), words)
+        self._clock.words.clear()
+
+    def _look_for_silent(self, now_s: float) -> None:
+        silent = self._clock.silent(now_s, self._patience_s)
+        if silent:
+            at_s = self._now_ms(now_s) / 1000
+            names = ", ".join(sorted(silent))
+            raise FleetError(f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission from {names}")
+
+    def _take(self, received: Received) -> None:
+        now_ms = self._now_ms(time.monotonic())
+        if not self._post.is_in_time(received, now_ms):
+            return
+        if received.topic is MISSION_OVER:
+            self._clock.over(received.header.sent_ms)
+        if self._under_way and not self._seat_closed:
+            self._post.publish(self._seat.take(received, now_ms))
+
+    def _hear(self, host: str, words: list[Any]) -> None:
+        try:
+            match words:
+                case ["hello", *_]:
+                    self._clock.hello(host, unpack_hello(words), time.monotonic())
+                case ["done", *_]:
+                    self._clock.done(host, unpack_last_word(words))
+                case ["failed", str(sentence)]:
+                    if self._strict:
+                        raise FleetError(sentence)
+                    self._notice(sentence)
+        except ControlError as error:
+            self._post.intake.drop("senseless words", host, str(error))
+
+    def _lose(self, host: str, instance: str) -> None:
+        if self._strict and not self._clock.is_done(host):
+            raise HostLostError(host, self._now_ms(time.monotonic()))
+        self._clock.gone(host, instance)
+
+    def _now_ms(self, now_s: float) -> int:
+        return self._clock.time.now_ms(now_s) if self._clock.time.known else 0
+
+    def _all_kept(self) -> list[Journal]:
+        return [self._kept, *self._seat.kept.values()]

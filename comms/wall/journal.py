@@ -1,0 +1,121 @@
+"""What is kept for whoever comes late or has lost its link: each sender's journal, and what a receiver has of it.
+
+Pure. A sender tells from time to time a tally of what it keeps under each of its key expressions: the sum over the kept
+messages of sequence number + 1. A receiver sums up what it has of them in the same way. Of each key it has no newer
+message than the sender, so that both sums are equal just where it has everything.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+from comms.node import Received
+from comms.runner import Outgoing
+from comms.said.codec import Header
+from comms.said.topics import Keep, Topic
+
+MOST_TRIES = 3  # to get what a tally tells of, where answers come but something is still missing
+
+
+class Journal:
+    """What one sender has said, as far as the topic table says that it is kept."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._latest: dict[str, tuple[int, bytes]] = {}
+        self._events: list[tuple[int, str, bytes]] = []
+        self._tallies: dict[str, int] = {}
+
+    def add(self, sent: Outgoing) -> None:
+        """The sender's next message: each has to be told, also those that are not kept."""
+        sequence = self._count
+        self._count += 1
+        topic = sent.route.topic
+        if topic.keep is Keep.NOTHING:
+            return
+        gain = sequence + 1
+        if topic.keep is Keep.EVENTS:
+            self._events.append((sequence, sent.key, sent.payload))
+        else:
+            gain -= self._latest[sent.key][0] + 1 if sent.key in self._latest else 0
+            self._latest[sent.key] = (sequence, sent.payload)
+        expression = topic.expression(topic.vehicle_of(sent.key))
+        self._tallies[expression] = self._tallies.get(expression, 0) + gain
+
+    @property
+    def tallies(self) -> dict[str, int]:
+        """The tally of each key expression."""
+        return self._tallies
+
+    def matching(self, matches: Callable[[str], bool]) -> Iterator[tuple[str, bytes]]:
+        """Key and payload of what is kept under matching keys, in the order of sending."""
+        found = [(sequence, key, payload) for key, (sequence, payload) in self._latest.items() if matches(key)]
+        found += [one for one in self._events if matches(one[1])]
+        return ((key, payload) for _, key, payload in sorted(found))
+
+
+@dataclass
+class _FromSender:
+    incarnation: int
+    latest: dict[str, int] = field(default_factory=dict)
+    events: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
+    sums: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    tried: dict[str, tuple[int, int]] = field(default_factory=dict)
+
+
+class HeardMessages:
+    """What a receiver has of the messages that their senders keep."""
+
+    def __init__(self) -> None:
+        self._senders: dict[str, _FromSender] = {}
+
+    def take(self, received: Received) -> bool:
+        """Whether a message is news; one that came before, or is older than what came, is none."""
+        header, topic = received.header, received.topic
+        sender = self._sender(header.sender, header.incarnation)
+        if sender is None:
+            return False
+        if topic.keep is Keep.NOTHING:
+            return True
+        gain = self._gain(sender, topic, received.key, header)
+        sender.sums[topic.expression(received.vehicle)] += gain
+        return gain > 0
+
+    def missing(self, name: str, incarnation: int, tallies: dict[str, int]) -> list[str]:
+        """The key expressions of a sender under which something is missing, going by its tallies."""
+        sender = self._sender(name, incarnation)
+        if sender is None:
+            return []
+        return [
+            expression
+            for expression, tally in tallies.items()
+            if sender.sums[expression] < tally and sender.tried.get(expression) != (tally, MOST_TRIES)
+        ]
+
+    def answered(self, name: str, expression: str, tally: int) -> None:
+        """The sender was asked for what a tally tells of, and has answered. Where something of it is missing that does
+        not come, it is not asked for for ever."""
+        sender = self._senders[name]
+        before, tries = sender.tried.get(expression, (tally, 0))
+        sender.tried[expression] = (tally, tries + 1 if before == tally else 1)
+
+    def _sender(self, name: str, incarnation: int) -> _FromSender | None:
+        known = self._senders.get(name)
+        if known is None or known.incarnation < incarnation:
+            known = self._senders[name] = _FromSender(incarnation)
+        return known if known.incarnation == incarnation else None
+
+    def _gain(self, sender: _FromSender, topic: Topic, key: str, header: Header) -> int:
+        if topic.keep is Keep.EVENTS:
+            seen = sender.events[topic.name]
+            if header.sequence in seen:
+                return 0
+            seen.add(header.sequence)
+            return header.sequence + 1
+        before = sender.latest.get(key, -1)
+        if header.sequence <= before:
+            return 0
+        sender.latest[key] = header.sequence
+        return header.sequence - before

@@ -1,0 +1,88 @@
+"""All nodes in one process, driven by the wall clock times a factor, no sockets."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+
+from comms.node import Listener, Node
+from comms.result import BusResult, Ending
+from comms.runner import Intake, Outgoing, Stamp
+from comms.said.codec import CLOCK
+from comms.said.messages import RunInfo
+from comms.said.routing import Routing
+from comms.said.topics import MISSION_OVER, RUN
+from comms.wall.clock import sum_up
+from comms.wall.mission_time import MissionTime
+from comms.wall.seats import ListenerSeat, NodeSeat
+from comms.wall.words import LastWord
+
+
+def run_local_by_wall(
+    routing: Routing,
+    nodes: Mapping[str, Callable[[], Node]],
+    listeners: Mapping[str, Listener],
+    run_info: RunInfo,
+    time_limit_ms: int,
+    factor: float,
+) -> BusResult:
+    """Runs the fleet to its end and closes the listeners, also when a node fails.
+
+    `nodes` holds what makes each node, `listeners` each listener, keyed by node id and complete for the roster of
+    `routing`. Raises NodeError.
+    """
+    watching = ListenerSeat(listeners, routing)
+    try:
+        acting = NodeSeat({node_id: make() for node_id, make in nodes.items()}, routing)
+        return _WallLocal(routing, acting, watching, factor).run(run_info, time_limit_ms)
+    finally:
+        watching.close()
+
+
+class _WallLocal:
+    def __init__(self, routing: Routing, acting: NodeSeat, watching: ListenerSeat, factor: float) -> None:
+        self._intake = Intake(routing)
+        self._announcer = Stamp(CLOCK, routing)
+        self._acting = acting
+        self._watching = watching
+        self._factor = factor
+        self._time = MissionTime()
+        self._over_ms: int | None = None
+
+    def run(self, run_info: RunInfo, time_limit_ms: int) -> BusResult:
+        self._time.hear(0, self._factor, time.monotonic())
+        for seat in (self._acting, self._watching):
+            seat.begin(0, self._factor)
+        self._carry([self._announcer(RUN.key(), run_info, 0)])
+        # What follows from the mission's end is said at once; nobody is any further away.
+        while self._over_ms is None:
+            now_ms = self._now_ms()
+            if now_ms > time_limit_ms:
+                return self._result(Ending.TIME_LIMIT, time_limit_ms)
+            self._carry(self._acting.act(now_ms))
+            self._watching.act(now_ms)
+            next_ms = min(time_limit_ms + 1, *(ms for ms in (self._acting.next_ms, self._watching.next_ms) if ms))
+            time.sleep(max(0.0, self._time.local_s(next_ms) - time.monotonic()))
+        return self._result(Ending.OVER, self._over_ms)
+
+    def _carry(self, outgoing: list[Outgoing]) -> None:
+        under_way = deque(outgoing)
+        while under_way:
+            sent = under_way.popleft()
+            received = self._intake.open(sent.key, sent.payload)
+            if received is None:
+                continue
+            if received.topic is MISSION_OVER:
+                self._over_ms = received.header.sent_ms
+            now_ms = self._now_ms()
+            self._watching.take(received, now_ms)
+            under_way.extend(self._acting.take(received, now_ms))
+
+    def _now_ms(self) -> int:
+        return self._time.now_ms(time.monotonic())
+
+    def _result(self, ending: Ending, mission_ms: int) -> BusResult:
+        last = self._acting.last_word(self._intake.dropped)
+        announced = LastWord({RUN.name: 1}, {}, {})
+        return sum_up(ending, mission_ms, [last, announced])

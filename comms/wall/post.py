@@ -1,0 +1,130 @@
+"""A process's post when the wall clock drives it: it opens what arrives, tells what is kept here, and asks for what is
+missing.
+
+Whatever a link loses that its sender keeps is noticed at the sender's next beat, and asked for. So a process that comes
+late, or had no link for a while, gets what it has missed, wherever that was lost. Until all has come nothing else of
+that sender is passed on; then everything is, in the order of sending.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from comms.control import ControlError, unpack
+from comms.node import Received
+from comms.runner import Intake, Outgoing
+from comms.said.routing import Routing
+from comms.wall.journal import HeardMessages, Journal
+from comms.wall.line import Answered, Asked, Event, Life, Mail, WallLine
+from comms.wall.words import Beat, WallKeys, pack_beat, unpack_beat
+
+WORDS = "clock/"  # what the keys of words begin with, below the run id
+BEAT = f"{WORDS}beat/"
+AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time is dropped
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """Words under a key below the run id."""
+
+    key: str
+    words: list[Any]
+
+
+Item = Received | Words | Life
+
+
+class WallPost:
+    """The post of the nodes of one process over its line."""
+
+    def __init__(self, line: WallLine, keys: WallKeys, routing: Routing) -> None:
+        self.line = line
+        self.intake = Intake(routing)
+        self._keys = keys
+        self._heard = HeardMessages()
+        self._beats: dict[str, Beat] = {}
+        self._asked: dict[str, set[str]] = {}
+        self._held: dict[str, list[Received]] = {}
+
+    def take(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
+        """Deals with what has arrived; returns messages that are news, words and news of a life, which are for others
+        to deal with. `kept`: what the nodes here keep."""
+        match event:
+            case Mail(key, payload) if key.startswith(WORDS):
+                return self._take_words(key, payload)
+            case Mail(key, payload):
+                return self._take_message(key, payload)
+            case Asked():
+                found = [
+                    pair for one in kept() for pair in one.matching(lambda key: self.line.is_asked_for(event, key))
+                ]
+                self.line.answer(event, found)
+            case Answered(sender, expression, tally, answers):
+                if answers:
+                    self._heard.answered(sender, expression, tally)
+                return self._end_asking(sender, expression)
+            case Life():
+                return [event]
+        return []
+
+    def is_in_time(self, received: Received, now_ms: int) -> bool:
+        """Whether a message may be handled; one that is too far ahead of our time is dropped."""
+        ahead_ms = received.header.sent_ms - now_ms
+        if ahead_ms > AHEAD_MS:
+            self.intake.drop("ahead of time", received.header.sender, f"{received.key}: by {ahead_ms / 1000:.3f} s")
+        return ahead_ms <= AHEAD_MS
+
+    def beat(self, incarnation: int, kept: Mapping[str, Journal]) -> None:
+        """Tells what the nodes here keep."""
+        for node, its in kept.items():
+            self.line.say(self._keys.beat(node), pack_beat(Beat(incarnation, its.tallies)), drop=True)
+
+    def publish(self, outgoing: Iterable[Outgoing]) -> None:
+        """Sends messages."""
+        self.line.publish(outgoing)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all is here that those who have told what they keep have kept for us."""
+        return not any(self._missing(sender) for sender in self._beats)
+
+    def _take_message(self, key: str, payload: bytes) -> list[Item]:
+        received = self.intake.open(key, payload)
+        if received is None or not self._heard.take(received):
+            return []
+        if received.header.sender in self._asked:
+            self._held.setdefault(received.header.sender, []).append(received)
+            return []
+        return [received]
+
+    def _end_asking(self, sender: str, expression: str) -> list[Item]:
+        asked = self._asked[sender]
+        asked.discard(expression)
+        if asked:
+            return []
+        del self._asked[sender]
+        return [*sorted(self._held.pop(sender, []), key=lambda one: one.header.order)]
+
+    def _take_words(self, key: str, payload: bytes) -> list[Item]:
+        try:
+            words = unpack(payload)
+            if not key.startswith(BEAT):
+                return [Words(key, words)]
+            sender = key.removeprefix(BEAT)
+            self._beats[sender] = unpack_beat(words)
+        except ControlError as error:
+            self.intake.drop("senseless words", key, str(error))
+            return []
+        for expression in self._missing(sender):
+            asked = self._asked.setdefault(sender, set())
+            if expression not in asked:
+                asked.add(expression)
+                self.line.ask(sender, expression, self._beats[sender].tallies[expression])
+        return []
+
+    def _missing(self, sender: str) -> list[str]:
+        beat = self._beats[sender]
+        missing = self._heard.missing(sender, beat.incarnation, beat.tallies)
+        return [expression for expression in missing if self.line.reads(expression)]

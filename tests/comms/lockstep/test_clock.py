@@ -1,0 +1,241 @@
+"""The lockstep clock against rounds worked out by hand, and against a plain account of what is due when."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import pytest
+from fleets import ROSTER
+from hypothesis import given
+from hypothesis import strategies as st
+
+from comms.lockstep.clock import Grant, LockstepClock, Round, Sent
+from comms.said.routing import Routing
+
+RUN = Sent("run", 300)
+NAV = Sent("veh/alpha/nav", 40)
+STATE = Sent("agent/alpha/state", 50)
+LOOK = Sent("veh/alpha/look", 9000)
+OVER = Sent("coord/mission_over", 20)
+ACTING = ("world", "alpha", "beta", "coordinator")
+
+
+def started(time_limit_ms: int = 60_000) -> LockstepClock:
+    """A clock whose first round has been granted, and nothing announced."""
+    clock = LockstepClock(Routing(ROSTER), time_limit_ms)
+    clock.next_round()
+    return clock
+
+
+def answer_all(clock: LockstepClock, **answers: tuple[int | None, list[Sent]]) -> None:
+    """Answers for all four nodes; those not named want nothing."""
+    for node_id in ACTING:
+        clock.answer(node_id, *answers.get(node_id, (None, [])))
+
+
+def test_rounds_grants_and_counts_worked_out_by_hand() -> None:
+    clock = LockstepClock(Routing(ROSTER), 60_000)
+    clock.publish("clock", [RUN])
+    # 0 ms: everyone is started; the announcement is on its way to all.
+    told = {"clock": 1}
+    assert clock.next_round() == Round(0, tuple(Grant(node, True, told, start=True) for node in ACTING))
+    answer_all(clock, world=(7, [NAV, NAV]))
+    # 1 ms: the announcement is due at all, two positions at alpha.
+    assert clock.next_round() == Round(
+        1,
+        (
+            Grant("world", False, {}),
+            Grant("alpha", False, {"world": 2}),
+            Grant("beta", False, {}),
+            Grant("coordinator", False, {}),
+        ),
+    )
+    answer_all(clock, world=(7, []), alpha=(2, [STATE]), coordinator=(7, []))
+    # 2 ms: alpha's wake-up, and its state at the coordinator, who keeps its wake-up.
+    assert clock.next_round() == Round(2, (Grant("alpha", True, {}), Grant("coordinator", False, {"alpha": 1})))
+    clock.answer("coordinator", 7, [])
+    clock.answer("alpha", 6, [])
+    assert clock.next_round() == Round(6, (Grant("alpha", True, {}),))
+    clock.answer("alpha", None, [STATE, STATE])
+    # 7 ms: what is due and a wake-up come in one grant; counts are totals.
+    assert clock.next_round() == Round(7, (Grant("world", True, {}), Grant("coordinator", True, {"alpha": 3})))
+    clock.answer("world", None, [])
+    clock.answer("coordinator", None, [])
+    assert clock.next_round() is None
+    assert (clock.now_ms, clock.rounds, clock.over_ms, clock.timed_out) == (7, 5, None, False)
+    assert clock.messages == {"run": 1, "nav": 2, "state": 3}
+    assert clock.watched == {"observer": {"clock": 1, "world": 2, "alpha": 3}}
+    assert clock.watched_bytes == {"observer": 300 + 2 * 40 + 3 * 50}
+
+
+def test_a_topic_that_nobody_who_acts_reads_makes_no_round() -> None:
+    clock = started()
+    answer_all(clock, world=(None, [Sent("world/truth/targets", 7)]))
+    assert clock.next_round() is None
+    assert clock.watched_bytes["observer"] == 7
+
+
+def test_after_the_end_there_are_100_ms_for_last_words_once_all_agents_rest() -> None:
+    clock = started()
+    answer_all(clock, coordinator=(2000, []), alpha=(9000, []), beta=(9000, []))
+    assert clock.next_round() == Round(2000, (Grant("coordinator", True, {}),))
+    clock.answer("coordinator", None, [OVER])
+    assert clock.over_ms == 2000
+    hearing = ("world", "alpha", "beta")
+    assert clock.next_round() == Round(2001, tuple(Grant(node, False, {"coordinator": 1}) for node in hearing))
+    clock.answer("world", 9000, [])
+    clock.answer("alpha", None, [STATE])
+    clock.answer("beta", 2300, [])  # it has not heard
+    assert clock.next_round() == Round(2002, (Grant("coordinator", False, {"alpha": 1}),))
+    clock.answer("coordinator", None, [OVER])  # a second end changes nothing
+    assert clock.over_ms == 2000
+    turn = clock.next_round()
+    assert turn is not None
+    assert turn.now_ms == 2003
+    clock.answer("world", 2400, [])
+    clock.answer("alpha", None, [])
+    clock.answer("beta", 2300, [])
+    assert clock.next_round() == Round(2300, (Grant("beta", True, {}),))
+    clock.answer("beta", None, [])
+    assert clock.next_round() == Round(2400, (Grant("world", True, {}),))
+    clock.answer("world", 2401, [])
+    assert clock.next_round() is None
+    assert not clock.timed_out
+
+
+def test_an_agent_that_does_not_rest_is_waited_for_10_s() -> None:
+    clock = started()
+    answer_all(clock, coordinator=(2000, []), alpha=(12_000, []))
+    clock.next_round()
+    clock.answer("coordinator", None, [OVER])
+    clock.next_round()
+    for node, wake_ms in (("world", None), ("alpha", 12_000), ("beta", None)):
+        clock.answer(node, wake_ms, [])
+    assert clock.next_round() == Round(12_000, (Grant("alpha", True, {}),))
+    clock.answer("alpha", 12_001, [])
+    assert clock.next_round() is None
+    assert not clock.timed_out
+
+
+@pytest.mark.parametrize(("wake_ms", "granted"), [(500, True), (501, False)])
+def test_the_time_limit_is_the_last_time_that_is_granted(wake_ms: int, granted: bool) -> None:
+    clock = started(time_limit_ms=500)
+    answer_all(clock, world=(wake_ms, []))
+    turn = clock.next_round()
+    assert (turn is not None, clock.timed_out) == (granted, not granted)
+
+
+def test_mail_that_is_due_after_the_time_limit_counts_as_late_too() -> None:
+    clock = started(time_limit_ms=500)
+    answer_all(clock, world=(500, []))
+    clock.next_round()
+    clock.answer("world", None, [LOOK])
+    assert clock.next_round() is None
+    assert clock.timed_out
+
+
+def test_what_wakes_nobody_comes_along_with_the_next_grant() -> None:
+    clock = started()
+    answer_all(clock, world=(5, [NAV]), alpha=(9, []))
+    turn = clock.next_round()
+    assert turn == Round(5, (Grant("world", True, {}),))
+    clock.answer("world", None, [NAV])
+    assert clock.next_round() == Round(9, (Grant("alpha", True, {"world": 2}),))
+    clock.answer("alpha", None, [])
+    assert clock.next_round() is None
+
+
+@pytest.mark.parametrize("wake_ms", [-1, 0, 99, 100])
+def test_a_wake_up_that_is_not_later_is_refused(wake_ms: int) -> None:
+    clock = started()
+    answer_all(clock, world=(100, []))
+    clock.next_round()
+    with pytest.raises(ValueError, match=rf"^world asks at 100 ms to be woken at {wake_ms} ms, which is not later$"):
+        clock.answer("world", wake_ms, [])
+
+
+def test_only_a_node_that_was_granted_may_answer_and_only_once() -> None:
+    clock = started()
+    answer_all(clock, world=(100, []))
+    with pytest.raises(ValueError, match=r"^world has answered at 0 ms without being asked$"):
+        clock.answer("world", None, [])
+    clock.next_round()
+    for node_id in ("alpha", "observer", "nobody"):
+        with pytest.raises(ValueError, match=f"^{node_id} has answered at 100 ms without being asked$"):
+            clock.answer(node_id, None, [])
+
+
+def test_no_round_begins_before_all_have_answered() -> None:
+    clock = started()
+    clock.answer("alpha", None, [])
+    clock.answer("world", None, [])
+    with pytest.raises(ValueError, match=r"no answer from beta, coordinator$"):
+        clock.next_round()
+
+
+@pytest.mark.parametrize("key", ["agent/alpha/state", "agent/gamma/state", "veh/alpha/state", "run", "clock/from/beta"])
+def test_a_key_that_the_sender_may_not_write_is_refused(key: str) -> None:
+    clock = started()
+    with pytest.raises(ValueError, match=f"^beta has published {key}, which it may not write$"):
+        clock.answer("beta", None, [Sent(key, 10)])
+
+
+WRITES = {
+    "world": [NAV, LOOK, Sent("veh/beta/nav", 41), Sent("world/truth/pose/beta", 30)],
+    "alpha": [STATE, Sent("agent/alpha/maneuver", 35)],
+    "beta": [Sent("agent/beta/state", 51), Sent("agent/beta/task_status/2", 60)],
+    "coordinator": [Sent("coord/task/beta/1", 44), Sent("coord/strip/1", 70)],
+}
+READERS = {
+    "veh/alpha/nav": ["alpha"],
+    "veh/alpha/look": ["alpha"],
+    "veh/beta/nav": ["beta"],
+    "world/truth/pose/beta": [],
+    "agent/alpha/state": ["coordinator"],
+    "agent/alpha/maneuver": ["world"],
+    "agent/beta/state": ["coordinator"],
+    "agent/beta/task_status/2": ["coordinator"],
+    "coord/task/beta/1": ["beta"],
+    "coord/strip/1": [],
+}
+
+
+@given(st.data())
+def test_every_message_is_granted_a_delay_after_it_was_sent_to_its_readers_alone(data: st.DataObject) -> None:
+    clock = LockstepClock(Routing(ROSTER), 1000)
+    wakes: dict[str, int | None] = dict.fromkeys(ACTING, 0)
+    due: set[tuple[int, str]] = set()
+    sent_to: Counter[tuple[str, str]] = Counter()
+    told: Counter[tuple[str, str]] = Counter()
+    last_ms = -1
+    for _ in range(25):
+        turn = clock.next_round()
+        times = [wake for wake in wakes.values() if wake is not None] + [when for when, _ in due]
+        if not times:
+            assert turn is None
+            return
+        assert turn is not None
+        assert turn.now_ms == min(times) > last_ms
+        last_ms = turn.now_ms
+        awake = {node for node, wake in wakes.items() if wake == last_ms}
+        assert {grant.node_id for grant in turn.grants} == awake | {node for when, node in due if when == last_ms}
+        due = {one for one in due if one[0] > last_ms}
+        for grant in turn.grants:
+            assert grant.wake == (grant.node_id in awake)
+            told.update(
+                {
+                    (sender, grant.node_id): count - told[sender, grant.node_id]
+                    for sender, count in grant.expected.items()
+                }
+            )
+            assert all(told[way] == count for way, count in sent_to.items() if way[1] == grant.node_id)
+        for grant in turn.grants:
+            sent = data.draw(st.lists(st.sampled_from(WRITES[grant.node_id]), max_size=2))
+            gap_ms = data.draw(st.sampled_from([None, 1, 2, 3]))
+            wakes[grant.node_id] = None if gap_ms is None else last_ms + gap_ms
+            clock.answer(grant.node_id, wakes[grant.node_id], sent)
+            for one in sent:
+                for reader in READERS[one.key]:
+                    if not one.key.endswith("nav"):
+                        due.add((last_ms + 1, reader))
+                    sent_to[grant.node_id, reader] += 1

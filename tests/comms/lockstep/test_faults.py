@@ -1,0 +1,130 @@
+"""Message faults strike as told, where told, by chance that depends on nothing but seed and message."""
+
+from __future__ import annotations
+
+import pytest
+from fleets import ROSTER, nav, state
+from hypothesis import given
+from hypothesis import strategies as st
+
+from comms.lockstep.faults import CutOff, Delivery, FaultKind, Faults, MessageFault
+from comms.runner import Intake
+from comms.said.codec import Header, encode
+from comms.said.messages import AgentState, Message, MissionOver, Nav
+from comms.said.routing import Routing
+
+ROUTING = Routing(ROSTER)
+NAV, STATE = "veh/alpha/nav", "agent/alpha/state"
+
+
+def payload_of(key: str, number: int, sent_ms: int) -> bytes:
+    """A message's payload; different for each number."""
+    route = ROUTING.route(key)
+    assert route is not None
+    message: Message = state(works_on=number)
+    if route.topic.message is not AgentState:
+        message = nav(number) if route.topic.message is Nav else MissionOver(f"{number}")
+    return encode(Header(route.writer, 0, number, sent_ms), message)
+
+
+def deliver(faults: Faults, key: str, number: int = 0, sent_ms: int = 0, receiver: str = "") -> list[Delivery]:
+    """What becomes of a message at its (first) reader."""
+    route = ROUTING.route(key)
+    received = Intake(ROUTING).open(key, payload_of(key, number, sent_ms))
+    assert route is not None
+    assert received is not None
+    return faults.deliveries(receiver or route.readers[0], received, ROUTING)
+
+
+def test_without_faults_a_message_passes() -> None:
+    faults = Faults(1)
+    assert not faults
+    assert deliver(faults, NAV) == [Delivery(payload_of(NAV, 0, 0))]
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [
+        (FaultKind.DROP, []),
+        (FaultKind.REPEAT, [0, 700]),
+        (FaultKind.DELAY, [700]),
+    ],
+)
+def test_a_certain_fault_strikes_every_message(kind: FaultKind, expected: list[int]) -> None:
+    faults = Faults(1, [MessageFault(kind, delay_ms=700)])
+    payload = payload_of(NAV, 3, 50)
+    assert deliver(faults, NAV, 3, 50) == [Delivery(payload, later_ms) for later_ms in expected]
+
+
+@given(st.integers(0, 10_000), st.integers(0, 2**31))
+def test_reordering_delays_within_its_bounds(number: int, seed: int) -> None:
+    (delivery,) = deliver(Faults(seed, [MessageFault(FaultKind.REORDER, delay_ms=30)]), NAV, number)
+    assert 1 <= delivery.later_ms <= 30
+
+
+@given(st.integers(0, 10_000), st.integers(0, 2**31))
+def test_corruption_changes_one_byte(number: int, seed: int) -> None:
+    (delivery,) = deliver(Faults(seed, [MessageFault(FaultKind.CORRUPT)]), NAV, number)
+    before = payload_of(NAV, number, 0)
+    assert sum(one != two for one, two in zip(before, delivery.payload, strict=True)) == 1
+
+
+def test_a_fault_by_chance_strikes_as_often_as_told_and_otherwise_for_another_seed() -> None:
+    def struck(seed: int) -> list[int]:
+        faults = Faults(seed, [MessageFault(FaultKind.DROP, probability=0.2)])
+        return [n for n in range(5000) if not deliver(faults, NAV, n)]
+
+    first = struck(1)
+    assert 900 < len(first) < 1100  # 1000 expected, standard deviation 28
+    assert struck(1) == first
+    assert 100 < len(set(first) & set(struck(2))) < 300  # 200 expected of independent draws
+
+
+@pytest.mark.parametrize(
+    ("fault", "key", "sent_ms", "strikes"),
+    [
+        (MessageFault(FaultKind.DROP, keys="agent/*/state"), STATE, 0, True),
+        (MessageFault(FaultKind.DROP, keys="agent/*/state"), NAV, 0, False),
+        (MessageFault(FaultKind.DROP, keys="agent/beta/*"), STATE, 0, False),
+        (MessageFault(FaultKind.DROP, from_ms=100, until_ms=200), NAV, 99, False),
+        (MessageFault(FaultKind.DROP, from_ms=100, until_ms=200), NAV, 100, True),
+        (MessageFault(FaultKind.DROP, from_ms=100, until_ms=200), NAV, 199, True),
+        (MessageFault(FaultKind.DROP, from_ms=100, until_ms=200), NAV, 200, False),
+        (MessageFault(FaultKind.DROP, receiver="alpha"), NAV, 0, True),
+        (MessageFault(FaultKind.DROP, receiver="coordinator"), NAV, 0, False),
+    ],
+)
+def test_a_fault_strikes_only_what_it_names(fault: MessageFault, key: str, sent_ms: int, strikes: bool) -> None:
+    assert (deliver(Faults(1, [fault]), key, 0, sent_ms) == []) is strikes
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "key", "sent_ms", "lost"),
+    [
+        ("alpha", STATE, 500, True),  # from its agent over water
+        ("beta", STATE, 500, False),  # another vehicle's
+        ("alpha", NAV, 500, False),  # within the vehicle
+        ("alpha", STATE, 499, False),
+        ("alpha", STATE, 999, True),
+        ("alpha", STATE, 1000, False),
+        ("beta", "coord/mission_over", 500, False),  # heard by the other vehicle
+        ("alpha", "coord/mission_over", 500, True),
+    ],
+)
+def test_a_vehicle_cut_off_loses_what_crosses_water(vehicle: str, key: str, sent_ms: int, lost: bool) -> None:
+    faults = Faults(1, cut_offs=[CutOff(vehicle, 500, 1000)])
+    route = ROUTING.route(key)
+    assert route is not None
+    receiver = "coordinator" if "coordinator" in route.readers else "alpha"
+    assert (deliver(faults, key, 0, sent_ms, receiver=receiver) == []) is lost
+
+
+def test_faults_apply_in_their_order() -> None:
+    twice_late = [MessageFault(FaultKind.REPEAT, delay_ms=5), MessageFault(FaultKind.DELAY, delay_ms=100)]
+    assert [one.later_ms for one in deliver(Faults(1, twice_late), NAV)] == [100, 105]
+
+
+@pytest.mark.parametrize("wrong", [{"probability": 1.1}, {"probability": float("nan")}, {"delay_ms": 0}])
+def test_what_is_no_fault_is_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=r"^a fault's (probability|delay) must be"):
+        MessageFault(FaultKind.DROP, **wrong)  # type: ignore[arg-type]

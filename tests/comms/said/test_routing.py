@@ -1,0 +1,142 @@
+"""The topic table applied to a fleet: one writer a key, readers as the table says, expressions that cover no more."""
+
+from __future__ import annotations
+
+import pytest
+import zenoh
+
+from comms.said.messages import Role
+from comms.said.routing import RosterNode, Routing
+from comms.said.topics import TOPICS, Topic, topic_of
+
+VEHICLES = ("alpha", "beta", "gamma")
+ROSTER = (
+    RosterNode("clock", Role.CLOCK),
+    RosterNode("world", Role.WORLD, ("alpha", "beta")),
+    RosterNode("gamma-body", Role.BODY, ("gamma",)),
+    RosterNode("alpha", Role.SURVEY, ("alpha",)),
+    RosterNode("beta", Role.REVISIT, ("beta",)),
+    RosterNode("gamma", Role.REVISIT, ("gamma",)),
+    RosterNode("coordinator", Role.COORDINATOR),
+    RosterNode("recorder", Role.RECORDER),
+    RosterNode("observer", Role.OBSERVER),
+)
+# For each topic who writes it for alpha, beta and gamma (or at all), and who reads it apart from recorder and observer.
+BODIES = {"alpha": "world", "beta": "world", "gamma": "gamma-body"}
+AGENTS = {name: name for name in VEHICLES}
+EXPECTED: dict[str, tuple[dict[str, str], dict[str, set[str]]]] = {
+    "run": ({"": "clock"}, {"": {"world", "gamma-body", "alpha", "beta", "gamma", "coordinator"}}),
+    "nav": (BODIES, {name: {name} for name in VEHICLES}),
+    "look": (BODIES, {name: {name} for name in VEHICLES}),
+    "maneuver_status": (BODIES, {name: {name} for name in VEHICLES}),
+    "maneuver": (AGENTS, {name: {body} for name, body in BODIES.items()}),
+    "state": (AGENTS, {name: {"coordinator"} for name in VEHICLES}),
+    "plan": ({"alpha": "alpha"}, {"alpha": {"coordinator"}}),
+    "curve": ({"alpha": "alpha"}, {"alpha": {"coordinator"}}),
+    "coverage": (AGENTS, {name: {"coordinator"} for name in VEHICLES}),
+    "contact": (AGENTS, {name: {"coordinator"} for name in VEHICLES}),
+    "hotspot": ({"alpha": "alpha"}, {"alpha": {"coordinator"}}),
+    "strip": ({"": "coordinator"}, {"": set()}),
+    "task": (dict.fromkeys(VEHICLES, "coordinator"), {"alpha": set(), "beta": {"beta"}, "gamma": {"gamma"}}),
+    "task_status": ({"beta": "beta", "gamma": "gamma"}, {"beta": {"coordinator"}, "gamma": {"coordinator"}}),
+    "mission_over": ({"": "coordinator"}, {"": {"world", "alpha", "beta", "gamma"}}),
+    "truth_targets": ({"": "world"}, {"": set()}),
+    "truth_look": ({"alpha": "world", "beta": "world"}, {"alpha": set(), "beta": set()}),
+    "truth_pose": ({"alpha": "world", "beta": "world"}, {"alpha": set(), "beta": set()}),
+}
+routing = Routing(ROSTER)
+by_topic = pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
+
+
+def keys_of(topic: Topic) -> list[tuple[str, str]]:
+    """(vehicle, key) of a few keys of a topic, for each vehicle of the fleet."""
+    vehicles = VEHICLES if topic.has_vehicle else ("",)
+    return [
+        (name, topic.key(vehicle=name, number=number, tile=f"{number}-0")) for name in vehicles for number in (0, 12)
+    ]
+
+
+ALL_KEYS = [key for topic in TOPICS for _, key in keys_of(topic)]
+
+
+@by_topic
+def test_a_key_has_the_writer_and_the_readers_that_the_table_says(topic: Topic) -> None:
+    writers, readers = EXPECTED[topic.name]
+    watchers = ("observer",) if topic.name == "look" else ("recorder", "observer")
+    for vehicle, key in keys_of(topic):
+        route = routing.route(key)
+        if vehicle not in writers:
+            assert route is None
+            continue
+        assert route is not None
+        assert (route.topic, route.writer, route.watchers) == (topic, writers[vehicle], watchers)
+        assert set(route.readers) == readers[vehicle]
+        assert len(set(route.readers)) == len(route.readers)
+
+
+def test_the_audiences_are_who_listens_to_any_key() -> None:
+    routes = [route for route in map(routing.route, ALL_KEYS) if route is not None]
+    assert routing.audiences == {route.watchers for route in routes} == {("recorder", "observer"), ("observer",)}
+
+
+@by_topic
+def test_a_key_belongs_to_one_topic(topic: Topic) -> None:
+    for vehicle, key in keys_of(topic):
+        assert [one for one in TOPICS if one.regex.fullmatch(key)] == [topic]
+        assert topic_of(key) == (topic, vehicle)
+
+
+@pytest.mark.parametrize("node_id", [node.node_id for node in ROSTER])
+def test_expressions_cover_exactly_the_keys_of_a_node(node_id: str) -> None:
+    reads = [zenoh.KeyExpr(one) for one in routing.subscriptions(node_id)]
+    writes = [zenoh.KeyExpr(one) for one in routing.publications(node_id)]
+    for key in ALL_KEYS:
+        route = routing.route(key)
+        if route is None:
+            continue
+        assert any(one.includes(zenoh.KeyExpr(key)) for one in writes) == (route.writer == node_id)
+        if route.writer != node_id:
+            is_reader = node_id in (*route.readers, *route.watchers)
+            assert any(one.includes(zenoh.KeyExpr(key)) for one in reads) == is_reader
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "", "run/", "/run", "runs", "veh/alpha", "veh//nav", "veh/alpha/nav/1", "veh/delta/nav", "veh/*/nav", "veh/**",
+        "veh/ALPHA/nav", "agent/alpha/hotspot/-1", "agent/alpha/hotspot/1a", "agent/alpha/hotspot/\u0661",
+        "agent/alpha/coverage/*", "world/truth/look/delta", "clock/to/alpha", "secondlook/v1/x/run", "run\n",
+    ],
+)  # fmt: skip
+def test_a_key_of_no_topic_or_no_vehicle_of_the_fleet_has_no_route(key: str) -> None:
+    assert routing.route(key) is None
+
+
+def test_a_route_is_looked_up_once_and_keys_that_lead_nowhere_are_not_kept() -> None:
+    fresh = Routing(ROSTER)
+    assert fresh.route("veh/alpha/nav") is fresh.route("veh/alpha/nav")
+    for number in range(100):
+        fresh.route(f"nowhere/{number}")
+    assert len(fresh._routes) == 1
+
+
+@pytest.mark.parametrize(
+    ("extra", "sentence"),
+    [
+        (RosterNode("alpha", Role.REVISIT, ("delta",)), "^two nodes have the same id$"),
+        (RosterNode("other", Role.SURVEY, ("alpha",)), "^maneuver of alpha has two writers: alpha, other$"),
+        (RosterNode("other", Role.REVISIT, ("beta",)), "^maneuver of beta has two writers: beta, other$"),
+        (RosterNode("body", Role.BODY, ("beta",)), "of beta has two writers: world, body$"),
+        (RosterNode("other", Role.COORDINATOR), "^strip of the fleet has two writers: coordinator, other$"),
+        (RosterNode("other", Role.CLOCK), "^run of the fleet has two writers: clock, other$"),
+        (RosterNode("other", Role.WORLD), "^truth_targets of the fleet has two writers: world, other$"),
+        (RosterNode("*", Role.OBSERVER), r"^'\*' is not an id"),
+        (RosterNode("a/b", Role.OBSERVER), "^'a/b' is not an id"),
+        (RosterNode("", Role.OBSERVER), "^'' is not an id"),
+        (RosterNode("a" * 41, Role.OBSERVER), "is not an id"),
+        (RosterNode("delta", Role.SURVEY, ("**",)), r"^'\*\*' is not an id"),
+    ],
+)
+def test_a_roster_that_clashes_is_refused(extra: RosterNode, sentence: str) -> None:
+    with pytest.raises(ValueError, match=sentence):
+        Routing((*ROSTER, extra))

@@ -1,0 +1,188 @@
+"""The clock of a fleet by the wall clock: who may take part, when the mission starts, how it ends and is taken up."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from comms.control import unpack
+from comms.result import Ending
+from comms.said.codec import SCHEMA_VERSION
+from comms.wall.clock import HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, Phase, WallClock
+from comms.wall.words import Hello, LastWord, unpack_finish
+
+SHA = "a" * 64
+LIMIT_MS = 100_000
+HOSTS = {"alpha": False, "beta": False, "observer": True}
+
+
+def clock(factor: float = 10.0) -> WallClock:
+    return WallClock(HOSTS, SHA, LIMIT_MS, factor, 0.0)
+
+
+def hello(instance: str = "1", *, welcomed: bool = True, now_ms: int | None = None, sha: str = SHA) -> Hello:
+    return Hello(instance, SCHEMA_VERSION, sha, welcomed, now_ms)
+
+
+def words(told: WallClock) -> list[tuple[str, str]]:
+    said = [(host, str(unpack(payload)[0])) for host, payload in told.words]
+    told.words.clear()
+    return said
+
+
+def phase(told: WallClock) -> Phase:
+    return told.phase
+
+
+def under_way(at_s: float = 1.0) -> WallClock:
+    started = clock()
+    for host in HOSTS:
+        started.hello(host, hello(), at_s)
+    started.pass_time(at_s)
+    assert started.phase == Phase.RUNNING
+    words(started)
+    return started
+
+
+def test_the_mission_starts_when_all_are_there_and_have_heard_the_clock() -> None:
+    told = clock()
+    for host in HOSTS:
+        told.hello(host, hello(welcomed=False), 1.0)
+        told.pass_time(1.0)
+    assert words(told) == [(host, "welcome") for host in HOSTS]
+    told.hello("alpha", hello(), 2.0)
+    told.hello("beta", hello(), 2.0)
+    told.pass_time(2.0)
+    assert (phase(told), told.missing) == (Phase.WAITING, ["observer"])
+    told.hello("observer", hello(), 3.0)
+    told.pass_time(3.0)
+    assert (phase(told), told.taken_up) == (Phase.RUNNING, False)
+    assert told.time.now_ms(3.5) == 5_000
+
+
+def test_a_clock_started_anew_takes_up_the_time_of_whoever_knows_it() -> None:
+    told = clock()
+    told.hello("beta", hello(now_ms=42_000), 7.0)
+    assert (phase(told), told.taken_up) == (Phase.RUNNING, True)
+    assert told.time.now_ms(8.0) == 52_000
+    told.hello("alpha", hello(now_ms=90_000), 8.0)
+    assert told.time.now_ms(8.0) == 52_000
+
+
+@pytest.mark.parametrize(
+    ("host", "said", "sentence"),
+    [
+        ("alpha", hello(sha="b" * 64), r"the router has another scenario than alpha, a{12} and not b{12}: .*"),
+        ("gamma", hello(), "gamma is none of the scenario's nodes that the router knows"),
+        ("alpha", Hello("1", 99, SHA, False, None), "the fleet speaks schema version 1, alpha version 99"),
+        ("beta", hello("2"), "another beta takes part already"),
+    ],
+)
+def test_who_does_not_fit_is_refused_with_the_reason(host: str, said: Hello, sentence: str) -> None:
+    told = clock()
+    told.hello("beta", hello("1"), 0.5)
+    words(told)
+    told.hello(host, said, 1.0)
+    ((refused, payload),) = told.words
+    assert refused == host
+    name, instance, reason = unpack(payload)
+    assert (name, instance) == ("refused", said.instance)
+    assert re.fullmatch(sentence, reason)
+    assert "alpha" in told.missing
+
+
+def test_a_host_that_is_gone_or_silent_may_be_replaced() -> None:
+    told = clock()
+    told.hello("beta", hello("1"), 1.0)
+    told.gone("beta", "2")
+    assert told.notices == ["beta is here"]
+    told.gone("beta", "1")
+    told.hello("beta", hello("2"), 1.5)
+    assert [name for _, name in words(told)] == []
+    told.hello("beta", hello("3"), 1.5 + HERE_S)
+    assert [name for _, name in words(told)] == []
+    assert told.notices == ["beta is here", "beta is gone", "beta is here", "beta is here"]
+
+
+def test_the_end_first_has_the_last_words_of_those_who_act_then_of_those_who_listen() -> None:
+    told = under_way()
+    told.over(30_000)
+    told.over(31_000)
+    told.pass_time(2.0)
+    told.pass_time(2.0 + WRAP_UP_S - 0.01)
+    assert phase(told) is Phase.RUNNING
+    told.pass_time(2.0 + WRAP_UP_S)
+    assert words(told) == [("alpha", "finish"), ("beta", "finish")]
+    told.done_here(LastWord({"run": 1}, {}, {}))
+    told.done("alpha", LastWord({"state": 3}, {"malformed": 1}, {}))
+    told.pass_time(2.6)
+    assert (phase(told), words(told)) == (Phase.ENDING, [("alpha", "goodbye")])
+    told.done("beta", LastWord({"state": 4}, {}, {"strip_to_task": [1.5]}))
+    told.pass_time(2.7)
+    assert phase(told) is Phase.CLOSING
+    (_, (host, finish)) = told.words
+    result = unpack_finish(unpack(finish))
+    assert (host, result.ending, result.mission_ms) == ("observer", Ending.OVER, 30_000)
+    assert (result.messages, result.dropped) == ({"run": 1, "state": 7}, {"malformed": 1})
+    assert (result.latencies_ms, result.digest, result.rounds) == ({"strip_to_task": [1.5]}, None, None)
+    told.done("observer", LastWord({}, {"ahead of time": 2}, {}))
+    told.pass_time(2.8)
+    assert phase(told) is Phase.ENDED
+    assert told.result.dropped == {"malformed": 1, "ahead of time": 2}
+
+
+def test_at_the_end_nobody_is_waited_for_who_is_not_there() -> None:
+    told = under_way()
+    told.hello("alpha", hello(), 10.0)
+    told.over(90_000)
+    told.pass_time(10.0)
+    told.pass_time(10.0 + WRAP_UP_S)
+    assert words(told) == [("alpha", "finish")]  # nothing heard of the others for long
+    told.done("alpha", LastWord({}, {}, {}))
+    told.pass_time(10.6)
+    told.pass_time(10.7)
+    assert phase(told) is Phase.ENDED
+
+
+def test_who_does_not_give_a_last_word_is_waited_for_no_longer_than_that() -> None:
+    told = under_way()
+    told.over(20_000)
+    told.pass_time(2.0)
+    told.pass_time(2.5)
+    told.hello("alpha", hello(), 2.5 + LAST_WORD_WITHIN_S)
+    told.pass_time(2.5 + LAST_WORD_WITHIN_S - 0.1)
+    assert phase(told) is Phase.ENDING
+    told.pass_time(2.5 + LAST_WORD_WITHIN_S)
+    assert phase(told) is Phase.CLOSING
+
+
+def test_who_comes_back_while_the_run_ends_is_told_so() -> None:
+    told = under_way()
+    told.over(20_000)
+    told.pass_time(2.0)
+    told.pass_time(2.5)
+    words(told)
+    told.hello("observer", hello(), 2.6)
+    assert words(told) == []
+    told.hello("alpha", hello(), 2.6)
+    assert words(told) == [("alpha", "finish")]
+
+
+def test_at_the_time_limit_the_run_ends() -> None:
+    told = under_way(1.0)
+    told.pass_time(11.0)
+    assert phase(told) is Phase.RUNNING
+    told.hello("alpha", hello(), 11.0)
+    told.pass_time(11.01)
+    assert phase(told) is Phase.ENDING
+    assert (told.result.ending, told.result.mission_ms) == (Ending.TIME_LIMIT, LIMIT_MS)
+
+
+def test_the_silent_are_those_of_whom_nothing_was_heard_for_so_long() -> None:
+    told = clock()
+    told.hello("alpha", hello(), 5.0)
+    assert told.silent(8.0, 10.0) == []
+    assert told.silent(10.0, 10.0) == ["beta", "observer"]
+    told.done("beta", LastWord({}, {}, {}))
+    assert told.silent(15.0, 10.0) == ["alpha", "observer"]

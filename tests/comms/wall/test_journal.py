@@ -1,0 +1,133 @@
+"""Tallies of what is kept: equal just where a receiver has everything, whatever was lost or came twice."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from fleets import ROSTER, say_state
+from hypothesis import given
+from hypothesis import strategies as st
+
+from comms.node import Publication, Received
+from comms.runner import Intake, Stamp
+from comms.said.codec import Header, decode
+from comms.said.messages import Contact
+from comms.said.routing import Routing
+from comms.said.topics import CONTACT, LOOK, STATE, topic_of
+from comms.wall.journal import MOST_TRIES, HeardMessages, Journal
+
+ROUTING = Routing(ROSTER)
+
+
+@dataclass
+class Sender:
+    """The survey agent alpha with its store, and all it has said."""
+
+    incarnation: int = 0
+    said: list[Received] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.kept = Journal()
+        self._stamp = Stamp("alpha", ROUTING, self.incarnation)
+        self._intake = Intake(ROUTING)
+
+    def say(self, publication: Publication) -> Received:
+        sent = self._stamp(publication.key, publication.message, len(self.said))
+        self.kept.add(sent)
+        received = self._intake.open(sent.key, sent.payload)
+        assert received is not None
+        self.said.append(received)
+        return received
+
+    def missing(self, receiver: HeardMessages) -> list[str]:
+        return receiver.missing("alpha", self.incarnation, self.kept.tallies)
+
+    def resend(self, receiver: HeardMessages) -> list[Received]:
+        """What is news of all that is kept."""
+        opened = [self._intake.open(key, payload) for key, payload in self.kept.matching(lambda key: True)]
+        return [one for one in opened if one is not None and receiver.take(one)]
+
+
+def contact(number: int) -> Publication:
+    return Publication(CONTACT.key(vehicle="alpha", number=number), Contact(0, 0, 0, 0.5, number))
+
+
+SAYS = st.lists(
+    st.one_of(st.integers(0, 9).map(lambda number: say_state("alpha", number)), st.integers(0, 30).map(contact)),
+    max_size=30,
+)
+
+
+@given(SAYS, st.data())
+def test_something_is_missing_just_where_not_all_that_is_kept_has_come(
+    said: list[Publication], data: st.DataObject
+) -> None:
+    sender, receiver = Sender(), HeardMessages()
+    lost: list[Received] = []
+    for publication in said:
+        received = sender.say(publication)
+        if data.draw(st.booleans()):
+            lost.append(received)
+        else:
+            receiver.take(received)
+    newest = {one.key: one for one in sender.said}
+    wanted = {STATE.expression("alpha"): False, CONTACT.expression("alpha"): False}
+    for one in lost:
+        if one.topic is CONTACT or newest[one.key] is one:
+            wanted[one.topic.expression("alpha")] = True
+    assert set(sender.missing(receiver)) == {expression for expression, is_missing in wanted.items() if is_missing}
+    sender.resend(receiver)
+    assert sender.missing(receiver) == []
+    assert sender.resend(receiver) == []
+
+
+def test_what_came_before_or_is_older_is_no_news() -> None:
+    sender, receiver = Sender(), HeardMessages()
+    first, second = sender.say(say_state("alpha", 1)), sender.say(say_state("alpha", 2))
+    assert [receiver.take(one) for one in (second, second, first)] == [True, False, False]
+    events = [sender.say(contact(number)) for number in (1, 2)]
+    assert [receiver.take(one) for one in (events[1], events[0], events[1])] == [True, True, False]
+
+
+def test_what_is_kept_comes_in_the_order_of_its_sending() -> None:
+    sender = Sender()
+    for one in (say_state("alpha", 1), contact(1), say_state("alpha", 2), contact(2)):
+        sender.say(one)
+    kept = [topic_of(key) for key, _ in sender.kept.matching(lambda key: True)]
+    assert [found[0] for found in kept if found] == [CONTACT, STATE, CONTACT]
+    only = [
+        decode(payload, CONTACT.message)[0].sequence
+        for _, payload in sender.kept.matching(lambda key: "contact" in key)
+    ]
+    assert only == [1, 3]
+
+
+def test_a_new_incarnation_is_heard_from_its_beginning_and_the_old_one_no_more() -> None:
+    old, new, receiver = Sender(), Sender(incarnation=7), HeardMessages()
+    assert receiver.take(old.say(say_state("alpha", 1)))
+    assert receiver.take(new.say(say_state("alpha", 1)))
+    assert not receiver.take(old.say(say_state("alpha", 2)))
+    assert old.missing(receiver) == []
+    assert new.missing(receiver) == []
+    new.say(say_state("alpha", 3))
+    assert new.missing(receiver) == [STATE.expression("alpha")]
+
+
+def test_what_is_not_kept_is_always_news_and_never_missing() -> None:
+    assert LOOK.keep.value == "nothing"
+    look = Received(LOOK.key(vehicle="alpha"), LOOK, "alpha", Header("world", 0, 4, 0), say_state("alpha").message)
+    receiver = HeardMessages()
+    assert receiver.take(look)
+    assert receiver.take(look)
+
+
+def test_a_sender_that_cannot_give_what_it_tells_of_is_asked_a_few_times_only() -> None:
+    sender, receiver = Sender(), HeardMessages()
+    sender.say(say_state("alpha"))
+    expression = STATE.expression("alpha")
+    for _ in range(MOST_TRIES):
+        assert sender.missing(receiver) == [expression]
+        receiver.answered("alpha", expression, sender.kept.tallies[expression])
+    assert sender.missing(receiver) == []
+    sender.say(say_state("alpha"))
+    assert sender.missing(receiver) == [expression]

@@ -1,0 +1,144 @@
+"""The post of a process: what a beat shows to be missing is asked for, and comes in the order of its sending."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+from by_wall import ROUTING, WALL_KEYS
+from fleets import say_state
+
+from comms.control import pack
+from comms.node import Publication, Received
+from comms.runner import Outgoing, Stamp
+from comms.said.messages import Contact
+from comms.said.topics import CONTACT, STATE
+from comms.wall.journal import Journal
+from comms.wall.line import Answered, Asked, Event, Mail, WallLine
+from comms.wall.post import AHEAD_MS, WallPost, Words
+from comms.wall.words import Beat, pack_beat, pack_time
+
+STATES, CONTACTS = STATE.expression("alpha"), CONTACT.expression("alpha")
+
+
+@dataclass
+class FakeLine:
+    """A line that notes what is asked and answered."""
+
+    asked: list[tuple[str, str, int]] = field(default_factory=list)
+    answered: list[tuple[str, bytes]] = field(default_factory=list)
+    deaf_to: str = ""
+
+    def reads(self, expression: str) -> bool:
+        return expression != self.deaf_to
+
+    def ask(self, sender: str, expression: str, tally: int) -> None:
+        self.asked.append((sender, expression, tally))
+
+    def answer(self, asked: Asked, kept: Iterable[tuple[str, bytes]]) -> None:
+        self.answered.extend(kept)
+
+    def is_asked_for(self, asked: Asked, key: str) -> bool:
+        return key == str(asked.query)
+
+
+class Alpha:
+    """A sender, of which some messages get lost."""
+
+    def __init__(self) -> None:
+        self.journal = Journal()
+        self._stamp = Stamp("alpha", ROUTING)
+
+    def say(self, publication: Publication) -> Outgoing:
+        sent = self._stamp(publication.key, publication.message, 1000)
+        self.journal.add(sent)
+        return sent
+
+    def beat(self) -> Mail:
+        return Mail("clock/beat/alpha", pack_beat(Beat(0, dict(self.journal.tallies))))
+
+
+def contact(number: int) -> Publication:
+    return Publication(CONTACT.key(vehicle="alpha", number=number), Contact(0, 0, 0, 0.5, number))
+
+
+def mail(sent: Outgoing) -> Mail:
+    return Mail(sent.key, sent.payload)
+
+
+def post_over(line: FakeLine) -> WallPost:
+    return WallPost(cast(WallLine, line), WALL_KEYS, ROUTING)
+
+
+def sequences(post: WallPost, *events: Event) -> list[int]:
+    """The sequence numbers of the messages that are passed on."""
+    items = [item for event in events for item in post.take(event, list)]
+    return [item.header.sequence for item in items if isinstance(item, Received)]
+
+
+def test_what_was_lost_comes_in_the_order_of_its_sending_and_nothing_before_it() -> None:
+    line, alpha = FakeLine(), Alpha()
+    post = post_over(line)
+    sent = [
+        alpha.say(one) for one in (contact(1), say_state("alpha", 1), contact(2), say_state("alpha", 2), contact(3))
+    ]
+    assert sequences(post, mail(sent[0])) == [0]
+    assert sequences(post, alpha.beat()) == []  # the rest was lost
+    assert sorted(line.asked) == [("alpha", CONTACTS, 1 + 3 + 5), ("alpha", STATES, 4)]
+    assert not post.is_complete
+    later = alpha.say(say_state("alpha", 3))
+    assert sequences(post, mail(later), mail(sent[4]), mail(sent[2]), mail(sent[0])) == []
+    assert sequences(post, Answered("alpha", CONTACTS, 9, 3), mail(sent[3])) == []
+    assert sequences(post, Answered("alpha", STATES, 4, 1)) == [2, 4, 5]
+    assert sequences(post, alpha.beat()) == []
+    assert post.is_complete
+    assert len(line.asked) == 2
+
+
+def test_it_is_asked_once_at_a_time_and_again_if_no_answer_came() -> None:
+    line, alpha = FakeLine(), Alpha()
+    post = post_over(line)
+    alpha.say(contact(1))
+    sequences(post, alpha.beat(), alpha.beat())
+    assert len(line.asked) == 1
+    sequences(post, Answered("alpha", CONTACTS, 1, 0), alpha.beat())
+    assert len(line.asked) == 2
+
+
+def test_what_is_not_for_this_process_is_not_missing() -> None:
+    line, alpha = FakeLine(deaf_to=CONTACTS), Alpha()
+    post = post_over(line)
+    alpha.say(contact(1))
+    assert sequences(post, alpha.beat()) == []
+    assert line.asked == []
+    assert post.is_complete
+
+
+def test_who_asks_is_given_what_is_kept() -> None:
+    line, alpha = FakeLine(), Alpha()
+    sent = [alpha.say(one) for one in (say_state("alpha", 1), contact(1), say_state("alpha", 2))]
+    asked = Asked(cast(Any, STATE.key(vehicle="alpha")))
+    assert post_over(line).take(asked, lambda: [alpha.journal, Journal()]) == []
+    assert line.answered == [(sent[2].key, sent[2].payload)]
+
+
+def test_words_are_passed_on_and_senseless_ones_dropped() -> None:
+    post = post_over(FakeLine())
+    assert post.take(Mail("clock/time", pack_time(5, 2.0, taken_up=True)), list) == [
+        Words("clock/time", ["time", 5, 2.0, True])
+    ]
+    for payload in (b"\xc1", pack("beat", "no number", {}), pack("beat", 0, {"state": "many"})):
+        assert post.take(Mail("clock/beat/alpha", payload), list) == []
+    assert post.intake.dropped == {"senseless words": 3}
+
+
+def test_a_message_up_to_five_seconds_ahead_is_in_time() -> None:
+    post, alpha = post_over(FakeLine()), Alpha()
+    (received,) = post.take(mail(alpha.say(contact(1))), list)
+    assert isinstance(received, Received)
+    assert post.is_in_time(received, 0)
+    assert post.is_in_time(received, 1000 - AHEAD_MS)
+    assert post.intake.dropped == {}
+    assert not post.is_in_time(received, 1000 - AHEAD_MS - 1)
+    assert post.intake.dropped == {"ahead of time": 1}
