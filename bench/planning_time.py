@@ -18,10 +18,10 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.allocation import NearestAllocator
-from coordinator.rolling_plan import RollingPlan
-from coordinator.service import service
-from coordinator.situation import Allocator, Helper, OpenStrip, Situation
+from coordinator.allocate.rolling import RollingPlan
+from coordinator.allocate.service import service
+from coordinator.allocate.simple import NearestAllocator
+from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coordinator.strips import columns_across
+from coordinator.cut.strips import columns_across
 from planner.types import GridSpec
 
 

@@ -6,13 +6,13 @@ import math
 from collections.abc import Mapping, Sequence
 
 from comms.said.messages import StripState
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
-from coordinator.cutter import Cutter
+from coordinator.cut.cutter import Cutter
+from coordinator.cut.strips import Cut, strip_of
+from coordinator.cut.worth import Supply, worth_later_m2ps
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.situation import Helper, OpenStrip, Situation
-from coordinator.strips import Cut, strip_of
 from coordinator.vehicles import KnownVehicle
-from coordinator.worth import Supply, worth_later_m2ps
 from planner.dubins import Pose
 from planner.types import GridSpec, Strip
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from coordinator.allocate.situation import Allocator
 from coordinator.priorities import Priority
-from coordinator.situation import Allocator
 
 
 @dataclass(frozen=True)

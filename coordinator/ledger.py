@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from comms.said.messages import StripState
-from coordinator.strips import Cut, Window
+from coordinator.cut.strips import Cut, Window
 from planner.types import Strip
 
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})

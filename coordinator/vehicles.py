@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, Role, RosterVehicle
+from coordinator.allocate.service import Service
+from coordinator.cut.growth import TrackUnderWay
+from coordinator.cut.strips import SAME_PLACE, Cut, Window
 from coordinator.expected_end import expected_end_ms
-from coordinator.growth import TrackUnderWay
 from coordinator.ledger import StripRecord
-from coordinator.service import Service
-from coordinator.strips import SAME_PLACE, Cut, Window
 from planner.risk import LevelArray
 from planner.types import Strip
 

@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from coordinator.allocators import ALLOCATORS
+from coordinator.allocate.allocators import ALLOCATORS
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 from secondlook.errors import UserError
 

@@ -25,7 +25,7 @@ from comms.said.messages import (
     Vertex,
 )
 from comms.said.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TASK_STATUS
-from coordinator.allocation import GreedyAllocator, NoAllocator
+from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
 from coordinator.ledger import ENDED, WITH_A_VEHICLE

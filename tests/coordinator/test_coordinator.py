@@ -41,10 +41,10 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.allocation import GreedyAllocator, NoAllocator
+from coordinator.allocate.simple import GreedyAllocator, NoAllocator
+from coordinator.allocate.situation import Allocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
-from coordinator.situation import Allocator
 from planner.tiles import tiles
 
 

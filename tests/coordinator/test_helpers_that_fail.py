@@ -20,7 +20,7 @@ from coordinator_by_hand import (
 from one_node import OneNode
 
 from comms.said.messages import Mode, Plan, Role, StripState, TaskAction, TaskState
-from coordinator.allocation import GreedyAllocator
+from coordinator.allocate.simple import GreedyAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
 from coordinator.vehicles import MOST_FAILURES, MOST_UNANSWERED

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from comms.said.messages import StripState
+from coordinator.cut.strips import Cut, Window
 from coordinator.ledger import ENDED, WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.strips import Cut, Window
 from planner.types import Strip
 
 OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN = StripState

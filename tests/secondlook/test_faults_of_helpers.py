@@ -23,7 +23,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.allocation import NearestAllocator
+from coordinator.allocate.simple import NearestAllocator
 from coordinator.ledger import ENDED
 from secondlook.testing import (
     Fleet,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from one_node import received
 
 from comms.said.messages import Nav, TruthPose
-from coordinator.allocators import ALLOCATORS
+from coordinator.allocate.allocators import ALLOCATORS
 from secondlook.closest import ClosestApproaches
 from secondlook.errors import UserError
 from secondlook.testing import Fleet, assert_kept_apart, assert_no_strip_lost

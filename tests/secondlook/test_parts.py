@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.allocators import ALLOCATORS
+from coordinator.allocate.allocators import ALLOCATORS
 from secondlook.scenario import load_scenario
 
 OWN = """

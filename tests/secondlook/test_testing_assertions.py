@@ -26,7 +26,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.allocation import GreedyAllocator, NoAllocator
+from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from secondlook.errors import UserError
 from secondlook.testing import (
     Fleet,

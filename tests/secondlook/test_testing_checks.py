@@ -15,7 +15,7 @@ import pytest
 
 from comms.node import Publication, Step
 from comms.said.messages import AgentState, Mode
-from coordinator.allocation import GreedyAllocator
+from coordinator.allocate.simple import GreedyAllocator
 from coordinator.coordinator import Coordinator
 from planner.spacing_planners import AdaptiveSpacing, SpacingDecision
 from planner.types import DetectionCurve

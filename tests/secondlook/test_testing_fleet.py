@@ -12,7 +12,7 @@ import pytest
 from flights import BRIEF
 
 from comms.said.messages import Hotspot, StripState, StripStatus
-from coordinator.allocation import GreedyAllocator, NoAllocator
+from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from secondlook.errors import UserError
 from secondlook.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
@@ -185,11 +185,11 @@ class TestSources:
         scenario = scenario_from(
             BRIEF, {"coordinator.allocator": NoAllocator, "vehicles.primary.start": {"x_m": 1, "y_m": 2}}
         )
-        assert scenario.coordinator.allocator == "coordinator.allocation:NoAllocator"
+        assert scenario.coordinator.allocator == "coordinator.allocate.simple:NoAllocator"
         assert scenario.vehicles["primary"].start.y_m == 2
         data = json.loads(json.dumps(scenario.model_dump(mode="json", exclude_none=True)))
         data["coordinator"]["allocator"] = GreedyAllocator
-        assert scenario_from(data).coordinator.allocator == "coordinator.allocation:GreedyAllocator"
+        assert scenario_from(data).coordinator.allocator == "coordinator.allocate.simple:GreedyAllocator"
 
     @pytest.mark.parametrize(
         ("source", "overrides", "sentence"),

@@ -25,10 +25,10 @@ from comms.said.messages import (
     TaskStatus,
     Vertex,
 )
-from coordinator.allocation import GreedyAllocator
+from coordinator.allocate.simple import GreedyAllocator
+from coordinator.allocate.situation import Allocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
-from coordinator.situation import Allocator
 from planner.risk import to_levels
 from planner.tiles import tiles
 

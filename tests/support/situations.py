@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from coordinator.service import service
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.service import service
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from coordinator.service import service
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.service import service
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
 from secondlook.parts import ALLOCATOR

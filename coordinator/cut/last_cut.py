@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.growth import Growth
-from coordinator.strips import CuttingRules, Window, stretches
+from coordinator.cut.growth import Growth
+from coordinator.cut.strips import CuttingRules, Window, stretches
 from planner.types import BoolArray, FloatArray, GridSpec
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.courses import STEP_S, Course
+from coordinator.keep_apart.courses import STEP_S, Course
 from planner.types import FloatArray
 
 NO_NEARER_M = 1.0

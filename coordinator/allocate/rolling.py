@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coordinator.allocation import SOON_S
-from coordinator.services import StripTable
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.services import StripTable
+from coordinator.allocate.simple import SOON_S
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.types import FloatArray
 
 HORIZON_S = 4 * 3600.0

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from coordinator.expected_looks import LEAST_SHARE, ExpectedLooks
-from coordinator.strips import Window
+from coordinator.cut.expected_looks import LEAST_SHARE, ExpectedLooks
+from coordinator.cut.strips import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, 6, 8)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from coordinator.strips import Cut, CuttingRules, Window, cut_strips, strip_of
+from coordinator.cut.strips import Cut, CuttingRules, Window, cut_strips, strip_of
 from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
 
 EAST = SweepFrame(0, 0, 0)

@@ -15,8 +15,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordinator.growth import Growth
-from coordinator.runs import TOLERANCE, Runs
+from coordinator.cut.growth import Growth
+from coordinator.cut.runs import TOLERANCE, Runs
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
 MOST_STRIPS_A_CUT = 100

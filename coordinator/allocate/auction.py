@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.allocation import SOON_S
-from coordinator.services import StripTable
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.services import StripTable
+from coordinator.allocate.simple import SOON_S
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 
 AT_ONCE = 3

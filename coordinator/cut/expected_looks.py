@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from coordinator.strips import Window
+from coordinator.cut.strips import Window
 from planner.types import BoolArray, FloatArray, GridSpec
 
 WELL_SEEN = 0.75

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.runs import Run, Runs
+from coordinator.cut.runs import Run, Runs
 from planner.types import FloatArray
 
 

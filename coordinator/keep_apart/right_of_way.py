@@ -13,10 +13,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
-from coordinator.courses import STEP_S, Course
-from coordinator.separation import Approach, too_close
-from coordinator.situation import Helper, OpenStrip
-from coordinator.traffic import Traffic
+from coordinator.allocate.situation import Helper, OpenStrip
+from coordinator.keep_apart.courses import STEP_S, Course
+from coordinator.keep_apart.separation import Approach, too_close
+from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle
 from planner.sweep import Sweep
 from planner.types import Point, Strip

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordinator.cutter import Cutter
-from coordinator.strips import Cut, CuttingRules
+from coordinator.cut.cutter import Cutter
+from coordinator.cut.strips import Cut, CuttingRules
 from planner.fleet_map import FleetMap
 from planner.risk import NATS_PER_LEVEL
 from planner.tiles import tiles

@@ -10,11 +10,11 @@ from by_hand import vehicle
 from situations import helper, open_strip, situation, strip
 
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
-from coordinator.allocation import GreedyAllocator, NearestAllocator
-from coordinator.offers import ASKED_LATER_S, offers_let_through
-from coordinator.right_of_way import RightOfWay, Underway
-from coordinator.separation import too_close
-from coordinator.situation import Allocator, Helper, OpenStrip
+from coordinator.allocate.offers import ASKED_LATER_S, offers_let_through
+from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
+from coordinator.allocate.situation import Allocator, Helper, OpenStrip
+from coordinator.keep_apart.right_of_way import RightOfWay, Underway
+from coordinator.keep_apart.separation import too_close
 from coordinator.vehicles import KnownVehicle
 from planner.types import Strip
 

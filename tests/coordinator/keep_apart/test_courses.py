@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from situations import helper, strip
 
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
-from coordinator.courses import STEP_S, Course, course, straight, survey_course, sweep_course
-from coordinator.separation import too_close
-from coordinator.service import service, sweeps
-from coordinator.situation import OpenStrip
+from coordinator.allocate.service import service, sweeps
+from coordinator.allocate.situation import OpenStrip
+from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course
+from coordinator.keep_apart.separation import too_close
 from planner.dubins import Pose
 from planner.sweep import shortest_sweep
 

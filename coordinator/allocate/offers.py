@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Protocol
 
-from coordinator.situation import Allocator, Helper, OpenStrip, Situation
+from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 
 ASKED = 3
 """An allocator is asked so often at most for offers that may be made."""

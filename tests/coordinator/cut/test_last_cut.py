@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.growth import Growth
-from coordinator.last_cut import LastCut
-from coordinator.strips import CuttingRules, Window
+from coordinator.cut.growth import Growth
+from coordinator.cut.last_cut import LastCut
+from coordinator.cut.strips import CuttingRules, Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, 40, 30)

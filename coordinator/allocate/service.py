@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coordinator.situation import Helper, OpenStrip
+from coordinator.allocate.situation import Helper, OpenStrip
 from planner.dubins import Pose
 from planner.sweep import Sweep, shortest_sweep, sweeps_over
 from planner.types import Strip

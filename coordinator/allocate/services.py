@@ -1,4 +1,4 @@
-"""The services of many strips by one helper, from many places at once: `coordinator.service`, for arrays."""
+"""The services of many strips by one helper, from many places at once: `coordinator.allocate.service`, for arrays."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.service import sweeps
-from coordinator.situation import Helper, OpenStrip
+from coordinator.allocate.service import sweeps
+from coordinator.allocate.situation import Helper, OpenStrip
 from planner.dubins import path_lengths_m
 from planner.types import FloatArray
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from coordinator.service import Service, removed_m2, service
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.service import Service, removed_m2, service
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
 SOON_S = 1.0
 """A strip is offered so long before the helper has to set out."""

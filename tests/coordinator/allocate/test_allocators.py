@@ -11,9 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import at_work, helper, open_strip, situation, situations, strip
 
-from coordinator.allocators import ALLOCATORS
-from coordinator.service import removed_m2, service
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.allocators import ALLOCATORS
+from coordinator.allocate.service import removed_m2, service
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
 HELPER = helper()
 

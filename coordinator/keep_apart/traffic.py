@@ -6,7 +6,15 @@ import math
 from dataclasses import dataclass
 
 from comms.said.messages import Mode
-from coordinator.courses import Course, course, lying_still, run_out_left_m, straight, survey_course, sweep_course
+from coordinator.keep_apart.courses import (
+    Course,
+    course,
+    lying_still,
+    run_out_left_m,
+    straight,
+    survey_course,
+    sweep_course,
+)
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose, shortest_path
 from planner.sweep import Sweep, shortest_sweep, sweeps_over

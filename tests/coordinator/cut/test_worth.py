@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordinator.worth import RISK_STEP, Supply, worth_later_m2ps, worth_risk
+from coordinator.cut.worth import RISK_STEP, Supply, worth_later_m2ps, worth_risk
 
 # Rates of 40, 30 and 10; 200 s, 2 x 100 s and 300 s.
 SUPPLIES = [Supply(3000, 100, 2), Supply(8000, 200, 1), Supply(3000, 300, 1)]

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
-from coordinator.allocation import GreedyAllocator
-from coordinator.rolling_plan import RollingPlan
-from coordinator.service import removed_m2, service
-from coordinator.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.rolling import RollingPlan
+from coordinator.allocate.service import removed_m2, service
+from coordinator.allocate.simple import GreedyAllocator
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
 PLAN = RollingPlan()
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from coordinator.allocation import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
-from coordinator.auction import AuctionAllocator
-from coordinator.rolling_plan import RollingPlan
-from coordinator.situation import Allocator
+from coordinator.allocate.auction import AuctionAllocator
+from coordinator.allocate.rolling import RollingPlan
+from coordinator.allocate.simple import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
+from coordinator.allocate.situation import Allocator
 
 ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
     {

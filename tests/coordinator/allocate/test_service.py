@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.service import removed_m2, service
-from coordinator.services import StripTable
-from coordinator.situation import Situation
+from coordinator.allocate.service import removed_m2, service
+from coordinator.allocate.services import StripTable
+from coordinator.allocate.situation import Situation
 from planner.dubins import Pose
 
 

@@ -8,12 +8,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from comms.said.messages import Hotspot
-from coordinator.badly_seen import BadlySeen, Place, Revision
-from coordinator.expected_looks import ExpectedLooks
-from coordinator.growth import Growth, TrackUnderWay
-from coordinator.last_cut import LastCut
-from coordinator.strips import Cut, CuttingRules, Window, cut_strips
-from coordinator.worth import worth_risk
+from coordinator.cut.badly_seen import BadlySeen, Place, Revision
+from coordinator.cut.expected_looks import ExpectedLooks
+from coordinator.cut.growth import Growth, TrackUnderWay
+from coordinator.cut.last_cut import LastCut
+from coordinator.cut.strips import Cut, CuttingRules, Window, cut_strips
+from coordinator.cut.worth import worth_risk
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray, FloatArray
 

@@ -1,0 +1,1 @@
+"""From strips to vehicles: who is offered which strip."""

@@ -1,0 +1,1 @@
+"""From hotspots to strips: where a second look is worth its time."""

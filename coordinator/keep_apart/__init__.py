@@ -1,0 +1,1 @@
+"""Who gives way to whom, so that no two vehicles come too close."""
