@@ -37,7 +37,7 @@ pictures: .venv/.test-ready
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 4995 --out docs/headland.png
 
 # The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
-GOLDEN := tests/secondlook/golden
+GOLDEN := tests/secondlook/recorded/golden
 golden: .venv/.run-ready
 	@rm -rf runs/golden
 	@$(BIN)/secondlook run tests/support/brief.yaml --bus local --out runs/golden

@@ -38,10 +38,10 @@ from bench.removable import Clairvoyance, Removable
 from secondlook.compare.contenders import BASELINES, contenders
 from secondlook.compare.flight import FailedFlight, fly
 from secondlook.errors import UserError
-from secondlook.processes import RunFailedError
+from secondlook.launch.processes import RunFailedError
+from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.side_by_side import worker_pool
-from secondlook.signals import signals_interrupt
+from secondlook.worker_pool import worker_pool
 
 BOUND_S = 60.0
 LARGEST_GRID_CELLS = 60_000

@@ -30,10 +30,10 @@ from bench.clairvoyant_bound import upper_bound
 from bench.removable import Clairvoyance, Removable
 from planner.spacing_planners import FixedSpacing, SpacingDecision
 from secondlook.errors import UserError
-from secondlook.mission import RunOptions, run_mission
-from secondlook.processes import RunFailedError
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.processes import RunFailedError
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.side_by_side import worker_pool
+from secondlook.worker_pool import worker_pool
 
 LAST_S = (120, 300, 600)
 BOUND_S = 20.0

@@ -25,16 +25,16 @@ from typing import Any
 import msgpack
 
 import comms.runner
-import secondlook.mission
+import secondlook.launch.mission
 from comms.lockstep.clock import LockstepClock
 from comms.lockstep.local_bus import run_local
 from comms.node import Publication, Received, Step
 from comms.said.routing import Routing
 from coordinator.coordinator import Coordinator
-from secondlook.fleet import build_fleet
-from secondlook.metrics import Metrics
-from secondlook.mission import RunOptions, run_mission
-from secondlook.mission_files import MissionFiles
+from secondlook.fleet.build import build_fleet
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.mission_files import MissionFiles
 from secondlook.scenario import Scenario, load_scenario
 from sim_world.world import World
 from vehicle_agent.revisit import RevisitAgent
@@ -62,7 +62,7 @@ PARTS: tuple[tuple[Any, str, str], ...] = (
     (LockstepClock, "answer", "clock"),
     (MissionFiles, "write", "observer, files"),
     (Metrics, "take", "observer, figures"),
-    (secondlook.mission, "run_local", "local bus"),
+    (secondlook.launch.mission, "run_local", "local bus"),
 )  # fmt: skip
 
 

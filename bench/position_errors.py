@@ -20,7 +20,7 @@ from comms.said.messages import Look, Nav, Role, RunInfo, TruthPose
 from planner.region import Region
 from planner.risk import residual_risk, risk_statistics
 from planner.types import GridSpec, Point
-from secondlook.mission import RunOptions, run_mission
+from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 from vehicle_agent.coverage import CoverageLayer
 

@@ -19,8 +19,8 @@ from comms.lockstep.local_bus import run_local
 from comms.node import Received
 from comms.said.routing import Routing
 from planner.types import BoolArray, FloatArray
-from secondlook.fleet import build_fleet
-from secondlook.metrics import Metrics
+from secondlook.fleet.build import build_fleet
+from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import load_scenario
 
 FIGURE_FILE = Path("docs/paper/predicted-risk.png")

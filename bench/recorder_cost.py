@@ -40,11 +40,11 @@ from rich.table import Table
 import secondlook
 from bench.replayed import ReplayedConfig
 from comms.node import Received
-from secondlook.fleet import build_fleet
-from secondlook.host_plans import RECORDER
-from secondlook.node_spec import NodeSpec
-from secondlook.processes import Processes
-from secondlook.recorder_config import recorder_config
+from secondlook.fleet.build import build_fleet
+from secondlook.fleet.node_spec import NodeSpec
+from secondlook.launch.host_plans import RECORDER
+from secondlook.launch.processes import Processes
+from secondlook.launch.recorder_config import recorder_config
 from secondlook.scenario import load_scenario
 
 SLOW = "tellaro:vehicles.primary.speed_mps=0.15:vehicles.helper.speed_mps=0.2:vehicles.primary.endurance_s=360000"
@@ -79,7 +79,7 @@ class Flight:
 
 def fly(scenario: str, sets: list[str], folder: Path, *, record: bool) -> Flight:
     """Flies one mission. Raises RuntimeError where it fails."""
-    program = "from secondlook.entry import main; main()"
+    program = "from secondlook.installed_command import main; main()"
     command = [sys.executable, "-c", program, "run", scenario, "--out", str(folder), "--no-report"]
     command += [word for one in sets for word in ("--set", one)] + ([] if record else ["--no-record"])
     before = os.times()
@@ -191,7 +191,7 @@ def _recorder_of(launcher: int) -> int | None:
     for entry in Path("/proc").glob("[0-9]*"):
         try:
             words = (entry / "cmdline").read_bytes().split(b"\0")
-            if b"secondlook.child" in words and words[-2] == b"recorder" and _parent(entry) == launcher:
+            if b"secondlook.launch.child_program" in words and words[-2] == b"recorder" and _parent(entry) == launcher:
                 return int(entry.name)
         except OSError:  # it has ended meanwhile
             continue

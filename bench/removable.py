@@ -14,8 +14,8 @@ from planner.dubins import Pose
 from planner.footprint import look_on_grid
 from planner.types import BoolArray, FloatArray, GridSpec
 from secondlook.errors import UserError
-from secondlook.fleet import build_fleet
-from secondlook.metrics import Metrics
+from secondlook.fleet.build import build_fleet
+from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import Scenario
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.seabed import make_seabed

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from planner.spacing_planners import AdaptiveSpacing, SpacingDecision
-from secondlook.mission import RunOptions, run_mission
+from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 
 

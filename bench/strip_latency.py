@@ -22,8 +22,8 @@ from comms.latency import STRIP_TO_TASK
 from comms.node import Received
 from comms.said.messages import StripState, StripStatus
 from secondlook.errors import UserError
-from secondlook.fleet import build_fleet
-from secondlook.processes import Processes, RunFailedError
+from secondlook.fleet.build import build_fleet
+from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.scenario import Scenario, load_scenario
 
 CROWDED = (

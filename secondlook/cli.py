@@ -12,6 +12,7 @@ from secondlook.commands.check import check
 from secondlook.commands.compare import compare
 from secondlook.commands.geojson import geojson
 from secondlook.commands.node import node_app
+from secondlook.commands.optional_value import with_number
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
@@ -20,7 +21,6 @@ from secondlook.commands.run import REAL_TIME, run
 from secondlook.commands.scenarios import scenarios
 from secondlook.commands.view import view
 from secondlook.errors import UserError
-from secondlook.optional_value import with_number
 
 WRONG_USE = 2
 """Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from secondlook.fleet import build_fleet
-from secondlook.planned_survey import planned_surveys
+from secondlook.commands.planned_survey import planned_surveys
+from secondlook.fleet.build import build_fleet
 from secondlook.scenario import load_scenario
 
 

@@ -21,9 +21,9 @@ from secondlook.compare.standings import as_json as comparison_as_json
 from secondlook.compare.standings import failures, standings
 from secondlook.compare.table import table
 from secondlook.errors import UserError
-from secondlook.fleet import build_fleet
+from secondlook.fleet.build import build_fleet
+from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import load_scenario
-from secondlook.signals import signals_interrupt
 
 FAILED = 1
 MOST_SEEDS = 10_000

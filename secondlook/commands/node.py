@@ -8,12 +8,12 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.endpoint import certificates, check_endpoint
 from secondlook.commands.run import check_factor
-from secondlook.endpoint import certificates, check_endpoint
 from secondlook.errors import UserError
-from secondlook.run_folder import run_folder
+from secondlook.launch.run_folder import run_folder
+from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.spread_fleet import Link, run_node, run_recorder, run_router
 
 node_app = typer.Typer(no_args_is_help=True, help="Start one node of a fleet spread over hosts, by the wall clock.")
 

@@ -10,9 +10,9 @@ import typer
 from comms.runner import NodeError
 from comms.said.routing import Routing
 from secondlook.errors import UserError
-from secondlook.fleet import build_fleet
-from secondlook.mission_files import read_messages
-from secondlook.replay import replay_node
+from secondlook.fleet.build import build_fleet
+from secondlook.recorded.mission_files import read_messages
+from secondlook.recorded.replay import replay_node
 from secondlook.scenario import load_scenario
 
 DIFFERS = 1

@@ -11,13 +11,13 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.live_view import live_view
 from secondlook.errors import UserError
-from secondlook.live_view import live_view
-from secondlook.mission import RunOptions, check_bodies, run_mission
-from secondlook.processes import RunFailedError
+from secondlook.launch.mission import RunOptions, check_bodies, run_mission
+from secondlook.launch.processes import RunFailedError
+from secondlook.launch.run_display import closing_table, progress_display
+from secondlook.launch.run_folder import run_folder
 from secondlook.report import write_report
-from secondlook.run_display import closing_table, progress_display
-from secondlook.run_folder import run_folder
 from secondlook.scenario import load_scenario
 
 MISSION_FAILED = 1

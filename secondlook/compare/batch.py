@@ -7,7 +7,7 @@ from concurrent.futures import as_completed
 
 from secondlook.compare.contenders import Contender
 from secondlook.compare.flight import FailedFlight, Flight, fly
-from secondlook.side_by_side import worker_pool
+from secondlook.worker_pool import worker_pool
 
 Flown = dict[str, dict[int, Flight | FailedFlight]]
 """By contender and seed; what has not been flown is not there."""

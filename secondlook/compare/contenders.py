@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from secondlook.errors import UserError
-from secondlook.parts import ALLOCATOR
 from secondlook.scenario import Scenario, make_scenario
+from secondlook.scenario.plug_ins import ALLOCATOR
 
 SELF = "self"
 SELF_LONGER = "self-longer"

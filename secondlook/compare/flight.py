@@ -6,10 +6,10 @@ import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from secondlook.metrics import Metrics
-from secondlook.mission import RunOptions, run_mission
-from secondlook.observer import Watch
-from secondlook.processes import RunFailedError
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.processes import RunFailedError
+from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.observer import Watch
 from secondlook.scenario import Scenario
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from secondlook.paper.measured import MeasuredMission, measure
 from secondlook.paper.published import PublishedMission
-from secondlook.side_by_side import worker_pool
+from secondlook.worker_pool import worker_pool
 
 
 def measure_all(

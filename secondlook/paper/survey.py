@@ -10,7 +10,7 @@ import numpy as np
 
 from planner.risk import LevelArray, residual_risk
 from planner.types import DetectionCurve, FloatArray
-from secondlook.mission import RunOptions, run_mission
+from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.paper.published import PublishedMission
 from secondlook.scenario import Scenario, load_scenario
 

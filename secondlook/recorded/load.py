@@ -11,8 +11,8 @@ from typing import Any
 import yaml
 
 from secondlook.errors import UserError
-from secondlook.mission_files import read_messages
 from secondlook.recorded.mission import RecordedMission
+from secondlook.recorded.mission_files import read_messages
 
 
 def load_run(run: str | os.PathLike[str]) -> RecordedMission:

@@ -26,10 +26,10 @@ from comms.said.messages import (
 from comms.said.topics import Topic, topic_of
 from comms.said.wire import WireError
 from secondlook.errors import UserError
-from secondlook.metrics import Metrics
 from secondlook.recorded.activities import Activity, activities
 from secondlook.recorded.hotspots import HotspotRecord, hotspots
 from secondlook.recorded.key_pattern import key_matcher
+from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.paths import PathRecord, paths
 from secondlook.recorded.priorities import PriorityRecord, priorities
 from secondlook.recorded.risk_map import RiskMap

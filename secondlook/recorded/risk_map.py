@@ -13,7 +13,7 @@ from shapely.geometry.base import BaseGeometry
 
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec
-from secondlook.metrics import Metrics
+from secondlook.recorded.metrics import Metrics
 
 Cells = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.intp]]]
 """Rows and columns of cells."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from comms.said.messages import CoverageTile, RunInfo
-from secondlook.metrics import Metrics
 from secondlook.recorded import RecordedMission, RiskMap
+from secondlook.recorded.metrics import Metrics
 
 MOST_SAMPLES, FEWEST_SAMPLES = 240, 30
 CELLS_TO_SUM_UP = 20_000_000  # over all samples: about a second

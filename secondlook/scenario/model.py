@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
-from secondlook.parts import ALLOCATOR, NODE
 from secondlook.scenario.area import Area
 from secondlook.scenario.dialect import dump
 from secondlook.scenario.origin import Origin
+from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 

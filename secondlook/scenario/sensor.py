@@ -9,9 +9,9 @@ import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
 from planner.types import DetectionCurve
-from secondlook.parts import CURVE, SONAR, PartError
 from secondlook.scenario import bundled
 from secondlook.scenario.dialect import Value
+from secondlook.scenario.plug_ins import CURVE, SONAR, PartError
 from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, part, refused
 
 

@@ -11,7 +11,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
-from secondlook.parts import PartError, PartKind
+from secondlook.scenario.plug_ins import PartError, PartKind
 
 TOLERANCE = 1e-6
 """By how much numbers may differ that must fit each other."""

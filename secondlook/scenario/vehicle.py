@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
 from planner.curve import effective_range_m
-from secondlook.parts import NODE, SPACING
+from secondlook.scenario.plug_ins import NODE, SPACING
 from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
 from secondlook.scenario.values import (
     TOLERANCE,

@@ -11,7 +11,7 @@ check_rooms()
 from typing import TYPE_CHECKING, Any
 
 from secondlook.errors import UserError
-from secondlook.processes import RunFailedError
+from secondlook.launch.processes import RunFailedError
 from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError
 from secondlook.testing.flight import Flight
 from secondlook.testing.heard import Heard

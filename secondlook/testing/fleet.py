@@ -11,10 +11,10 @@ from comms.node import Received
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
-from secondlook.fleet import build_fleet
-from secondlook.mission import Bus, RunOptions, run_mission
-from secondlook.mission_files import NOT_FOR_PEOPLE
-from secondlook.observer import RunStopped
+from secondlook.fleet.build import build_fleet
+from secondlook.launch.mission import Bus, RunOptions, run_mission
+from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
+from secondlook.recorded.observer import RunStopped
 from secondlook.testing.flight import Flight
 from secondlook.testing.heard import Heard
 from secondlook.testing.sources import Overrides, ScenarioSource, scenario_from

@@ -14,9 +14,9 @@ from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray
-from secondlook.closest import Closest
-from secondlook.metrics import Metrics
-from secondlook.mission import Bus
+from secondlook.launch.mission import Bus
+from secondlook.recorded.closest_approach import Closest
+from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import Scenario
 from secondlook.testing.heard import Heard
 

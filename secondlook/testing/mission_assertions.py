@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from comms.lockstep.group import LOST
 from comms.said.messages import AgentState, MissionOver, Mode
 from secondlook.errors import UserError
-from secondlook.mission import Bus
+from secondlook.launch.mission import Bus
 from secondlook.testing.fail import fail_if
 from secondlook.testing.fleet import Fleet, first_difference
 from secondlook.testing.flight import Flight

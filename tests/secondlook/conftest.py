@@ -9,7 +9,7 @@ from browser import chromium
 from flights import BRIEF
 from playwright.sync_api import Browser
 
-from secondlook.mission import RunOptions, run_mission
+from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 
 VALID = """\

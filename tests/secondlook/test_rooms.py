@@ -15,7 +15,7 @@ PLAIN = """
 import sys
 sys.meta_path[:] = [one for one in sys.meta_path if "editable" not in getattr(one, "__module__", str(one))]
 sys.path[:0] = [{shadow!r}, {root!r}]
-from secondlook.entry import main
+from secondlook.installed_command import main
 main()
 """
 
@@ -41,7 +41,7 @@ def test_a_file_in_the_way_is_named(tmp_path: Path, shadow: str) -> None:
 
 def test_with_nothing_in_the_way_the_command_runs(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-P", "-c", "from secondlook.entry import main; main()", "scenarios"],
+        [sys.executable, "-P", "-c", "from secondlook.installed_command import main; main()", "scenarios"],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -13,8 +13,8 @@ from comms.node import Received
 from comms.result import BusResult
 from comms.said.routing import Routing
 from comms.said.topics import TOPICS
-from secondlook.fleet import build_fleet
-from secondlook.metrics import Metrics
+from secondlook.fleet.build import build_fleet
+from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.scenario.vehicle import Start, Vehicle
 

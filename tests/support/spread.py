@@ -17,7 +17,7 @@ from typing import Any
 from flights import BRIEF, until
 
 from comms.said.topics import TOPICS, Keep, topic_of
-from secondlook.mission_files import read_messages
+from secondlook.recorded.mission_files import read_messages
 
 # So that a slow machine does no harm: nobody is lost soon, and the helper has time for strips after the survey.
 PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=2.5")

@@ -14,7 +14,7 @@ from coordinator.allocate.service import service
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
-from secondlook.parts import ALLOCATOR
+from secondlook.scenario.plug_ins import ALLOCATOR
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked, is_whole
 
 _HELPERS = ("alpha", "beta", "gamma")

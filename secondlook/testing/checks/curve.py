@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from planner.types import DetectionCurve
-from secondlook.parts import CURVE
+from secondlook.scenario.plug_ins import CURVE
 from secondlook.testing.checks.examples import PATIENCE_S, Checked
 from sim_world.config import SensorConfig
 

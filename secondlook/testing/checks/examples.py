@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Flaky
 
-from secondlook.parts import PartError, PartKind
-from secondlook.watchdog import NoReturn, Watchdog
+from secondlook.launch.watchdog import NoReturn, Watchdog
+from secondlook.scenario.plug_ins import PartError, PartKind
 
 EXAMPLES = 100
 PATIENCE_S = 10.0

@@ -15,12 +15,12 @@ from comms.said.messages import Maneuver, Message
 from comms.said.routing import Routing
 from comms.said.topics import RUN, TOPICS, Reach, Topic
 from secondlook.errors import UserError
-from secondlook.fleet import Fleet, build_fleet
-from secondlook.parts import NODE
+from secondlook.fleet.build import Fleet, build_fleet
+from secondlook.launch.watchdog import WatchedNode
+from secondlook.scenario.plug_ins import NODE
 from secondlook.testing.checks.any_mail import Letter, about_last, letters
 from secondlook.testing.checks.examples import PATIENCE_S, Checked
 from secondlook.testing.sources import ScenarioSource, scenario_from
-from secondlook.watchdog import WatchedNode
 
 EXAMPLES = 40
 _LETTERS = 25

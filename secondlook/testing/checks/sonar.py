@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from planner.types import DetectionCurve
-from secondlook.parts import SONAR
+from secondlook.scenario.plug_ins import SONAR
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked
 from sim_world.config import HIGHEST_P_DETECT, SeabedConfig
 from sim_world.seabed import make_seabed

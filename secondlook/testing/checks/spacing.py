@@ -8,7 +8,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from planner.spacing_planners import LENGTH_TOLERANCE_M, counted_range_m, lowest_range_m
-from secondlook.parts import SPACING
+from secondlook.scenario.plug_ins import SPACING
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked, is_number, is_whole
 
 _FARTHEST_M = 1e6

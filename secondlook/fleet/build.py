@@ -1,0 +1,237 @@
+"""From a scenario to a fleet: the nodes with their configurations, who is who, and the run's announcement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from comms.said.codec import CLOCK, SCHEMA_VERSION, Header, encode
+from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
+from comms.said.routing import RosterNode
+from coordinator.config import CoordinatorConfig
+from coordinator.priorities import Priority
+from planner.region import Region
+from planner.types import DetectionCurve, Point
+from secondlook.errors import UserError
+from secondlook.fleet.node_spec import NodeSpec
+from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
+from secondlook.scenario import (
+    PatchySeabed,
+    RevisitVehicle,
+    Scenario,
+    SurveyVehicle,
+    body_of,
+    scenario_hash,
+)
+from secondlook.scenario.plug_ins import ALLOCATOR, SONAR, SPACING, made
+from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
+from vehicle_agent.config import RevisitConfig, SurveyConfig, SurveyRevisitConfig
+
+AS_CONVEX = 1e-6
+"""Share of its area that an outline's dents may have for it to count as convex."""
+
+
+@dataclass(frozen=True)
+class Fleet:
+    """A fleet ready to be run. `roster`: every node, clock, recorder and observer included. `specs`: how to make the
+    acting nodes that are ours, by node id. `factor`: by how much mission time runs faster than the wall clock; None for
+    lockstep."""
+
+    run_info: RunInfo
+    roster: tuple[RosterNode, ...]
+    specs: dict[str, NodeSpec]
+    time_limit_ms: int
+    factor: float | None = None
+
+
+def build_fleet(scenario: Scenario, *, record: bool, factor: float | None = None) -> Fleet:
+    """The fleet of a scenario; `record`: with a recorder. `factor`: see `Fleet`.
+
+    Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
+    """
+    try:
+        return _build_fleet(scenario, record, factor)
+    except ValueError as error:
+        raise UserError(f"scenario {scenario.name}: {error}") from error
+
+
+def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Fleet:
+    heading_rad = track_heading_rad(scenario)
+    grid = region_of(scenario).about(heading_rad).grid(scenario.area.cell_m)
+    for primary in scenario.survey_vehicles.values():
+        region_for(scenario, primary, heading_rad)  # refuses a part that is none
+    run_info = RunInfo(
+        schema=SCHEMA_VERSION,
+        scenario=scenario.name,
+        scenario_sha256=scenario_hash(scenario),
+        seed=scenario.seed,
+        mode=ClockMode.LOCKSTEP if factor is None else ClockMode.WALL,
+        area=_outline(scenario.area.polygon_m),
+        grid=Grid(
+            grid.frame.origin_x_m,
+            grid.frame.origin_y_m,
+            grid.frame.heading_rad,
+            grid.cell_m,
+            grid.columns,
+            grid.rows,
+        ),
+        rho=scenario.mission.rho,
+        vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
+    )
+    Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
+    encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
+    external = scenario.external_vehicles
+    simulated = [name for name in scenario.vehicles if name not in external]
+    roster = [
+        RosterNode("clock", Role.CLOCK),
+        *([RosterNode("world", Role.WORLD, tuple(simulated))] if simulated else []),
+        *(RosterNode(body_of(name), Role.BODY, (name,)) for name in external),
+        *(RosterNode(name, _role(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
+        RosterNode("coordinator", Role.COORDINATOR),
+        *([RosterNode("recorder", Role.RECORDER)] if record else []),
+        RosterNode("observer", Role.OBSERVER),
+    ]
+    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))} if simulated else {}
+    for name, vehicle in scenario.vehicles.items():
+        specs[name] = _agent_spec(name, vehicle)
+    specs["coordinator"] = NodeSpec(
+        scenario.coordinator.node or "coordinator.coordinator:Coordinator", _coordinator_config(scenario)
+    )
+    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000), factor)
+
+
+def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
+    """Corners as they travel, in whole centimetres; of a convex outline without those that rounding makes dents of."""
+    corners = dict.fromkeys((round(x_m, 2), round(y_m, 2)) for x_m, y_m in polygon_m)
+    hull = shapely.MultiPoint(list(corners)).convex_hull
+    if not isinstance(hull, shapely.Polygon):
+        raise ValueError("an area that has none in whole centimetres cannot be surveyed")
+    given = shapely.Polygon(polygon_m)
+    if given.convex_hull.area - given.area > AS_CONVEX * given.area:
+        return tuple(Vertex(*corner) for corner in corners)
+    convex = set(hull.exterior.coords)
+    return tuple(Vertex(*corner) for corner in corners if corner in convex)
+
+
+def _role(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
+    if isinstance(vehicle, RevisitVehicle):
+        return Role.REVISIT
+    return Role.SURVEY_REVISIT if vehicle.revisits else Role.SURVEY
+
+
+def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
+    curve = vehicle.sensor.detection_curve(vehicle.nadir_gap_m)
+    return RosterVehicle(
+        vehicle=name,
+        role=_role(vehicle),
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        run_in_m=vehicle.run_in_m,
+        nadir_gap_m=vehicle.nadir_gap_m,
+        swath_m=vehicle.sensor.reach_m,
+        p_detect=_mean_p_detect(curve, vehicle.nadir_gap_m, vehicle.sensor.reach_m),
+        endurance_ms=_endurance_ms(vehicle),
+    )
+
+
+def _mean_p_detect(curve: DetectionCurve, near_m: float, far_m: float) -> float:
+    """The mean of P(y) from one range to another."""
+    within = curve.range_m[(curve.range_m > near_m) & (curve.range_m < far_m)]
+    range_m = np.concatenate([[near_m], within, [far_m]])
+    return float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
+
+
+def _endurance_ms(vehicle: SurveyVehicle | RevisitVehicle) -> int:
+    return max(1, round(vehicle.endurance_s * 1000))
+
+
+def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
+    roster = _roster_vehicle(name, vehicle)
+    revisit = RevisitConfig(
+        vehicle=name,
+        swath_m=roster.strip_width_m,
+        beside_m=(roster.nadir_gap_m + roster.swath_m) / 2 if roster.nadir_gap_m > 0 else 0.0,
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        run_in_m=vehicle.run_in_m,
+        endurance_ms=roster.endurance_ms,
+    )
+    if isinstance(vehicle, RevisitVehicle):
+        return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", revisit)
+    survey = SurveyConfig(
+        vehicle=name,
+        spacing=made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
+        nadir_gap_m=vehicle.nadir_gap_m,
+        range_m=vehicle.told_range_m,
+        threshold=vehicle.threshold,
+        hotspot_risk=vehicle.hotspot_risk,
+        run_in_m=vehicle.run_in_m,
+        endurance_ms=roster.endurance_ms,
+        prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
+        share=vehicle.share,
+    )
+    if vehicle.revisits:
+        config = SurveyRevisitConfig(survey, revisit)
+        return NodeSpec(vehicle.agent or "vehicle_agent.survey_revisit:SurveyRevisitAgent", config)
+    return NodeSpec(vehicle.agent or "vehicle_agent.survey:SurveyAgent", survey)
+
+
+def _world_config(scenario: Scenario) -> WorldConfig:
+    seabed = scenario.seabed
+    return WorldConfig(
+        seed=scenario.seed,
+        area=tuple(scenario.area.polygon_m),
+        holes=tuple(scenario.area.holes_m),
+        vehicles=tuple(
+            _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
+        ),
+        seabed=(
+            SeabedConfig("patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength)
+            if isinstance(seabed, PatchySeabed)
+            else SeabedConfig()
+        ),
+        targets=TargetsConfig(scenario.targets.count),
+    )
+
+
+def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
+    sensor = vehicle.sensor
+    return VehicleConfig(
+        vehicle=name,
+        start_x_m=vehicle.start.x_m,
+        start_y_m=vehicle.start.y_m,
+        start_heading_rad=math.radians(vehicle.start.heading_deg),
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        altitude_m=vehicle.altitude_m,
+        position_error_m=vehicle.position_error_m,
+        position_drift_mps=vehicle.position_drift_m_per_h / 3600,
+        sensor=SensorConfig(
+            curve=sensor.detection_curve(vehicle.nadir_gap_m),
+            along_bin_m=sensor.along_bin_m,
+            range_bin_m=sensor.range_bin_m,
+            look_m=sensor.look_m,
+            noise_cell=sensor.noise_cell,
+            noise_track=sensor.noise_track,
+            sonar=None if sensor.sonar is None else SONAR.maker(sensor.sonar),
+        ),
+    )
+
+
+def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
+    return CoordinatorConfig(
+        allocator=made(ALLOCATOR, scenario.coordinator.allocator),
+        deadline_factor=scenario.mission.deadline_factor,
+        lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
+        min_strip_m=scenario.coordinator.min_strip_m,
+        max_strip_m=scenario.coordinator.max_strip_m,
+        worth_risk=scenario.coordinator.worth_risk,
+        switch_margin=scenario.coordinator.switch_margin,
+        separation_m=scenario.mission.separation_m,
+        priorities=tuple(Priority(one.polygon_m, one.weight) for one in scenario.area.priorities),
+    )

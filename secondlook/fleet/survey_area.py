@@ -1,0 +1,50 @@
+"""From a scenario's area to what planning takes: the region, the heading of its tracks, and a first plan."""
+
+from __future__ import annotations
+
+import math
+
+from planner.first_plan import FirstPlan, best_heading, first_plan
+from planner.region import Region
+from secondlook.errors import UserError
+from secondlook.scenario import Scenario, SurveyVehicle
+from secondlook.scenario.plug_ins import SPACING, made
+from vehicle_agent.config import WHOLE
+
+
+def region_of(scenario: Scenario) -> Region:
+    """What is surveyed, mission frame. Raises ValueError as `Region` does."""
+    return Region(scenario.area.polygon_m, scenario.area.holes_m)
+
+
+def region_for(scenario: Scenario, vehicle: SurveyVehicle, heading_rad: float) -> Region:
+    """What of it is surveyed by one vehicle, with tracks along a heading. Raises ValueError as `Region.share` does."""
+    region = region_of(scenario)
+    return region if vehicle.share == WHOLE else region.share(*vehicle.share, heading_rad)
+
+
+def track_heading_rad(scenario: Scenario) -> float:
+    """The compass heading of the tracks; where the scenario leaves it to us, the best for the first survey vehicle."""
+    heading_deg = scenario.area.track_heading_deg
+    if heading_deg != "auto":
+        return math.radians(heading_deg)
+    first = next(iter(scenario.survey_vehicles.values()))
+    return best_heading(region_of(scenario), first.nadir_gap_m, first.told_range_m)
+
+
+def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
+    """The first tracks of a survey vehicle, by its id, as its spacing planner lays them with the range that it is told.
+
+    Raises:
+        UserError: a spacing planner of the user's fails.
+    """
+    vehicle = scenario.survey_vehicles[name]
+    region = region_for(scenario, vehicle, heading_rad)
+    sonar = vehicle.nadir_gap_m, vehicle.told_range_m
+    spacing = made(SPACING, vehicle.spacing, nadir_gap_m=sonar[0], told_range_m=sonar[1])
+    try:
+        return first_plan(region, heading_rad, *sonar, spacing)
+    except Exception as error:
+        if vehicle.spacing in SPACING.ours:
+            raise
+        raise UserError(f"{vehicle.spacing} has failed to lay tracks: {type(error).__name__}: {error}") from error

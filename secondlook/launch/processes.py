@@ -1,0 +1,236 @@
+"""Starts a fleet's processes, watches over them and leaves none behind."""
+
+from __future__ import annotations
+
+import secrets
+import selectors
+import time
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from comms.control import HostPlan, RunKeys
+from comms.lockstep.events import Change, NodeEvent, timeline
+from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.node import Listener
+from comms.result import BusResult, Ending
+from comms.said.routing import Routing
+from comms.session import PATIENCE_S
+from secondlook.fleet.build import Fleet
+from secondlook.fleet.node_spec import NodeSpec
+from secondlook.launch.child_order import ChildOrder
+from secondlook.launch.child_process import ChildProcess
+from secondlook.launch.host_plans import HUB, OBSERVER, RECORDER, plan_hosts
+from secondlook.launch.listening_thread import ListeningThread
+from secondlook.launch.verdict import Verdict
+from secondlook.recorded.observer import RunStopped
+
+LOOK_EVERY_S = 0.1
+GRACE_S = 3.0  # to end by themselves, once their pipe is closed
+HUB_PATIENCE = 1.5  # times the hub's own patience with its hosts, whose words come first that way
+
+
+class RunFailedError(Exception):
+    """The mission has failed; the text is one sentence."""
+
+
+class Processes:
+    """The processes of one run over Zenoh. Use as a context: on leaving it, none of them is left.
+
+    `logs`: a folder for what they print; no file is left there of those that print nothing. `recorder`: how to make the
+    recorder in its process, None for none. `observer` lives in this process, and is closed on leaving the context at
+    the latest. `processes`: see `plan_hosts`. `faults` and `events`: see `comms.lockstep`; raises ValueError for events
+    that do not fit. `patience_s`: wall time after which a process that should say something and does not is given up.
+    """
+
+    def __init__(
+        self,
+        fleet: Fleet,
+        logs: Path,
+        observer: Listener,
+        recorder: NodeSpec | None,
+        processes: int | None,
+        *,
+        faults: Faults = NO_FAULTS,
+        events: tuple[NodeEvent, ...] = (),
+        patience_s: float = PATIENCE_S,
+    ) -> None:
+        self._fleet = fleet
+        self._faults = faults
+        self._events = events
+        self._logs = logs
+        self._keys = RunKeys(f"{fleet.run_info.scenario}-{secrets.token_hex(4)}")
+        self._in_hub, self._plans = plan_hosts(fleet, processes, timeline(events, Routing(fleet.roster)))
+        self._to_join = {plan.host for plan in self._plans if plan.joins}
+        self._killed: set[str] = set()
+        self._endpoint = ""
+        self._passwords = {plan.host: secrets.token_hex(16) for plan in self._plans}
+        self._recorder = recorder
+        self._patience_s = patience_s
+        self._children: dict[str, ChildProcess] = {}
+        self._verdict = Verdict(HUB)
+        self._hub_heard_s = 0.0
+        self._hub_alive_ms = 0
+        self._selector = selectors.DefaultSelector()
+        self._listening = ListeningThread(
+            OBSERVER, observer, self._keys, Routing(fleet.roster), self._passwords[OBSERVER], patience_s, fleet
+        )
+
+    def __enter__(self) -> Processes:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stop()
+
+    @property
+    def count(self) -> int:
+        """How many processes the run has, this one included: hub, other hosts, and the observer's, which is this."""
+        return 1 + len(self._plans)
+
+    @property
+    def process_ids(self) -> dict[str, int]:
+        """Of each child process that is there by now, by host; may be asked from any thread."""
+        return {host: child.pid for host, child in list(self._children.items())}
+
+    def run(self) -> BusResult:
+        """Starts all, waits for the run's end; raises RunFailedError, and RunStopped where the observer does."""
+        self._start_all()
+        self._hub_heard_s = time.monotonic()
+        while True:
+            for child, words in self._hear():
+                if "result" in words:
+                    return self._end(words["result"])
+                self._take(child, words)
+            if self._listening.stopped:
+                raise RunStopped
+            now_s = time.monotonic()
+            for child in self._children.values():
+                fate = None if child.host in self._killed else child.fate()
+                if fate is not None:
+                    self._verdict.ends(child.host, fate, now_s)
+            if self._listening.error is not None:
+                self._verdict.says(str(self._listening.error))
+            if now_s - self._hub_heard_s >= HUB_PATIENCE * self._patience_s:
+                last_s = self._hub_alive_ms / 1000
+                self._verdict.says(f"{HUB} has fallen silent, last heard at {last_s:.3f} s of the mission")
+            sentence = self._verdict.sentence(now_s)
+            if sentence is not None:
+                raise RunFailedError(sentence)
+
+    def stop(self) -> None:
+        """Ends whatever still runs: closes the pipes, waits a little, then kills. The observer keeps what it has."""
+        try:
+            for child in self._children.values():
+                child.let_go()
+                child.thaw()
+            self._listening.interrupt()
+            deadline_s = time.monotonic() + GRACE_S
+            for child in self._children.values():
+                child.wait(deadline_s)
+        finally:  # also for someone who is in a hurry and interrupts again
+            for child in self._children.values():
+                child.bury()
+            self._children.clear()
+            self._selector.close()
+            # Last: a session cannot be closed as long as a frozen hub holds the other end.
+            self._listening.stop(GRACE_S)
+
+    def _start_all(self) -> None:
+        fleet = self._fleet
+        self._start(
+            ChildOrder(
+                run=self._keys.run,
+                plan=HostPlan(HUB, tuple(self._in_hub)),
+                password="",
+                roster=fleet.roster,
+                specs={node_id: fleet.specs[node_id] for node_id in self._in_hub},
+                patience_s=self._patience_s,
+                is_hub=True,
+                hosts=self._plans,
+                passwords=self._passwords,
+                run_info=fleet.run_info,
+                time_limit_ms=fleet.time_limit_ms,
+                faults=self._faults,
+                events=self._events,
+                factor=fleet.factor,
+            )
+        )
+        for plan in self._plans:
+            if plan.host == OBSERVER:
+                continue
+            recorder = {RECORDER: self._recorder} if plan.host == RECORDER and self._recorder else None
+            self._start(
+                ChildOrder(
+                    run=self._keys.run,
+                    plan=plan,
+                    password=self._passwords[plan.host],
+                    roster=fleet.roster,
+                    specs=recorder or {node_id: fleet.specs[node_id] for node_id in plan.nodes},
+                    patience_s=self._patience_s,
+                    faults=self._faults,
+                    is_listener=recorder is not None,
+                    run_info=fleet.run_info,
+                    time_limit_ms=fleet.time_limit_ms,
+                    factor=fleet.factor,
+                )
+            )
+
+    def _start(self, order: ChildOrder) -> None:
+        child = self._children[order.host] = ChildProcess(order, self._logs)
+        self._selector.register(child.status, selectors.EVENT_READ, child)
+
+    def _hear(self) -> Iterable[tuple[ChildProcess, dict[str, Any]]]:
+        """What the children say, waited for a little."""
+        for key, _ in self._selector.select(LOOK_EVERY_S):
+            child: ChildProcess = key.data
+            words = child.status.read()
+            if words is None:
+                self._selector.unregister(child.status)
+                continue
+            if child.host == HUB:
+                self._hub_heard_s = time.monotonic()
+            for one in words:
+                yield child, one
+
+    def _take(self, child: ChildProcess, words: dict[str, Any]) -> None:
+        match words:
+            case {"endpoint": endpoint}:
+                self._endpoint = endpoint
+                for other in self._children.values():
+                    if other is not child and other.host not in self._to_join:
+                        other.tell(endpoint)
+                self._listening.start(endpoint)
+            case {"change": change, "host": host}:
+                self._change(Change(change), self._children[host])
+                child.tell("done")
+            case {"alive_ms": now_ms}:
+                self._hub_alive_ms = now_ms
+            case {"failed": sentence}:
+                self._verdict.says(sentence)
+            case {"lost": host, "at_ms": at_ms}:
+                self._verdict.loses(host, at_ms, time.monotonic())
+
+    def _change(self, change: Change, child: ChildProcess) -> None:
+        """What the hub has asked for, as planned."""
+        match change:
+            case Change.KILL:
+                self._killed.add(child.host)
+                child.kill()
+            case Change.FREEZE:
+                child.freeze()
+            case Change.THAW:
+                child.thaw()
+            case Change.JOIN:
+                self._to_join.remove(child.host)
+                child.tell(self._endpoint)
+
+    def _end(self, result: dict[str, Any]) -> BusResult:
+        deadline_s = time.monotonic() + GRACE_S
+        self._listening.join(GRACE_S)
+        if self._listening.error is not None:
+            raise RunFailedError(str(self._listening.error))
+        for host in self._to_join:  # the mission was over before
+            self._children[host].let_go()
+        for child in self._children.values():
+            child.wait(deadline_s)  # whoever is late is killed on leaving the context
+        return BusResult(**{**result, "ending": Ending(result["ending"])})

@@ -1,0 +1,256 @@
+"""A fleet spread over hosts, by the wall clock: what each of its processes does, from its start to its exit code."""
+
+from __future__ import annotations
+
+import json
+import logging
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from comms.control import HostPlan
+from comms.result import BusResult, Ending
+from comms.runner import NodeError
+from comms.said.messages import Role
+from comms.said.routing import RosterNode, Routing
+from comms.session import ConnectionFailedError
+from comms.wall.access import wall_access_rules
+from comms.wall.host import RefusedError, WallHost
+from comms.wall.hub import WallHub
+from comms.wall.line import Interrupted
+from comms.wall.seats import ListenerSeat, NodeSeat, Seat
+from comms.wall.session import Certificates, open_guest, open_router
+from comms.wall.words import WallKeys
+from secondlook.errors import UserError
+from secondlook.fleet.build import Fleet, build_fleet
+from secondlook.fleet.node_spec import NodeSpec, make_nodes
+from secondlook.launch.host_plans import OBSERVER, RECORDER
+from secondlook.launch.mission import not_over
+from secondlook.launch.recorder_config import recorder_config
+from secondlook.launch.run_display import closing_table
+from secondlook.recorded.observer import Observer
+from secondlook.recorded.summary import summarise
+from secondlook.report import write_report
+from secondlook.scenario import Scenario
+
+FAILED = 1
+ROUTER = "router"
+
+
+@dataclass(frozen=True)
+class Link:
+    """How a process speaks to the others. `listen` of a node: where others may speak through it. `wait_s`: for the
+    router to be there. `run`: the run's name, part of all keys."""
+
+    run: str
+    certificates: Certificates | None = None
+    connect: str = ""
+    listen: str | None = None
+    wait_s: float = 10.0
+
+
+def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -> int:
+    """Routes and holds the clock until the mission is over; returns the exit code. Raises UserError where it cannot
+    listen. `record`: it waits for a recorder too."""
+    _log_to_stderr()
+    fleet = build_fleet(scenario, record=record, factor=factor)
+    routing, keys = Routing(fleet.roster), WallKeys(link.run)
+    hosts = _hosts(fleet.roster)
+    rules = None
+    if link.certificates is not None:
+        rules = wall_access_rules(routing, _subjects(fleet.roster), keys, "cert_common_names")
+    try:
+        session, endpoint = open_router(link.listen or "", link.certificates, rules)
+    except ConnectionFailedError as error:
+        raise UserError(str(error)) from error
+    with session:
+        hub = WallHub(
+            session,
+            keys,
+            routing,
+            hosts,
+            NodeSeat({}, routing),
+            fleet.run_info,
+            fleet.time_limit_ms,
+            factor,
+            strict=False,
+            notice=_say_as(ROUTER),
+        )
+        _say(ROUTER, f"listens on {endpoint}, and waits for {', '.join(plan.host for plan in hosts)}")
+        try:
+            with _signals(hub.interrupt):
+                result = hub.run()
+        except Interrupted:
+            _say(ROUTER, "interrupted; the others go on, and connect again when it is back")
+            return FAILED
+    part = _Part(result)
+    failure = part.failure(scenario)
+    _say(ROUTER, failure or part.closing_words)
+    return FAILED if failure else 0
+
+
+def run_node(scenario: Scenario, link: Link, node_id: str) -> int:
+    """Runs an acting node of the fleet; returns the exit code. Raises UserError where it cannot take part."""
+    _log_to_stderr()
+    fleet = build_fleet(scenario, record=True, factor=1.0)
+    try:
+        nodes = make_nodes({node_id: fleet.specs[node_id]})
+        part = _take_part(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))
+    except NodeError as error:
+        _say(node_id, str(error))
+        return FAILED
+    failure = part.failure(scenario)
+    _say(node_id, failure or part.closing_words)
+    return FAILED if failure else 0
+
+
+def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
+    """Records a mission into a folder, as `secondlook run` does; returns the exit code. Raises UserError where it
+    cannot take part."""
+    _log_to_stderr()
+    began_s = time.perf_counter()
+    fleet = build_fleet(scenario, record=True, factor=1.0)
+    (folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
+    observer = Observer(folder, with_messages=True)
+    recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, folder / "mission.rrd"))
+    part = _Part()
+    try:
+        listeners = {OBSERVER: observer, **make_nodes({RECORDER: recorder})}
+        part = _take_part(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
+        failure = part.failure(scenario)
+    except NodeError as error:
+        failure = str(error)
+    summary = summarise(
+        scenario,
+        observer,
+        part.result,
+        bus="zenoh",
+        processes=1 + len(_hosts(fleet.roster)),
+        wall_s=time.perf_counter() - began_s,
+        ending=part.ending,
+        failure=failure,
+        factor=part.factor,
+    )
+    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    try:
+        write_report(folder)
+    except UserError as error:  # the mission is what counts
+        _say(RECORDER, str(error))
+    if failure is not None:
+        _say(RECORDER, f"{failure}; what was recorded is in {folder}")
+        return FAILED
+    closing_table(summary, folder)
+    return 0
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A process's part in a mission, once it has ended."""
+
+    result: BusResult | None = None
+    factor: float = 1.0
+    interrupted_ms: int | None = None
+
+    @property
+    def ending(self) -> str:
+        if self.result is not None:
+            return self.result.ending.value
+        return "failed" if self.interrupted_ms is None else "interrupted"
+
+    @property
+    def closing_words(self) -> str:
+        assert self.result is not None
+        return f"the mission is over at {self.result.mission_ms / 1000:.1f} s"
+
+    def failure(self, scenario: Scenario) -> str | None:
+        """Why the mission has failed here, in a sentence; None where it has not."""
+        if self.interrupted_ms is not None:
+            return f"interrupted at {self.interrupted_ms / 1000:.0f} s of the mission"
+        if self.result is None:
+            return f"no word from the router, and mission.time_limit_s is over: {scenario.mission.time_limit_s:g}"
+        return None if self.result.ending is Ending.OVER else not_over(self.result, scenario)
+
+
+def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
+    try:
+        session = open_guest(link.connect, link.listen, link.certificates, within_s=link.wait_s)
+    except ConnectionFailedError as error:
+        seat.close()
+        raise UserError(str(error)) from error
+    with session:
+        guest = WallHost(
+            session,
+            WallKeys(link.run),
+            host,
+            seat,
+            Routing(fleet.roster),
+            fleet.run_info.scenario_sha256,
+            fleet.time_limit_ms,
+            answer_within_s=link.wait_s,
+            notice=_say_as(host),
+        )
+        try:
+            with _signals(guest.interrupt):
+                result = guest.run()
+        except RefusedError as error:
+            raise UserError(str(error)) from error
+        return _Part(result, guest.factor, guest.now_ms if guest.interrupted else None)
+
+
+def _hosts(roster: tuple[RosterNode, ...]) -> tuple[HostPlan, ...]:
+    """The processes that the mission waits for: one for each node that acts and is ours, one for those that listen."""
+    acting = [node for node in roster if not node.listens_only and node.role not in (Role.CLOCK, Role.BODY)]
+    plans = [HostPlan(node.node_id, (node.node_id,)) for node in acting]
+    if any(node.role is Role.RECORDER for node in roster):
+        plans.append(HostPlan(RECORDER, (RECORDER, OBSERVER)))
+    return tuple(plans)
+
+
+def _subjects(roster: tuple[RosterNode, ...]) -> tuple[HostPlan, ...]:
+    """Whose certificates the router knows. A body that is not ours has one of its own, or speaks through its agent."""
+    bodies = {node.vehicles[0]: node.node_id for node in roster if node.role is Role.BODY}
+    hosts = tuple(
+        HostPlan(plan.host, (*plan.nodes, bodies[plan.host])) if plan.host in bodies else plan
+        for plan in _hosts(roster)
+    )
+    return (*hosts, *(HostPlan(body, (body,)) for body in bodies.values()))
+
+
+@contextmanager
+def _signals(interrupt: Callable[[], None]) -> Iterator[None]:
+    """Within it Ctrl-C, SIGTERM and SIGHUP ask for an early end; a second one does not wait for it."""
+    numbers = [
+        number
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        if signal.getsignal(number) is not signal.SIG_IGN
+    ]
+
+    def handle(*_: object) -> None:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
+        interrupt()
+
+    before = {number: signal.signal(number, handle) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _log_to_stderr() -> None:
+    logging.basicConfig(level=logging.WARNING, format="%(name)s: %(message)s", stream=sys.stderr)
+    logging.getLogger("secondlook").setLevel(logging.INFO)
+
+
+def _say(who: str, sentence: str) -> None:
+    sys.stderr.write(f"{who}: {sentence}\n")
+    sys.stderr.flush()
+
+
+def _say_as(who: str) -> Callable[[str], None]:
+    return lambda sentence: _say(who, sentence)

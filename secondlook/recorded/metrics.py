@@ -1,0 +1,289 @@
+"""What happened: folds a mission's messages into its figures. Pure; used while the mission runs and afterwards."""
+
+from __future__ import annotations
+
+import copy
+import math
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from comms.node import Received
+from comms.said.messages import (
+    AgentState,
+    CoverageTile,
+    Look,
+    Mode,
+    Nav,
+    Plan,
+    Role,
+    RunInfo,
+    StripState,
+    StripStatus,
+    TruthLook,
+    TruthPose,
+    TruthTargets,
+)
+from planner.fleet_map import FleetMap, VehicleLayer
+from planner.region import Region
+from planner.risk import RiskStatistics, risk_statistics
+from planner.types import BoolArray, FloatArray
+from secondlook.recorded.closest_approach import ClosestApproaches
+
+RISK_AT_FACTORS = (1.0, 1.05)
+CUT_ANEW = "its coordinator was started anew"
+_STILL_OPEN = (StripState.OPEN, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
+
+
+@dataclass
+class VehicleFigures:
+    """One vehicle: path flown, when it ended, and for a primary what it planned and learned. `surveyed`: its layer when
+    it had surveyed all, if it goes on to take strips."""
+
+    role: Role
+    path_m: float = 0.0
+    ended_ms: int = 0
+    looked_m: float = 0.0
+    plan: Plan | None = None
+    last_nav: Nav | None = None
+    finished_ms: int | None = None
+    surveyed: VehicleLayer | None = None
+
+
+@dataclass
+class StripFigures:
+    """One strip's last word and its first times."""
+
+    status: StripStatus
+    published_ms: int
+    accepted_ms: int | None = None
+
+
+@dataclass
+class Metrics:
+    """Take the messages in order; ask at any time. `coordinators`: the newest incarnation that has told of strips; what
+    those before have left counts as withdrawn."""
+
+    now_ms: int = 0
+    run: RunInfo | None = None
+    map: FleetMap | None = None
+    inside: BoolArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
+    vehicles: dict[str, VehicleFigures] = field(default_factory=dict)
+    strips: dict[int, StripFigures] = field(default_factory=dict)
+    targets: TruthTargets | None = None
+    detected: set[int] = field(default_factory=set)
+    risk_at: list[dict[str, float]] = field(default_factory=list)
+    approaches: ClosestApproaches = field(default_factory=lambda: ClosestApproaches({}))
+    misfits: int = 0
+    coordinators: int = 0
+
+    def take(self, received: Received) -> None:
+        """Folds one message in. What contradicts the run's announcement is counted in `misfits`."""
+        message = received.message
+        if received.header.sent_ms > self.now_ms:
+            self._pass_time(received.header.sent_ms)
+        vehicle = self.vehicles.get(received.vehicle)
+        if isinstance(message, Nav):  # most are
+            if vehicle is not None:
+                self._take_nav(vehicle, message)
+                self.approaches.take(received)
+        elif isinstance(message, RunInfo) and self.run is None:
+            self._begin(message)
+        elif isinstance(message, TruthPose) and vehicle is not None:
+            self.approaches.take(received)
+        elif isinstance(message, Look) and message.valid and vehicle is not None:
+            vehicle.looked_m += message.p_detect.shape[1] * message.along_bin_m
+        elif isinstance(message, CoverageTile):
+            self._take_tile(received, message)
+        elif isinstance(message, Plan) and vehicle is not None:
+            vehicle.plan = message
+        elif isinstance(message, AgentState) and vehicle is not None:
+            vehicle.ended_ms = received.header.sent_ms
+            if message.mode is Mode.FINISHED and vehicle.finished_ms is None:
+                vehicle.finished_ms = received.header.sent_ms
+                if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
+                    vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))
+        elif isinstance(message, StripStatus):
+            self._take_strip(received, message)
+        elif isinstance(message, TruthTargets):
+            self.targets = message
+        elif isinstance(message, TruthLook):
+            self.detected.update(message.detected)
+
+    def primary_ms(self) -> int | None:
+        """When the last primary ended its last track; None while one is still at it."""
+        last_ms = None
+        for one in self.vehicles.values():
+            if one.role.surveys:
+                if one.finished_ms is None:
+                    return None
+                last_ms = one.finished_ms if last_ms is None else max(last_ms, one.finished_ms)
+        return last_ms
+
+    def share_flown(self) -> float:
+        """Share of the primaries' planned track length that has been looked at."""
+        planned_m = looked_m = 0.0
+        for one in self.vehicles.values():
+            if one.role.surveys and one.plan is not None:
+                looked_m += one.looked_m
+                planned_m += sum(
+                    math.hypot(track.end_x_m - track.start_x_m, track.end_y_m - track.start_y_m)
+                    for track in one.plan.tracks
+                )
+        return min(1.0, looked_m / planned_m) if planned_m > 0 else 0.0
+
+    def risk(self) -> RiskStatistics | None:
+        """The fleet's residual risk as far as it is known."""
+        if self.map is None:
+            return None
+        return risk_statistics(self.map.risk, self.map.seen(), self.inside)
+
+    def risk_primary_alone(self) -> RiskStatistics | None:
+        """The same without second looks: the primaries' layers, of one that takes strips itself as it was before."""
+        if self.map is None:
+            return None
+        layers = [
+            one.surveyed or self.map.layers[name]
+            for name, one in self.vehicles.items()
+            if one.role.surveys and name in self.map.layers
+        ]
+        return risk_statistics(*self.map.risk_of_layers(layers), self.inside)
+
+    def targets_met(self) -> tuple[FloatArray, BoolArray]:
+        """Of each target the fleet's residual risk where it lies, and whether nobody has detected it; both of shape
+        (targets,)."""
+        if self.map is None or self.targets is None:
+            return np.zeros(0), np.zeros(0, dtype=np.bool_)
+        grid = self.map.grid
+        x_m = np.array([target.x_m for target in self.targets.targets])
+        y_m = np.array([target.y_m for target in self.targets.targets])
+        across, along = grid.frame.to_sweep(x_m, y_m)
+        columns = np.clip(np.rint(across / grid.cell_m).astype(int), 0, grid.columns - 1)
+        rows = np.clip(np.floor(along / grid.cell_m).astype(int), 0, grid.rows - 1)
+        missed = ~np.isin(np.arange(x_m.size), sorted(self.detected))
+        return self.map.risk[rows, columns], missed
+
+    def close(self) -> None:
+        """The mission has ended: times that were not reached have the risk of its end."""
+        primary_ms = self.primary_ms()
+        if primary_ms is not None:
+            for factor in RISK_AT_FACTORS[len(self.risk_at) :]:
+                self._note_risk(round(primary_ms * factor))
+
+    def summary(self) -> dict[str, Any]:
+        """The part of summary.json that the messages tell."""
+        risk, alone = self.risk(), self.risk_primary_alone()
+        primary_ms = self.primary_ms()
+        return {
+            "vehicles": {name: _vehicle_summary(one) for name, one in self.vehicles.items()},
+            "primary_s": None if primary_ms is None else primary_ms / 1000,
+            "risk": asdict(risk) if risk else None,
+            "risk_primary_alone": asdict(alone) if alone else None,
+            "risk_at": self.risk_at,
+            "truth": self._truth_summary(),
+            "hotspots": self._strip_summary(),
+            "closest": [
+                {"vehicles": list(one.vehicles), "closest_m": round(one.closest_m, 2), "t_s": round(one.t_s, 3)}
+                for one in self.approaches.found()
+            ],
+        }
+
+    def _begin(self, run: RunInfo) -> None:
+        self.run = run
+        spec = run.grid.spec
+        self.map = FleetMap(spec, run.rho)
+        self.inside = Region(run.outline, run.hole_outlines).inside(spec)
+        self.vehicles = {entry.vehicle: VehicleFigures(entry.role) for entry in run.vehicles}
+        self.approaches = ClosestApproaches({entry.vehicle: entry.speed_mps for entry in run.vehicles})
+
+    def _pass_time(self, sent_ms: int) -> None:
+        while len(self.risk_at) < len(RISK_AT_FACTORS):
+            primary_ms = self.primary_ms()
+            if primary_ms is None:
+                break
+            at_ms = round(primary_ms * RISK_AT_FACTORS[len(self.risk_at)])
+            if sent_ms <= at_ms:
+                break
+            self._note_risk(at_ms)
+        self.now_ms = sent_ms
+
+    def _note_risk(self, at_ms: int) -> None:
+        risk = self.risk()
+        if risk is not None:
+            self.risk_at.append({"t_s": at_ms / 1000, "mean": risk.mean, "worst30_mean": risk.worst30_mean})
+
+    def _take_nav(self, vehicle: VehicleFigures, nav: Nav) -> None:
+        if vehicle.last_nav is not None:
+            vehicle.path_m += math.hypot(nav.x_m - vehicle.last_nav.x_m, nav.y_m - vehicle.last_nav.y_m)
+        vehicle.last_nav = nav
+
+    def _take_tile(self, received: Received, tile: CoverageTile) -> None:
+        if self.map is None:
+            return
+        version = (received.header.incarnation, tile.version)
+        try:
+            self.map.take(
+                received.vehicle,
+                version,
+                tile.first_row,
+                tile.first_column,
+                tile.sum_levels,
+                tile.largest_levels,
+                tile.settled,
+            )
+        except ValueError:
+            self.misfits += 1
+
+    def _take_strip(self, received: Received, status: StripStatus) -> None:
+        if received.header.incarnation > self.coordinators:  # it was started anew, and cuts strips of its own
+            self.coordinators = received.header.incarnation
+            for left in self.strips.values():
+                if left.status.state in _STILL_OPEN:
+                    left.status = replace(left.status, state=StripState.WITHDRAWN, vehicle="", reason=CUT_ANEW)
+        number = received.number
+        strip = self.strips.get(number)
+        if strip is None:
+            strip = self.strips[number] = StripFigures(status, received.header.sent_ms)
+        strip.status = status
+        if status.state in (StripState.ACCEPTED, StripState.UNDER_WAY) and strip.accepted_ms is None:
+            strip.accepted_ms = received.header.sent_ms
+
+    def _truth_summary(self) -> dict[str, Any]:
+        risk, missed = self.targets_met()
+        if not risk.size:
+            return {"targets": 0, "missed_share": None, "predicted_missed_share": None}
+        return {
+            "targets": risk.size,
+            "missed_share": float(missed.mean()),
+            "predicted_missed_share": float(risk.mean()),
+        }
+
+    def _strip_summary(self) -> dict[str, Any]:
+        states = [strip.status.state for strip in self.strips.values()]
+        published = [strip.published_ms for strip in self.strips.values()]
+        accepted = [strip.accepted_ms for strip in self.strips.values() if strip.accepted_ms is not None]
+        return {
+            "published": len(states),
+            "revisited": states.count(StripState.DONE),
+            "open": sum(states.count(state) for state in _STILL_OPEN),
+            "withdrawn": states.count(StripState.WITHDRAWN),
+            "failed": states.count(StripState.FAILED),
+            "first_published_s": min(published) / 1000 if published else None,
+            "first_assigned_s": min(accepted) / 1000 if accepted else None,
+        }
+
+
+def _vehicle_summary(vehicle: VehicleFigures) -> dict[str, Any]:
+    ended_ms = vehicle.finished_ms if vehicle.finished_ms is not None else vehicle.ended_ms
+    summary: dict[str, Any] = {
+        "role": vehicle.role.value,
+        "path_m": round(vehicle.path_m, 1),
+        "ended_s": ended_ms / 1000,
+    }
+    if vehicle.role.surveys:
+        plan = vehicle.plan
+        summary["tracks"] = sum(track.flown for track in plan.tracks) if plan else 0
+        summary["r_adpt_m"] = list(plan.r_adpt_m) if plan else []
+        summary["r_eff_m"] = list(plan.r_eff_m) if plan else []
+    return summary

@@ -1,0 +1,81 @@
+"""summary.json: the figures of a mission that has ended, in whatever way."""
+
+from __future__ import annotations
+
+from collections import Counter
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from comms.latency import STRIP_TO_TASK
+from comms.result import BusResult
+from secondlook.recorded.observer import Observer
+from secondlook.scenario import Scenario
+
+
+def summarise(
+    scenario: Scenario,
+    observer: Observer,
+    result: BusResult | None,
+    *,
+    bus: str,
+    processes: int,
+    wall_s: float,
+    ending: str,
+    failure: str | None = None,
+    factor: float | None = None,
+) -> dict[str, Any]:
+    """summary.json's content.
+
+    `result` is None for a run that was cut off: then digest and rounds are not known, and the rest is what the observer
+    has heard until then. `ending`: a `comms.result.Ending`, or `failed` or `interrupted`. `failure`: the sentence that
+    the run failed with. `wall_s`: start-up included. `factor`: of a run by the wall clock; None for lockstep.
+    """
+    told = observer.metrics.summary()
+    closest = told.pop("closest")
+    mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
+    dropped = {} if result is None else dict(result.dropped)
+    if observer.metrics.misfits:
+        dropped["does not fit the map"] = observer.metrics.misfits
+    messages = observer.messages if result is None else result.messages
+    lost = Counter(messages)
+    lost.subtract(observer.messages)
+    if factor is not None and +lost:
+        dropped["lost on the way to the observer"] = (+lost).total()
+    return {
+        "scenario": scenario.name,
+        "seed": scenario.seed,
+        "version": version("secondlook"),
+        "bus": bus,
+        "processes": processes,
+        "factor": factor,
+        "digest": None if result is None else result.digest,
+        "ending": ending,
+        **({} if failure is None else {"failure": failure}),
+        "time": {
+            "mission_s": mission_s,
+            "primary_s": told.pop("primary_s"),
+            "wall_s": round(wall_s, 3),
+            "real_time_factor": round(mission_s / wall_s, 1),
+        },
+        **told,
+        "separation": {
+            "least_m": scenario.mission.separation_m,
+            "pairs_closer": sum(pair["closest_m"] < scenario.mission.separation_m for pair in closest),
+            "closest": closest,
+        },
+        "latency_ms": {
+            "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
+        },
+        "rounds": None if result is None else result.rounds,
+        "messages": dict(sorted(messages.items())),
+        "dropped": dropped,
+    }
+
+
+def _percentiles(milliseconds: list[float]) -> dict[str, float | None]:
+    if not milliseconds:
+        return {"p50": None, "p99": None}
+    p50, p99 = np.percentile(milliseconds, [50, 99])
+    return {"p50": round(float(p50), 3), "p99": round(float(p99), 3)}

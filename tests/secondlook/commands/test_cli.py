@@ -1,0 +1,256 @@
+"""The command line as a user meets it: what it prints, where, and its exit codes."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from planner.spacing import track_offsets
+from secondlook import cli
+
+SecondLook = Callable[..., tuple[int | str | None, str, str]]
+
+
+@pytest.fixture
+def secondlook(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> SecondLook:
+    """Runs a command; gives its exit code, and what it prints on standard output and standard error."""
+
+    def run(*arguments: str) -> tuple[int | str | None, str, str]:
+        monkeypatch.setattr("sys.argv", ["secondlook", *arguments])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        return stopped.value.code, *capsys.readouterr()
+
+    return run
+
+
+PLAN = ("plan", "--width", "1212", "--nadir", "40", "--range")
+
+
+def test_plan_prints_the_published_spacing_as_json_alone(secondlook: SecondLook) -> None:
+    code, out, err = secondlook(*PLAN, "120", "145", "--json")
+    assert (code, err) == (0, "")
+    plan = json.loads(out)
+    # Three pairs of 3 * 138 - 40 = 374 m each leave 90 m, which one track at 1212 - 138 covers.
+    assert plan == {"r_adpt_m": 138, "tracks": 7, "offsets_m": [138, 236, 512, 610, 886, 984, 1074]}
+
+
+def test_plan_prints_a_sentence_for_people(secondlook: SecondLook) -> None:
+    code, out, err = secondlook(*PLAN, "120", "130")
+    assert (code, err) == (0, "")
+    assert out.splitlines()[0] == "8 tracks at a range of 120 m, laid at"
+    assert len(out.splitlines()[1].split(",")) == 8
+
+
+@pytest.mark.parametrize(
+    ("width", "nadir", "lowest", "highest", "expected"),
+    [
+        ("nan", "40", "120", "145", "--width: nan is not allowed; must be a number of metres up to 100000"),
+        ("inf", "40", "120", "145", "--width: inf is not allowed; must be a number of metres up to 100000"),
+        ("0", "40", "120", "145", "--width: 0 is not allowed; must be greater than 0"),
+        ("1212", "-1", "120", "145", "--nadir: -1 is not allowed; must be at least 0"),
+        ("1212", "40", "119", "145", "--range A: 119 is not allowed; must be at least 3 times --nadir, 120"),
+        ("1212", "0", "0", "145", "--range A: 0 is not allowed; must be at least 1"),
+        ("1212", "40", "145", "120", "--range: 145 120 is not allowed; a whole metre must lie from A to B"),
+        ("1212", "40", "120.2", "120.8", "--range: 120.2 120.8 is not allowed; a whole metre must lie from A to B"),
+        ("1212", "40", "120", "1e9", "--range B: 1e+09 is not allowed; must be a number of metres up to 100000"),
+    ],
+)
+def test_plan_refuses_bad_numbers_in_one_sentence(
+    secondlook: SecondLook, width: str, nadir: str, lowest: str, highest: str, expected: str
+) -> None:
+    arguments = ("plan", "--width", width, "--nadir", nadir, "--range", lowest, highest)
+    assert secondlook(*arguments) == (2, "", f"{expected}\n")
+
+
+def test_plan_of_a_scenario_lays_its_tracks_in_the_sweep_frame(secondlook: SecondLook) -> None:
+    code, out, err = secondlook("plan", "tellaro")
+    assert (code, err) == (0, "")
+    first, frame, *tracks = out.splitlines()
+    assert first.startswith("primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered; ")
+    assert frame == (
+        "part 1: 1212 m across, 400 m along, spaced for 138 m; sweep frame at (0.0, 0.0), heading 0 degrees"
+    )
+    assert tracks[1] == ("  track  2  at   236.0 m across: (236.0, 400.0) to (236.0, 0.0), 400 m along 180 degrees")
+    assert len(tracks) == 7
+
+
+def test_plan_of_a_scenario_takes_any_area_heading_and_spacing(secondlook: SecondLook) -> None:
+    settings = (
+        "area.polygon_m=[[0, 0], [1212, 0], [606, 400]]",
+        "area.track_heading_deg=90",
+        "vehicles.primary.spacing=fixed",
+    )
+    code, out, err = secondlook("plan", "tellaro", "--json", *(word for one in settings for word in ("--set", one)))
+    assert (code, err) == (0, "")
+    (survey,) = json.loads(out)["surveys"]
+    # Tracks east are laid from the north, 400 m across: a pair for 145 m is pulled in to end with the area.
+    (part,) = survey["parts"]
+    assert part["frame"] == {"origin_m": [0, 400], "heading_deg": 90}
+    assert (part["r_adpt_m"], part["width_m"], part["length_m"]) == (145, 400, 1212)
+    assert [track["across_m"] for track in part["tracks"]] == [145, 250, 255]
+    assert (survey["tracks"], survey["turns"], survey["uncovered_share"]) == (3, 2, 0)
+    for track in part["tracks"]:
+        assert track["start_m"][1] == track["end_m"][1] == 400 - track["across_m"]
+
+
+def test_plan_of_a_scenario_as_geojson_lies_where_the_scenario_does(secondlook: SecondLook) -> None:
+    origin = ("--set", "origin={latitude_deg: 44, longitude_deg: 10}")
+    for settings, east in (((), (0, 1300)), (origin, (10, 10.02))):
+        code, out, err = secondlook("plan", "headland", "--geojson", *settings)
+        assert (code, err) == (0, "")
+        features = json.loads(out)["features"]
+        kinds = [feature["properties"]["kind"] for feature in features]
+        assert (kinds.count("area"), kinds.count("part"), kinds.count("track")) == (1, 7, 10)
+        assert all(
+            east[0] <= x <= east[1]
+            for f in features
+            if f["geometry"]["type"] == "LineString"
+            for x, _ in f["geometry"]["coordinates"]
+        )
+
+
+def test_a_survey_that_outlasts_its_battery_is_told(
+    secondlook: SecondLook, write: Callable[[str], str], valid_text: str
+) -> None:
+    # Three tracks of 400 m take 800 s; with the way to the first and two turns it is more than 900.
+    name = write(valid_text.replace("endurance_s: 36000", "endurance_s: 900"))
+    told = re.compile(r"primary: its survey takes (\d+) s, longer than its endurance_s of 900\n")
+    for command in ("check", "plan"):
+        code, _, err = secondlook(command, name)
+        match = told.fullmatch(err)
+        assert code == 0
+        assert match is not None
+        assert int(match[1]) > 900
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ((), "secondlook plan needs a scenario, or --width, --nadir and --range\n"),
+        (("--width", "100"), "secondlook plan needs a scenario, or --width, --nadir and --range\n"),
+        (
+            ("tellaro", "--nadir", "40"),
+            "--nadir: is not allowed with a scenario, which says what is surveyed and how\n",
+        ),
+        (("--geojson",), "--geojson: must go with a scenario\n"),
+        (("--set", "seed=1"), "--set: must go with a scenario\n"),
+        (("tellaro", "--json", "--geojson"), "--geojson: is not allowed with --json; one form at a time\n"),
+        (
+            ("tellaro", "--set", "vehicles.primary.spacing=stubborn_spacing:Stubborn"),
+            "stubborn_spacing:Stubborn has failed to lay tracks: RuntimeError: not today\n",
+        ),
+    ],
+)
+def test_plan_refuses_what_does_not_go_together(
+    secondlook: SecondLook, arguments: tuple[str, ...], expected: str
+) -> None:
+    assert secondlook("plan", *arguments) == (2, "", expected)
+
+
+def test_check_counts_of_a_share_of_the_area_what_is_its_own(secondlook: SecondLook) -> None:
+    _, out, _ = secondlook("check", "wide")
+    assert [line.split("; ")[-1] for line in out.splitlines()[1:]] == ["up to 145 m all is covered"] * 3
+
+
+def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
+    expected = (
+        "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
+        "primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered\n"
+    )
+    assert secondlook("check", "tellaro") == (0, expected, "")
+
+
+def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook: SecondLook) -> None:
+    code, out, _ = secondlook("check", "headland")
+    told = re.fullmatch(
+        r"primary: (\d+) tracks along 90 degrees in (\d+) convex parts, \d\.\d km; up to 130 m all is covered",
+        out.splitlines()[1],
+    )
+    assert code == 0
+    assert told is not None
+    assert int(told[1]) >= int(told[2]) > 2
+
+
+def test_check_tells_what_a_plan_cannot_cover(secondlook: SecondLook, monkeypatch: pytest.MonkeyPatch) -> None:
+    # One track fewer: the last one's 90 m, but for what its neighbours see.
+    monkeypatch.setattr(
+        "planner.spacing_planners.track_offsets", lambda *told, **covered: track_offsets(*told, **covered)[:-1]
+    )
+    _, out, _ = secondlook("check", "tellaro")
+    share = re.search(r"6 tracks .* up to 145 m (\d\.\d\d)% is not covered", out)
+    assert share is not None
+    assert 5 < float(share[1]) < 9
+
+
+def test_check_tells_all_mistakes_without_a_traceback(
+    secondlook: SecondLook, write: Callable[[str], str], valid_text: str
+) -> None:
+    name = write(valid_text.replace("speed_mps: 1.5", "speed_mps: 0").replace("range_m: 145", "range_m: 5"))
+    expected = (
+        "bad.yaml:8: vehicles.primary.speed_mps: 0 is not allowed; must be greater than 0\n"
+        "bad.yaml:12: vehicles.primary.range_m: 5 is not allowed; must be at least 3 times nadir_gap_m, 120\n"
+    )
+    assert secondlook("check", name) == (2, "", expected)
+
+
+def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
+    code, out, err = secondlook("scenarios")
+    assert (code, err) == (0, "")
+    names = [line.split()[0] for line in out.splitlines()]
+    assert names == ["five-helpers", "headland", "paper", "patchy", "tellaro", "two-helpers", "wide"]
+
+
+def test_live_without_a_display_is_told_before_anything_flies(
+    secondlook: SecondLook, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.platform", "linux")
+    for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(variable, raising=False)
+    expected = "--live: there is no display for the viewer's window; add --web to watch in a browser\n"
+    assert secondlook("run", "--live", "--out", str(tmp_path / "run")) == (2, "", expected)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["--web"], "--web: says how to show a mission --live; must go with --live\n"),
+        (
+            ["--live", "--no-record"],
+            "--no-record: is not allowed with --live, which shows what the recorder draws\n",
+        ),
+    ],
+)
+def test_options_that_do_not_go_together_are_told(
+    secondlook: SecondLook, tmp_path: Path, arguments: list[str], expected: str
+) -> None:
+    assert secondlook("run", "--out", str(tmp_path / "run"), *arguments) == (2, "", expected)
+    assert not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("arguments", [["fly"], ["check"], ["plan", "--width", "wide"], ["check", "tellaro", "--fast"]])
+def test_wrong_use_is_told_without_a_traceback(secondlook: SecondLook, arguments: list[str]) -> None:
+    code, out, err = secondlook(*arguments)
+    assert (code, out) == (2, "")
+    assert err.splitlines()[-1].startswith("Error: ")
+    assert "Traceback" not in err
+
+
+def test_a_cell_is_checked_like_the_scenarios(secondlook: SecondLook, tmp_path: Path) -> None:
+    code, _, err = secondlook("run", "tellaro", "--cell", "0.1", "--out", str(tmp_path / "run"))
+    assert code == 2
+    assert "area.cell_m" in err
+    assert "20000000 cells" in err
+    assert not (tmp_path / "run").exists()
+
+
+def test_a_cell_is_the_scenarios(secondlook: SecondLook, tmp_path: Path) -> None:
+    brief = Path(__file__).parents[2] / "support" / "brief.yaml"
+    code, _, err = secondlook(
+        "run", str(brief), "--cell", "10", "--bus", "local", "--no-record", "--out", str(tmp_path)
+    )
+    assert (code, err) == (0, "")
+    assert "cell_m: 10" in (tmp_path / "scenario.yaml").read_text()

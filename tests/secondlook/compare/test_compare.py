@@ -1,0 +1,262 @@
+"""`secondlook compare`: who is compared, what the missions come to, and the command as a user calls it."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from flights import BRIEF, until
+
+from secondlook import cli
+from secondlook.compare.batch import Flown
+from secondlook.compare.contenders import contenders, equal_vehicle_seconds
+from secondlook.compare.flight import FailedFlight, Flight, Risk, fly
+from secondlook.compare.plot import _lines
+from secondlook.compare.standings import failures, standings
+from secondlook.compare.table import table
+from secondlook.errors import UserError
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.scenario import load_scenario
+from secondlook.scenario.plug_ins import ALLOCATOR
+
+
+def flight(seed: int, end: float, *, served: int = 3, ends_at: float = 1.05, worse: float = 0.2) -> Flight:
+    """A mission over 1000 s of survey, with this mean risk from then on, and so much more over the worst 30 %."""
+    then, later = Risk(1000, end, end + worse), Risk(1050, end, end + worse)
+    at_end = Risk(1000 * ends_at, end, end + worse)
+    return Flight(seed, "", 1000, then, later, at_end, 0.7, (0.7 - end) * 100, served, (Risk(500, 0.9, 1.0), at_end))
+
+
+class TestWhoIsCompared:
+    def test_without_names_the_scenarios_own_allocator_comes_first_and_the_baselines_last(self) -> None:
+        names = [one.name for one in contenders(load_scenario("tellaro", ["coordinator.allocator=none"]))]
+        assert names[0] == "none"
+        assert names[-2:] == ["self", "self-longer"]
+        assert set(names) == {*ALLOCATOR.ours, "self", "self-longer"}
+
+    def test_an_allocator_changes_nothing_else(self) -> None:
+        scenario = load_scenario("tellaro")
+        (none,) = contenders(scenario, ["none"])
+        coordinator = scenario.coordinator.model_copy(update={"allocator": "none"})
+        assert none.with_seed(5) == scenario.model_copy(update={"coordinator": coordinator, "seed": 5})
+
+    def test_the_baselines_have_no_helper_and_primaries_that_revisit(self) -> None:
+        scenario = load_scenario("two-helpers", ["coordinator.allocator=none"])
+        equal_end, longer = contenders(scenario, ["self", "self-longer"])
+        for one in (equal_end.scenario, longer.scenario):
+            assert {name: vehicle.role for name, vehicle in one.vehicles.items()} == {"primary": "survey"}
+            assert one.survey_vehicles["primary"].revisits
+            assert one.coordinator.allocator == "greedy"  # none would let them do nothing
+        assert equal_end.scenario.mission.deadline_factor == 1.05
+        # A primary for T and two helpers for 1.05 T each are 3.1 T of one primary.
+        assert longer.scenario.mission.deadline_factor == pytest.approx(3.1)
+
+    def test_vehicle_seconds_are_shared_by_all_primaries(self) -> None:
+        assert equal_vehicle_seconds(load_scenario("wide")) == pytest.approx(1 + 1.05 * 8 / 3)
+
+    def test_an_unknown_name_is_told_with_those_that_are_known(self) -> None:
+        with pytest.raises(
+            UserError, match=r"^--allocators: nobody is not allowed; must be .*greedy.* or self-longer$"
+        ):
+            contenders(load_scenario("tellaro"), ["nobody"])
+
+    def test_a_name_given_twice_is_told(self) -> None:
+        with pytest.raises(UserError, match=r"^--allocators: greedy is not allowed twice$"):
+            contenders(load_scenario("tellaro"), ["greedy", "none", "greedy"])
+
+
+FLOWN: Flown = {
+    "first": {1: flight(1, 0.40), 2: flight(2, 0.50), 3: flight(3, 0.30)},
+    "other": {1: flight(1, 0.42, worse=0.1), 2: flight(2, 0.46), 3: FailedFlight(3, "it failed")},
+    "equal": {1: flight(1, 0.40)},
+    "nothing yet": {},
+}
+
+
+class TestStandings:
+    def test_mean_and_deviation_by_hand(self) -> None:
+        first, other, equal = standings(FLOWN)
+        assert (first.name, first.flown, first.failed) == ("first", 3, 0)
+        assert (first.mean_105.mean, first.mean_105.deviation) == pytest.approx((0.4, 0.1))
+        assert first.worst30_mean.mean == pytest.approx(0.6)
+        assert first.removed_m2.mean == pytest.approx(30)
+        assert (other.mean_end.mean, other.mean_end.deviation) == pytest.approx((0.44, 0.04 / math.sqrt(2)))
+        assert equal.mean.deviation == 0
+
+    def test_wins_and_losses_count_the_seeds_that_both_have_flown(self) -> None:
+        first, other, equal = standings(FLOWN)
+        assert [(one.wins, one.losses) for one in (first, other, equal)] == [(0, 0), (1, 1), (0, 0)]
+        worst = [(one.worst30_wins, one.worst30_losses) for one in (first, other, equal)]
+        assert worst == [(0, 0), (2, 0), (0, 0)]
+
+    def test_what_failed_is_counted_and_told(self) -> None:
+        assert standings(FLOWN)[1].failed == 1
+        assert failures(FLOWN) == ["other, seed 3: it failed"]
+
+    def test_columns_that_say_nothing_are_left_out(self) -> None:
+        full = table(standings(FLOWN), "")
+        fewer = table(standings({"first": FLOWN["first"]}), "")
+        longer = table(standings({"first": {1: flight(1, 0.4, ends_at=2)}}), "")
+        assert [len(one.columns) for one in (fewer, full, longer)] == [9, 10, 12]
+
+
+def test_a_mission_is_flown_as_by_run(tmp_path: Path) -> None:
+    scenario = load_scenario(BRIEF)
+    summary = run_mission(scenario, RunOptions(tmp_path, bus="local", record=False))
+    flown = fly(scenario)
+    assert isinstance(flown, Flight)
+    assert flown.digest == summary["digest"]
+    assert (flown.at_end.mean, flown.served) == (summary["risk"]["mean"], summary["hotspots"]["revisited"])
+    removed = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
+    assert flown.removed_m2 == pytest.approx(removed * summary["risk"]["cells"] * 25)
+    assert [risk.t_s for risk in flown.over_time] == sorted(risk.t_s for risk in flown.over_time)
+
+
+Command = Callable[..., tuple[int | str | None, str, str]]
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+    """`secondlook compare` in this process."""
+
+    def run(*arguments: str) -> tuple[int | str | None, str, str]:
+        monkeypatch.setattr("sys.argv", ["secondlook", "compare", *arguments])
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        return stopped.value.code, *capsys.readouterr()
+
+    return run
+
+
+@pytest.fixture
+def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Missions by hand in place of flown ones."""
+
+    def fly_all(chosen: object, seeds: object, jobs: int, flown: Flown, progress: Callable[[Flown], None]) -> None:
+        flown.update(FLOWN)
+        progress(flown)
+
+    monkeypatch.setattr("secondlook.commands.compare.fly_all", fly_all)
+
+
+class TestCommand:
+    def test_missions_are_flown_in_processes_and_written(self, command: Command, tmp_path: Path) -> None:
+        arguments = ("--allocators", "greedy,none", "--seeds", "2", "--jobs", "2", "--out", str(tmp_path / "out"))
+        code, out, err = command(str(BRIEF), *arguments)
+        assert (code, err) == (0, "")  # and no progress in a pipe
+        assert "brief, seeds 1 to 2" in out
+        written = json.loads((tmp_path / "out" / "compare.json").read_text())
+        assert [(one["contender"], one["seed"]) for one in written["missions"]] == [
+            ("greedy", 1), ("greedy", 2), ("none", 1), ("none", 2),
+        ]  # fmt: skip
+        greedy, none = written["contenders"]
+        assert greedy["removed_m2"]["mean"] > none["removed_m2"]["mean"] == 0
+        assert none["losses"] == 2
+        assert (tmp_path / "out" / "risk.png").read_bytes().startswith(b"\x89PNG")
+
+    def test_json_alone_is_printed(self, command: Command, by_hand: None) -> None:
+        code, out, _ = command("--json")
+        assert code == 1  # a mission failed
+        assert [one["name"] for one in json.loads(out)["contenders"]] == ["first", "other", "equal"]
+
+    def test_a_mission_that_fails_is_told_and_counted_and_the_others_are_compared(
+        self, command: Command, by_hand: None
+    ) -> None:
+        code, out, err = command()
+        assert (code, err) == (1, "other, seed 3: it failed\n")
+        assert "failed" in out
+        assert "0.400 ± 0.100" in out
+
+    @pytest.mark.parametrize(
+        ("raised", "told"),
+        [
+            (KeyboardInterrupt(), "interrupted after 1 of 2 missions\n"),
+            (BrokenProcessPool(), "a process that flew missions has died, after 1 of 2 missions\n"),
+        ],
+        ids=["interrupted", "died"],
+    )
+    def test_what_was_flown_before_an_end_too_early_is_told(
+        self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
+    ) -> None:
+        def fail(chosen: object, seeds: object, jobs: object, flown: Flown, progress: object) -> None:
+            flown["greedy"] = {1: flight(1, 0.4)}
+            raise raised
+
+        monkeypatch.setattr("secondlook.commands.compare.fly_all", fail)
+        code, out, err = command("--allocators", "greedy,none", "--seeds", "1")
+        assert (code, err) == (1, told)
+        assert "0.400" in out
+
+    def test_a_part_that_raises_fails_its_missions_alone(
+        self, command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        (tmp_path / "mine.py").write_text("class Fails:\n    def assign(self, situation):\n        raise ValueError\n")
+        monkeypatch.chdir(tmp_path)
+        code, out, err = command(str(BRIEF), "--allocators", "none,mine:Fails", "--seeds", "1", "--jobs", "1")
+        assert code == 1
+        assert err.startswith("mine:Fails, seed 1: coordinator")
+        assert "none" in out
+
+    def test_without_matplotlib_one_sentence_says_what_is_missing(
+        self, command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    ) -> None:
+        find = importlib.util.find_spec
+        monkeypatch.setattr(
+            "secondlook.commands.compare.find_spec", lambda name: None if name == "matplotlib" else find(name)
+        )
+        code, out, err = command("--out", str(tmp_path / "out"))
+        assert (code, out) == (2, "")
+        assert err == "--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it\n"
+
+    def test_an_out_that_is_a_file_is_refused(self, command: Command, tmp_path: Path) -> None:
+        (tmp_path / "taken").write_text("")
+        code, _, err = command("--out", str(tmp_path / "taken"))
+        assert (code, err) == (2, f"--out {tmp_path / 'taken'}: File exists; must be a folder that can be written\n")
+
+
+def test_ctrl_c_ends_it_with_a_sentence_and_leaves_no_process_and_no_file(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [Path(sys.executable).with_name("secondlook"), "compare", BRIEF, "--seeds", "500", "--jobs", "2"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "TMPDIR": str(tmp_path)},
+        start_new_session=True,
+    )
+    try:
+        assert until(lambda: any(tmp_path.glob("secondlook-compare-*/events.jsonl")), 60)
+        os.killpg(process.pid, signal.SIGINT)
+        _, err = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 1
+    assert err.startswith("interrupted after ")
+    assert err.endswith(" missions\n")
+    assert err.count("\n") == 1
+    assert until(lambda: _group_is_gone(process.pid))
+
+
+def _group_is_gone(group: int) -> bool:
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def test_lines_of_missions_that_ended_earlier_stay_as_they_were() -> None:
+    shares, lines = _lines([flight(1, 0.4, ends_at=1.05), replace(flight(2, 0.3), at_end=Risk(2000, 0.3, 0.5))], "mean")
+    assert (shares[0], shares[-1]) == (0, 2)
+    assert lines[:, 0].tolist() == [1, 1]
+    assert lines[:, -1].tolist() == [0.4, 0.3]

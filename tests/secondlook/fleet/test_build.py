@@ -1,0 +1,89 @@
+"""From a scenario to a fleet: what everyone is told, and what cannot be told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import pytest
+from one_node import received
+
+from comms.said.messages import Role, RosterVehicle, RunInfo
+from planner.area import SurveyArea
+from secondlook.errors import UserError
+from secondlook.fleet.build import build_fleet
+from secondlook.scenario import load_scenario
+
+
+def announced(*overrides: str) -> RunInfo:
+    """The run's announcement as everyone hears it."""
+    run_info = build_fleet(load_scenario("tellaro", overrides), record=False).run_info
+    message = received("run", run_info).message
+    assert isinstance(message, RunInfo)
+    return message
+
+
+def helper(run: RunInfo) -> RosterVehicle:
+    return next(vehicle for vehicle in run.vehicles if vehicle.role is Role.REVISIT)
+
+
+def askew(points: Sequence[tuple[float, float]], heading_deg: float) -> str:
+    """These places of the sweep frame, as a polygon far from the origin."""
+    sin, cos = math.sin(math.radians(heading_deg)), math.cos(math.radians(heading_deg))
+    return f"area.polygon_m={[[5000 + u * cos + v * sin, -3000 - u * sin + v * cos] for u, v in points]}"
+
+
+class TestTheAnnouncement:
+    def test_the_trials(self) -> None:
+        run = announced()
+        assert [(corner.x_m, corner.y_m) for corner in run.area] == [(0, 0), (1212, 0), (1212, 400), (0, 400)]
+        assert (run.grid.columns, run.grid.rows, run.grid.cell_m) == (243, 80, 5)
+        assert [(vehicle.vehicle, vehicle.role) for vehicle in run.vehicles] == [
+            ("primary", Role.SURVEY),
+            ("helper", Role.REVISIT),
+        ]
+        assert (helper(run).swath_m, helper(run).p_detect, helper(run).endurance_ms) == (25, 0.7, 14_400_000)
+
+    @pytest.mark.parametrize("heading_deg", [1, 37, 90, 200.5])
+    def test_corners_along_straight_sides_do_no_harm_when_they_are_rounded(self, heading_deg: float) -> None:
+        corners = [(0, 0), (303, 0), (600, 0), (1212, 0), (1212, 123.3), (1212, 400), (611, 400), (0, 400), (0, 111)]
+        run = announced(askew(corners, heading_deg), f"area.track_heading_deg={heading_deg}")
+        area = SurveyArea(tuple((corner.x_m, corner.y_m) for corner in run.area), run.grid.heading_rad)
+        assert (area.width_m, area.length_m) == pytest.approx((1212, 400), abs=0.02)
+
+    def test_of_an_area_with_a_hole(self) -> None:
+        run = announced("area.holes_m=[[[100, 100], [200, 100], [150, 200.004]]]")
+        assert run.hole_outlines == (((100, 100), (200, 100), (150, 200)),)
+        assert announced().holes == ()
+
+    def test_of_an_area_that_is_concave_has_every_corner(self) -> None:
+        corners = [(0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (606.0, 200.0), (0.0, 400.0)]
+        assert announced(f"area.polygon_m={[list(one) for one in corners]}").outline == tuple(corners)
+
+    def test_of_a_heading_left_to_us(self) -> None:
+        run = announced("area.track_heading_deg=auto")
+        assert run.grid.heading_rad == pytest.approx(math.pi / 2, abs=1e-6)
+        assert (run.grid.columns, run.grid.rows) == (81, 243)
+
+    def test_a_helpers_typical_p_detect_is_its_mean_over_the_swath(self) -> None:
+        run = announced(
+            "vehicles.helper.sensor={curve: {range_m: [0, 20, 40], p_detect: [0.2, 0.8, 0.2]}}",
+        )
+        assert (helper(run).swath_m, helper(run).p_detect) == (40, 0.5)
+
+    def test_an_endurance_below_a_millisecond_is_one(self) -> None:
+        assert helper(announced("vehicles.helper.endurance_s=0.0001")).endurance_ms == 1
+
+    def test_an_area_smaller_than_a_centimetre_is_refused(self) -> None:
+        scenario = load_scenario(
+            "tellaro", ["area.polygon_m=[[0, 0], [0.004, 0], [0.004, 0.004]]", "area.cell_m=0.001"]
+        )
+        with pytest.raises(UserError, match="an area that has none in whole centimetres"):
+            build_fleet(scenario, record=False)
+
+    def test_what_cannot_be_announced_is_told_in_a_sentence(self) -> None:
+        angles = [math.tau * n / 700 for n in range(700)]
+        circle = [(3600 * math.cos(angle), 3600 * math.sin(angle)) for angle in angles]
+        scenario = load_scenario("tellaro", [askew(circle, 0)])
+        with pytest.raises(UserError, match=r"^scenario tellaro: RunInfo\.area: \d+ entries are more than 500$"):
+            build_fleet(scenario, record=False)

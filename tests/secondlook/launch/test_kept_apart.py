@@ -1,0 +1,88 @@
+"""Vehicles keep apart: over whole missions, with every allocator; and the figures that tell."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from one_node import received
+
+from comms.said.messages import Nav, TruthPose
+from coordinator.allocate.allocators import ALLOCATORS
+from secondlook.errors import UserError
+from secondlook.recorded.closest_approach import ClosestApproaches
+from secondlook.testing import Fleet, assert_kept_apart, assert_no_strip_lost
+
+HARD = [("five-helpers", name) for name in ALLOCATORS if name != "none"]  # the fleet that is most in its own way
+OTHERS = [("tellaro", "plan"), ("two-helpers", "nearest"), ("patchy", "auction"), ("headland", "plan")]
+
+
+def nav(name: str, t_s: float, x_m: float, y_m: float, speed_mps: float = 2.0) -> object:
+    """Where a vehicle says it is."""
+    return received(f"veh/{name}/nav", Nav(x_m, y_m, 0, speed_mps, 5, 0), sent_ms=round(t_s * 1000))
+
+
+class TestMissions:
+    @pytest.mark.parametrize(("scenario", "allocator"), HARD + OTHERS)
+    def test_no_two_come_too_close(self, tmp_path: Path, scenario: str, allocator: str) -> None:
+        fleet = Fleet(scenario, folder=tmp_path, overrides=(f"coordinator.allocator={allocator}",), seed=1)
+        flight = fleet.run()
+        assert_kept_apart(flight)
+        assert_no_strip_lost(flight)
+        told = flight.summary["separation"]
+        assert told["least_m"] == 12
+        assert told["pairs_closer"] == 0
+        assert told["closest"][0]["closest_m"] == pytest.approx(flight.closest[0].closest_m, abs=0.01)
+
+    def test_they_do_where_nobody_sees_to_it(self, tmp_path: Path) -> None:
+        fleet = Fleet("five-helpers", folder=tmp_path, overrides=("mission.separation_m=0",), seed=1)
+        flight = fleet.run()
+        assert_kept_apart(flight)
+        with pytest.raises(AssertionError, match=r"came within \d+\.\d m of each other at \d+\.\d{3} s"):
+            assert_kept_apart(flight, 12)
+        with pytest.raises(UserError, match="separation_m: nan is not allowed"):
+            assert_kept_apart(flight, math.nan)
+
+
+class TestTheFigure:
+    def test_between_two_positions(self) -> None:
+        figure = ClosestApproaches({"a": 20, "b": 20})
+        for one in [nav("a", 0, -10, 3), nav("b", 0, 10, 0), nav("a", 1, 10, 3), nav("b", 1, -10, 0)]:
+            figure.take(one)  # type: ignore[arg-type]
+        (found,) = figure.found()
+        assert found.vehicles == ("a", "b")
+        assert found.closest_m == pytest.approx(3)
+        assert found.t_s == pytest.approx(0.5)
+
+    def test_a_vehicle_counts_once_it_is_under_way(self) -> None:
+        figure = ClosestApproaches({"a": 2, "b": 2})
+        for one in [nav("a", 0, 0, 0), nav("b", 0, 1, 0, 0), nav("a", 1, 2, 0), nav("b", 1, 1, 0, 0)]:
+            figure.take(one)  # type: ignore[arg-type]
+        assert figure.found() == []
+
+    def test_true_positions_count(self) -> None:
+        figure = ClosestApproaches({"a": 2, "b": 2})
+        for t_s in (0, 1):
+            figure.take(nav("a", t_s, 0, 0))  # type: ignore[arg-type]
+            figure.take(received("world/truth/pose/a", TruthPose(7, 0, 0), sender="world", sent_ms=t_s * 1000))
+            figure.take(nav("b", t_s, 0, 0))  # type: ignore[arg-type]
+        assert figure.found()[0].closest_m == pytest.approx(7)
+
+    @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 4), min_size=20, max_size=60))
+    def test_it_is_the_least_although_not_every_pair_is_looked_at(
+        self, turns: list[tuple[float, float, float, float]]
+    ) -> None:
+        """Two vehicles that wander by up to sqrt(2) m a second, against a search in small steps."""
+        ways = np.round(np.cumsum(np.array(turns), axis=0) + np.array([0, 0, 15, 15]), 2)
+        figure = ClosestApproaches({"a": 1.43, "b": 1.43})
+        for t_s, (ax, ay, bx, by) in enumerate(ways.tolist()):
+            figure.take(nav("a", t_s, ax, ay))  # type: ignore[arg-type]
+            figure.take(nav("b", t_s, bx, by))  # type: ignore[arg-type]
+        apart = ways[:, :2] - ways[:, 2:]
+        share = np.linspace(0, 1, 101)[:, np.newaxis, np.newaxis]
+        apart_m = np.hypot(*np.moveaxis(apart[:-1] * (1 - share) + apart[1:] * share, -1, 0))
+        assert figure.found()[0].closest_m == pytest.approx(apart_m.min(), abs=0.02)

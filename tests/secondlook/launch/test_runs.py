@@ -1,0 +1,261 @@
+"""Whole runs of the command: the same mission however it is spread and whatever else the machine does, all its files,
+and nothing left behind."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import subprocess
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from flights import BRIEF, events, flight
+
+from comms.control import HostPlan
+from comms.result import BusResult
+from comms.said.codec import decode
+from comms.said.topics import topic_of
+from secondlook.fleet.build import build_fleet
+from secondlook.fleet.node_spec import NodeSpec
+from secondlook.launch import processes
+from secondlook.launch.host_plans import plan_hosts
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.processes import Processes, RunFailedError
+from secondlook.recorded.mission_files import NOT_FOR_PEOPLE, read_messages
+from secondlook.recorded.observer import Observer
+from secondlook.scenario import load_scenario, scenario_hash
+from secondlook.scenario.bundled import scenario_names
+from tests.viz.recordings import verify
+
+FILES = {"events.jsonl", "messages.mpk", "mission.rrd", "report.html", "risk.npz", "scenario.yaml", "summary.json"}
+
+
+@dataclass
+class Landed:
+    """A run that has ended."""
+
+    folder: Path
+    code: int
+    out: str
+    err: str
+    left: dict[str, int]
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        summary: dict[str, Any] = json.loads((self.folder / "summary.json").read_text())
+        return summary
+
+
+def fly(folder: Path, *arguments: str) -> Landed:
+    with flight(folder, *arguments) as flying:
+        code, out, err = flying.finish()
+        return Landed(folder, code, out, err, flying.children())
+
+
+@pytest.fixture(scope="module")
+def landed(tmp_path_factory: pytest.TempPathFactory) -> Landed:
+    """One run over Zenoh, each node in its process, which many tests look at."""
+    return fly(tmp_path_factory.mktemp("flown") / "out")
+
+
+@pytest.fixture(scope="module")
+def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The mission's digest on the local bus."""
+    folder = tmp_path_factory.mktemp("local")
+    return str(run_mission(load_scenario(str(BRIEF)), RunOptions(folder, bus="local", record=False))["digest"])
+
+
+def test_a_mission_ends_well_and_leaves_no_process(landed: Landed) -> None:
+    assert (landed.code, landed.err, landed.left) == (0, "", {})
+    assert landed.out.startswith("mission ")
+    assert "\x1b" not in landed.out + landed.err
+
+
+def test_all_files_of_a_run_are_there_and_no_other(landed: Landed) -> None:
+    assert {path.name for path in landed.folder.iterdir()} == FILES
+
+
+def test_every_message_is_kept_and_can_be_read(landed: Landed) -> None:
+    kept = Counter[str]()
+    for key, payload in read_messages(landed.folder / "messages.mpk"):
+        found = topic_of(key)
+        assert found is not None
+        decode(payload, found[0].message)
+        kept[found[0].name] += 1
+    assert kept == landed.summary["messages"]
+
+
+def test_events_are_those_messages_that_are_for_people_in_their_order(landed: Landed) -> None:
+    hidden = {topic.name for topic in NOT_FOR_PEOPLE}
+    for_people = [
+        key
+        for key, _ in read_messages(landed.folder / "messages.mpk")
+        if (topic_of(key) or ("", ""))[0] not in NOT_FOR_PEOPLE
+    ]
+    told = events(landed.folder)
+    assert [one["key"] for one in told] == for_people
+    assert len(told) == sum(count for name, count in landed.summary["messages"].items() if name not in hidden)
+    times = [one["t_s"] for one in told]
+    assert times == sorted(times)
+
+
+def test_the_risk_map_holds_the_fleet_and_each_vehicle(landed: Landed) -> None:
+    risk = np.load(landed.folder / "risk.npz")
+    summary = landed.summary
+    assert risk["risk"].shape == risk["inside"].shape == risk["primary_sum_levels"].shape
+    assert risk["helper_largest_levels"].any()
+    assert int(risk["inside"].sum()) == summary["risk"]["cells"]
+    assert float(risk["risk"][risk["inside"]].mean()) == pytest.approx(summary["risk"]["mean"])
+
+
+def test_the_scenario_as_run_is_the_scenario(landed: Landed) -> None:
+    again = load_scenario(str(landed.folder / "scenario.yaml"))
+    assert scenario_hash(again) == scenario_hash(load_scenario(str(BRIEF)))
+
+
+def test_the_recording_is_complete(landed: Landed) -> None:
+    checked = verify(landed.folder / "mission.rrd")
+    assert (checked.returncode, checked.stderr.strip()) == (0, "1 file verified without error.")
+
+
+def test_the_summary_has_all_that_is_promised(landed: Landed) -> None:
+    summary = landed.summary
+    assert (summary["scenario"], summary["seed"], summary["bus"], summary["processes"]) == ("brief", 3, "zenoh", 6)
+    assert len(summary["digest"]) == 64
+    assert summary["ending"] == "over"
+    assert summary["dropped"] == {}
+    assert summary["time"].keys() == {"mission_s", "primary_s", "wall_s", "real_time_factor"}
+    assert 0 < summary["time"]["primary_s"] <= summary["time"]["mission_s"]
+    primary, helper = summary["vehicles"]["primary"], summary["vehicles"]["helper"]
+    assert helper.keys() == {"role", "path_m", "ended_s"}
+    assert primary.keys() == {"role", "path_m", "ended_s", "tracks", "r_adpt_m", "r_eff_m"}
+    assert len(primary["r_eff_m"]) == primary["tracks"] > 0
+    for name in ("risk", "risk_primary_alone"):
+        assert summary[name].keys() == {"cells", "mean", "worst30_mean", "uncovered_share"}
+    assert summary["risk"]["mean"] < summary["risk_primary_alone"]["mean"]
+    assert [one["t_s"] for one in summary["risk_at"]] == pytest.approx(
+        [summary["time"]["primary_s"], 1.05 * summary["time"]["primary_s"]], abs=0.001
+    )
+    assert summary["truth"].keys() == {"targets", "missed_share", "predicted_missed_share"}
+    strips = summary["hotspots"]
+    assert strips["published"] == sum(strips[name] for name in ("revisited", "open", "withdrawn", "failed")) > 0
+    assert strips["revisited"] > 0
+    assert strips["first_published_s"] <= strips["first_assigned_s"]
+    latency = summary["latency_ms"]["strip_to_task"]
+    assert 0 < latency["p50"] <= latency["p99"]
+
+
+@contextmanager
+def busy_machine() -> Iterator[None]:
+    """Twice as many busy processes as there are processors here."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(4)]
+    try:
+        yield
+    finally:
+        for one in busy:
+            one.kill()
+            one.wait()
+
+
+def test_the_digest_is_the_local_buss(landed: Landed, digest: str) -> None:
+    assert landed.summary["digest"] == digest
+
+
+@pytest.mark.parametrize(("processes", "counted"), [(1, 2), (2, 3)])
+def test_the_digest_is_the_same_in_any_number_of_processes(
+    tmp_path: Path, digest: str, processes: int, counted: int
+) -> None:
+    flown = fly(tmp_path / "out", "--processes", str(processes), "--no-record")
+    assert (flown.code, flown.summary["digest"], flown.left) == (0, digest, {})
+    assert flown.summary["processes"] == counted
+    assert {path.name for path in flown.folder.iterdir()} == FILES - {"messages.mpk", "mission.rrd", "report.html"}
+
+
+def test_the_digest_is_the_same_on_a_busy_machine(tmp_path: Path, digest: str) -> None:
+    with busy_machine():
+        flown = fly(tmp_path / "out")
+    assert (flown.code, flown.summary["digest"], flown.left) == (0, digest, {})
+
+
+# Of these no more than the first strips' second looks, by this time: all of it takes long over Zenoh.
+UNTIL_S = {"wide": 900, "five-helpers": 1000, "two-helpers": 1500, "headland": 2500}
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_every_bundled_mission_has_one_digest_on_both_buses(tmp_path: Path, name: str) -> None:
+    overrides = (f"mission.time_limit_s={UNTIL_S[name]}",) if name in UNTIL_S else ()
+    summaries = []
+    for bus in ("local", "zenoh"):
+        (tmp_path / bus).mkdir()
+        with contextlib.suppress(RunFailedError) if overrides else contextlib.nullcontext():
+            run_mission(load_scenario(name, overrides, seed=11), RunOptions(tmp_path / bus, bus=bus, record=False))
+        summaries.append(json.loads((tmp_path / bus / "summary.json").read_text()))
+    assert summaries[0]["digest"] == summaries[1]["digest"]
+    assert (summaries[0]["hotspots"]["revisited"] >= 3) == (name != "paper")
+
+
+def run_with(folder: Path, recorder: NodeSpec | None) -> BusResult:
+    """A run of the brief mission with this recorder."""
+    fleet = build_fleet(load_scenario(str(BRIEF)), record=recorder is not None)
+    with Processes(fleet, folder, Observer(folder, with_messages=False), recorder, None) as started:
+        return started.run()
+
+
+def test_the_digest_is_the_same_with_a_recorder_that_cannot_keep_up(tmp_path: Path, digest: str) -> None:
+    # It needs several times the mission's wall time.
+    assert run_with(tmp_path, NodeSpec("faulty_nodes:SlowListener", 3000)).digest == digest
+
+
+@pytest.mark.parametrize("turn", range(3))
+def test_the_digest_is_the_same_in_whatever_order_processes_start(
+    tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch, turn: int
+) -> None:
+    def turned(*arguments: Any) -> tuple[list[str], tuple[HostPlan, ...]]:
+        in_hub, plans = plan_hosts(*arguments)
+        order = [*plans[turn:], *plans[:turn]]
+        return in_hub, tuple(order[::-1])
+
+    monkeypatch.setattr(processes, "plan_hosts", turned)
+    assert run_with(tmp_path, None).digest == digest
+
+
+def test_another_seed_gives_another_digest(tmp_path: Path, digest: str) -> None:
+    flown = fly(tmp_path / "out", "--bus", "local", "--seed", "4", "--no-record")
+    assert (flown.code, flown.summary["seed"]) == (0, 4)
+    assert flown.summary["digest"] != digest
+
+
+def test_the_report_is_left_out_on_request(tmp_path: Path) -> None:
+    flown = fly(tmp_path / "out", "--bus", "local", "--no-report")
+    assert (flown.code, flown.err) == (0, "")
+    assert {path.name for path in flown.folder.iterdir()} == FILES - {"report.html"}
+
+
+def test_a_run_that_fails_has_a_report_that_says_so(tmp_path: Path) -> None:
+    flown = fly(tmp_path / "out", "--bus", "local", "--set", "mission.time_limit_s=20")
+    assert flown.code == 1
+    assert flown.summary["failure"] in (flown.folder / "report.html").read_text()
+
+
+def test_json_is_the_summary_alone(tmp_path: Path) -> None:
+    flown = fly(tmp_path / "out", "--bus", "local", "--json")
+    assert (flown.code, flown.err) == (0, "")
+    assert json.loads(flown.out) == flown.summary
+    assert {path.name for path in flown.folder.iterdir()} == FILES
+
+
+@pytest.mark.parametrize("bus", ["zenoh", "local"])
+def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path, bus: str) -> None:
+    flown = fly(tmp_path / "out", "--bus", bus, "--no-record", "--set", "mission.time_limit_s=20")
+    said = "the mission is not over at its time limit, mission.time_limit_s: 20"
+    assert (flown.code, flown.out, flown.left) == (1, "", {})
+    assert flown.err == f"{said}; what was recorded is in {flown.folder}\n"
+    assert (flown.summary["ending"], flown.summary["failure"]) == ("time_limit", said)
+    assert len(flown.summary["digest"]) == 64

@@ -1,0 +1,248 @@
+"""The figures of a mission, against small streams of messages worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+from by_hand import HELPER, PRIMARY, flat, look, nav, run_info
+from hypothesis import given
+from hypothesis import strategies as st
+from one_node import received
+
+from comms.said.messages import (
+    AgentState,
+    CoverageTile,
+    Maneuver,
+    ManeuverKind,
+    Message,
+    Mode,
+    Plan,
+    PlannedTrack,
+    RunInfo,
+    StripState,
+    StripStatus,
+    TruthLook,
+    TruthTarget,
+    TruthTargets,
+)
+from secondlook.recorded.metrics import Metrics
+
+RUN = run_info(40, 20, cell_m=10)  # 5 columns at 0, 10, ... 40 m; 2 rows at 5 and 15 m
+LEVELS_OF_HALF = 35  # exp(-35 * 0.02) is 0.4966
+HALF = math.exp(-0.7)
+
+
+@dataclass
+class Stream:
+    """Figures fed with messages at given times."""
+
+    metrics: Metrics = field(default_factory=Metrics)
+    sequence: int = 0
+
+    def say(self, at_s: float, key: str, message: Message, *, incarnation: int = 0) -> None:
+        self.sequence += 1
+        self.metrics.take(
+            received(key, message, sent_ms=round(at_s * 1000), sequence=self.sequence, incarnation=incarnation)
+        )
+
+    def tile(self, at_s: float, name: str, levels: list[list[int]], version: int = 1, incarnation: int = 0) -> None:
+        cells = np.array(levels, dtype=np.uint8)
+        tile = CoverageTile(version, 0, 0, cells, cells, cells > 0)
+        self.say(at_s, f"agent/{name}/coverage/0-0", tile, incarnation=incarnation)
+
+    def state(self, at_s: float, name: str, mode: Mode) -> None:
+        self.say(at_s, f"agent/{name}/state", AgentState(mode, 0, 1, 0, 0, 0, 0))
+
+    def strip(self, at_s: float, number: int, state: StripState) -> None:
+        self.say(at_s, f"coord/strip/{number}", StripStatus(1, state, 0, 0, 0, 50, 50, 10, "", ""))
+
+
+def begun(run: RunInfo = RUN) -> Stream:
+    stream = Stream()
+    stream.say(0, "run", run)
+    return stream
+
+
+class TestPaths:
+    def test_a_path_is_the_sum_of_its_steps_for_each_vehicle(self) -> None:
+        stream = begun()
+        for place in ((0, 0), (3, 4), (3, 4), (3, 16)):
+            stream.say(1, f"veh/{PRIMARY}/nav", nav(*place))
+        stream.say(1, f"veh/{HELPER}/nav", nav(7, 7))
+        summary = stream.metrics.summary()["vehicles"]
+        assert (summary[PRIMARY]["path_m"], summary[HELPER]["path_m"]) == (17.0, 0.0)
+
+    def test_the_share_flown_counts_valid_looks_of_primaries_over_planned_tracks(self) -> None:
+        stream = begun()
+        assert stream.metrics.share_flown() == 0
+        tracks = tuple(PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 200, n == 1) for n in (1, 2))
+        stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (120,), (), ""))
+        track = Maneuver(1, ManeuverKind.FOLLOW, 10, 0, 10, 200, 20)
+        stream.say(2, f"veh/{PRIMARY}/look", look(track, 1, 0, 8, flat(0.5, 0, 50)))
+        stream.say(2, f"veh/{PRIMARY}/look", look(track, 2, 40, 20, flat(0.5, 0, 50), valid=False))
+        stream.say(2, f"veh/{HELPER}/look", look(track, 1, 0, 20, flat(0.5, 0, 25)))
+        assert stream.metrics.share_flown() == pytest.approx(40 / 400)
+
+    def test_a_primary_tells_its_tracks_and_ranges(self) -> None:
+        stream = begun()
+        tracks = tuple(PlannedTrack(n, 0, 0, 0, 0, 200, n < 3) for n in (1, 2, 3))
+        stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (138, 120), (130, 129), ""))
+        summary = stream.metrics.summary()["vehicles"]
+        assert (summary[PRIMARY]["tracks"], summary[PRIMARY]["r_adpt_m"]) == (2, [138, 120])
+        assert summary[PRIMARY]["r_eff_m"] == [130, 129]
+        assert summary[HELPER].keys() == {"role", "path_m", "ended_s"}
+        assert (summary[PRIMARY]["role"], summary[HELPER]["role"]) == ("survey", "revisit")
+
+    def test_a_primary_ends_when_it_says_so_first_others_with_their_last_state(self) -> None:
+        stream = begun()
+        stream.state(90, PRIMARY, Mode.SURVEY)
+        assert stream.metrics.primary_ms() is None
+        stream.state(100, PRIMARY, Mode.FINISHED)
+        stream.state(110, PRIMARY, Mode.FINISHED)
+        stream.state(115, HELPER, Mode.IDLE)
+        summary = stream.metrics.summary()
+        assert (summary["primary_s"], summary["vehicles"][PRIMARY]["ended_s"]) == (100, 100)
+        assert summary["vehicles"][HELPER]["ended_s"] == 115
+
+
+class TestRisk:
+    def test_layers_are_joined_and_the_primary_stands_alone_beside_them(self) -> None:
+        stream = begun()
+        stream.tile(1, PRIMARY, [[LEVELS_OF_HALF] * 4 + [0], [0] * 5])
+        stream.tile(2, HELPER, [[LEVELS_OF_HALF, 0, 0, 0, 0], [LEVELS_OF_HALF, 0, 0, 0, 0]])
+        risk, alone = stream.metrics.summary()["risk"], stream.metrics.summary()["risk_primary_alone"]
+        # Of ten cells: one seen twice, four seen once, five not at all.
+        assert (risk["cells"], risk["mean"]) == (10, pytest.approx((HALF**2 + 4 * HALF + 5) / 10))
+        assert (risk["uncovered_share"], risk["worst30_mean"]) == (pytest.approx(0.5), 1.0)
+        assert alone["mean"] == pytest.approx((4 * HALF + 6) / 10)
+        assert alone["uncovered_share"] == pytest.approx(0.6)
+
+    def test_the_newest_tile_wins_however_they_come(self) -> None:
+        stream = begun()
+        stream.tile(1, PRIMARY, [[50] * 5] * 2, version=9)
+        stream.tile(2, PRIMARY, [[10] * 5] * 2, version=8)
+        assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-1))
+        stream.tile(3, PRIMARY, [[20] * 5] * 2, version=1, incarnation=1)
+        assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-0.4))
+
+    def test_risk_at_holds_what_was_sent_until_then(self) -> None:
+        stream = begun()
+        for at_s, level in ((50, 10), (100, 20), (104, 30), (105, 40), (105.001, 50), (120, 60)):
+            stream.tile(at_s, PRIMARY, [[level] * 5] * 2, version=level)
+            if at_s == 100:
+                stream.state(100, PRIMARY, Mode.FINISHED)
+        stream.metrics.close()
+        assert stream.metrics.summary()["risk_at"] == [
+            {"t_s": 100.0, "mean": pytest.approx(math.exp(-0.4)), "worst30_mean": pytest.approx(math.exp(-0.4))},
+            {"t_s": 105.0, "mean": pytest.approx(math.exp(-0.8)), "worst30_mean": pytest.approx(math.exp(-0.8))},
+        ]
+
+    def test_times_that_were_not_reached_have_the_risk_of_the_end(self) -> None:
+        stream = begun()
+        stream.state(100, PRIMARY, Mode.FINISHED)
+        stream.tile(101, HELPER, [[10] * 5] * 2)
+        stream.metrics.close()
+        stream.metrics.close()
+        assert [(one["t_s"], one["mean"]) for one in stream.metrics.risk_at] == [
+            (100, 1.0),
+            (105, pytest.approx(math.exp(-0.2))),
+        ]
+
+    def test_without_a_primarys_end_there_are_no_such_times(self) -> None:
+        stream = begun()
+        stream.tile(1, PRIMARY, [[10] * 5] * 2)
+        stream.metrics.close()
+        assert stream.metrics.summary()["risk_at"] == []
+
+    def test_a_tile_off_the_map_is_counted_and_left_out(self) -> None:
+        stream = begun()
+        stream.tile(1, PRIMARY, [[10] * 6] * 2)
+        assert (stream.metrics.misfits, stream.metrics.summary()["risk"]["mean"]) == (1, 1.0)
+
+    def test_an_announcement_repeated_does_not_begin_anew(self) -> None:
+        stream = begun()
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        stream.say(2, "run", RUN)
+        assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-1))
+
+    def test_correlated_looks_count_as_the_run_says(self) -> None:
+        stream = begun(replace(RUN, rho=1.0))
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        stream.tile(1, HELPER, [[30] * 5] * 2)
+        assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-1))
+
+    def test_before_anything_is_known_there_are_no_figures(self) -> None:
+        metrics = Metrics()
+        metrics.close()
+        summary = metrics.summary()
+        assert (summary["risk"], summary["risk_primary_alone"], summary["risk_at"]) == (None, None, [])
+        assert summary["primary_s"] is None
+        assert summary["truth"] == {"targets": 0, "missed_share": None, "predicted_missed_share": None}
+
+
+class TestTruth:
+    @pytest.mark.parametrize("heading_deg", [0, 90, 213])
+    def test_shares_missed_in_truth_and_as_predicted(self, heading_deg: float) -> None:
+        run = run_info(40, 20, cell_m=10, heading_rad=math.radians(heading_deg))
+        stream = begun(run)
+        frame = run.grid.spec.frame
+        # Three on the cells of column 0, one of them at its edge, and two on column 3.
+        places = [frame.to_mission(u, v) for u, v in ((0, 2), (4.9, 5), (0, 19), (30, 3), (27, 12))]
+        targets = tuple(TruthTarget(float(x_m), float(y_m)) for x_m, y_m in places)
+        stream.say(0, "world/truth/targets", TruthTargets(targets))
+        stream.tile(1, PRIMARY, [[100, 0, 0, 50, 0], [100, 0, 0, 25, 0]])
+        for number, detected in ((1, (0,)), (2, (0, 2))):
+            look_truth = TruthLook(PRIMARY, number, (0, 2, 3), np.array([0.9, 0.9, 0.6]), detected)
+            stream.say(2, f"world/truth/look/{PRIMARY}", look_truth)
+        stream.say(3, f"world/truth/look/{HELPER}", TruthLook(HELPER, 1, (4, 99), np.array([0.5, 0.5]), (4, 99)))
+        truth = stream.metrics.summary()["truth"]
+        assert (truth["targets"], truth["missed_share"]) == (5, 0.4)  # numbers 1 and 3
+        expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5)) / 5
+        assert truth["predicted_missed_share"] == pytest.approx(expected)
+
+    def test_without_targets_there_are_no_shares(self) -> None:
+        stream = begun()
+        stream.say(0, "world/truth/targets", TruthTargets(()))
+        assert stream.metrics.summary()["truth"]["missed_share"] is None
+
+
+class TestStrips:
+    def test_by_hand(self) -> None:
+        stream = begun()
+        steps = [
+            (400, 1, StripState.OPEN), (401, 1, StripState.OFFERED), (402, 1, StripState.ACCEPTED),
+            (410, 2, StripState.OPEN), (420, 1, StripState.UNDER_WAY), (450, 3, StripState.OPEN),
+            (460, 3, StripState.WITHDRAWN), (500, 1, StripState.DONE), (510, 2, StripState.OFFERED),
+            (511, 2, StripState.ACCEPTED), (600, 2, StripState.FAILED), (610, 4, StripState.OPEN),
+            (620, 5, StripState.OPEN), (621, 5, StripState.OFFERED),
+        ]  # fmt: skip
+        for at_s, number, state in steps:
+            stream.strip(at_s, number, state)
+        assert stream.metrics.summary()["hotspots"] == {
+            "published": 5,
+            "revisited": 1,
+            "open": 2,
+            "withdrawn": 1,
+            "failed": 1,
+            "first_published_s": 400,
+            "first_assigned_s": 402,
+        }
+
+    def test_a_strip_under_way_was_assigned_even_if_its_acceptance_was_never_heard(self) -> None:
+        stream = begun()
+        stream.strip(400, 1, StripState.OFFERED)
+        stream.strip(430, 1, StripState.UNDER_WAY)
+        assert stream.metrics.summary()["hotspots"]["first_assigned_s"] == 430
+
+    @given(st.lists(st.tuples(st.integers(1, 6), st.sampled_from(StripState)), max_size=40))
+    def test_the_counts_add_up_to_what_was_published(self, changes: list[tuple[int, StripState]]) -> None:
+        stream = begun()
+        for at_s, (number, state) in enumerate(changes):
+            stream.strip(at_s, number, state)
+        figures = stream.metrics.summary()["hotspots"]
+        assert figures["published"] == len({number for number, _ in changes})
+        assert sum(figures[name] for name in ("revisited", "open", "withdrawn", "failed")) == figures["published"]
+        assert (figures["first_published_s"] is None) is (not changes)

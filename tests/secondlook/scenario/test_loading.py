@@ -1,0 +1,323 @@
+"""What a scenario says when it loads: defaults, overrides, numbers, and what is written out again."""
+
+import copy
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+import yaml
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from secondlook.fleet.survey_area import plan_for, track_heading_rad
+from secondlook.scenario import (
+    RevisitVehicle,
+    Scenario,
+    ScenarioError,
+    SurveyVehicle,
+    bundled_scenarios,
+    load_scenario,
+    scenario_hash,
+)
+from secondlook.scenario.bundled import curve, scenario_text
+from secondlook.scenario.dialect import dump
+from secondlook.scenario.overrides import override
+from secondlook.scenario.reader import read, read_value
+
+Write = Callable[[str | bytes], str]
+BUNDLED = [name for name, _ in bundled_scenarios()]
+MUSCLE: dict[str, Any] = curve("muscle")
+TELLARO: dict[str, Any] = read(scenario_text("tellaro"), "tellaro").data
+
+
+def problems_of(*overrides: str, seed: int | None = None) -> list[str]:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario("tellaro", overrides, seed)
+    return str(caught.value).splitlines()
+
+
+def load_text(folder: Path, text: str) -> Scenario:
+    path = folder / "some.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_scenario(path)
+
+
+def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
+    assert BUNDLED == ["five-helpers", "headland", "paper", "patchy", "tellaro", "two-helpers", "wide"]
+    for name, description in bundled_scenarios():
+        assert load_scenario(name).name == name
+        assert description
+
+
+@pytest.mark.parametrize("name", ["paper", "patchy", "tellaro"])
+def test_the_bundled_scenarios_of_at_most_one_helper_hide_no_default_from_their_reader(name: str) -> None:
+    written = yaml.safe_load(load_scenario(name).to_yaml())
+    in_file = yaml.safe_load(scenario_text(name))
+    for vehicle_id, vehicle in in_file["vehicles"].items():
+        as_written = written["vehicles"][vehicle_id]
+        # Named in the file, written out in full; and the noise is the curve's, which has it in one place.
+        for holder, out, key in (
+            (vehicle["sensor"], as_written["sensor"], "curve"),
+            (vehicle, as_written, "prior_curve"),
+        ):
+            if key in holder:
+                holder[key] = out[key]
+        for key in ("noise_cell", "noise_track"):
+            vehicle["sensor"][key] = MUSCLE[key]
+    assert in_file == written
+
+
+def test_tellaro_is_the_published_mission() -> None:
+    scenario = load_scenario("tellaro")
+    assert scenario.area.extent_m == (1212, 400)
+    (primary,) = scenario.survey_vehicles.values()
+    assert (primary.nadir_gap_m, primary.range_m, primary.threshold) == (40, 145, 0.05)
+    seen = primary.sensor.detection_curve(primary.nadir_gap_m)
+    assert seen.at(np.array([24.9, 131])).tolist() == [0, 0]
+    assert seen.range_m[np.argmax(seen.p_detect)] == 70
+    steps = np.diff(seen.p_detect)
+    assert (steps[seen.range_m[1:] <= 70] > 0).all()
+    assert (steps[seen.range_m[1:] > 70] < 0).all()
+    # Where data ends it is well above the threshold, so that no track's own error moves r_eff.
+    assert seen.at(130) > 0.06
+    (helper,) = scenario.revisit_vehicles.values()
+    flat = helper.sensor.detection_curve(helper.nadir_gap_m)
+    assert flat.at(np.array([0, 12, 25, 25.1])) == pytest.approx([0.7, 0.7, 0.7, 0])
+
+
+def test_the_headland_is_concave_has_a_hole_and_leaves_the_heading_to_us() -> None:
+    scenario = load_scenario("headland")
+    area = scenario.area
+    outline = shapely.Polygon(area.polygon_m)
+    assert outline.convex_hull.area > 1.1 * outline.area
+    assert (len(area.holes_m), area.track_heading_deg) == (1, "auto")
+    assert math.degrees(track_heading_rad(scenario)) == pytest.approx(90)
+    assert len(plan_for(scenario, "primary", math.pi / 2).parts) > 1
+
+
+def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: str) -> None:
+    scenario = load_scenario(write(valid_text))
+    assert (scenario.seed, scenario.description, scenario.area.cell_m) == (0, "", 5)
+    assert (scenario.mission.deadline_factor, scenario.seabed.kind, scenario.targets.count) == (1.05, "uniform", 200)
+    primary, helper = scenario.vehicles["primary"], scenario.vehicles["helper"]
+    assert isinstance(primary, SurveyVehicle)
+    assert (primary.spacing, primary.hotspot_risk, primary.run_in_m, primary.altitude_m) == ("adaptive", 0.55, 20, 15)
+    assert isinstance(helper, RevisitVehicle)
+    assert (helper.nadir_gap_m, helper.run_in_m, helper.altitude_m) == (0, 5, 5)
+    assert scenario.coordinator.allocator == "plan"
+
+
+def test_noise_that_a_sensor_leaves_out_is_its_curves_or_else_the_calibrated_one(write: Write, valid_text: str) -> None:
+    own = "{range_m: [20, 130], p_detect: [0.5, 0.1], noise_cell: 0.4}"
+    scenario = load_scenario(write(valid_text), [f"vehicles.primary.sensor={{curve: {own}, noise_track: 0.01}}"])
+    sensors = [vehicle.sensor for vehicle in scenario.vehicles.values()]
+    assert [(sensor.noise_cell, sensor.noise_track) for sensor in sensors] == [
+        (0.4, 0.01),
+        (MUSCLE["noise_cell"], MUSCLE["noise_track"]),
+    ]
+
+
+def test_without_a_told_range_the_prior_curve_tells_it(write: Write, valid_text: str) -> None:
+    # From 0.3 at 100 m to 0.1 at 140 m it falls by 0.005 a metre: at 0.125 it is at 135 m.
+    prior = "prior_curve: {range_m: [30, 100, 140], p_detect: [0.2, 0.3, 0.1]}\n    threshold: 0.125"
+    scenario = load_scenario(write(valid_text.replace("range_m: 145", prior)))
+    (primary,) = scenario.survey_vehicles.values()
+    assert (primary.range_m, primary.told_range_m) == (None, 135)
+    told = load_scenario(write(valid_text.replace("range_m: 145", "range_m: 145\n    prior_curve: muscle")))
+    assert told.survey_vehicles["primary"].told_range_m == 145
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1e3", 1000.0),
+        ("1E-3", 0.001),
+        ("+.5", 0.5),
+        ("5.", 5.0),
+        ("-0.0", 0.0),
+        ("010", 10),
+        ("-12", -12),
+        (".inf", float("inf")),
+        ("-.INF", float("-inf")),
+        ("true", True),
+        ("yes", "yes"),
+        ("1:30", "1:30"),
+        ("1_000", "1_000"),
+        ("0x10", "0x10"),
+        ("2020-01-01", "2020-01-01"),
+        ("'1e3'", "1e3"),
+        ("null", None),
+        ("", None),
+        ("[1, a]", [1, "a"]),
+    ],
+)
+def test_scalars_are_read_as_yaml_1_2_reads_them(text: str, value: object) -> None:
+    assert read_value(text) == value
+    assert type(read_value(text)) is type(value)
+
+
+def test_overrides_set_what_the_file_says_and_what_it_leaves_out(write: Write, valid_text: str) -> None:
+    settings = [
+        "coordinator.allocator=none",
+        "vehicles.primary.speed_mps=2",
+        "seabed={kind: patchy}",
+        "mission.rho=1e-1",
+    ]
+    scenario = load_scenario(write(valid_text), settings, seed=5)
+    assert scenario.coordinator.allocator == "none"
+    assert scenario.vehicles["primary"].speed_mps == 2
+    assert scenario.seabed.kind == "patchy"
+    assert scenario.mission.rho == 0.1
+    assert scenario.seed == 5
+
+
+def test_the_last_of_two_overrides_of_a_key_counts() -> None:
+    scenario = load_scenario(
+        "tellaro", ["targets.count=-1", "targets.count=3", "targets={count: 4}", "targets.count=5"]
+    )
+    assert scenario.targets.count == 5
+
+
+def test_overriding_leaves_the_document_as_it_was() -> None:
+    document = read("mission: {rho: 1}", "some.yaml")
+    changed = override(document, ["mission.rho=2", "mission"], seed=3)
+    assert changed.data == {"mission": {"rho": 2}, "seed": 3}
+    assert document == read("mission: {rho: 1}", "some.yaml")
+
+
+def test_a_wrong_override_is_told_with_the_option_in_place_of_the_line() -> None:
+    cases = {
+        "vehicles.primary.speed_mps=0": "vehicles.primary.speed_mps: 0 is not allowed; must be greater than 0",
+        "targets.cont=1": "targets.cont: 1 is not allowed; no such key, did you mean count?",
+        "coordinatr.allocator=none": (
+            'coordinatr: {"allocator": "none"} is not allowed; no such key, did you mean coordinator?'
+        ),
+        "vehicles.ghost.speed_mps=1": "vehicles.ghost: no such vehicle, there are primary, helper",
+        "vehicles.ghost={role: survey}": "vehicles.ghost: no such vehicle, there are primary, helper",
+        "seed.x=1": "seed: 7 is no mapping, so nothing in it can be set",
+        "seabed.kind.x=1": 'seabed.kind: "uniform" is no mapping, so nothing in it can be set',
+        "seed": "must be KEY=VALUE, KEY a dotted path such as mission.rho",
+        "=1": "must be KEY=VALUE, KEY a dotted path such as mission.rho",
+        "a..b=1": "must be KEY=VALUE, KEY a dotted path such as mission.rho",
+        "seed=": "seed: nothing is not allowed; must be a whole number",
+        "seed={a: 1, a: 2}": "a: given twice; the first is in line 1",
+        "mission={rho: 2}": "mission.rho: 2 is not allowed; must be at most 1",
+    }
+    for setting, expected in cases.items():
+        assert problems_of(setting) == [f"--set {setting}: {expected}"]
+    assert problems_of(seed=-1) == ["--seed -1: seed: -1 is not allowed; must be at least 0"]
+
+
+def test_an_override_that_is_not_yaml_is_told_with_its_column() -> None:
+    (line,) = problems_of("seed=[1")
+    assert line.startswith("--set seed=[1: column 3: not valid YAML: ")
+
+
+def test_a_file_and_an_override_that_disagree_are_told_where_the_rule_is_broken() -> None:
+    lines = [line.split("#")[0].strip() for line in scenario_text("tellaro").splitlines()]
+    number = lines.index("range_m: 145") + 1
+    assert problems_of("vehicles.primary.nadir_gap_m=60") == [
+        f"tellaro:{number}: vehicles.primary.range_m: 145 is not allowed; must be at least 3 times nadir_gap_m, 180"
+    ]
+
+
+@pytest.mark.parametrize("name", BUNDLED)
+def test_a_scenario_written_out_loads_as_the_same(name: str, tmp_path: Path) -> None:
+    scenario = load_scenario(name, ["description='1e3: yes é'"])
+    again = load_text(tmp_path, scenario.to_yaml())
+    assert again == scenario
+    assert scenario_hash(again) == scenario_hash(scenario)
+
+
+@given(st.text(alphabet=st.characters(exclude_categories=["Cs"])))
+@example("1e3")
+@example("08")
+@example("yes")
+@example(".inf")
+@example("\x85")
+def test_any_text_is_written_so_that_it_reads_back_as_that_text(text: str) -> None:
+    assert read(dump({"a": text}), "some.yaml").data == {"a": text}
+
+
+def test_the_hash_tells_scenarios_apart_and_not_their_spelling(write: Write, valid_text: str) -> None:
+    first = load_scenario(write(valid_text))
+    spelt = load_scenario(write("# comment\n" + valid_text.replace("1.5", "15e-1").replace("[[0, 0]", "[[-0.0, 0]")))
+    assert scenario_hash(first) == scenario_hash(spelt)
+    assert len(scenario_hash(first)) == 64
+    assert scenario_hash(first) != scenario_hash(load_scenario(write(valid_text), seed=1))
+
+
+WORDS = st.sampled_from(["survey", "uniform", "[key]", "role", "kind", "p_detect", "muscle", "", "\ud800"])
+SCALARS = st.one_of(st.none(), st.booleans(), st.integers(), st.floats(), WORDS, st.text(max_size=4))
+VALUES = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=4), inner))
+KEYS = st.one_of(WORDS, st.text(max_size=4))
+
+
+def paths_of(value: object) -> list[tuple[str | int, ...]]:
+    entries: list[tuple[str | int, Any]] = []
+    if isinstance(value, dict):
+        entries = list(value.items())
+    elif isinstance(value, list):
+        entries = list(enumerate(value))
+    return [path for key, inner in entries for path in [(key,), *((key, *rest) for rest in paths_of(inner))]]
+
+
+@st.composite
+def mutations(draw: st.DrawFn) -> dict[str, Any]:
+    """The mapping of tellaro with one to three entries replaced, removed or added."""
+    mutated = copy.deepcopy(TELLARO)
+    for _ in range(draw(st.integers(1, 3))):
+        path = draw(st.sampled_from(paths_of(mutated)))
+        holder: Any = mutated
+        for step in path[:-1]:
+            holder = holder[step]
+        action = draw(st.sampled_from(["replace", "remove", "add"]))
+        if action == "replace":
+            holder[path[-1]] = draw(VALUES)
+        elif action == "remove":
+            del holder[path[-1]]
+        elif isinstance(holder, dict):
+            holder[draw(KEYS)] = draw(VALUES)
+        else:
+            holder.append(draw(VALUES))
+    return mutated
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("scenarios")
+
+
+def outcome(path: Path) -> Scenario | ScenarioError:
+    try:
+        return load_scenario(path)
+    except ScenarioError as error:
+        return error
+
+
+@given(mapping=mutations())
+def test_any_mutation_loads_or_is_refused_in_lines(folder: Path, mapping: dict[str, Any]) -> None:
+    path = folder / "mutated.yaml"
+    path.write_text(dump(mapping), encoding="utf-8")
+    result = outcome(path)
+    if isinstance(result, Scenario):
+        assert load_text(folder, result.to_yaml()) == result
+        return
+    lines = str(result).splitlines()
+    assert len(lines) == len(result.problems) > 0
+    for line in lines:
+        assert re.match(rf"{re.escape(str(path))}:\d+: .+(; .+|given twice|key)", line), line
+
+
+@given(noise=st.binary(max_size=40), at=st.integers(0, len(scenario_text("tellaro"))), removed=st.integers(0, 40))
+def test_any_damage_to_a_file_loads_or_is_refused(folder: Path, noise: bytes, at: int, removed: int) -> None:
+    content = scenario_text("tellaro").encode()
+    path = folder / "damaged.yaml"
+    path.write_bytes(content[:at] + noise + content[at + removed :])
+    result = outcome(path)
+    assert isinstance(result, Scenario) or str(result).startswith(str(path))

@@ -1,0 +1,220 @@
+"""A user's own parts: found from where the command is called, checked before anything flies, used in every process."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from coordinator.allocate.allocators import ALLOCATORS
+from secondlook.scenario import load_scenario
+
+OWN = """
+import numpy as np
+from planner.spacing_planners import SpacingDecision
+from planner.types import DetectionCurve
+from sim_world.sonar import CurveSonar
+from vehicle_agent.survey import SurveyAgent
+
+class LastFirst:
+    def assign(self, situation):
+        return {helper.vehicle: one.strip.number for helper, one in zip(situation.free, reversed(situation.strips))}
+
+class Idle:
+    def assign(self, situation):
+        return {}
+
+class OldFashioned:
+    def assign(self, strips, helpers):
+        return {}
+
+class Clueless:
+    def assign(self, situation):
+        raise RuntimeError("no idea")
+
+class ToThePrimary:
+    def assign(self, situation):
+        return {"primary": situation.strips[0].strip.number}
+
+class Vague:
+    def assign(self, situation):
+        return {helper.vehicle: float("nan") for helper in situation.free}
+
+class Speechless:
+    def assign(self, situation):
+        return None
+
+class Every60:
+    def __init__(self, nadir_gap_m, told_range_m):
+        pass
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(60, tuple(np.arange(30.0, width_m, 60.0).tolist()), replans=False)
+
+class Nowhere(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(60, (float("nan"),), replans=False)
+
+class Deaf(CurveSonar):
+    def p_detect(self, range_m, look_bearing_rad, altitude_m, position_m, time_s):
+        return 0.1 * super().p_detect(range_m, look_bearing_rad, altitude_m, position_m, time_s)
+
+class HalfCharged(SurveyAgent):
+    def battery(self, now_ms):
+        return 0.5
+
+def tent():
+    return DetectionCurve(np.array([5.0, 40.0, 75.0]), np.array([0.1, 0.6, 0.1]))
+
+def not_a_curve():
+    return 7
+
+fine = "words"
+"""
+
+OURS = ", ".join(ALLOCATORS)
+
+BAY = """
+name: bay
+area: {polygon_m: [[0, 0], [300, 0], [300, 100], [0, 100]]}
+targets: {count: 20}
+vehicles:
+  primary: {role: survey, start: {x_m: -10, y_m: -10}, speed_mps: 4, turn_radius_m: 10, endurance_s: 3600, run_in_m: 5,
+            nadir_gap_m: 20, range_m: 70, sensor: {p_detect: 0.3, range_m: 60}}
+  helper: {role: revisit, start: {x_m: -5, y_m: -10}, speed_mps: 4, turn_radius_m: 5, endurance_s: 3600,
+           sensor: {p_detect: 0.7, range_m: 25}}
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A user's folder: a module of parts and a scenario."""
+    (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "bay.yaml").write_text(BAY)
+    return tmp_path
+
+
+def run(folder: Path, *settings: str, bus: str = "local") -> tuple[int, dict[str, object], str]:
+    """Exit code, summary and standard error of a mission called from the user's folder."""
+    sets = [word for setting in settings for word in ("--set", setting)]
+    code = "from secondlook.installed_command import main; main()"
+    command = [sys.executable, "-P", "-c", code, "run", "bay.yaml", "--no-record", "--json", "--bus", bus, *sets]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
+    return done.returncode, json.loads(done.stdout) if done.stdout else {}, done.stderr
+
+
+@pytest.mark.parametrize("bus", ["local", "zenoh"])
+def test_all_kinds_of_parts_together_on_either_bus(folder: Path, bus: str) -> None:
+    code, summary, error = run(
+        folder,
+        "coordinator.allocator=own:LastFirst",
+        "vehicles.primary.spacing=own:Every60",
+        "vehicles.primary.agent=own:HalfCharged",
+        "vehicles.helper.sensor.sonar=own:Deaf",
+        bus=bus,
+    )
+    assert (code, error) == (0, "")
+    assert summary["vehicles"]["primary"]["tracks"] == 5  # type: ignore[index]
+
+
+def test_a_part_changes_what_happens(folder: Path) -> None:
+    _, plain, _ = run(folder)
+    for setting in (
+        "coordinator.allocator=own:Idle",
+        "vehicles.primary.spacing=own:Every60",
+        "vehicles.primary.agent=own:HalfCharged",
+        "vehicles.helper.sensor.sonar=own:Deaf",
+    ):
+        code, changed, _ = run(folder, setting)
+        assert code == 0
+        assert changed["digest"] != plain["digest"], setting
+
+
+def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path) -> None:
+    (folder / "bay.yaml").write_text(BAY.replace("sensor: {p_detect: 0.3, range_m: 60}", 'sensor: {curve: "own:tent"}'))
+    code, _, error = run(folder)
+    assert (code, error) == (0, "")
+    (run_folder,) = (folder / "runs").iterdir()
+    sensor = load_scenario(run_folder / "scenario.yaml").vehicles["primary"].sensor
+    assert sensor.curve is not None
+    assert (sensor.curve.range_m, sensor.curve.p_detect) == ((5, 40, 75), (0.1, 0.6, 0.1))
+
+
+@pytest.mark.parametrize(
+    ("setting", "allowed"),
+    [
+        ("coordinator.allocator=own:OldFashioned", "an allocator must have assign(situation); missing a required"),
+        ("coordinator.allocator=own:Missing", "must be importable; own has no Missing"),
+        ("coordinator.allocator=nowhere:X", "must be importable; ModuleNotFoundError: No module named 'nowhere'"),
+        (
+            "coordinator.allocator=own:fine",
+            f"must be {OURS} or package.module:Class of an allocator; that is a str",
+        ),
+        (
+            "coordinator.allocator=own:tent:x",
+            f"must be {OURS} or package.module:Class of an allocator",
+        ),
+        ("vehicles.primary.spacing=own:LastFirst", "own:LastFirst must take (nadir_gap_m, told_range_m); "),
+        ("vehicles.primary.agent=own:Every60", "own:Every60 must take (config); "),
+        ("vehicles.helper.sensor.sonar=own:Every60", "own:Every60 must take (curve, seabed); "),
+    ],
+)
+def test_what_cannot_be_used_is_refused_before_anything_flies(folder: Path, setting: str, allowed: str) -> None:
+    code, _, error = run(folder, setting)
+    assert code == 2
+    key, _, value = setting.partition("=")
+    assert error.startswith(f'--set {setting}: {key}: "{value}" is not allowed; {allowed}')
+    assert error.count("\n") == 1
+    assert not (folder / "runs").exists()
+
+
+@pytest.mark.parametrize("bus", ["local", "zenoh"])
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("coordinator.allocator=own:Clueless", "coordinator has failed at "),
+        ("vehicles.primary.spacing=own:Nowhere", "primary has failed at 0.001 s: ValueError: "),
+    ],
+)
+def test_a_part_that_fails_ends_the_mission_with_one_sentence(
+    folder: Path, setting: str, sentence: str, bus: str
+) -> None:
+    code, _, error = run(folder, setting, bus=bus)
+    told = [
+        line for line in error.splitlines() if not line.startswith(("secondlook.comms:", "Traceback", " ", "Runtime"))
+    ]
+    assert code == 1
+    assert any(line.startswith(sentence) for line in told), error
+
+
+@pytest.mark.parametrize(
+    ("allocator", "sentence"),
+    [
+        (
+            "ToThePrimary",
+            "ValueError: the allocator gives strip 1 to 'primary'; must give an open strip, and each once, to",
+        ),
+        (
+            "Vague",
+            "ValueError: the allocator gives strip nan to 'helper'; must give an open strip, and each once, to a he",
+        ),
+        ("Speechless", "ValueError: the allocator must answer with a mapping from vehicle to strip number, not None"),
+    ],
+)
+def test_an_answer_that_is_none_is_told_for_what_it_is(folder: Path, allocator: str, sentence: str) -> None:
+    code, _, error = run(folder, f"coordinator.allocator=own:{allocator}")
+    assert code == 1
+    assert re.search(rf"^coordinator has failed at \d+\.\d+ s: {re.escape(sentence)}", error, re.MULTILINE), error
+
+
+@pytest.mark.parametrize("made", ["own:not_a_curve", "own:Clueless"])
+def test_what_makes_no_curve_is_refused(folder: Path, made: str) -> None:
+    (folder / "bay.yaml").write_text(
+        BAY.replace("sensor: {p_detect: 0.3, range_m: 60}", f'sensor: {{curve: "{made}"}}')
+    )
+    code, _, error = run(folder)
+    assert code == 2
+    assert f'bay.yaml:7: vehicles.primary.sensor.curve: "{made}" is not allowed; must make a DetectionCurve' in error
