@@ -27,9 +27,9 @@ from scipy.optimize import least_squares
 from bench.counted_mixture import fit_counted
 from planner.risk import residual_risk, to_levels
 from planner.types import DetectionCurve, FloatArray
+from secondlook.paper.measured import Survey, fly, scenario_of
 from secondlook.paper.published import PublishedMission, published_missions
-from secondlook.paper.survey import Survey, fly, scenario_of
-from sim_world.estimate import PDetectEstimate
+from sim_world.looks import PDetectEstimate
 
 CURVE_FILE = Path("secondlook/curves/muscle.yaml")
 KNOTS_M = np.array([25.0, 40.0, 55.0, 70.0, 85.0, 100.0, 115.0, 130.9])

@@ -35,8 +35,7 @@ from bench.clairvoyant_schedule import best_schedule
 from bench.flown_legs import FlownLegs
 from bench.legs import Schedule, Simulator
 from bench.removable import Clairvoyance, Removable
-from secondlook.compare.contenders import BASELINES, contenders
-from secondlook.compare.flight import FailedFlight, fly
+from secondlook.compare.flights import BASELINES, FailedFlight, contenders, fly
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.signals import signals_interrupt

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from planner.types import FloatArray
 from secondlook.paper.fit import MOST_STEPS, TOLERANCE, different_starts
-from secondlook.paper.mixture import Mixture
+from secondlook.paper.measured import Mixture
 
 REGULARISATION = 1e-6
 """What scikit-learn adds to each variance."""

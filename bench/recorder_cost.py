@@ -43,8 +43,8 @@ from comms.node import Received
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.node_spec import NodeSpec
 from secondlook.launch.host_plans import RECORDER
+from secondlook.launch.mission import recorder_config
 from secondlook.launch.processes import Processes
-from secondlook.launch.recorder_config import recorder_config
 from secondlook.scenario import load_scenario
 
 SLOW = "tellaro:vehicles.primary.speed_mps=0.15:vehicles.helper.speed_mps=0.2:vehicles.primary.endurance_s=360000"

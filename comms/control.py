@@ -12,7 +12,7 @@ from typing import Any
 
 from comms.lockstep.clock import Grant, Sent
 from comms.runner import SenderDigest
-from comms.said import messagepack
+from comms.said import codec as messagepack
 from comms.said.topics import KEY_ROOT
 from comms.said.wire import WireError
 

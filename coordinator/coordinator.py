@@ -27,16 +27,15 @@ from comms.said.messages import (
     TaskStatus,
 )
 from comms.said.topics import MISSION_OVER, STRIP, TASK
-from coordinator.allocate.offers import checked_offers, offers_let_through
+from coordinator.allocate.allocators import checked_offers, offers_let_through
 from coordinator.allocate.service import service
 from coordinator.allocate.situation import Helper, Situation
 from coordinator.briefing import Briefing
-from coordinator.config import CoordinatorConfig
+from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import Cut, CuttingRules, Window
 from coordinator.keep_apart.right_of_way import Order, RightOfWay, Underway
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.priorities import weights_over
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.fleet_map import FleetMap
 from planner.region import Region

@@ -1,9 +1,10 @@
-"""The area to survey: a convex polygon, the rectangle about it along the track heading, its grid and its legs."""
+"""The area to survey: a convex polygon, the rectangle about it along the track heading, its grid and its legs, which
+are flown to and fro like a lawnmower's."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -141,3 +142,34 @@ def _checked(vertices: Sequence[Point]) -> tuple[Point, ...]:
     if hull.area - polygon.area > least_m2:
         raise ValueError("an area must be convex: split a concave one into convex parts")
     return tuple(points if polygon.exterior.is_ccw else points[::-1])
+
+
+def lawnmower(
+    area: SurveyArea,
+    offsets_m: Iterable[float],
+    reach_m: float,
+    *,
+    first_number: int = 1,
+    first_reverse: bool = False,
+) -> list[Track]:
+    """The legs at the given offsets across an area, in their order and in alternating direction.
+
+    An offset from which the area is out of reach gives no leg and takes neither a number nor a change of direction.
+
+    Args:
+        area: the area to survey.
+        offsets_m: offsets across it, sweep frame, in the order of flying.
+        reach_m: half the swath's width, > 0; a leg is as long as the area within it.
+        first_number: number of the first leg.
+        first_reverse: whether the first leg is flown against the track heading.
+
+    Raises:
+        ValueError: `reach_m` is not above 0 or an offset not finite.
+    """
+    tracks: list[Track] = []
+    for across_m in offsets_m:
+        reverse = first_reverse ^ (len(tracks) % 2 == 1)
+        track = area.track(first_number + len(tracks), across_m, reverse, reach_m)
+        if track is not None:
+            tracks.append(track)
+    return tracks

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from importlib.metadata import version
 from typing import Annotated
 
@@ -12,7 +13,6 @@ from secondlook.commands.check import check
 from secondlook.commands.compare import compare
 from secondlook.commands.geojson import geojson
 from secondlook.commands.node import node_app
-from secondlook.commands.optional_value import with_number
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
@@ -21,6 +21,27 @@ from secondlook.commands.run import REAL_TIME, run
 from secondlook.commands.scenarios import scenarios
 from secondlook.commands.view import view
 from secondlook.errors import UserError
+
+
+def with_number(arguments: Sequence[str], option: str, left_out: str) -> list[str]:
+    """The arguments with `left_out` as the option's value wherever no number follows the option."""
+    completed = []
+    for place, argument in enumerate(arguments):
+        following = arguments[place + 1] if place + 1 < len(arguments) else ""
+        if argument == option and not _is_number(following):
+            completed.append(f"{option}={left_out}")
+        else:
+            completed.append(argument)
+    return completed
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
 
 WRONG_USE = 2
 """Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""

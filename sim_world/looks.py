@@ -1,4 +1,5 @@
-"""What a vehicle's sonar makes of a stretch of track: the look it publishes, and the truth behind it."""
+"""What a vehicle's sonar makes of a stretch of track: the look it publishes, with the errors of its own estimate, and
+the truth behind it."""
 
 from __future__ import annotations
 
@@ -8,12 +9,62 @@ from comms.node import random_stream
 from comms.said.messages import Look, LookContact, TruthLook
 from planner.types import FloatArray, Point
 from sim_world.config import VehicleConfig
-from sim_world.estimate import PDetectEstimate
-from sim_world.recogniser import Recogniser
 from sim_world.sonar_model import SonarModel
 from sim_world.swath import SIDES, Swath
-from sim_world.targets import Targets
+from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import Stretch
+
+LOWEST_SEEN = 1e-4
+"""The wire's step: an estimate of what was seen does not fall below it, for 0 says that nothing was seen."""
+HIGHEST = 0.999
+"""The wire refuses P_d above this."""
+QUADRATURE_POINTS = 32
+TABLE_LOGITS = np.linspace(-14.0, 14.0, 1401)
+
+
+class PDetectEstimate:
+    """Estimated P_d: `logit(estimate) = logit(truth) + shift + track error + cell error`.
+
+    Both errors are normal with mean 0: the cell's (standard deviation `noise_cell`) is drawn for every cell of every
+    look, the track's (`noise_track`) once a track. The sigmoid of a symmetric error has a mean nearer to 0.5 than the
+    truth; the shift, a function of the truth, undoes that, so that the expected estimate over both draws is the truth.
+    It is found by Gauss-Hermite quadrature and kept in a table.
+    """
+
+    def __init__(self, noise_cell: float, noise_track: float) -> None:
+        self._noise_cell = noise_cell
+        self._noise_track = noise_track
+        nodes, weights = np.polynomial.hermite_e.hermegauss(QUADRATURE_POINTS)
+        spread = TABLE_LOGITS[:, None] + np.hypot(noise_cell, noise_track) * nodes
+        means = _sigmoid(spread) @ (weights / weights.sum())
+        self._truth_logits = _logit(means)
+        self._shifts = TABLE_LOGITS - self._truth_logits
+
+    def track_error(self, generator: np.random.Generator) -> float:
+        """A track's error, logit scale."""
+        return self._noise_track * float(generator.standard_normal())
+
+    def estimate(self, p_detect: FloatArray, track_error: float, generator: np.random.Generator) -> FloatArray:
+        """Estimates for the true P_d of a look's cells, same shape.
+
+        0 where the truth is 0, else within [1e-4, 0.999]. The shape alone says how much is drawn.
+        """
+        errors = generator.standard_normal(p_detect.shape)
+        errors *= self._noise_cell
+        seen = p_detect > 0.0
+        logits = _logit(np.where(seen, p_detect, 0.5))
+        logits += np.interp(logits, self._truth_logits, self._shifts) + track_error
+        logits += errors
+        return np.where(seen, np.minimum(np.maximum(_sigmoid(logits), LOWEST_SEEN), HIGHEST), 0.0)
+
+
+def _logit(p: FloatArray) -> FloatArray:
+    return np.log(p / (1.0 - p))
+
+
+def _sigmoid(logit: FloatArray) -> FloatArray:
+    return 1.0 / (1.0 + np.exp(-logit))
+
 
 MOST_CONTACTS = 200
 """The wire's limit: of more contacts the best are kept."""

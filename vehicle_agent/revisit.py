@@ -1,11 +1,186 @@
-"""The revisit agent: takes strips from the coordinator, sweeps them with the sonar on, reports what came of it."""
+"""The revisit agent, and the work on strips of any agent that takes them: answers offers, sweeps strip by strip
+with the sonar on, reports what came of it."""
 
 from __future__ import annotations
 
-from comms.said.messages import Look, ManeuverStatus, Mode, RunInfo, Task
-from vehicle_agent.agent import Agent
+import math
+
+from comms.said.messages import (
+    Look,
+    ManeuverState,
+    ManeuverStatus,
+    Mode,
+    RunInfo,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+from comms.said.topics import TASK_STATUS
+from planner.dubins import Pose
+from planner.region import share_within
+from planner.sweep import shortest_sweep, sweeps_over
+from planner.types import Strip, Track
+from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
-from vehicle_agent.second_looks import SecondLooks
+
+SWEPT_SHARE = 0.5
+BATTERY_TOO_LOW = "the battery does not last"
+
+
+class SecondLooks:
+    """Works on one strip at a time, with the agent's vehicle; repeated words about a strip change nothing.
+
+    `rest`: the agent's mode between two strips.
+    """
+
+    def __init__(self, agent: Agent, config: RevisitConfig, rest: Mode) -> None:
+        self.config = config
+        self.strip: Strip | None = None
+        self._agent = agent
+        self._rest = rest
+        self._legs: list[Track] = []
+        self._length_m = 0.0
+        self._swept_m = 0.0
+        self._answers: dict[int, tuple[Strip, TaskState]] = {}
+        self._status_number = 0
+
+    def on_task(self, task: Task, now_ms: int, *, busy: str = "") -> None:
+        """Answers an offer, or gives a strip back. `busy`: why none can be taken now, if so."""
+        agent = self._agent
+        strip = Strip(task.strip, (task.start_x_m, task.start_y_m), task.heading_rad, task.length_m, task.width_m)
+        known, answer = self._answers.get(task.strip, (None, None))
+        if task.action is TaskAction.GIVE_BACK:
+            self._give_back(task.strip, now_ms)
+        elif task.action is TaskAction.STAND_ASIDE:
+            if self.strip is None and not busy and all(abs(place_m) <= FARTHEST_M for place_m in strip.start):
+                agent.go_to(strip.start)
+        elif self.strip is not None and self.strip.number == task.strip:
+            under_way = agent.mode is Mode.REVISIT
+            self._tell(task.strip, TaskState.UNDER_WAY if under_way else TaskState.ACCEPTED, agent.expected_end_ms)
+        elif known is not None and answer is TaskState.DONE and _is_done_with(known, strip):
+            agent.report_again(known)  # whoever offers it again does not know what was seen there
+            self._tell(task.strip, TaskState.DONE, now_ms)
+        elif busy:
+            self._tell(task.strip, TaskState.REFUSED, 0, busy)
+        else:
+            self._consider(strip, now_ms)
+
+    def on_look(self, look: Look) -> None:
+        """Counts what has been swept of the present leg."""
+        if self._agent.maneuver is not None and look.maneuver == self._agent.maneuver.number:
+            self._swept_m += look.p_detect.shape[1] * look.along_bin_m
+
+    def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
+        """Goes from leg to leg."""
+        agent = self._agent
+        if self.strip is None or not self._legs:
+            return
+        if status.state is ManeuverState.ON_TRACK:
+            if agent.mode is not Mode.REVISIT:
+                agent.mode = Mode.REVISIT
+                self._tell(self.strip.number, TaskState.UNDER_WAY, agent.expected_end_ms)
+                agent.report_state(now_ms)
+        elif status.state is ManeuverState.DONE:
+            self._legs.pop(0)
+            if self._legs:
+                agent.follow(self._legs[0], self.config.run_in_m)
+            else:
+                self._leave(TaskState.DONE, now_ms)
+        elif status.state is ManeuverState.REFUSED:
+            self._leave(TaskState.FAILED, now_ms, status.reason)
+
+    def on_over(self, now_ms: int) -> None:
+        """The mission is over: what is not done is left."""
+        if self.strip is not None:
+            self._leave(TaskState.FAILED, now_ms, "the mission is over")
+
+    def tell_progress(self) -> None:
+        """Says how far the strip under way is swept."""
+        if self.strip is not None and self._agent.mode is Mode.REVISIT:
+            self._tell(self.strip.number, TaskState.UNDER_WAY, self._agent.expected_end_ms)
+
+    def _consider(self, strip: Strip, now_ms: int) -> None:
+        agent, config = self._agent, self.config
+        if self.strip is not None:
+            self._tell(strip.number, TaskState.REFUSED, 0, f"at work on strip {self.strip.number}")
+            return
+        if agent.nav is None:
+            self._tell(strip.number, TaskState.REFUSED, 0, "no position yet")
+            return
+        if not _makes_sense(strip):
+            self._tell(strip.number, TaskState.REFUSED, 0, "that is no strip")
+            return
+        if not agent.region.meets(strip):
+            self._tell(strip.number, TaskState.REFUSED, 0, "it lies outside the area")
+            return
+        least_ms = round((strip.length_m + strip.width_m - config.swath_m) / config.speed_mps * 1000)
+        if agent.battery(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
+            self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
+            return
+        pose = Pose(agent.nav.x_m, agent.nav.y_m, agent.nav.heading_rad)
+        # A sensor that looks to the side can pass on either.
+        sides_m = (config.beside_m, -config.beside_m) if config.beside_m else (0.0,)
+        ways = [
+            sweep
+            for side_m in sides_m
+            for sweep in sweeps_over(strip, config.swath_m, config.turn_radius_m, config.run_in_m, side_m)
+        ]
+        sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
+        ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
+        if agent.battery(ends_ms) <= 0.0:
+            self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
+            return
+        self.strip = strip
+        self._legs = list(sweep.legs)
+        self._length_m = sum(leg.length_m for leg in sweep.legs)
+        self._swept_m = 0.0
+        agent.mode = Mode.TRANSIT
+        agent.works_on = strip.number
+        agent.expected_end_ms = ends_ms
+        self._tell(strip.number, TaskState.ACCEPTED, ends_ms)
+        agent.follow(sweep.legs[0], config.run_in_m)
+        agent.report_state(now_ms)
+
+    def _give_back(self, number: int, now_ms: int) -> None:
+        if self.strip is not None and self.strip.number == number:
+            self._leave(TaskState.GIVEN_BACK, now_ms)
+            self._agent.hold()
+        else:
+            self._tell(number, TaskState.GIVEN_BACK, now_ms)
+
+    def _leave(self, state: TaskState, now_ms: int, reason: str = "") -> None:
+        """Ends the work on the present strip. The tiles go out first: whoever hears of the end knows the map."""
+        assert self.strip is not None
+        agent, strip = self._agent, self.strip
+        agent.mode = self._rest
+        agent.works_on = 0
+        agent.expected_end_ms = 0
+        self.strip = None
+        self._legs = []
+        agent.report(now_ms)
+        if state is TaskState.DONE:
+            agent.report_again(strip)
+        self._answers[strip.number] = (strip, state)
+        self._tell(strip.number, state, now_ms, reason)
+
+    def _tell(self, number: int, state: TaskState, ends_ms: int, reason: str = "") -> None:
+        progress = 1.0 if state is TaskState.DONE else 0.0
+        if self.strip is not None and self.strip.number == number and self._length_m > 0:
+            progress = min(1.0, self._swept_m / self._length_m)
+        self._status_number += 1
+        key = TASK_STATUS.key(vehicle=self._agent.vehicle, number=self._status_number)
+        self._agent.publish(key, TaskStatus(number, state, progress, ends_ms, reason))
+
+
+def _is_done_with(known: Strip, strip: Strip) -> bool:
+    """Whether who has swept the one has swept at least half of the other."""
+    return _makes_sense(strip) and share_within(strip, known) >= SWEPT_SHARE
+
+
+def _makes_sense(strip: Strip) -> bool:
+    near_enough = all(abs(place_m) <= FARTHEST_M for place_m in strip.start) and math.isfinite(strip.heading_rad)
+    return near_enough and 0 < strip.length_m <= FARTHEST_M and 0 < strip.width_m <= FARTHEST_M
 
 
 class RevisitAgent(Agent):

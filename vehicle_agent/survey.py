@@ -21,10 +21,10 @@ from comms.said.messages import (
     Vertex,
 )
 from comms.said.topics import CURVE, HOTSPOT, PLAN
+from planner.area import lawnmower
 from planner.curve import RangeTally, effective_range_m
 from planner.first_plan import parts_in_order
 from planner.hotspots import HotspotMap, update_hotspots
-from planner.lawnmower import lawnmower
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.settle import Ahead, Reach, cells_within, settled_cells
 from planner.spacing_planners import SpacingDecision

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from comms.said.messages import Look, ManeuverStatus, Mode, Task
 from vehicle_agent.config import SurveyRevisitConfig
-from vehicle_agent.second_looks import SecondLooks
+from vehicle_agent.revisit import SecondLooks
 from vehicle_agent.survey import SurveyAgent
 
 

@@ -1,9 +1,10 @@
-"""The fleet's residual risk from above, drawn as it changes, and its statistics over time."""
+"""The fleet's residual risk from above, drawn as it changes in blocks of whole tiles, and its statistics over time."""
 
 from __future__ import annotations
 
 import sys
 from collections import defaultdict
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
@@ -13,13 +14,91 @@ from comms.node import Received
 from comms.said.messages import CoverageTile, RunInfo
 from planner.fleet_map import FleetMap
 from planner.region import Region
-from planner.types import BoolArray, FloatArray
+from planner.risk import RiskStatistics
+from planner.tiles import TILE_CELLS
+from planner.types import BoolArray, FloatArray, GridSpec
 from viz import palette, paths
-from viz.blocks import Block, Blocks
 from viz.canvas import Canvas
 from viz.pace import Pace
-from viz.risk_tally import RiskTally
 from viz.shapes import OUTLINE_Z_M, UNSEEN_Z_M, Extent, ring
+
+SMALLEST_CELLS = 2 * TILE_CELLS  # every drawing costs some 2 kB beside its cells
+MOST_BLOCKS = 500  # each is an entity of its own, which the viewer has to find
+
+
+@dataclass(frozen=True)
+class Block:
+    """One block: its name, its first cell and its window of the grid's arrays."""
+
+    name: str
+    first_row: int
+    first_column: int
+    window: tuple[slice, slice]
+
+
+class Blocks:
+    """All blocks of a grid, row by row; those at the far edges may be smaller.
+
+    `are_large`: whether the grid is so large that they have longer edges than the shortest.
+    """
+
+    def __init__(self, grid: GridSpec) -> None:
+        edge = SMALLEST_CELLS
+        while -(-grid.rows // edge) * -(-grid.columns // edge) > MOST_BLOCKS:
+            edge *= 2
+        self._edge = edge
+        self.are_large = edge > SMALLEST_CELLS
+        self._a_row = -(-grid.columns // edge)
+        self.all = tuple(
+            Block(
+                name=f"{row // edge}-{column // edge}",
+                first_row=row,
+                first_column=column,
+                window=(slice(row, min(row + edge, grid.rows)), slice(column, min(column + edge, grid.columns))),
+            )
+            for row in range(0, grid.rows, edge)
+            for column in range(0, grid.columns, edge)
+        )
+
+    def index_at(self, row: int, column: int) -> int:
+        """The place in `all` of the block that a cell of the grid lies in."""
+        return row // self._edge * self._a_row + column // self._edge
+
+
+STEPS = 1024  # of risk; within one the worst 30 % are cut off by its mean, so that they are right to a thousandth
+
+
+class RiskTally:
+    """Counts cells and sums their risk, per block and step of risk."""
+
+    def __init__(self, blocks: int) -> None:
+        self._cells = np.zeros((blocks, STEPS + 1), dtype=np.int32)  # the last step is that of what nobody has seen
+        self._sums = np.zeros((blocks, STEPS + 1))
+
+    def replace(self, block: int, cells: NDArray[np.intp], risk: FloatArray) -> bool:
+        """Takes how many of a block's cells have each of these risks; whether another number of them is seen now."""
+        step = (risk * STEPS).astype(np.intp)
+        before = self._cells[block, STEPS]
+        self._cells[block] = np.bincount(step, weights=cells, minlength=STEPS + 1)
+        self._sums[block] = np.bincount(step, weights=cells * risk, minlength=STEPS + 1)
+        return bool(self._cells[block, STEPS] != before)
+
+    def statistics(self) -> RiskStatistics:
+        """As `planner.risk.risk_statistics` has them. Raises ValueError where no cell counts."""
+        cells, sums = self._cells.sum(axis=0)[::-1], self._sums.sum(axis=0)[::-1]  # the worst come first
+        count = int(cells.sum())
+        if not count:
+            raise ValueError("no cell lies inside the area")
+        worst = max(1, (3 * count + 5) // 10)
+        taken = np.diff(np.minimum(np.cumsum(cells), worst), prepend=0)
+        worst_sum = float((sums * taken / np.maximum(cells, 1)).sum())
+        return RiskStatistics(
+            cells=count,
+            mean=float(sums.sum()) / count,
+            worst30_mean=worst_sum / worst,
+            uncovered_share=int(cells[0]) / count,
+        )
+
 
 SCALE_CELLS = 64
 DEPTH_SHARE = 0.001  # how far the map lies below what covers it, of the area's longer side

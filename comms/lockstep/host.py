@@ -18,8 +18,7 @@ from comms.latency import STRIP_TO_TASK, StripLatency
 from comms.lockstep.clock import Grant, Sent
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import NodeGroup
-from comms.lockstep.parcels import unpacked
-from comms.lockstep.post import publish
+from comms.lockstep.parcels import publish, unpacked
 from comms.node import Listener, Node, Received
 from comms.runner import Intake, NodeError
 from comms.said.messages import Role

@@ -28,7 +28,7 @@ from comms.lockstep.group import NodeGroup
 from comms.lockstep.kept_messages import KeptMessages
 from comms.lockstep.local_bus import ending_of
 from comms.lockstep.pacing import MOST_BEHIND_BYTES, Pacing
-from comms.lockstep.post import publish
+from comms.lockstep.parcels import publish
 from comms.node import Node
 from comms.result import BusResult
 from comms.runner import SenderDigest, Stamp, fleet_digest

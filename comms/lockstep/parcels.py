@@ -1,13 +1,17 @@
-"""What several messages of one sender look like in one, for those that only listen: a parcel costs its way as much as a
-message."""
+"""How a node's messages go out in a lockstep run over Zenoh: each to those that act, in parcels to those that only
+listen, as a parcel costs its way as much as a message."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
+import zenoh
+
+from comms.control import RunKeys
 from comms.runner import Outgoing
-from comms.said.messagepack import pack, unpack
+from comms.said.codec import pack, unpack
 from comms.said.wire import WireError
+from comms.session import put
 
 MOST_BYTES = 7900  # of a parcel, unless a single message has more: so it fits into one packet with its own key
 HEAD_BYTES = 8  # that MessagePack puts before key and payload, at the most, and before all
@@ -41,3 +45,12 @@ def unpacked(parcel: bytes) -> Iterator[tuple[str, bytes]]:
     if not ({str}.issuperset(map(type, keys)) and {bytes}.issuperset(map(type, payloads))):
         raise WireError("not a list of keys and payloads")
     return zip(keys, payloads, strict=True)
+
+
+def publish(session: zenoh.Session, keys: RunKeys, sender: str, outgoing: Sequence[Outgoing]) -> None:
+    """Sends messages of one node; they go out with the next word at the latest."""
+    for one in outgoing:
+        if one.route.readers:
+            put(session, keys.topic(one.key), one.payload, at_once=False)
+    for watchers, parcel in parcels(outgoing):
+        put(session, keys.parcel(watchers, sender), parcel, at_once=False)

@@ -17,8 +17,8 @@ from comms.result import BusResult
 from comms.runner import NodeError
 from comms.said.codec import LARGEST_INCARNATION, SCHEMA_VERSION
 from comms.said.routing import Routing
+from comms.wall.clock import MissionTime
 from comms.wall.line import Interrupted, WallLine
-from comms.wall.mission_time import MissionTime
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import Seat
 from comms.wall.words import Hello, WallKeys, pack_hello, pack_last_word, unpack_finish, unpack_time

@@ -13,8 +13,7 @@ from comms.said.codec import CLOCK
 from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN
-from comms.wall.clock import sum_up
-from comms.wall.mission_time import MissionTime
+from comms.wall.clock import MissionTime, sum_up
 from comms.wall.seats import ListenerSeat, NodeSeat
 from comms.wall.words import LastWord
 

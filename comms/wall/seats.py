@@ -1,22 +1,149 @@
-"""What sits in a process of a fleet that the wall clock drives: nodes that act, or listeners. The process's loop tells
-them messages and the time, and carries out what they want."""
+"""What sits in a process of a fleet that the wall clock drives: nodes that act, or listeners. No I/O.
+
+The process's loop tells them messages and the time, and carries out what they want. A message is handled on receipt, a
+wake-up when it is due; listeners get messages in the order of sending within a small window.
+"""
 
 from __future__ import annotations
 
+import heapq
 import time
+from collections import Counter
 from collections.abc import Iterable, Mapping
+from itertools import count
 from typing import Protocol
 
 from comms.kept_listener import KeptListener, close_all
 from comms.latency import STRIP_TO_TASK, StripLatency
-from comms.node import Listener, Node, Received
-from comms.runner import Outgoing
+from comms.node import Listener, Node, Publication, Received, Step
+from comms.runner import NodeError, Outgoing, Stamp, failure_of
 from comms.said.messages import Role
 from comms.said.routing import Routing
+from comms.said.topics import RUN
 from comms.wall.journal import Journal
-from comms.wall.nodes import WallNodes
-from comms.wall.order_window import OrderWindow
 from comms.wall.words import LastWord
+
+
+class OrderWindow:
+    """Holds each message until the mission time is `window_ms` beyond its send time. One that comes later than that is
+    passed on at once: nothing is lost, but it is out of order."""
+
+    def __init__(self, window_ms: int) -> None:
+        self._window_ms = window_ms
+        self._held: list[tuple[tuple[int, bool, str, int, int], int, Received]] = []
+        self._arrivals = count()
+
+    def add(self, received: Received) -> None:
+        """A message has arrived."""
+        heapq.heappush(self._held, (received.header.order, next(self._arrivals), received))
+
+    def due(self, now_ms: int | None) -> list[Received]:
+        """In order, those that need wait no longer at this mission time; all of them where it is None."""
+        found = []
+        while self._held and (now_ms is None or self._held[0][2].header.sent_ms + self._window_ms <= now_ms):
+            found.append(heapq.heappop(self._held)[2])
+        return found
+
+    @property
+    def due_ms(self) -> int | None:
+        """The mission time at which the next one is due."""
+        return self._held[0][2].header.sent_ms + self._window_ms if self._held else None
+
+
+class WallNode:
+    """One node. It is started when the run is announced to it; what came before that is held until then.
+
+    `wake_ms`: the wake-up it has asked for. `kept`: what it has said and keeps for others.
+    """
+
+    def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
+        self.node_id = node_id
+        self.wake_ms: int | None = None
+        self.kept = Journal()
+        self._node = node
+        self._stamp = Stamp(node_id, routing, incarnation)
+        self._held: list[Received] = []
+        self._started = False
+
+    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+        """Handles a message; returns what the node publishes. Raises NodeError."""
+        if self._started:
+            return self._act(now_ms, [received], start=False)
+        self._held.append(received)
+        if received.topic is not RUN:
+            return []
+        self._started = True
+        held = sorted(self._held, key=lambda one: one.header.order)
+        self._held.clear()
+        return self._act(now_ms, held, start=True)
+
+    def wake(self, now_ms: int) -> list[Outgoing]:
+        """Wakes the node if that is due; returns what it publishes. Raises NodeError."""
+        if not self._is_due(now_ms):
+            return []
+        published = self._act(now_ms, [], start=False)
+        if self._is_due(now_ms):
+            raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self.wake_ms} ms, which is not later")
+        return published
+
+    def _is_due(self, now_ms: int) -> bool:
+        return self.wake_ms is not None and self.wake_ms <= now_ms
+
+    def _act(self, now_ms: int, mail: list[Received], *, start: bool) -> list[Outgoing]:
+        published: list[Publication] = []
+        try:
+            if start:
+                self._note(self._node.start(now_ms), published)
+            for received in mail:
+                self._note(self._node.on_message(received, now_ms), published)
+            if not mail:
+                self._note(self._node.on_wake(now_ms), published)
+        except NodeError:
+            raise
+        except Exception as error:
+            raise failure_of(self.node_id, error, at_ms=now_ms) from error
+        return [self._send(one, now_ms) for one in published]
+
+    def _note(self, step: Step, published: list[Publication]) -> None:
+        self.wake_ms = step.wake_ms
+        published.extend(step.publish)
+
+    def _send(self, publication: Publication, now_ms: int) -> Outgoing:
+        outgoing = self._stamp(publication.key, publication.message, now_ms)
+        self.kept.add(outgoing)
+        return outgoing
+
+
+class WallNodes:
+    """All nodes of a process, keyed by node id. `said` counts their messages by topic."""
+
+    def __init__(self, nodes: Mapping[str, Node], routing: Routing, incarnation: int = 0) -> None:
+        self.incarnation = incarnation
+        self.said: Counter[str] = Counter()
+        self.nodes = {node_id: WallNode(node_id, node, routing, incarnation) for node_id, node in nodes.items()}
+        self._routing = routing
+
+    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+        """Gives a message to those here that read it; returns what they publish. Raises NodeError."""
+        route = self._routing.route(received.key)
+        readers = () if route is None else route.readers
+        return self._count(
+            [one for name in readers if name in self.nodes for one in self.nodes[name].take(received, now_ms)]
+        )
+
+    def wake(self, now_ms: int) -> list[Outgoing]:
+        """Wakes those for whom it is time; returns what they publish. Raises NodeError."""
+        return self._count([one for node in self.nodes.values() for one in node.wake(now_ms)])
+
+    @property
+    def wake_ms(self) -> int | None:
+        """When the next wake-up is due."""
+        return min((node.wake_ms for node in self.nodes.values() if node.wake_ms is not None), default=None)
+
+    def _count(self, published: list[Outgoing]) -> list[Outgoing]:
+        self.said.update(one.route.topic.name for one in published)
+        return published
+
 
 WINDOW_S = 0.5  # of wall time, within which listeners get messages in the order of their sending
 

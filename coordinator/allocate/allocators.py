@@ -1,14 +1,18 @@
-"""Our allocators, by the names that a scenario knows them by."""
+"""Our allocators, by the names that a scenario knows them by; whether an allocator's answer is one, and which of its
+offers may be made now."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from types import MappingProxyType
+from typing import Protocol
 
 from coordinator.allocate.auction import AuctionAllocator
 from coordinator.allocate.rolling import RollingPlan
 from coordinator.allocate.simple import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
-from coordinator.allocate.situation import Allocator
+from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 
 ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
     {
@@ -20,3 +24,62 @@ ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
         "none": NoAllocator,
     }
 )
+
+
+ASKED = 3
+"""An allocator is asked so often at most for offers that may be made."""
+ASKED_LATER_S = 20.0
+"""What may not be offered for long is asked for again after this time."""
+
+
+class Gate(Protocol):
+    """Tells which offers must wait."""
+
+    def begin(self) -> None:
+        """All offers are judged anew."""
+
+    def wait_s(self, helper: Helper, one: OpenStrip) -> float:
+        """How long a helper has to wait before it may set out to a strip; infinite for long."""
+
+
+def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tuple[str, int]]:
+    """An allocator's offers, sorted; raises ValueError for any that is not of an open strip to a helper that is there,
+    or for a strip that is offered twice."""
+    if not isinstance(offers, Mapping):
+        raise ValueError(f"the allocator must answer with a mapping from vehicle to strip number, not {offers!r}")
+    helpers = {helper.vehicle for helper in situation.helpers}
+    left = {one.strip.number for one in situation.strips}
+    for vehicle, number in offers.items():
+        if vehicle not in helpers or number not in left:
+            gives = f"the allocator gives strip {number!r} to {vehicle!r}"
+            raise ValueError(f"{gives}; must give an open strip, and each once, to a helper that is there")
+        left.remove(number)
+    return sorted(offers.items())
+
+
+def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -> tuple[list[tuple[str, int]], float]:
+    """The allocator's offers less those that must wait, and after how many seconds to ask again, infinite for never.
+
+    A helper that would have to wait long for its strip is not to be offered it, and the allocator is asked again. One
+    that is to give its task back need not wait.
+    """
+    strips = {one.strip.number: one for one in situation.strips}
+    again_s = math.inf
+    passed: list[tuple[str, int]] = []
+    for _ in range(ASKED):
+        gate.begin()
+        helpers = {helper.vehicle: helper for helper in situation.helpers}
+        passed, long = [], {}
+        for name, number in checked_offers(allocator.assign(situation), situation):
+            wait_s = 0.0 if helpers[name].task is not None else gate.wait_s(helpers[name], strips[number])
+            if wait_s == 0:
+                passed.append((name, number))
+            elif math.isinf(wait_s):
+                long[name] = helpers[name].refused | {number}
+            if wait_s > 0:
+                again_s = min(again_s, wait_s, ASKED_LATER_S)
+        if not long:
+            break
+        helpers_now = (replace(one, refused=long.get(one.vehicle, one.refused)) for one in situation.helpers)
+        situation = replace(situation, helpers=tuple(helpers_now))
+    return passed, again_s

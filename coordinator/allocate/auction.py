@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from coordinator.allocate.services import StripTable
+from coordinator.allocate.service import StripTable
 from coordinator.allocate.simple import SOON_S
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose

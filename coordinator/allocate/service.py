@@ -1,13 +1,17 @@
-"""How long a helper needs for a strip, the way there included, and what it removes there in time."""
+"""How long a helper needs for a strip, the way there included, and what it removes there in time: of one strip, and of
+many from many places at once."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from coordinator.allocate.situation import Helper, OpenStrip
-from planner.dubins import Pose
+from planner.dubins import Pose, path_lengths_m
 from planner.sweep import Sweep, shortest_sweep, sweeps_over
-from planner.types import Strip
+from planner.types import FloatArray, Strip
 
 
 @dataclass(frozen=True)
@@ -61,3 +65,66 @@ def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: floa
     if served.ends_s > helper.lasts_until_s:
         return 0.0
     return helper.p_detect * one.risk_m2 * served.share_by(deadline_s)
+
+
+@dataclass(frozen=True)
+class Services:
+    """Arrays of shape (n, strips), for n places: what each service removes by the deadline, 0 where it cannot be; when
+    the helper sets out; when it is free; and `leave`, shape (n, strips, 3), its pose then."""
+
+    removed_m2: FloatArray
+    leaves_s: FloatArray
+    free_s: FloatArray
+    leave: FloatArray
+
+
+class StripTable:
+    """What a helper finds at each of some strips. Strips that it is not to be offered are worth nothing to it."""
+
+    def __init__(self, strips: Sequence[OpenStrip], helper: Helper, deadline_s: float) -> None:
+        self._helper = helper
+        self._deadline_s = deadline_s
+        ways = [sweeps(one.strip, helper) for one in strips]
+        most = max(map(len, ways), default=1)
+        filled = [(*way, *[way[-1]] * (most - len(way))) for way in ways]
+        shape = (len(strips), most)
+        self._entry = np.array([one.entry for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
+        self._leave = np.array([one.leave for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
+        self._length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
+        settles_s = np.array([one.settles_s for one in strips], dtype=np.float64)
+        wake_s = settles_s - np.array([one.strip.length_m for one in strips]) / helper.speed_mps
+        follows = np.array([one.follows for way in filled for one in way], dtype=np.bool_).reshape(shape)
+        may_begin_s = np.where(follows, wake_s[:, np.newaxis], settles_s[:, np.newaxis])
+        self._may_begin_s = np.where(settles_s[:, np.newaxis] > 0, may_begin_s, -np.inf)
+        risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
+        self._removable_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
+
+    def of(self, chosen: np.ndarray[tuple[int], np.dtype[np.intp]]) -> StripTable:
+        """The table of some of the strips, by their places."""
+        table = object.__new__(StripTable)
+        table.__dict__ = {
+            name: value[chosen] if isinstance(value, np.ndarray) else value for name, value in self.__dict__.items()
+        }
+        return table
+
+    def services(self, poses: FloatArray, times_s: FloatArray) -> Services:
+        """The services of all strips, each by itself, from poses, shape (n, 3), at these times, shape (n,)."""
+        helper, (count, ways) = self._helper, self._length_m.shape
+        speed_mps, run_in_m = helper.speed_mps, helper.run_in_m
+        way_m = path_lengths_m(poses, self._entry.reshape(-1, 3), helper.turn_radius_m).reshape(len(poses), count, ways)
+        # To the micrometre: of equals the first.
+        chosen = np.round(way_m + self._length_m, 6).argmin(axis=2)[:, :, np.newaxis]
+        way_m = np.take_along_axis(way_m, chosen, axis=2)[:, :, 0]
+        strips = np.arange(count)
+        which = chosen[:, :, 0]
+        to_begin_s = (way_m + run_in_m) / speed_mps
+        begins_s = np.maximum(times_s[:, np.newaxis] + to_begin_s, self._may_begin_s[strips, which])
+        sonar_on_s = (self._length_m[strips, which] - 2 * run_in_m) / speed_mps
+        share = np.clip((self._deadline_s - begins_s) / sonar_on_s, 0.0, 1.0)
+        ends_s = begins_s + sonar_on_s
+        return Services(
+            removed_m2=np.where(ends_s <= helper.lasts_until_s, self._removable_m2 * share, 0.0),
+            leaves_s=begins_s - to_begin_s,
+            free_s=ends_s + run_in_m / speed_mps,
+            leave=self._leave[strips, which],
+        )

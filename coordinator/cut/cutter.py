@@ -1,21 +1,66 @@
 """Where a second look is worth flying to, and what is still to come: from the hotspots, the fleet's map, what helpers
-have found, and what the primaries are about to settle."""
+have found, and what the primaries are about to settle. Cut anew is only where something has changed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from comms.said.messages import Hotspot
-from coordinator.cut.badly_seen import BadlySeen, Place, Revision
-from coordinator.cut.expected_looks import ExpectedLooks
-from coordinator.cut.growth import Growth, TrackUnderWay
-from coordinator.cut.last_cut import LastCut
-from coordinator.cut.strips import Cut, CuttingRules, Window, cut_strips
+from coordinator.cut.ground import BadlySeen, ExpectedLooks, Growth, Place, Revision, TrackUnderWay
+from coordinator.cut.strips import Cut, CuttingRules, Window, cut_strips, stretches
 from coordinator.cut.worth import worth_risk
 from planner.fleet_map import FleetMap
-from planner.types import BoolArray, FloatArray
+from planner.types import BoolArray, FloatArray, GridSpec
+
+
+@dataclass
+class LastCut:
+    """Remembers one cut at a time; before the first one all has changed."""
+
+    grid: GridSpec
+    _arrays: tuple[FloatArray | BoolArray, ...] = ()
+    _rules: CuttingRules | None = None
+    _looked_at: frozenset[Window] = frozenset()
+
+    def changed_columns(
+        self,
+        risk: FloatArray,
+        open_cells: BoolArray,
+        growth: Growth,
+        rules: CuttingRules,
+        looked_at: Iterable[Window],
+    ) -> BoolArray:
+        """Columns, shape (columns,), with a cell whose risk, settling or strip is another than at the last cut, and
+        those two swaths beside; all of them where the rules are others.
+
+        `looked_at`: the windows that are a strip's, or will be; where one has gone its cells have changed. Remembers
+        the arrays and the rules.
+        """
+        arrays = (risk, open_cells, growth.risk, growth.settles_s, growth.descending)
+        if rules != self._rules:
+            self._arrays, self._rules = arrays, rules
+            return np.ones(self.grid.columns, dtype=np.bool_)
+        changed = np.zeros(self.grid.shape, dtype=np.bool_)
+        for now, before in zip(arrays, self._arrays, strict=True):
+            changed |= now != before
+        found = np.zeros(self.grid.columns, dtype=np.bool_)
+        found |= changed.any(axis=0)
+        for window in self._looked_at.difference(looked_at):
+            found[window.columns] = True
+        self._arrays = arrays
+        reach = 2 * rules.columns(self.grid)
+        columns = np.zeros_like(found)
+        for stretch in stretches(found):
+            columns[max(0, stretch.start - reach) : stretch.stop + reach] = True
+        return columns
+
+    def remember(self, looked_at: Iterable[Window]) -> None:
+        """Remembers the windows that are a strip's, or will be, after the cut."""
+        self._looked_at = frozenset(looked_at)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from coordinator.cut.growth import Growth
+from coordinator.cut.ground import Growth
 from coordinator.cut.runs import TOLERANCE, Runs
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from itertools import product
 
 from coordinator.allocate.situation import Helper, OpenStrip
-from coordinator.keep_apart.courses import STEP_S, Course
-from coordinator.keep_apart.separation import Approach, too_close
+from coordinator.keep_apart.courses import STEP_S, Approach, Course, too_close
 from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle
 from planner.sweep import Sweep

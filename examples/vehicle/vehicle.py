@@ -21,7 +21,7 @@ import zenoh
 from comms.said.codec import Header, decode, encode
 from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav
 from comms.said.wire import WireError
-from comms.wall.mission_time import MissionTime
+from comms.wall.clock import MissionTime
 
 LOOK_M = 20.0
 ALONG_BIN_M = 5.0

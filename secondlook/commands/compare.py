@@ -15,11 +15,9 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from secondlook.compare.batch import Flown, fly_all
-from secondlook.compare.contenders import Contender, contenders
+from secondlook.compare.flights import Contender, Flown, contenders, fly_all
 from secondlook.compare.standings import as_json as comparison_as_json
-from secondlook.compare.standings import failures, standings
-from secondlook.compare.table import table
+from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.signals import signals_interrupt

@@ -17,11 +17,10 @@ from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.signals import signals_interrupt
 from secondlook.paper.extra import require_extra
-from secondlook.paper.measured import MeasuredMission
+from secondlook.paper.measured import MeasuredMission, measure_all
 from secondlook.paper.published import PublishedMission, published_missions
 from secondlook.paper.report import as_json as entries_of
 from secondlook.paper.report import conclusions, differing_decisions, tables
-from secondlook.paper.side_by_side import measure_all
 
 FAILED = 1
 

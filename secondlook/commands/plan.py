@@ -10,8 +10,7 @@ from typing import Annotated
 import typer
 
 from planner.spacing import TOLERANCE_M, adapt_range, track_offsets
-from secondlook.commands.plan_output import plan_as_geojson, plan_as_json, plan_as_text
-from secondlook.commands.planned_survey import planned_surveys
+from secondlook.commands.planned_survey import plan_as_geojson, plan_as_json, plan_as_text, planned_surveys
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 

@@ -10,8 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.types import FloatArray
-from secondlook.compare.batch import Flown
-from secondlook.compare.flight import Flight, Risk
+from secondlook.compare.flights import Flight, Flown, Risk
 
 BAND_PERCENT = (10.0, 90.0)
 POINTS = 400

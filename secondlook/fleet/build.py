@@ -12,8 +12,7 @@ import shapely
 from comms.said.codec import CLOCK, SCHEMA_VERSION, Header, encode
 from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.routing import RosterNode
-from coordinator.config import CoordinatorConfig
-from coordinator.priorities import Priority
+from coordinator.config import CoordinatorConfig, Priority
 from planner.region import Region
 from planner.types import DetectionCurve, Point
 from secondlook.errors import UserError

@@ -34,7 +34,7 @@ from comms.session import ConnectionFailedError, open_client, open_hub, read_whe
 from comms.wall.host import RefusedError
 from comms.wall.seats import ListenerSeat, NodeSeat
 from secondlook.fleet.node_spec import make_nodes
-from secondlook.launch.child_order import STATUS_FD, ChildOrder, read_order
+from secondlook.launch.child_process import STATUS_FD, ChildOrder, read_order
 from secondlook.launch.wall_child import run_host, run_hub
 
 FAILED = 1  # exit codes: after a sentence for the launcher, and when the launcher is gone

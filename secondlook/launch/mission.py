@@ -10,6 +10,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
+import shapely
+
 from comms.lockstep.clock import RunawayError
 from comms.lockstep.events import NodeEvent, timeline
 from comms.lockstep.faults import NO_FAULTS, Faults
@@ -19,18 +21,38 @@ from comms.runner import NodeError
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from comms.wall.local_bus import run_local_by_wall
+from planner.types import Point
 from secondlook.errors import UserError
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.node_spec import NodeSpec, make_node, make_nodes
 from secondlook.launch.host_plans import OBSERVER, RECORDER
-from secondlook.launch.log_file import log_to_file
 from secondlook.launch.processes import Processes, RunFailedError
-from secondlook.launch.recorder_config import recorder_config
+from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
 from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
 from secondlook.recorded.summary import summarise
 from secondlook.scenario import Scenario
+from secondlook.scenario.area import priority_grounds
+from viz.recorder_config import PriorityGround, RecorderConfig
+
+
+def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = None) -> RecorderConfig:
+    """For a recording at `path`, and a live view behind `live_pipe`."""
+    area = scenario.area
+    grounds = priority_grounds(shapely.Polygon(area.polygon_m, area.holes_m), area.priorities)
+    return RecorderConfig(
+        path,
+        live_pipe=live_pipe,
+        thresholds=scenario.thresholds,
+        priorities=tuple(PriorityGround(_rings(ground), weight) for ground, weight in grounds),
+    )
+
+
+def _rings(ground: shapely.MultiPolygon) -> tuple[tuple[Point, ...], ...]:
+    rings = [ring for part in ground.geoms for ring in (part.exterior, *part.interiors)]
+    return tuple(tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
+
 
 log = logging.getLogger("secondlook.mission")
 

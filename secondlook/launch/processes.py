@@ -18,8 +18,7 @@ from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.fleet.build import Fleet
 from secondlook.fleet.node_spec import NodeSpec
-from secondlook.launch.child_order import ChildOrder
-from secondlook.launch.child_process import ChildProcess
+from secondlook.launch.child_process import ChildOrder, ChildProcess
 from secondlook.launch.host_plans import HUB, OBSERVER, RECORDER, plan_hosts
 from secondlook.launch.listening_thread import ListeningThread
 from secondlook.launch.verdict import Verdict

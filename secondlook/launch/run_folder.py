@@ -1,7 +1,11 @@
-"""Where the files of a run go."""
+"""Where the files of a run go, the launcher's own log among them."""
 
 from __future__ import annotations
 
+import contextlib
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
@@ -30,3 +34,22 @@ def run_folder(out: Path | None, name: str) -> Path:
     if taken is not None:
         raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
     return out
+
+
+@contextmanager
+def log_to_file(path: Path) -> Iterator[None]:
+    """Within it warnings and errors go to the file, which is made when there is one to write; its folder is taken away
+    again if it stays empty."""
+    path.parent.mkdir(exist_ok=True)
+    handler = logging.FileHandler(path, delay=True, encoding="utf-8")
+    handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
+    handler.setLevel(logging.WARNING)
+    root = logging.getLogger()
+    root.addHandler(handler)
+    try:
+        yield
+    finally:
+        root.removeHandler(handler)
+        handler.close()
+        with contextlib.suppress(OSError):
+            path.parent.rmdir()

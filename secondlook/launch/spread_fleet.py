@@ -29,8 +29,7 @@ from secondlook.errors import UserError
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.node_spec import NodeSpec, make_nodes
 from secondlook.launch.host_plans import OBSERVER, RECORDER
-from secondlook.launch.mission import not_over
-from secondlook.launch.recorder_config import recorder_config
+from secondlook.launch.mission import not_over, recorder_config
 from secondlook.launch.run_display import closing_table
 from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise

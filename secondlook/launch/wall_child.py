@@ -14,7 +14,7 @@ from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.seats import NodeSeat, Seat
 from comms.wall.words import WallKeys
-from secondlook.launch.child_order import ChildOrder
+from secondlook.launch.child_process import ChildOrder
 
 
 def run_hub(order: ChildOrder, nodes: Mapping[str, Node], tell: Callable[..., None]) -> BusResult:

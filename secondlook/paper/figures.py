@@ -13,10 +13,8 @@ from matplotlib.patches import Rectangle
 from planner.risk import NATS_PER_LEVEL
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner
 from planner.types import FloatArray
-from secondlook.paper.measured import MeasuredMission
-from secondlook.paper.mixture import Mixture
+from secondlook.paper.measured import MeasuredMission, Mixture, scenario_of
 from secondlook.paper.published import published_sonar
-from secondlook.paper.survey import scenario_of
 
 CONTROL, ADAPTIVE = "tab:blue", "tab:orange"
 ADAPTIVE_FIT = "tab:red"

@@ -9,7 +9,7 @@ from sklearn.mixture import GaussianMixture
 from threadpoolctl import threadpool_limits
 
 from planner.types import FloatArray
-from secondlook.paper.mixture import Mixture
+from secondlook.paper.measured import Mixture
 
 TOLERANCE = 1e-6
 """Of the log-likelihood a cell. scikit-learn's own, 1e-3, stops the fit of experiment 1 before it has settled."""

@@ -1,13 +1,16 @@
-"""A mission that was flown: its messages, and what can be told from them."""
+"""A mission that was flown, read back from the files of its run: its messages, and what can be told from them."""
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 import shapely
+import yaml
 
 from comms.node import Received
 from comms.said.codec import decode, header_of
@@ -26,17 +29,13 @@ from comms.said.messages import (
 from comms.said.topics import Topic, topic_of
 from comms.said.wire import WireError
 from secondlook.errors import UserError
-from secondlook.recorded.activities import Activity, activities
-from secondlook.recorded.hotspots import HotspotRecord, hotspots
+from secondlook.recorded.ground import PriorityRecord, RiskMap, TargetRecord, priorities, targets
 from secondlook.recorded.key_pattern import key_matcher
 from secondlook.recorded.metrics import Metrics
-from secondlook.recorded.paths import PathRecord, paths
-from secondlook.recorded.priorities import PriorityRecord, priorities
-from secondlook.recorded.risk_map import RiskMap
+from secondlook.recorded.mission_files import read_messages
 from secondlook.recorded.said import M, Said
-from secondlook.recorded.strips import StripRecord, strips
-from secondlook.recorded.targets import TargetRecord, targets
-from secondlook.recorded.tracks import TrackRecord, tracks
+from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
+from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord, activities, paths, tracks
 
 T = TypeVar("T")
 
@@ -199,3 +198,37 @@ class _Entry(NamedTuple):
 def _said(received: Received, message: M) -> Said[M]:
     header = received.header
     return Said(received.key, received.vehicle, header.sender, header.sent_ms / 1000, message)
+
+
+def load_run(run: str | os.PathLike[str]) -> RecordedMission:
+    """The mission of a run's folder, of one that failed or was cut off as far as it came.
+
+    Summary and scenario are empty mappings where their files are missing. Raises UserError, in one sentence, for what
+    is not the folder of a recorded run.
+    """
+    folder = Path(run)
+    if not folder.is_dir():
+        raise UserError(f"{folder}: there is no such folder; must be the folder of a run")
+    messages = folder / "messages.mpk"
+    if not messages.exists():
+        raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
+    return RecordedMission(
+        folder,
+        summary=_mapping(folder / "summary.json", json.loads),
+        scenario=_mapping(folder / "scenario.yaml", yaml.safe_load),
+        messages=read_messages(messages),
+    )
+
+
+def _mapping(path: Path, parse: Any) -> Mapping[str, Any]:
+    try:
+        content = parse(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    except (ValueError, yaml.YAMLError) as error:
+        raise UserError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{path}: is not a mapping; must be as the run wrote it")
+    return content

@@ -1,32 +1,47 @@
-"""The report's page: everything that is known of a mission, put into the template."""
+"""The report's page: everything that is known of a mission, put into the template, and written into the
+run's folder."""
 
 from __future__ import annotations
 
+import os
 import statistics
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
 from markupsafe import Markup
 
-from secondlook.recorded import RecordedMission, RiskMap
-from secondlook.report.fates import fate
-from secondlook.report.flown_map import are_many, flown_map, strips_on_map
-from secondlook.report.histogram import histogram
-from secondlook.report.moments import log_lines, moments
-from secondlook.report.png import data_url, indexed_png
-from secondlook.report.reproduce import command_to_reproduce
-from secondlook.report.risk_chart import risk_chart
-from secondlook.report.risk_colours import LEVELS, palette
-from secondlook.report.risk_maps import risk_map
-from secondlook.report.risk_series import risk_series
-from secondlook.report.svg import Element, markup
-from secondlook.report.timeline import timeline
+from secondlook.errors import UserError
+from secondlook.recorded import RecordedMission, RiskMap, load_run
+from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
+from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
+from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map
+from secondlook.report.words import fate, log_lines, moments
+from secondlook.scenario import load_scenario, scenario_hash
+from secondlook.scenario.bundled import scenario_names
+
+
+def command_to_reproduce(mission: RecordedMission) -> str:
+    """The command that flies the same mission: of a bundled scenario by its name, of another from scenario.yaml in the
+    run's folder; by the wall clock if it was."""
+    factor = mission.summary.get("factor")
+    return _lockstep_command(mission) + (f" --real-time {factor:g}" if factor else "")
+
+
+def _lockstep_command(mission: RecordedMission) -> str:
+    if mission.has_begun and mission.run.scenario in scenario_names():
+        run = mission.run
+        for seed, option in ((None, ""), (run.seed, f" --seed {run.seed}")):
+            if scenario_hash(load_scenario(run.scenario, seed=seed)) == run.scenario_sha256:
+                return f"secondlook run {run.scenario}{option}"
+    return "secondlook run scenario.yaml"
+
 
 WIDE_PX, NARROW_PX = 900.0, 360.0  # on a desk and on paper, and on a phone
 STRIP_ON_MAP = "on-map-"
@@ -124,3 +139,21 @@ def _template() -> jinja2.Template:
     environment.filters["share"] = lambda share: f"{100 * share:.0f} %"
     environment.filters["risk"] = lambda risk: "–" if risk != risk else f"{risk:.2f}"  # noqa: PLR0124 - NaN
     return environment.from_string(_text("template.html"))
+
+
+REPORT = "report.html"
+
+
+def write_report(run: str | os.PathLike[str]) -> Path:
+    """Writes report.html into the folder of a run, in place of one that is there; its path.
+
+    Raises UserError, in one sentence, for what is no recorded run and where the file cannot be written.
+    """
+    mission = load_run(run)
+    path = mission.folder / REPORT
+    page = report_page(mission)
+    try:
+        path.write_text(page, encoding="utf-8")
+    except OSError as error:
+        raise UserError(f"{path}: {error.strerror}; must be a file that can be written") from error
+    return path

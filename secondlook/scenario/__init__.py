@@ -9,13 +9,13 @@ from secondlook.scenario.load import bundled_scenarios, load_scenario, make_scen
 from secondlook.scenario.model import (
     Coordinator,
     Mission,
+    Origin,
     PatchySeabed,
     Scenario,
     Targets,
     UniformSeabed,
     scenario_hash,
 )
-from secondlook.scenario.origin import Origin
 from secondlook.scenario.sensor import Curve, Sensor
 from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle, body_of
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from functools import cache
 from importlib.resources import files
 
-from secondlook.scenario.dialect import Value
-from secondlook.scenario.reader import read
+from secondlook.scenario.text import Value, read
 
 _PACKAGE = files("secondlook")
 

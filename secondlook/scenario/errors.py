@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from secondlook.errors import UserError
 
-Path = tuple[str | int, ...]
+KeyPath = tuple[str | int, ...]
 """Where a value lies in a scenario: keys, and places in lists counted from 0."""
 
 _LONGEST_VALUE = 60
@@ -45,7 +45,7 @@ class ScenarioError(UserError):
         super().__init__("\n".join(map(str, self.problems)))
 
 
-def dotted(path: Path) -> str:
+def dotted(path: KeyPath) -> str:
     """A path as the user writes it: `area.polygon_m[2]`."""
     text = "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
     return text.removeprefix(".")

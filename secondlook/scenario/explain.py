@@ -9,9 +9,9 @@ from typing import Any
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
-from secondlook.scenario.dialect import Value
-from secondlook.scenario.errors import Path, Place, Problem, dotted, shown
+from secondlook.scenario.errors import KeyPath, Place, Problem, dotted, shown
 from secondlook.scenario.model import PatchySeabed, UniformSeabed
+from secondlook.scenario.text import Value
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle
 
 # Pydantic puts the chosen member of a union into the location of an error, and this where a key itself is wrong.
@@ -54,7 +54,7 @@ _ALLOWED = {
 def explain(
     errors: Iterable[ErrorDetails],
     data: dict[str, Value],
-    places: Mapping[Path, Place],
+    places: Mapping[KeyPath, Place],
     classes: Mapping[int, type[BaseModel]],
 ) -> list[Problem]:
     """One problem for each error.
@@ -70,7 +70,7 @@ def explain(
     return [problem for problem in problems if problem]
 
 
-def place_of(path: Path, places: Mapping[Path, Place]) -> Place:
+def place_of(path: KeyPath, places: Mapping[KeyPath, Place]) -> Place:
     """Where a value stands, or else the nearest mapping or list around it."""
     while path not in places:
         path = path[:-1]
@@ -84,7 +84,7 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
 
 
 def _problem(
-    error: ErrorDetails, data: dict[str, Value], places: Mapping[Path, Place], classes: Mapping[int, type[BaseModel]]
+    error: ErrorDetails, data: dict[str, Value], places: Mapping[KeyPath, Place], classes: Mapping[int, type[BaseModel]]
 ) -> Problem | None:
     kind, context = error["type"], error.get("ctx", {})
     path, holder, value = _locate(error["loc"], data)
@@ -110,9 +110,9 @@ def _problem(
     return Problem(place_of(path, places), f"{dotted(path)}: {text} is not allowed; {what}")
 
 
-def _locate(location: Iterable[str | int], data: dict[str, Value]) -> tuple[Path, Any, Any]:
+def _locate(location: Iterable[str | int], data: dict[str, Value]) -> tuple[KeyPath, Any, Any]:
     """The path in the user's data, the mapping or list that holds the value, and the value (None where missing)."""
-    path: Path = ()
+    path: KeyPath = ()
     holder: Any = None
     value: Any = data
     for step in location:

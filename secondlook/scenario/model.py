@@ -9,11 +9,21 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from secondlook.scenario.area import Area
-from secondlook.scenario.dialect import dump
-from secondlook.scenario.origin import Origin
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
+from secondlook.scenario.text import dump
 from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
+
+# Beyond, a metre of easting is more degrees than a map can show.
+Latitude = Annotated[float, Field(ge=-89, le=89)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
+
+
+class Origin(Mapping):
+    """The mission frame's origin, WGS84: x points east there, y north."""
+
+    latitude_deg: Latitude
+    longitude_deg: Longitude
 
 
 class Mission(Mapping):

@@ -10,8 +10,8 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from planner.types import DetectionCurve
 from secondlook.scenario import bundled
-from secondlook.scenario.dialect import Value
 from secondlook.scenario.plug_ins import CURVE, SONAR, PartError
+from secondlook.scenario.text import Value
 from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, part, refused
 
 

@@ -4,7 +4,7 @@ The fixtures come with the pytest plugin, `secondlook.pytest_plugin`.
 """
 # ruff: noqa: E402 - a file of the user's may lie in a room's way: that is told before anything of a room is imported
 
-from secondlook.rooms import check_rooms
+from secondlook.installed_command import check_rooms
 
 check_rooms()
 
@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
-from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError
-from secondlook.testing.flight import Flight
-from secondlook.testing.heard import Heard
+from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError, scenario_from
+from secondlook.testing.flight import Flight, Heard
 from secondlook.testing.map_assertions import assert_maps_converged, assert_risk_at_most
 from secondlook.testing.mission_assertions import (
     assert_all_finished,
@@ -22,7 +21,6 @@ from secondlook.testing.mission_assertions import (
     assert_no_message_dropped,
     assert_repeats,
 )
-from secondlook.testing.sources import scenario_from
 from secondlook.testing.strip_assertions import (
     assert_never_assigned_to_lost,
     assert_no_strip_lost,

@@ -1,24 +1,88 @@
-"""A mission that was flown, to its end or so far: what was said, the figures, the risk map."""
+"""A mission that was flown in a test: all that was heard of it, what reached each node, and what came of it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
-from comms.lockstep.events import NodeEvent
+from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
+from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, NodeEvent, absent_at_start
 from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.lockstep.kept_messages import KeptMessages
 from comms.node import Received
+from comms.runner import Intake
 from comms.said.messages import RunInfo
 from comms.said.routing import Routing
+from comms.said.topics import MISSION_OVER
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray
 from secondlook.launch.mission import Bus
 from secondlook.recorded.closest_approach import Closest
 from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import Scenario
-from secondlook.testing.heard import Heard
+from secondlook.testing.patterns import key_pattern
+
+
+class Heard(Sequence[Received]):
+    """All messages so far. Each has its `key`, its typed `message` and its `header`: who sent it, and when.
+
+    Asking again and again for the same pattern while the mission goes on looks at each message once.
+    """
+
+    def __init__(self, vehicles: tuple[str, ...], messages: Iterable[Received] = ()) -> None:
+        self._vehicles = vehicles
+        self._all: list[Received] = []
+        self._found: dict[str, tuple[list[Received], int]] = {}
+        for one in messages:
+            self.take(one)
+
+    def take(self, received: Received) -> None:
+        """Takes one more message."""
+        self._all.append(received)
+
+    def messages(self, keys: str = "*") -> list[Received]:
+        """The messages whose keys are like a pattern, `agent/*/hotspot/*` say; UserError where none ever can be."""
+        if keys == "*":
+            return list(self._all)
+        return list(self._like(keys))
+
+    def last(self, keys: str = "*") -> Received | None:
+        """The newest message whose key is like a pattern, None if there is none yet."""
+        found = self._all if keys == "*" else self._like(keys)
+        return found[-1] if found else None
+
+    @property
+    def now_ms(self) -> int:
+        """When the newest message was sent, simulated milliseconds; 0 before the first."""
+        return self._all[-1].header.sent_ms if self._all else 0
+
+    @property
+    def now_s(self) -> float:
+        """The same in seconds."""
+        return self.now_ms / 1000
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    @overload
+    def __getitem__(self, place: int) -> Received: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[Received]: ...
+    def __getitem__(self, place: int | slice) -> Received | list[Received]:
+        return self._all[place]
+
+    def __iter__(self) -> Iterator[Received]:
+        return iter(self._all)
+
+    def _like(self, keys: str) -> list[Received]:
+        found, looked_at = self._found.get(keys, ([], 0))
+        pattern = key_pattern(keys, self._vehicles)
+        found.extend(one for one in self._all[looked_at:] if pattern.match(one.key))
+        self._found[keys] = found, len(self._all)
+        return found
 
 
 @dataclass(frozen=True)
@@ -81,3 +145,77 @@ class Flight:
         for one in self.heard:
             figures.take(one)
         return figures
+
+
+@dataclass(frozen=True)
+class Life:
+    """One start of a node: there from `start_ms` up to, but not at, `end_ms`; `killed`: that is because it was."""
+
+    incarnation: int
+    start_ms: int
+    end_ms: int
+    killed: bool
+
+
+def lives(flight: Flight, node_id: str) -> list[Life]:
+    """The starts of a node in their order; none for one that is absent to the end."""
+    found: list[Life] = []
+    beyond_ms = _end_ms(flight) + 1
+    events = sorted((one for one in flight.events if one.node_id == node_id), key=lambda one: one.at_ms)
+    starts_ms = [] if node_id in absent_at_start(events) else [0]
+    starts_ms += [one.at_ms for one in events if isinstance(one, Join)]
+    ends_ms = [one.at_ms for one in events if isinstance(one, Kill)]
+    for incarnation, start_ms in enumerate(starts_ms):
+        killed = incarnation < len(ends_ms) and ends_ms[incarnation] < beyond_ms
+        if start_ms < beyond_ms:
+            found.append(Life(incarnation, start_ms, ends_ms[incarnation] if killed else beyond_ms, killed))
+    return found
+
+
+def _end_ms(flight: Flight) -> int:
+    """Until when messages are delivered: after the mission's end that of the last words, too."""
+    overs_ms = [one.header.sent_ms for one in flight.heard if one.topic is MISSION_OVER]
+    now_ms = flight.heard.now_ms
+    return min(now_ms + WRAP_UP_MS, overs_ms[0] + LATE_WORDS_MS) if overs_ms else now_ms
+
+
+def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Received]]:
+    """The messages that a node was given in one of its lives, each with the time in milliseconds, in that order."""
+    if flight.routing.nodes[node_id].listens_only:  # no trouble strikes what it hears
+        return [(one.header.sent_ms, one) for one in flight.heard]
+    intake, kept = Intake(flight.routing), KeptMessages(node_id, flight.routing)
+    found: list[tuple[int, Received]] = []
+    for one in flight.heard:
+        route = flight.routing.route(one.key)
+        if route is None or node_id not in route.readers:
+            continue
+        sent_ms = one.header.sent_ms
+        if sent_ms < life.start_ms:
+            kept.take(one.key, one.payload)
+            continue
+        for delivery in flight.faults.deliveries(node_id, one, flight.routing):
+            opened = one if delivery.payload is one.payload else intake.open(one.key, delivery.payload)
+            if opened is not None:
+                found.append((sent_ms + one.topic.delay_ms + delivery.later_ms, opened))
+    for key, payload in kept.messages():
+        opened = intake.open(key, payload)
+        if opened is not None:
+            found.append((life.start_ms + JOINER_DELAY_MS, opened))
+    for event in flight.events:
+        if isinstance(event, Freeze) and event.node_id == node_id:
+            found = [
+                (event.until_ms if event.at_ms <= due_ms < event.until_ms else due_ms, one) for due_ms, one in found
+            ]
+    return sorted((one for one in found if one[0] < life.end_ms), key=lambda one: (one[0], one[1].header.order))
+
+
+_MOST_TOLD = 10
+
+
+def fail_if(problems: Sequence[str], what: str) -> None:
+    """Raises AssertionError if there is a problem."""
+    __tracebackhide__ = True
+    if problems:
+        shown = [f"  {one}" for one in problems[:_MOST_TOLD]]
+        more = [f"  and {len(problems) - _MOST_TOLD} more"] if len(problems) > _MOST_TOLD else []
+        raise AssertionError("\n".join([f"{what}:", *shown, *more]))

@@ -11,9 +11,7 @@ from comms.node import Received
 from comms.said.messages import AgentState, CoverageTile, Look, MissionOver
 from planner.fleet_map import FleetMap, VehicleLayer
 from secondlook.errors import UserError
-from secondlook.testing.fail import fail_if
-from secondlook.testing.flight import Flight
-from secondlook.testing.reached import lives, reached
+from secondlook.testing.flight import Flight, fail_if, lives, reached
 from vehicle_agent.coverage import CoverageLayer
 
 

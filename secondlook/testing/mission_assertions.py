@@ -9,10 +9,8 @@ from comms.lockstep.group import LOST
 from comms.said.messages import AgentState, MissionOver, Mode
 from secondlook.errors import UserError
 from secondlook.launch.mission import Bus
-from secondlook.testing.fail import fail_if
 from secondlook.testing.fleet import Fleet, first_difference
-from secondlook.testing.flight import Flight
-from secondlook.testing.reached import lives
+from secondlook.testing.flight import Flight, fail_if, lives
 
 
 def assert_all_finished(flight: Flight) -> None:

@@ -22,9 +22,7 @@ from comms.said.messages import (
 )
 from coordinator.coordinator import ANSWER_WITHIN_MS, NUMBERS_A_SECOND
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
-from secondlook.testing.fail import fail_if
-from secondlook.testing.flight import Flight
-from secondlook.testing.reached import lives, reached
+from secondlook.testing.flight import Flight, fail_if, lives, reached
 
 M = TypeVar("M", bound=Message)
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)

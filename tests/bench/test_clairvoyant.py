@@ -32,10 +32,9 @@ from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 from sim_world.looks import Looks
-from sim_world.recogniser import Recogniser
 from sim_world.seabed import make_seabed
 from sim_world.sonar import CurveSonar
-from sim_world.targets import Targets
+from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import Stretch
 from vehicle_agent.coverage import CoverageLayer
 

@@ -17,7 +17,7 @@ from comms.said.messages import Role
 from comms.said.routing import Routing
 from comms.said.topics import NAV, STATE, TOPICS, Topic
 from comms.said.wire import LARGEST_MS
-from secondlook.testing.checks.any_message import any_message
+from secondlook.testing.checks.any_mail import any_message
 
 GOOD = encode(Header("world", 0, 0, 1000), nav(2.0))
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.priorities import Priority, weights_over
+from coordinator.config import Priority, weights_over
 from planner.types import GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 10, 4, 6)  # 40 m across, 60 m along; cell centres 0, 10, 20, 30 and 5 to 55

@@ -12,9 +12,8 @@ from regions import regions
 
 from planner import convex_parts as cutting
 from planner.convex_parts import SHALLOW_M, convex_parts
-from planner.first_plan import best_heading, first_plan, parts_in_order
+from planner.first_plan import best_heading, first_plan, in_order, parts_in_order
 from planner.footprint import LookGeometry, look_on_grid
-from planner.part_order import in_order
 from planner.region import Region
 from planner.seen import seen_cells
 from planner.spacing import adapt_range, track_count, track_offsets

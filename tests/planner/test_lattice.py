@@ -7,7 +7,7 @@ import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.lattice import points_inside
+from planner.region import points_inside
 
 COLUMNS, ROWS = np.arange(12.0), np.arange(9.0)
 HALVES = st.integers(-4, 26).map(lambda half: half / 2)

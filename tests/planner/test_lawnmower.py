@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.area import SurveyArea
-from planner.lawnmower import lawnmower
+from planner.area import SurveyArea, lawnmower
 from planner.spacing import track_offsets
 
 AREA = SurveyArea(((0, 0), (1212, 0), (1212, 400), (0, 400)), 0)

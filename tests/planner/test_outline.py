@@ -6,7 +6,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.outline import outline
+from planner.hotspots import outline
 from planner.types import BoolArray
 
 

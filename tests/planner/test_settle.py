@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.area import SurveyArea
+from planner.area import SurveyArea, lawnmower
 from planner.footprint import LookGeometry, look_on_grid
-from planner.lawnmower import lawnmower
 from planner.settle import Ahead, Reach, cells_within, settled_cells
 from planner.spacing import track_offsets
 from planner.types import BoolArray, GridSpec, SweepFrame, Track

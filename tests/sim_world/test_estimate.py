@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_world.estimate import HIGHEST, LOWEST_SEEN, PDetectEstimate
+from sim_world.looks import HIGHEST, LOWEST_SEEN, PDetectEstimate
 
 TRUTHS = (0.05, 0.3, 0.49, 0.7, 0.9)
 

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from planner.types import DetectionCurve
 from sim_world.area import uniform_points
-from sim_world.recogniser import Recogniser
 from sim_world.swath import Swath
-from sim_world.targets import Passed, Targets
+from sim_world.targets import Passed, Recogniser, Targets
 
 AREA = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0))
 CURVE = DetectionCurve(np.array([0.0, 20.0, 30.0, 70.0, 130.0, 140.0]), np.array([0.0, 0.0, 0.2, 0.5, 0.1, 0.0]))

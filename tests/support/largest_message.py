@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from comms.said.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, Header
 from comms.said.messages import Message
 from comms.said.wire import IDENTIFIER, LARGEST_MS, Flag, Mask, Packed, Scaled, Whole, Words
-from secondlook.testing.checks.any_message import bounded_tuple, kind_of
+from secondlook.testing.checks.any_mail import bounded_tuple, kind_of
 
 MESSAGE_TYPES: tuple[type[Any], ...] = get_args(Message)
 

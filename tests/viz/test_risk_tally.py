@@ -10,8 +10,7 @@ from hypothesis.extra.numpy import arrays
 
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
-from viz.blocks import MOST_BLOCKS, Blocks
-from viz.risk_tally import RiskTally
+from viz.risk_map import MOST_BLOCKS, Blocks, RiskTally
 
 LEVELS = st.integers(0, 255)
 

@@ -1,9 +1,8 @@
 """Conformance checks for parts of a user's own: what each kind has to keep to, tried on many examples."""
 
 from secondlook.testing.checks.allocator import check_allocator
-from secondlook.testing.checks.curve import check_detection_curve
 from secondlook.testing.checks.node import check_node
-from secondlook.testing.checks.sonar import check_sonar_model
+from secondlook.testing.checks.sonar import check_detection_curve, check_sonar_model
 from secondlook.testing.checks.spacing import check_spacing_planner
 
 __all__ = [

@@ -20,7 +20,7 @@ from secondlook.launch.watchdog import WatchedNode
 from secondlook.scenario.plug_ins import NODE
 from secondlook.testing.checks.any_mail import Letter, about_last, letters
 from secondlook.testing.checks.examples import PATIENCE_S, Checked
-from secondlook.testing.sources import ScenarioSource, scenario_from
+from secondlook.testing.fleet import ScenarioSource, scenario_from
 
 EXAMPLES = 40
 _LETTERS = 25

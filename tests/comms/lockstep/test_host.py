@@ -18,7 +18,7 @@ from flights import until
 from comms.control import HostPlan, pack, pack_grants, unpack, unpack_answers
 from comms.lockstep.clock import Grant
 from comms.lockstep.host import ListenerHost, serve_nodes
-from comms.lockstep.post import publish
+from comms.lockstep.parcels import publish
 from comms.runner import Outgoing, Stamp
 from comms.said.messages import Look, Message, Role, TruthPose
 from comms.said.routing import RosterNode, Routing
@@ -193,7 +193,7 @@ def test_a_listener_hears_what_it_shares_with_others_and_what_it_does_not(hub: H
 
 def test_what_only_listeners_read_goes_out_in_a_parcel_alone(monkeypatch: pytest.MonkeyPatch, hub: HubByHand) -> None:
     keys: list[str] = []
-    monkeypatch.setattr("comms.lockstep.post.put", lambda session, key, payload, at_once: keys.append(key))
+    monkeypatch.setattr("comms.lockstep.parcels.put", lambda session, key, payload, at_once: keys.append(key))
     stamp = Stamp("world", WATCHED)
     pose = stamp(TRUTH_POSE.key(vehicle="alpha"), TruthPose(0, 0, 0), 0)
     publish(hub.session, KEYS, "world", [pose, stamp(NAV.key(vehicle="alpha"), nav(), 0)])

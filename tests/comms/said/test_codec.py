@@ -32,7 +32,7 @@ from comms.said.topics import TASK, TOPICS, Topic
 from comms.said.wire import LARGEST_MS, MISFITS, Scaled, WireError, record_of
 from comms.session import LARGEST_MESSAGE_BYTES
 from planner.tiles import TILE_CELLS
-from secondlook.testing.checks.any_message import any_message, kind_of
+from secondlook.testing.checks.any_mail import any_message, kind_of
 
 HEADER = Header("alpha", 0, 3, 4500)
 NAV = Nav(1.0, -2.5, 0.5, 1.5, 15.0, 0.0)

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.wall.mission_time import SIGNALS_KEPT, MissionTime
+from comms.wall.clock import SIGNALS_KEPT, MissionTime
 
 
 def test_it_runs_by_the_factor_from_what_a_signal_tells() -> None:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from comms.node import Received
 from comms.said.codec import Header
 from comms.said.topics import STATE
-from comms.wall.order_window import OrderWindow
+from comms.wall.seats import OrderWindow
 
 WINDOW_MS = 50
 

@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.allocate.service import removed_m2, service
-from coordinator.allocate.services import StripTable
+from coordinator.allocate.service import StripTable, removed_m2, service
 from coordinator.allocate.situation import Situation
 from planner.dubins import Pose
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from coordinator.cut.expected_looks import LEAST_SHARE, ExpectedLooks
+from coordinator.cut.ground import LEAST_SHARE, ExpectedLooks
 from coordinator.cut.strips import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 

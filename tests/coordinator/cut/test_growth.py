@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from comms.said.messages import PlannedTrack
-from coordinator.cut.growth import REPORTED_WITHIN_S, Growth, TrackUnderWay
+from coordinator.cut.ground import REPORTED_WITHIN_S, Growth, TrackUnderWay
 from coordinator.cut.strips import CuttingRules, Window, cut_strips, strip_of
 from planner.fleet_map import VehicleLayer
 from planner.types import BoolArray, GridSpec, SweepFrame

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.cut.growth import Growth
-from coordinator.cut.last_cut import LastCut
+from coordinator.cut.cutter import LastCut
+from coordinator.cut.ground import Growth
 from coordinator.cut.strips import CuttingRules, Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 

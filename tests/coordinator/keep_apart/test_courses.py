@@ -15,8 +15,7 @@ from situations import helper, strip
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
 from coordinator.allocate.service import service, sweeps
 from coordinator.allocate.situation import OpenStrip
-from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course
-from coordinator.keep_apart.separation import too_close
+from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close
 from planner.dubins import Pose
 from planner.sweep import shortest_sweep
 

@@ -10,11 +10,11 @@ from by_hand import vehicle
 from situations import helper, open_strip, situation, strip
 
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
-from coordinator.allocate.offers import ASKED_LATER_S, offers_let_through
+from coordinator.allocate.allocators import ASKED_LATER_S, offers_let_through
 from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip
+from coordinator.keep_apart.courses import too_close
 from coordinator.keep_apart.right_of_way import RightOfWay, Underway
-from coordinator.keep_apart.separation import too_close
 from coordinator.vehicles import KnownVehicle
 from planner.types import Strip
 

@@ -18,12 +18,9 @@ import pytest
 from flights import BRIEF, until
 
 from secondlook import cli
-from secondlook.compare.batch import Flown
-from secondlook.compare.contenders import contenders, equal_vehicle_seconds
-from secondlook.compare.flight import FailedFlight, Flight, Risk, fly
+from secondlook.compare.flights import FailedFlight, Flight, Flown, Risk, contenders, equal_vehicle_seconds, fly
 from secondlook.compare.plot import _lines
-from secondlook.compare.standings import failures, standings
-from secondlook.compare.table import table
+from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario

@@ -16,8 +16,7 @@ from flights import BRIEF, Flight, events, flight, has_ended, until
 from comms.said.codec import decode
 from comms.said.messages import ClockMode, RunInfo
 from comms.said.topics import topic_of
-from secondlook.cli import main
-from secondlook.commands.optional_value import with_number
+from secondlook.cli import main, with_number
 from secondlook.recorded.mission_files import read_messages
 
 # Half as long again after the primary's end, so that the helper has time for its strips however slow the machine is.

@@ -7,7 +7,7 @@ from pathlib import Path
 import shapely
 from flights import BRIEF
 
-from secondlook.launch.recorder_config import recorder_config
+from secondlook.launch.mission import recorder_config
 from secondlook.scenario import load_scenario
 from secondlook.scenario.area import priority_grounds
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from secondlook.launch.status_lines import CHUNK_BYTES, StatusLines
+from secondlook.launch.child_process import CHUNK_BYTES, StatusLines
 
 
 @pytest.fixture

@@ -22,12 +22,9 @@ from secondlook.commands.paper import seed_of
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.figures import draw_all
 from secondlook.paper.fit import fit_mixture
-from secondlook.paper.measured import MeasuredMission
-from secondlook.paper.mixture import Mixture
+from secondlook.paper.measured import MeasuredMission, Mixture, Survey, measure_all
 from secondlook.paper.published import published_missions, published_sonar
 from secondlook.paper.report import as_json, conclusions, differing_decisions, mean_difference, rc_mean_drop, tables
-from secondlook.paper.side_by_side import measure_all
-from secondlook.paper.survey import Survey
 from secondlook.scenario import load_scenario
 
 MISSIONS = {mission.name: mission for mission in published_missions()}

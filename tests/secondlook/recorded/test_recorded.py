@@ -27,10 +27,9 @@ from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
 from secondlook.recorded import Activity, RecordedMission, RiskMap, Said
-from secondlook.recorded.activities import activities
 from secondlook.recorded.key_pattern import key_matcher
-from secondlook.recorded.strips import strips
-from secondlook.recorded.tracks import tracks
+from secondlook.recorded.second_looks import strips
+from secondlook.recorded.vehicles import activities, tracks
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,8 @@ from playwright.sync_api import Browser, Page
 
 import secondlook
 from comms.said.messages import StripState
-from secondlook.report import flown_map, report_page
+from secondlook.report import maps as flown_map
+from secondlook.report import report_page
 
 IN_VIEW = "(node) => { const box = node.getBoundingClientRect(); return box.bottom > 0 && box.top < innerHeight; }"
 BACKGROUND = "(node) => getComputedStyle(node).backgroundColor"

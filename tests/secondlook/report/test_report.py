@@ -28,17 +28,11 @@ from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
 from secondlook.report import report_page
-from secondlook.report.axis import ticks
-from secondlook.report.flown_map import number_places
-from secondlook.report.histogram import shares
-from secondlook.report.map_frame import MOST_PIXELS, MapFrame
-from secondlook.report.moments import Moment, log_lines, moments
-from secondlook.report.png import indexed_png
-from secondlook.report.reproduce import command_to_reproduce
-from secondlook.report.risk_chart import MARK_PX, risk_chart
-from secondlook.report.risk_colours import LEVELS, OUTSIDE, UNSEEN, as_pixels, palette, viridis
-from secondlook.report.risk_series import RiskSample, risk_series
-from secondlook.report.timeline import timeline
+from secondlook.report.charts import MARK_PX, RiskSample, risk_chart, risk_series, shares, timeline
+from secondlook.report.drawing import LEVELS, OUTSIDE, UNSEEN, as_pixels, indexed_png, palette, ticks, viridis
+from secondlook.report.maps import MOST_PIXELS, MapFrame, number_places
+from secondlook.report.page import command_to_reproduce
+from secondlook.report.words import Moment, log_lines, moments
 from secondlook.scenario import load_scenario
 
 

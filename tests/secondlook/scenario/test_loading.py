@@ -25,9 +25,8 @@ from secondlook.scenario import (
     scenario_hash,
 )
 from secondlook.scenario.bundled import curve, scenario_text
-from secondlook.scenario.dialect import dump
-from secondlook.scenario.overrides import override
-from secondlook.scenario.reader import read, read_value
+from secondlook.scenario.load import override
+from secondlook.scenario.text import dump, read, read_value
 
 Write = Callable[[str | bytes], str]
 BUNDLED = [name for name, _ in bundled_scenarios()]

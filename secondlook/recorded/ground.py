@@ -1,19 +1,27 @@
-"""The residual-risk map at one moment, with the places of its cells."""
+"""What is known of the ground: the residual-risk map at one moment, ground that counts for more or less,
+and the targets."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
+from pydantic import TypeAdapter, ValidationError
 from shapely.geometry.base import BaseGeometry
 
+from comms.said.messages import TruthLook, TruthTargets
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec
+from secondlook.errors import UserError
 from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.said import Said
+from secondlook.scenario.area import Priority, priority_grounds
 
 Cells = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.intp]]]
 """Rows and columns of cells."""
@@ -99,3 +107,54 @@ class RiskMap:
 def _span(places: FloatArray, count: int) -> slice:
     """Of a number of cells, whose centres lie at 0, 1 and so on, those from the first of some places to the last."""
     return slice(max(0, math.floor(places.min())), max(0, min(count, math.ceil(places.max()) + 1)))
+
+
+_PRIORITIES = TypeAdapter(list[Priority])
+
+
+@dataclass(frozen=True)
+class PriorityRecord:
+    """One such ground, as far as it lies in the area and under no later one, mission frame; its risk counts `weight`
+    times."""
+
+    ground: shapely.MultiPolygon
+    weight: float
+
+
+def priorities(scenario: Mapping[str, Any], area: shapely.Polygon, folder: Path) -> list[PriorityRecord]:
+    """Those of a scenario as a run's folder holds it; raises UserError where they are not as the run wrote them."""
+    told = scenario.get("area")
+    try:
+        read = _PRIORITIES.validate_python(told.get("priorities", []) if isinstance(told, dict) else [])
+    except ValidationError:
+        raise UserError(f"{folder / 'scenario.yaml'}: area.priorities must be as the run wrote them") from None
+    return [PriorityRecord(ground, weight) for ground, weight in priority_grounds(area, read)]
+
+
+@dataclass(frozen=True)
+class TargetRecord:
+    """A target on the seabed at its true place, mission frame. `found_by` and `found_s`: the first look that detected
+    it; None if none did."""
+
+    number: int
+    found_by: str | None
+    found_s: float | None
+    point: shapely.Point
+
+
+def targets(truth: Iterable[Said[TruthTargets]], looks: Iterable[Said[TruthLook]]) -> list[TargetRecord]:
+    """All targets; none where nobody knows them."""
+    first: dict[int, Said[TruthLook]] = {}
+    for look in looks:
+        for number in look.message.detected:
+            first.setdefault(number, look)
+    places = [target for said in truth for target in said.message.targets]
+    return [
+        TargetRecord(
+            number,
+            first[number].vehicle if number in first else None,
+            first[number].t_s if number in first else None,
+            shapely.Point(place.x_m, place.y_m),
+        )
+        for number, place in enumerate(places)
+    ]

@@ -1,19 +1,101 @@
-"""The area from above: tracks, paths, and the strips, each of which leads to its fate."""
+"""The maps of the report: residual risk cell by cell, and tracks, paths and strips as they were flown."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from comms.said.messages import StripState
-from planner.types import Point
+from planner.types import GridSpec, Point
 from secondlook.recorded import PathRecord, PriorityRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
-from secondlook.report.axis import ticks
-from secondlook.report.fates import FATE_CLASS, fate_in_words
-from secondlook.report.map_frame import MapFrame
-from secondlook.report.svg import Element, drawing, element
+from secondlook.report.drawing import Element, as_pixels, data_url, drawing, element, indexed_png, palette, ticks
+from secondlook.report.words import FATE_CLASS, fate_in_words
+
+MOST_PIXELS = 1600  # of a map's side; what has more cells is drawn with every so many of them
+
+
+@dataclass(frozen=True)
+class MapFrame:
+    """The part of the mission frame that is shown."""
+
+    west_m: float
+    south_m: float
+    east_m: float
+    north_m: float
+
+    @classmethod
+    def around(cls, geometry: BaseGeometry, margin_m: float) -> MapFrame:
+        """What shows a geometry with some room around it."""
+        west_m, south_m, east_m, north_m = geometry.bounds
+        return cls(west_m - margin_m, south_m - margin_m, east_m + margin_m, north_m + margin_m)
+
+    @property
+    def width_m(self) -> float:
+        """From west to east."""
+        return self.east_m - self.west_m
+
+    @property
+    def height_m(self) -> float:
+        """From south to north."""
+        return self.north_m - self.south_m
+
+    def place(self, x_m: float, y_m: float) -> tuple[float, float]:
+        """A place of the mission frame in the picture."""
+        return x_m - self.west_m, self.north_m - y_m
+
+    def line(self, geometry: BaseGeometry) -> str:
+        """The path data of a geometry: lines, or polygons with their holes, of one part or several."""
+        rings: list[BaseGeometry] = []
+        for part in shapely.get_parts(geometry):
+            rings += [part.exterior, *part.interiors] if isinstance(part, shapely.Polygon) else [part]
+        return " ".join(self._ring(ring) for ring in rings if not ring.is_empty)
+
+    def risk(self, risk: RiskMap) -> Element:
+        """The map of risk, turned as its grid is."""
+        grid = risk.grid
+        steps = (-(-grid.rows // MOST_PIXELS), -(-grid.columns // MOST_PIXELS))
+        pixels = as_pixels(risk, steps)
+        return element(
+            "image",
+            href=data_url(indexed_png(pixels, palette())),
+            width=pixels.shape[1],
+            height=pixels.shape[0],
+            preserveAspectRatio="none",
+            transform=self._of_pixels(grid, steps),
+            class_="risk",
+        )
+
+    def _ring(self, ring: BaseGeometry) -> str:
+        places = [self.place(x_m, y_m) for x_m, y_m in ring.coords]
+        closed = "Z" if isinstance(ring, shapely.LinearRing) else ""
+        return "M" + " ".join(f"{x:.1f},{y:.1f}" for x, y in places) + closed
+
+    def _of_pixels(self, grid: GridSpec, steps: tuple[int, int]) -> str:
+        """From pixels, of which the first row is at the near end, to the picture."""
+        down_m, right_m = steps[0] * grid.cell_m, steps[1] * grid.cell_m
+        sin, cos = math.sin(grid.frame.heading_rad), math.cos(grid.frame.heading_rad)
+        # Columns are centred at whole multiples of the cell, rows begin there.
+        x_m, y_m = grid.frame.to_mission(-grid.cell_m / 2, 0.0)
+        left, top = self.place(float(x_m), float(y_m))
+        numbers = (right_m * cos, right_m * sin, down_m * sin, -down_m * cos, left, top)
+        return f"matrix({' '.join(f'{number:.6g}' for number in numbers)})"
+
+
+MARGIN_SHARE = 0.01
+
+
+def risk_map(mission: RecordedMission, risk: RiskMap, label: str) -> Element:
+    """A map of risk with the area's outline; maps of one mission have one scale."""
+    west_m, south_m, east_m, north_m = mission.area.bounds
+    frame = MapFrame.around(mission.area, MARGIN_SHARE * max(east_m - west_m, north_m - south_m))
+    outline = element("path", d=frame.line(mission.area), class_="area")
+    return drawing(frame.width_m, frame.height_m, label, [frame.risk(risk), outline], class_="map")
+
 
 WIDTH_PX, HEIGHT_PX = 900.0, 620.0  # of the picture on a desk: what text and margins are measured by
 MARGIN_PX = 30.0

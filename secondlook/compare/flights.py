@@ -1,0 +1,179 @@
+"""Who is compared, and how each flies every seed, in several processes."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from secondlook.errors import UserError
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.processes import RunFailedError
+from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.observer import Watch
+from secondlook.scenario import Scenario, make_scenario
+from secondlook.scenario.plug_ins import ALLOCATOR
+from secondlook.worker_pool import worker_pool
+
+SELF = "self"
+SELF_LONGER = "self-longer"
+BASELINES = {
+    SELF: "no helper, the primaries pass again where they saw badly, until the same end of the mission",
+    SELF_LONGER: "the same, until the fleet's vehicle-seconds are used up",
+}
+
+
+@dataclass(frozen=True)
+class Contender:
+    """`name`: an allocator's or a baseline's. `scenario`: what it flies, but for the seed."""
+
+    name: str
+    scenario: Scenario
+
+    def with_seed(self, seed: int) -> Scenario:
+        """The mission of one seed."""
+        return self.scenario.model_copy(update={"seed": seed})
+
+
+def contenders(scenario: Scenario, names: Sequence[str] = ()) -> list[Contender]:
+    """Those with the given names, each an allocator's as in `coordinator.allocator`, or a baseline's.
+
+    Without names: the scenario's own allocator, then our others, then the baselines. Raises UserError for a name that
+    is none, or comes twice.
+    """
+    own = scenario.coordinator.allocator
+    chosen = list(names) or [own, *(name for name in ALLOCATOR.ours if name != own), *BASELINES]
+    twice = next((name for index, name in enumerate(chosen) if name in chosen[:index]), None)
+    if twice is not None:
+        raise UserError(f"--allocators: {twice} is not allowed twice")
+    return [Contender(name, _scenario_of(scenario, name)) for name in chosen]
+
+
+def equal_vehicle_seconds(scenario: Scenario) -> float:
+    """The deadline factor with which the primaries alone spend the vehicle-seconds of the whole fleet.
+
+    Counted are a primary's seconds until the last of them has surveyed all, and a helper's until the deadline.
+    """
+    primaries, helpers = len(scenario.survey_vehicles), len(scenario.revisit_vehicles)
+    return 1.0 + scenario.mission.deadline_factor * helpers / primaries
+
+
+def _scenario_of(scenario: Scenario, name: str) -> Scenario:
+    data = scenario.model_dump(mode="json", exclude_none=True)
+    if name not in BASELINES:
+        try:
+            ALLOCATOR.maker(name)
+        except Exception as error:
+            raise UserError(f"--allocators: {name} is not allowed; {error}, or {' or '.join(BASELINES)}") from error
+        data["coordinator"]["allocator"] = name
+        return make_scenario(data)
+    data["vehicles"] = {key: {**data["vehicles"][key], "revisits": True} for key in scenario.survey_vehicles}
+    if data["coordinator"]["allocator"] == "none":
+        data["coordinator"]["allocator"] = "greedy"
+    if name == SELF_LONGER:
+        data["mission"]["deadline_factor"] = equal_vehicle_seconds(scenario)
+    return make_scenario(data)
+
+
+@dataclass(frozen=True)
+class Risk:
+    """Residual risk at one time: its mean over the area, and over the worst 30 % of it."""
+
+    t_s: float
+    mean: float
+    worst30_mean: float
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What came of a mission.
+
+    `primary_s`: when the last primary had surveyed all. `at_primary_s`, `at_105`: then, and at 1.05 times that;
+    `at_end`: when the mission was over. `survey_alone`: mean residual risk without any second look. `removed_m2`: what
+    second looks removed of it, times the area. `served`: strips done. `over_time`: about every 10 s.
+    """
+
+    seed: int
+    digest: str
+    primary_s: float
+    at_primary_s: Risk
+    at_105: Risk
+    at_end: Risk
+    survey_alone: float
+    removed_m2: float
+    served: int
+    over_time: tuple[Risk, ...]
+
+
+@dataclass(frozen=True)
+class FailedFlight:
+    """A mission that failed, and the sentence that says why."""
+
+    seed: int
+    failure: str
+
+
+def fly(scenario: Scenario, watch: Watch | None = None) -> Flight | FailedFlight:
+    """Flies a mission; its files lie in a folder that is gone afterwards. `watch`: see `RunOptions`."""
+    notes = _Notes()
+    with tempfile.TemporaryDirectory(prefix="secondlook-compare-") as folder:
+        try:
+            options = RunOptions(Path(folder), bus="local", record=False, progress=notes.take, watch=watch)
+            summary = run_mission(scenario, options)
+        except RunFailedError as error:
+            return FailedFlight(scenario.seed, str(error))
+    primary_s, mission_s = summary["time"]["primary_s"], summary["time"]["mission_s"]
+    if primary_s is None or summary["risk"] is None:
+        return FailedFlight(scenario.seed, "the mission was over before the survey")
+    at_primary_s, at_105 = (Risk(**at) for at in summary["risk_at"])
+    at_end = Risk(mission_s, summary["risk"]["mean"], summary["risk"]["worst30_mean"])
+    alone = summary["risk_primary_alone"]
+    return Flight(
+        seed=scenario.seed,
+        digest=summary["digest"],
+        primary_s=primary_s,
+        at_primary_s=at_primary_s,
+        at_105=at_105,
+        at_end=at_end,
+        survey_alone=alone["mean"],
+        removed_m2=(alone["mean"] - at_end.mean) * alone["cells"] * scenario.area.cell_m**2,
+        served=summary["hotspots"]["revisited"],
+        over_time=(*notes.taken, at_end),
+    )
+
+
+@dataclass
+class _Notes:
+    """Notes the risk as the mission goes on."""
+
+    taken: list[Risk] = field(default_factory=list)
+
+    def take(self, metrics: Metrics) -> None:
+        """Called every 10 simulated seconds."""
+        risk = metrics.risk()
+        if risk is not None:
+            self.taken.append(Risk(metrics.now_ms / 1000, risk.mean, risk.worst30_mean))
+
+
+Flown = dict[str, dict[int, Flight | FailedFlight]]
+"""By contender and seed; what has not been flown is not there."""
+
+
+def fly_all(
+    contenders: Sequence[Contender], seeds: Sequence[int], jobs: int, flown: Flown, progress: Callable[[Flown], None]
+) -> None:
+    """Flies them seed by seed, so that after an interrupt, which goes through, all have flown about as many.
+
+    `flown` is filled as missions end, and told to `progress` each time. Raises BrokenProcessPool where a process of its
+    own dies.
+    """
+    missions = [(contender, seed) for seed in seeds for contender in contenders]
+    flown.update({contender.name: {} for contender in contenders})
+    with worker_pool(min(jobs, len(missions))) as pool:
+        futures = {pool.submit(fly, contender.with_seed(seed)): (contender, seed) for contender, seed in missions}
+        for future in as_completed(futures):
+            contender, seed = futures[future]
+            flown[contender.name][seed] = future.result()
+            progress(flown)
