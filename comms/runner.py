@@ -143,7 +143,7 @@ class NodeRunner:
     def deliver(self, received: Received, due_ms: int | None = None) -> None:
         """Puts a message into the mailbox, to be handled when it is due: as its topic says, or at `due_ms`."""
         if due_ms is None:
-            due_ms = received.header.sent_ms + received.topic.delay_ms
+            due_ms = received.topic.due_ms(received.header.sent_ms)
         self._mail.setdefault(due_ms, []).append(received)
 
     def deliver_late(self, received: Received, due_ms: int) -> None:

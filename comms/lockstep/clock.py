@@ -133,7 +133,7 @@ class LockstepClock:
                 self._sent_to[reader][sender] += 1
                 self._grown[reader].add(sender)
             if readers and route.topic.wakes:
-                self._make_due(readers, self.now_ms + route.topic.delay_ms)
+                self._make_due(readers, route.topic.due_ms(self.now_ms))
             for watcher in route.watchers:
                 self.watched[watcher][sender] += 1
                 self.watched_bytes[watcher] += one.size

@@ -108,7 +108,7 @@ class NodeGroup:
             if opened is None:
                 continue
             # When it is due depends on when it was sent, whatever a corrupt message says of that.
-            due_ms = received.header.sent_ms + received.topic.delay_ms + one.later_ms
+            due_ms = received.topic.due_ms(received.header.sent_ms) + one.later_ms
             if one.later_ms:
                 runner.deliver_late(opened, due_ms)
             else:

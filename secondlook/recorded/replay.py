@@ -64,7 +64,7 @@ def replay_node(
         if route is not None and node_id in route.readers:
             runner.deliver(one)
             if one.topic.wakes:
-                due_times.add(one.header.sent_ms + one.topic.delay_ms)
+                due_times.add(one.topic.due_ms(one.header.sent_ms))
     overs = [one.header.sent_ms for one in messages if one.topic is MISSION_OVER]
     end_ms = max(overs[0] + WRAP_UP_MS, last_ms) if overs else last_ms
     agreed = 0

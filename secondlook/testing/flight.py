@@ -196,7 +196,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
         for delivery in flight.faults.deliveries(node_id, one, flight.routing):
             opened = one if delivery.payload is one.payload else intake.open(one.key, delivery.payload)
             if opened is not None:
-                found.append((sent_ms + one.topic.delay_ms + delivery.later_ms, opened))
+                found.append((one.topic.due_ms(sent_ms) + delivery.later_ms, opened))
     for key, payload in kept.messages():
         opened = intake.open(key, payload)
         if opened is not None:
