@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -85,12 +84,7 @@ class StripRecord:
     @cached_property
     def polygon(self) -> shapely.Polygon:
         """Its rectangle, mission frame."""
-        one = self.strip
-        right = (math.cos(one.heading_rad) * one.width_m / 2, -math.sin(one.heading_rad) * one.width_m / 2)
-        return shapely.Polygon([
-            (x_m + side * right[0], y_m + side * right[1])
-            for (x_m, y_m), side in ((one.start, -1), (one.start, 1), (one.end, 1), (one.end, -1))
-        ])  # fmt: skip
+        return shapely.Polygon(self.strip.corners)
 
     @property
     def centre_line(self) -> shapely.LineString:
@@ -118,7 +112,7 @@ def _record(number: int, told: list[Said[StripStatus]]) -> StripRecord:
         if not history or (event.state, event.vehicle) != (history[-1].state, history[-1].vehicle):
             history.append(event)
     return StripRecord(
-        Strip(number, (last.start_x_m, last.start_y_m), last.heading_rad, last.length_m, last.width_m),
+        last.as_strip(number),
         last.state,
         next((event.vehicle for event in reversed(history) if event.vehicle), ""),
         told[0].message.removable_m2,
