@@ -68,15 +68,7 @@ def _joined(flight: Flight, tiles: Iterable[Received]) -> FleetMap:
     for one in tiles:
         tile = one.message
         assert isinstance(tile, CoverageTile)
-        joined.take(
-            one.vehicle,
-            (one.header.incarnation, tile.version),
-            tile.first_row,
-            tile.first_column,
-            tile.sum_levels,
-            tile.largest_levels,
-            tile.settled,
-        )
+        joined.join(one.vehicle, one.header.incarnation, tile)
     return joined
 
 
