@@ -6,15 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from planner.types import Point
-
-
-@dataclass(frozen=True)
-class PriorityGround:
-    """Ground whose risk counts `weight` times in second looks, by the corners of its outlines in the mission frame."""
-
-    outlines_m: tuple[tuple[Point, ...], ...]
-    weight: float
+from planner.types import PriorityGround
 
 
 @dataclass(frozen=True)

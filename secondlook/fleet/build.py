@@ -12,9 +12,9 @@ import shapely
 from comms.said.codec import CLOCK, SCHEMA_VERSION, Header, encode
 from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.routing import RosterNode
-from coordinator.config import CoordinatorConfig, Priority
+from coordinator.config import CoordinatorConfig
 from planner.region import Region
-from planner.types import DetectionCurve, Point
+from planner.types import DetectionCurve, Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.node_spec import NodeSpec
 from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
@@ -232,5 +232,5 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
         separation_m=scenario.mission.separation_m,
-        priorities=tuple(Priority(one.polygon_m, one.weight) for one in scenario.area.priorities),
+        priorities=tuple(PriorityGround((one.polygon_m,), one.weight) for one in scenario.area.priorities),
     )

@@ -21,7 +21,6 @@ from comms.runner import NodeError
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from comms.wall.local_bus import run_local_by_wall
-from planner.types import Point
 from secondlook.errors import UserError
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.node_spec import NodeSpec, make_node, make_nodes
@@ -34,7 +33,7 @@ from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
 from secondlook.recorded.summary import summarise
 from secondlook.scenario import Scenario
 from secondlook.scenario.area import priority_grounds
-from viz.recorder_config import PriorityGround, RecorderConfig
+from viz.recorder_config import RecorderConfig
 
 
 def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = None) -> RecorderConfig:
@@ -45,13 +44,8 @@ def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = Non
         path,
         live_pipe=live_pipe,
         thresholds=scenario.thresholds,
-        priorities=tuple(PriorityGround(_rings(ground), weight) for ground, weight in grounds),
+        priorities=tuple(grounds),
     )
-
-
-def _rings(ground: shapely.MultiPolygon) -> tuple[tuple[Point, ...], ...]:
-    rings = [ring for part in ground.geoms for ring in (part.exterior, *part.interiors)]
-    return tuple(tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
 
 
 log = logging.getLogger("secondlook.mission")

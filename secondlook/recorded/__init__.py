@@ -1,7 +1,7 @@
 """Runs read back from their files: messages, figures, maps and geometry of a mission that was flown."""
 
 from secondlook.recorded.geojson import GeographicOrigin, to_geojson
-from secondlook.recorded.ground import PriorityRecord, RiskMap, TargetRecord
+from secondlook.recorded.ground import RiskMap, TargetRecord
 from secondlook.recorded.mission import RecordedMission, load_run
 from secondlook.recorded.said import Said
 from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord
@@ -12,7 +12,6 @@ __all__ = [
     "GeographicOrigin",
     "HotspotRecord",
     "PathRecord",
-    "PriorityRecord",
     "RecordedMission",
     "RiskMap",
     "Said",

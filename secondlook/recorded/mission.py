@@ -28,8 +28,9 @@ from comms.said.messages import (
 )
 from comms.said.topics import Topic, topic_of
 from comms.said.wire import WireError
+from planner.types import PriorityGround
 from secondlook.errors import UserError
-from secondlook.recorded.ground import PriorityRecord, RiskMap, TargetRecord, priorities, targets
+from secondlook.recorded.ground import RiskMap, TargetRecord, priorities, targets
 from secondlook.recorded.key_pattern import key_matcher
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
@@ -115,7 +116,7 @@ class RecordedMission:
         return shapely.Polygon(self.run.outline, self.run.hole_outlines)
 
     @cached_property
-    def priorities(self) -> list[PriorityRecord]:
+    def priorities(self) -> list[PriorityGround]:
         """Ground of the area whose risk counts for more or less in second looks, as the scenario says."""
         return priorities(self.scenario, self.area, self.folder)
 

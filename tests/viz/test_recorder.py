@@ -42,11 +42,12 @@ from comms.said.messages import (
 )
 from comms.said.topics import TOPICS
 from planner.region import Region
+from planner.types import PriorityGround
 from tests.viz.mission_stream import HELPER, PRIMARY, mission
 from tests.viz.recordings import entities, rows, rows_so_far, static, timelines, verify
 from viz import palette
 from viz.recorder import Recorder
-from viz.recorder_config import PriorityGround, RecorderConfig
+from viz.recorder_config import RecorderConfig
 from viz.task_table import HEAD
 
 Record = Callable[[list[Received], Path], Path]
