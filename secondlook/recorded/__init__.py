@@ -3,7 +3,6 @@
 from secondlook.recorded.geojson import GeographicOrigin, to_geojson
 from secondlook.recorded.ground import RiskMap, TargetRecord
 from secondlook.recorded.mission import RecordedMission, load_run
-from secondlook.recorded.said import Said
 from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord
 from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord
 
@@ -14,7 +13,6 @@ __all__ = [
     "PathRecord",
     "RecordedMission",
     "RiskMap",
-    "Said",
     "StripEvent",
     "StripRecord",
     "TargetRecord",

@@ -15,12 +15,12 @@ import shapely
 from pydantic import TypeAdapter, ValidationError
 from shapely.geometry.base import BaseGeometry
 
+from comms.node import Received
 from comms.said.messages import TruthLook, TruthTargets
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from secondlook.errors import UserError
 from secondlook.recorded.metrics import Metrics
-from secondlook.recorded.said import Said
 from secondlook.scenario.area import Priority, priority_grounds
 
 Cells = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.intp]]]
@@ -136,9 +136,9 @@ class TargetRecord:
     point: shapely.Point
 
 
-def targets(truth: Iterable[Said[TruthTargets]], looks: Iterable[Said[TruthLook]]) -> list[TargetRecord]:
+def targets(truth: Iterable[Received[TruthTargets]], looks: Iterable[Received[TruthLook]]) -> list[TargetRecord]:
     """All targets; none where nobody knows them."""
-    first: dict[int, Said[TruthLook]] = {}
+    first: dict[int, Received[TruthLook]] = {}
     for look in looks:
         for number in look.message.detected:
             first.setdefault(number, look)

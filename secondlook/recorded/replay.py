@@ -113,7 +113,7 @@ def _near(one: Any, other: Any, tolerance: float) -> bool:
 
 
 def _difference(agreed: int, now_ms: int, recorded: Received | None, replayed: Outgoing | None) -> Difference:
-    before = "nothing" if recorded is None else f"{recorded.key} at {recorded.header.sent_ms / 1000:.3f} s"
+    before = "nothing" if recorded is None else f"{recorded.key} at {recorded.t_s:.3f} s"
     after = "nothing" if replayed is None else f"{replayed.key} at {now_ms / 1000:.3f} s"
     if recorded is not None and replayed is not None and recorded.key == replayed.key:
         # The payload is what was compared; the replayed message is not quantised, so only clear differences are named.

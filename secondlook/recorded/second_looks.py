@@ -8,9 +8,9 @@ from functools import cached_property
 
 import shapely
 
+from comms.node import Received
 from comms.said.messages import Hotspot, HotspotState, StripState, StripStatus
 from planner.types import Strip
-from secondlook.recorded.said import Said
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,10 @@ class HotspotRecord:
     polygon: shapely.Polygon
 
 
-def hotspots(published: Iterable[Said[Hotspot]]) -> list[HotspotRecord]:
+def hotspots(published: Iterable[Received[Hotspot]]) -> list[HotspotRecord]:
     """Every hotspot that was ever published, in the order of finding."""
     first: dict[str, float] = {}
-    last: dict[str, Said[Hotspot]] = {}
+    last: dict[str, Received[Hotspot]] = {}
     for one in published:
         first.setdefault(one.key, one.t_s)
         last[one.key] = one
@@ -96,15 +96,15 @@ class StripRecord:
         return next((event.t_s for event in self.history if event.state is state), None)
 
 
-def strips(published: Iterable[Said[StripStatus]]) -> list[StripRecord]:
+def strips(published: Iterable[Received[StripStatus]]) -> list[StripRecord]:
     """Every strip that was ever published, by number."""
-    told: dict[int, list[Said[StripStatus]]] = {}
+    told: dict[int, list[Received[StripStatus]]] = {}
     for one in published:
         told.setdefault(one.number, []).append(one)
     return [_record(number, statuses) for number, statuses in sorted(told.items())]
 
 
-def _record(number: int, told: list[Said[StripStatus]]) -> StripRecord:
+def _record(number: int, told: list[Received[StripStatus]]) -> StripRecord:
     last = told[-1].message
     history: list[StripEvent] = []
     for said in told:

@@ -28,7 +28,7 @@ SABOTAGE: dict[str, tuple[NodeEvent, ...]] = {
     "a late and frozen coordinator": (Join("coordinator", 50_000), Freeze("coordinator", 200_000, 280_000)),
     "a primary frozen on its track": (Freeze("primary", 100_000, 160_000),),
 }
-LOSSY = Faults(3, [MessageFault(FaultKind.DROP, "*", 0.2), MessageFault(FaultKind.CORRUPT, "*/coverage/*", 0.1)])
+LOSSY = Faults(3, [MessageFault(FaultKind.DROP, "**", 0.2), MessageFault(FaultKind.CORRUPT, "**/coverage/*", 0.1)])
 
 
 def fly(folder: Path, bus: Any, events: tuple[NodeEvent, ...], faults: Faults = NO_FAULTS, **options: Any) -> Any:
