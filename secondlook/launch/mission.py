@@ -30,6 +30,7 @@ from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
 from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
+from secondlook.recorded.story import Story
 from secondlook.recorded.summary import summarise
 from secondlook.scenario import Scenario
 from secondlook.scenario.area import priority_grounds
@@ -42,6 +43,7 @@ def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = Non
     grounds = priority_grounds(shapely.Polygon(area.polygon_m, area.holes_m), area.priorities)
     return RecorderConfig(
         path,
+        Story,
         live_pipe=live_pipe,
         thresholds=scenario.thresholds,
         priorities=tuple(grounds),
