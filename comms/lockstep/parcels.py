@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import zenoh
 
-from comms.control import RunKeys
+from comms.keys import RunKeys
 from comms.runner import Outgoing
 from comms.said.codec import pack, unpack
 from comms.said.wire import WireError

@@ -11,17 +11,18 @@ from typing import Any
 
 import zenoh
 
-from comms.control import ControlError, pack
+from comms.errors import Interrupted, NodeError, RefusedError, WordsError
+from comms.keys import RunKeys
 from comms.node import Received
 from comms.result import BusResult
-from comms.runner import NodeError
 from comms.said.codec import LARGEST_INCARNATION, SCHEMA_VERSION
 from comms.said.routing import Routing
 from comms.wall.clock import MissionTime
-from comms.wall.line import Interrupted, WallLine
+from comms.wall.line import WallLine
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import Seat
-from comms.wall.words import Hello, WallKeys, pack_hello, pack_last_word, unpack_finish, unpack_time
+from comms.wall.words import Hello, pack_hello, unpack_finish, unpack_time
+from comms.words import pack, pack_last_word
 
 HELLO_EVERY_S = 1.0
 FIRST_HELLO_EVERY_S = 0.1  # until the clock has answered
@@ -30,10 +31,6 @@ GOODBYE_WITHIN_S = 5.0
 CLOCK_LOST_AFTER_S = 3.0  # of wall time without a time signal; there are four a second
 GIVES_UP_AFTER_S = 20.0  # of wall time beyond the mission's time limit
 COMPLETE_WITHIN_S = 5.0  # so long a listener waits at the end for what is still missing
-
-
-class RefusedError(Exception):
-    """The clock does not let this process take part, or does not answer; the text is one sentence that says why."""
 
 
 class WallHost:
@@ -47,7 +44,7 @@ class WallHost:
     def __init__(
         self,
         session: zenoh.Session,
-        keys: WallKeys,
+        keys: RunKeys,
         host: str,
         seat: Seat,
         routing: Routing,
@@ -186,7 +183,7 @@ class WallHost:
                 self._hear_time(*unpack_time(words))
             elif key == self._to_me:
                 self._hear_clock(words)
-        except ControlError as error:
+        except WordsError as error:
             self._post.intake.drop("senseless words", "clock", str(error))
 
     def _hear_time(self, now_ms: int | None, factor: float, taken_up: bool) -> None:

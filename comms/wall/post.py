@@ -12,13 +12,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from comms.control import ControlError, unpack
+from comms.errors import WordsError
+from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake, Outgoing
 from comms.said.routing import Routing
 from comms.wall.journal import HeardMessages, Journal
 from comms.wall.line import Answered, Asked, Event, Life, Mail, WallLine
-from comms.wall.words import Beat, WallKeys, pack_beat, unpack_beat
+from comms.wall.words import Beat, pack_beat, unpack_beat
+from comms.words import unpack
 
 WORDS = "clock/"  # what the keys of words begin with, below the run id
 BEAT = f"{WORDS}beat/"
@@ -39,7 +41,7 @@ Item = Received | Words | Life
 class WallPost:
     """The post of the nodes of one process over its line."""
 
-    def __init__(self, line: WallLine, keys: WallKeys, routing: Routing) -> None:
+    def __init__(self, line: WallLine, keys: RunKeys, routing: Routing) -> None:
         self.line = line
         self.intake = Intake(routing)
         self._keys = keys
@@ -58,7 +60,7 @@ class WallPost:
                 return self._take_message(key, payload)
             case Asked():
                 found = [
-                    pair for one in kept() for pair in one.matching(lambda key: self.line.is_asked_for(event, key))
+                    pair for one in kept() for pair in one.kept.messages(lambda key: self.line.is_asked_for(event, key))
                 ]
                 self.line.answer(event, found)
             case Answered(sender, expression, tally, answers):
@@ -92,7 +94,7 @@ class WallPost:
 
     def _take_message(self, key: str, payload: bytes) -> list[Item]:
         received = self.intake.open(key, payload)
-        if received is None or not self._heard.take(received):
+        if received is None or not self._heard.add(received):
             return []
         if received.header.sender in self._asked:
             self._held.setdefault(received.header.sender, []).append(received)
@@ -114,7 +116,7 @@ class WallPost:
                 return [Words(key, words)]
             sender = key.removeprefix(BEAT)
             self._beats[sender] = unpack_beat(words)
-        except ControlError as error:
+        except WordsError as error:
             self.intake.drop("senseless words", key, str(error))
             return []
         for expression in self._missing(sender):

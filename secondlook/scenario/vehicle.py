@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from comms.said.messages import Role
 from planner.curve import effective_range_m
 from secondlook.scenario.plug_ins import NODE, SPACING
 from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
@@ -26,7 +27,7 @@ from secondlook.scenario.values import part as named
 
 _PART = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
-RESERVED_IDS = ("clock", "coordinator", "observer", "recorder", "world")
+RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
 """Ids of the nodes that are no vehicles."""
 
 

@@ -9,7 +9,6 @@ from typing import Any, cast
 from by_wall import ROUTING, WALL_KEYS
 from fleets import say_state
 
-from comms.control import pack
 from comms.node import Publication, Received
 from comms.runner import Outgoing, Stamp
 from comms.said.messages import Contact
@@ -18,6 +17,7 @@ from comms.wall.journal import Journal
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
 from comms.wall.words import Beat, pack_beat, pack_time
+from comms.words import pack
 
 STATES, CONTACTS = STATE.expression("alpha"), CONTACT.expression("alpha")
 
