@@ -63,7 +63,7 @@ class _Line:
             words = self.words(HELLO_EVERY_S)
         self.say(pack("ready"))
 
-    def part(self, words: bytes) -> None:
+    def leave(self, words: bytes) -> None:
         """A last word; returns when the hub has heard it, or is gone. The session may be closed then: the news of its
         end cannot overtake the word."""
         self.say(words)
@@ -170,7 +170,7 @@ class NodeHost:
             elif words[:1] == ["last_word"]:
                 line.say(pack_last_word(self._nodes.last_word()))
             elif words[:1] == ["finish"]:
-                line.part(pack_last_word(self._nodes.last_word()))
+                line.leave(pack_last_word(self._nodes.last_word()))
                 return
             if granted is not None and group.has_all(granted[1]):
                 self._act(*granted)
@@ -235,7 +235,7 @@ class ListenerHost:
             self._line.say(pack("failed", str(error)))
             raise
         if finished:
-            self._line.part(pack_last_word(LastWord(dropped=dict(self._intake.dropped))))
+            self._line.leave(pack_last_word(LastWord(dropped=dict(self._intake.dropped))))
 
     def _listen(self) -> None:
         mark: list[Any] | None = None

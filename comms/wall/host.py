@@ -114,7 +114,7 @@ class WallHost:
             raise
         if self._result is not None:
             with contextlib.suppress(Interrupted):
-                self._part()
+                self._leave()
         return self._result
 
     def _live(self) -> None:
@@ -218,7 +218,7 @@ class WallHost:
                 self._result = unpack_finish(words)
                 self._finish_by_s = self._finish_by_s or time.monotonic() + COMPLETE_WITHIN_S
 
-    def _part(self) -> None:
+    def _leave(self) -> None:
         """Gives the last word; returns when the clock has heard it, or is gone. The session may be closed then: the
         news of its end cannot overtake the word."""
         self._post.beat(self._incarnation, self._seat.kept)

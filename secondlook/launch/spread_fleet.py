@@ -89,9 +89,9 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
         except Interrupted:
             _say(ROUTER, "interrupted; the others go on, and connect again when it is back")
             return FAILED
-    part = _Part(result)
-    failure = part.failure(scenario)
-    _say(ROUTER, failure or part.closing_words)
+    outcome = _Outcome(result)
+    failure = outcome.failure(scenario)
+    _say(ROUTER, failure or outcome.closing_words)
     return FAILED if failure else 0
 
 
@@ -101,12 +101,12 @@ def run_node(scenario: Scenario, link: Link, node_id: str) -> int:
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     try:
         nodes = make_nodes({node_id: fleet.specs[node_id]})
-        part = _take_part(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))
+        outcome = _run_as_guest(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))
     except NodeError as error:
         _say(node_id, str(error))
         return FAILED
-    failure = part.failure(scenario)
-    _say(node_id, failure or part.closing_words)
+    failure = outcome.failure(scenario)
+    _say(node_id, failure or outcome.closing_words)
     return FAILED if failure else 0
 
 
@@ -119,23 +119,23 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     (folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(folder, with_messages=True)
     recorder = node_spec(Role.RECORDER, recorder_config(scenario, folder / "mission.rrd"))
-    part = _Part()
+    outcome = _Outcome()
     try:
         listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
-        part = _take_part(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
-        failure = part.failure(scenario)
+        outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
+        failure = outcome.failure(scenario)
     except NodeError as error:
         failure = str(error)
     summary = summarise(
         scenario,
         observer,
-        part.result,
+        outcome.result,
         bus="zenoh",
         processes=1 + len(hosts_when_spread(fleet.roster)),
         wall_s=time.perf_counter() - began_s,
-        ending=part.ending,
+        ending=outcome.ending,
         failure=failure,
-        factor=part.factor,
+        factor=outcome.factor,
     )
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     try:
@@ -150,8 +150,8 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
 
 
 @dataclass(frozen=True)
-class _Part:
-    """A process's part in a mission, once it has ended."""
+class _Outcome:
+    """What came of a mission for one process."""
 
     result: BusResult | None = None
     factor: float = 1.0
@@ -177,7 +177,7 @@ class _Part:
         return None if self.result.ending is Ending.OVER else not_over(self.result, scenario)
 
 
-def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
+def _run_as_guest(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Outcome:
     try:
         session = open_guest(link.connect, link.listen, link.certificates, within_s=link.wait_s)
     except ConnectionFailedError as error:
@@ -200,7 +200,7 @@ def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
                 result = guest.run()
         except RefusedError as error:
             raise UserError(str(error)) from error
-        return _Part(result, guest.factor, guest.now_ms if guest.interrupted else None)
+        return _Outcome(result, guest.factor, guest.now_ms if guest.interrupted else None)
 
 
 def _log_to_stderr() -> None:
