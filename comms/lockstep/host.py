@@ -225,7 +225,7 @@ class ListenerHost:
                 self._listen()
                 finished = True
             except Interrupted:
-                self._take_mail()
+                self._open_mail()
                 # Without a mark nobody knows whether earlier messages are still missing: what there is, in order.
                 self._release(up_to_ms=None)
                 finished = False
@@ -242,7 +242,7 @@ class ListenerHost:
         self._line.shake_hands()
         while True:
             words = self._line.words(TAKE_EVERY_S if mark is None else MAIL_EVERY_S)
-            self._take_mail()
+            self._open_mail()
             if words[:1] in (["mark"], ["finish"]):
                 mark = words
             if mark is None or not self._has_all(mark[3]):
@@ -253,7 +253,7 @@ class ListenerHost:
             self._line.say(pack("ack", mark[1]))
             mark = None
 
-    def _take_mail(self) -> None:
+    def _open_mail(self) -> None:
         for key, parcel in self._line.mail():
             # A key that is an expression comes to all whom it fits.
             watchers, sender = self._parcels.get(key, ((), ""))

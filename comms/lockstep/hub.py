@@ -214,11 +214,11 @@ class Hub:
                 raise HostLostError(host, self._clock.now_ms)
             return
         try:
-            self._take_words(host, unpack(payload))
+            self._hear_words(host, unpack(payload))
         except (WordsError, ValueError) as error:
             raise FleetError(f"{host} has said what makes no sense to the clock: {error}") from error
 
-    def _take_words(self, host: str, words: list[Any]) -> None:
+    def _hear_words(self, host: str, words: list[Any]) -> None:
         match words:
             case ["hello"]:
                 self._say(host, pack("welcome"))

@@ -139,10 +139,10 @@ class WallHost:
             event = self._line.get(self._next_s(now_s) - time.monotonic())
             if event is None:
                 continue
-            for item in self._post.take(event, self._seat.kept.values):
+            for item in self._post.receive(event, self._seat.kept.values):
                 match item:
                     case Received():
-                        self._take(item)
+                        self._pass_on(item)
                     case Words(key, words):
                         self._hear(key, words)
 
@@ -169,13 +169,13 @@ class WallHost:
             self._clock_is_heard = heard
             self._notice("the router is heard again" if heard else "the router is not heard")
 
-    def _take(self, received: Received) -> None:
+    def _pass_on(self, received: Received) -> None:
         if not self._time.known:
             self._early.append(received)
             return
         now_ms = self._time.now_ms(time.monotonic())
         if self._post.is_in_time(received, now_ms):
-            self._post.publish(self._seat.take(received, now_ms))
+            self._post.publish(self._seat.hear(received, now_ms))
 
     def _hear(self, key: str, words: list[Any]) -> None:
         try:
@@ -204,7 +204,7 @@ class WallHost:
             self._notice("the mission begins" if is_first else f"the mission is at {now_ms / 1000:.0f} s")
             early, self._early = self._early, []
             for received in early:
-                self._take(received)
+                self._pass_on(received)
 
     def _hear_clock(self, words: list[Any]) -> None:
         match words:
@@ -228,7 +228,7 @@ class WallHost:
             event = self._line.get(left_s)
             if event is None:
                 return
-            for item in self._post.take(event, self._seat.kept.values):  # others may still ask for what is kept
+            for item in self._post.receive(event, self._seat.kept.values):  # others may still ask for what is kept
                 if isinstance(item, Words) and item.key == self._to_me and item.words[0] == "goodbye":
                     return
 

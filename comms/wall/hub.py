@@ -92,10 +92,10 @@ class WallHub:
                 self._post.publish(self._seat.act(clock.time.now_ms(now_s)))
             self._speak(now_s)
             event = self._line.get(self._next_s(now_s) - time.monotonic())
-            for item in [] if event is None else self._post.take(event, self._all_kept):
+            for item in [] if event is None else self._post.receive(event, self._all_kept):
                 match item:
                     case Received():
-                        self._take(item)
+                        self._pass_on(item)
                     case Words(key, words) if key.startswith(FROM):
                         self._hear(key.removeprefix(FROM), words)
                     case Life(host, instance, alive) if not alive:
@@ -159,14 +159,14 @@ class WallHub:
             names = ", ".join(sorted(silent))
             raise FleetError(f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission from {names}")
 
-    def _take(self, received: Received) -> None:
+    def _pass_on(self, received: Received) -> None:
         now_ms = self._now_ms(time.monotonic())
         if not self._post.is_in_time(received, now_ms):
             return
         if received.topic is MISSION_OVER:
             self._clock.over(received.header.sent_ms)
         if self._under_way and not self._seat_closed:
-            self._post.publish(self._seat.take(received, now_ms))
+            self._post.publish(self._seat.hear(received, now_ms))
 
     def _hear(self, host: str, words: list[Any]) -> None:
         try:

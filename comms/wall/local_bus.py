@@ -74,8 +74,8 @@ class _WallLocal:
             if received.topic is MISSION_OVER:
                 self._over_ms = received.header.sent_ms
             now_ms = self._now_ms()
-            self._watching.take(received, now_ms)
-            under_way.extend(self._acting.take(received, now_ms))
+            self._watching.hear(received, now_ms)
+            under_way.extend(self._acting.hear(received, now_ms))
 
     def _now_ms(self) -> int:
         return self._time.now_ms(time.monotonic())

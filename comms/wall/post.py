@@ -50,14 +50,14 @@ class WallPost:
         self._asked: dict[str, set[str]] = {}
         self._held: dict[str, list[Received]] = {}
 
-    def take(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
+    def receive(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
         """Deals with what has arrived; returns messages that are news, words and news of a life, which are for others
         to deal with. `kept`: what the nodes here keep."""
         match event:
             case Mail(key, payload) if key.startswith(WORDS):
-                return self._take_words(key, payload)
+                return self._receive_words(key, payload)
             case Mail(key, payload):
-                return self._take_message(key, payload)
+                return self._receive_message(key, payload)
             case Asked():
                 found = [
                     pair for one in kept() for pair in one.kept.messages(lambda key: self.line.is_asked_for(event, key))
@@ -92,7 +92,7 @@ class WallPost:
         """Whether all is here that those who have told what they keep have kept for us."""
         return not any(self._missing(sender) for sender in self._beats)
 
-    def _take_message(self, key: str, payload: bytes) -> list[Item]:
+    def _receive_message(self, key: str, payload: bytes) -> list[Item]:
         received = self.intake.open(key, payload)
         if received is None or not self._heard.add(received):
             return []
@@ -109,7 +109,7 @@ class WallPost:
         del self._asked[sender]
         return [*sorted(self._held.pop(sender, []), key=lambda one: one.header.order)]
 
-    def _take_words(self, key: str, payload: bytes) -> list[Item]:
+    def _receive_words(self, key: str, payload: bytes) -> list[Item]:
         try:
             words = unpack(payload)
             if not key.startswith(BEAT):

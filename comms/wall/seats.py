@@ -65,7 +65,7 @@ class WallNode:
         """The wake-up that it has asked for."""
         return self._node.wake_ms
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Handles a message; returns what the node publishes. Raises NodeError."""
         if self._started:
             return self._keep(self._node.act(now_ms, [received]))
@@ -100,12 +100,12 @@ class WallNodes:
         self.nodes = {node_id: WallNode(node_id, node, routing, incarnation) for node_id, node in nodes.items()}
         self._routing = routing
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Gives a message to those here that read it; returns what they publish. Raises NodeError."""
         route = self._routing.route(received.key)
         readers = () if route is None else route.readers
         return self._count(
-            [one for name in readers if name in self.nodes for one in self.nodes[name].take(received, now_ms)]
+            [one for name in readers if name in self.nodes for one in self.nodes[name].hear(received, now_ms)]
         )
 
     def wake(self, now_ms: int) -> list[Outgoing]:
@@ -135,7 +135,7 @@ class Seat(Protocol):
     def begin(self, incarnation: int, factor: float) -> None:
         """The mission's time is known; nothing else is called before."""
 
-    def take(self, received: Received, now_ms: int) -> Iterable[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> Iterable[Outgoing]:
         """A message has arrived; returns what is to be published."""
 
     def act(self, now_ms: int) -> Iterable[Outgoing]:
@@ -174,11 +174,11 @@ class NodeSeat:
         """Seats the nodes; they are started when the run is announced to them."""
         self._nodes = WallNodes(self._raw, self._routing, incarnation)
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Lets the nodes handle a message."""
         if self._is_coordinators:
             self._latency.arrived(received, time.perf_counter())
-        return self._time(self._nodes.take(received, now_ms))
+        return self._time(self._nodes.hear(received, now_ms))
 
     def act(self, now_ms: int) -> list[Outgoing]:
         """Wakes the nodes for whom it is time."""
@@ -226,7 +226,7 @@ class ListenerSeat:
         """Sets the window."""
         self._window = OrderWindow(round(WINDOW_S * 1000 * factor))
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Takes a message."""
         self._window.add(received)
         return []
