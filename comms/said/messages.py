@@ -46,6 +46,11 @@ class Role(enum.Enum):
     SURVEY_REVISIT = "survey_revisit"
 
     @property
+    def is_single(self) -> bool:
+        """Whether a fleet has one such node at most, whose id is the role's word."""
+        return self in (Role.CLOCK, Role.WORLD, Role.COORDINATOR, Role.RECORDER, Role.OBSERVER)
+
+    @property
     def surveys(self) -> bool:
         """Whether it is the agent of a primary."""
         return self in (Role.SURVEY, Role.SURVEY_REVISIT)

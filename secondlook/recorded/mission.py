@@ -52,8 +52,8 @@ class Mission(ABC):
     What tells of the mission raises UserError where the run ended before `has_begun`.
 
     `keys` chooses messages by their keys, those of `comms.said.topics` below the run id, as Zenoh's key expressions do:
-    in `agent/*/state` or `coord/**` `*` is one chunk of a key, `**` any number of chunks, `$*` a part of one. Raises
-    UserError for what is none, and where no key is ever like it.
+    in `agent/*/state` or `coord/**` `*` is one chunk of a key, `**` any number of chunks, `$*` any characters within one.
+    Raises UserError for what is none, and where no key is ever like it.
     """
 
     folder: Path

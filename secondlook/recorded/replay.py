@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from comms.lockstep.clock import WRAP_UP_MS
+from comms.lockstep.group import NodeRunner
 from comms.node import Node, Received
-from comms.runner import Intake, NodeRunner, Outgoing
+from comms.runner import Intake, Outgoing
 from comms.said.codec import decode
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 from secondlook.scenario.area import Area
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
-from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
+from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, plug_in, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
 # Beyond, a metre of easting is more degrees than a map can show.
@@ -82,8 +82,8 @@ class Coordinator(Mapping):
     get better for a helper to be turned round.
     """
 
-    allocator: Annotated[str, part(ALLOCATOR)] = "plan"
-    node: Annotated[str, part(NODE)] | None = None
+    allocator: Annotated[str, plug_in(ALLOCATOR)] = "plan"
+    node: Annotated[str, plug_in(NODE)] | None = None
     lost_after_s: Duration = 30.0
     min_strip_m: Length = 30.0
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0

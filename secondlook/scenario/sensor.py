@@ -10,9 +10,9 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from planner.types import DetectionCurve
 from secondlook.scenario import bundled
-from secondlook.scenario.plug_ins import CURVE, SONAR, PartError
+from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
 from secondlook.scenario.text import Value
-from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, part, refused
+from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, plug_in, refused
 
 
 class Curve(Mapping):
@@ -60,7 +60,7 @@ def _take_bundled(value: object) -> object:
         )
     try:
         made = CURVE.maker(value)()
-    except PartError as error:
+    except PlugInError as error:
         raise refused(str(error)) from error
     except Exception as error:
         raise refused(f"must make a DetectionCurve; {type(error).__name__}: {error}") from error
@@ -98,7 +98,7 @@ class Sensor(Mapping):
     """
 
     curve: OptionalCurve = None
-    sonar: Annotated[str, part(SONAR)] | None = None
+    sonar: Annotated[str, plug_in(SONAR)] | None = None
     p_detect: PDetect | None = None
     range_m: Length | None = None
     noise_cell: Noise = _noise("noise_cell")

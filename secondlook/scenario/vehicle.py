@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from comms.said.messages import Role
 from planner.curve import effective_range_m
 from secondlook.scenario.plug_ins import NODE, SPACING
 from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
@@ -20,13 +21,13 @@ from secondlook.scenario.values import (
     Mapping,
     OpenShare,
     Speed,
+    plug_in,
     refused,
 )
-from secondlook.scenario.values import part as named
 
-_PART = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
+_SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
-RESERVED_IDS = ("clock", "coordinator", "observer", "recorder", "world")
+RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
 """Ids of the nodes that are no vehicles."""
 
 
@@ -74,7 +75,7 @@ class VehicleBase(Mapping):
     sensor: Sensor
     position_error_m: LengthOrZero = 0.0
     position_drift_m_per_h: LengthOrZero = 0.0
-    agent: Annotated[str, named(NODE)] | None = None
+    agent: Annotated[str, plug_in(NODE)] | None = None
 
     @field_validator("sensor")
     @classmethod
@@ -99,7 +100,7 @@ class SurveyVehicle(VehicleBase):
     altitude_m: Length = 15.0
     run_in_m: LengthOrZero = 20.0
     range_m: Length | None = None
-    spacing: Annotated[str, named(SPACING)] = "adaptive"
+    spacing: Annotated[str, plug_in(SPACING)] = "adaptive"
     threshold: OpenShare = 0.05
     prior_curve: OptionalCurve = None
     hotspot_risk: OpenShare = 0.55
@@ -141,7 +142,7 @@ class SurveyVehicle(VehicleBase):
     @field_validator("part")
     @classmethod
     def _check_part(cls, part: str | None) -> str | None:
-        match = None if part is None else _PART.fullmatch(part)
+        match = None if part is None else _SHARE.fullmatch(part)
         if part is not None and (match is None or not 1 <= int(match[1]) <= int(match[2])):
             raise refused("must be such as 1 of 3: which part, and of how many, at most 99")
         return part
@@ -149,7 +150,7 @@ class SurveyVehicle(VehicleBase):
     @property
     def part_of(self) -> tuple[int, int]:
         """Which part of how many is its own, from 1; the whole is 1 of 1."""
-        match = None if self.part is None else _PART.fullmatch(self.part)
+        match = None if self.part is None else _SHARE.fullmatch(self.part)
         return (1, 1) if match is None else (int(match[1]), int(match[2]))
 
     @property

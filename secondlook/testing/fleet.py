@@ -11,6 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from comms.lockstep.drive import Lockstep
 from comms.node import Received
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
@@ -177,8 +178,7 @@ class Fleet(Trouble):
             bus,
             self._processes,
             record=self._record,
-            faults=faults,
-            events=events,
+            drive=Lockstep(faults, events),
             watch=watch.take,
             patience_s=self._patience_s,
         )

@@ -10,7 +10,7 @@ from typing import Any, overload
 from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
 from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, NodeEvent, absent_at_start
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.kept_messages import KeptMessages
+from comms.lockstep.group import JoinerMail
 from comms.node import Received
 from comms.runner import Intake
 from comms.said.routing import Routing
@@ -39,7 +39,7 @@ class Heard(Sequence[Received]):
 
     def messages(self, keys: str = "**") -> list[Received]:
         """The messages whose keys are like `keys`, `agent/*/hotspot/*` say: `*` is one chunk of a key, `**` any number
-        of chunks, `$*` a part of one. Raises UserError where no key ever can be like it."""
+        of chunks, `$*` any characters within one. Raises UserError where no key ever can be like it."""
         return list(self._like(keys))
 
     def last(self, keys: str = "**") -> Received | None:
@@ -140,7 +140,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
     """The messages that a node was given in one of its lives, each with the time in milliseconds, in that order."""
     if flight.routing.nodes[node_id].listens_only:  # no trouble strikes what it hears
         return [(one.header.sent_ms, one) for one in flight.heard]
-    intake, kept = Intake(flight.routing), KeptMessages(node_id, flight.routing)
+    intake, kept = Intake(flight.routing), JoinerMail(node_id, flight.routing)
     found: list[tuple[int, Received]] = []
     for one in flight.heard:
         route = flight.routing.route(one.key)
@@ -148,7 +148,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
             continue
         sent_ms = one.header.sent_ms
         if sent_ms < life.start_ms:
-            kept.take(one.key, one.payload)
+            kept.add(one.key, one.payload)
             continue
         for delivery in flight.faults.deliveries(node_id, one, flight.routing):
             opened = one if delivery.payload is one.payload else intake.open(one.key, delivery.payload)

@@ -62,7 +62,7 @@ class Trouble:
         self, keys: str, *, probability: float = 1.0, to: str = "", from_s: float | None = None, for_s: float = math.inf
     ) -> None:
         """Messages whose keys are like `keys`, `agent/*/coverage/*` say, are lost: `*` is one chunk of a key, `**` any
-        number of chunks, `$*` a part of one. What the clock says of the run is never struck.
+        number of chunks, `$*` any characters within one. What the clock says of the run is never struck.
 
         `probability`: for each message and reader by itself. `to`: the only reader concerned, by its node id; all if
         left out. What is sent from `from_s` on, for `for_s`, is concerned. So it is with the faults that follow.
