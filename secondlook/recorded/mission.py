@@ -51,9 +51,9 @@ class Mission(ABC):
     `folder`: the run's. `summary`: what summary.json holds; empty where the run was killed before it could write it.
     What tells of the mission raises UserError where the run ended before `has_begun`.
 
-    `keys` chooses messages by their keys, those of `comms.said.topics` below the run id, as Zenoh's key expressions do:
-    in `agent/*/state` or `coord/**` `*` is one chunk of a key, `**` any number of chunks, `$*` any characters within one.
-    Raises UserError for what is none, and where no key is ever like it.
+    `keys`: a key expression as Zenoh has it, `agent/*/state` or `coord/**`, for keys of `comms.said.topics` below the
+    run id: `*` is one chunk of a key, `**` any number of chunks, `$*` any characters within one. Raises UserError for
+    what is none, and where no key is ever like it.
     """
 
     folder: Path
