@@ -20,6 +20,7 @@ from comms.said.routing import RosterNode, Routing
 from comms.said.topics import TOPICS
 
 STRUCK = tuple(topic for topic in TOPICS if Role.CLOCK not in topic.writers)
+"""Whose messages faults may strike."""
 
 
 class FaultKind(enum.Enum):
