@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import Cut, strip_of
-from coordinator.cut.worth import Supply, worth_later_m2ps
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
@@ -20,7 +20,7 @@ SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on 
 
 
 class Briefing:
-    """Looks at ledger, vehicles and cutter as they are when it is asked; changes none of them."""
+    """Reads ledger, vehicles and cutter as they are when it is asked; changes none of them."""
 
     def __init__(
         self,
@@ -141,3 +141,23 @@ class Briefing:
 
     def _risk_m2(self, cut: Cut) -> float:
         return cut.counts_m2 / self._cutter.rules.p_detect
+
+
+@dataclass(frozen=True)
+class Supply:
+    """Strips of a kind: what one look removes at each (residual risk times m2), the seconds it takes, and how many."""
+
+    removed_m2: float
+    service_s: float
+    count: float
+
+
+def worth_later_m2ps(supplies: Iterable[Supply], helpers_s: float) -> float:
+    """The rate of the last strip served if `helpers_s` seconds go to the strips of the best rates first; 0 where the
+    time suffices for all of them."""
+    left_s = helpers_s
+    for supply in sorted(supplies, key=lambda one: -one.removed_m2 / one.service_s):
+        left_s -= supply.service_s * supply.count
+        if left_s < 0:
+            return supply.removed_m2 / supply.service_s
+    return 0.0

@@ -33,13 +33,14 @@ from coordinator.allocate.situation import Helper, Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.cutter import Cutter
-from coordinator.cut.strips import Cut, CuttingRules, Window
+from coordinator.cut.strips import Cut, CuttingRules
+from coordinator.cut.window import Window
 from coordinator.keep_apart.right_of_way import Order, RightOfWay, Underway
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.fleet_map import FleetMap
 from planner.region import Region
-from planner.risk import NATS_PER_LEVEL, LevelArray
+from planner.risk import LevelArray
 from planner.types import BoolArray, Point, Strip
 
 log = logging.getLogger("secondlook.coordinator")
@@ -187,7 +188,7 @@ class Coordinator:
     def _take_hotspot(self, received: Received, message: Hotspot) -> None:
         if self._cutter is not None:
             place = (received.vehicle, received.number)
-            self._to_cut |= self._cutter.take_hotspot(place, (received.header.incarnation, message.revision), message)
+            self._to_cut |= self._cutter.hear_hotspot(place, (received.header.incarnation, message.revision), message)
 
     def _take_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost = vehicle.is_idle, vehicle.is_finished, vehicle.lost
@@ -299,12 +300,8 @@ class Coordinator:
 
     def _learn(self, record: StripRecord, vehicle: KnownVehicle) -> None:
         """Learns from a strip that a vehicle has swept what second looks find."""
-        assert self.map is not None
-        layer = self.map.layers.get(vehicle.entry.vehicle)
-        if layer is not None and self._cutter is not None:
-            levels = layer.largest_levels[record.window.cells].astype(np.float64)
-            p_detect = -np.expm1(-NATS_PER_LEVEL * levels)
-            self._cutter.learn(record.window, p_detect, vehicle.entry.p_detect)
+        if self._cutter is not None:
+            self._cutter.learn(record.window, vehicle.entry.vehicle, vehicle.entry.p_detect)
 
     def _note_failure(self, vehicle: KnownVehicle, record: StripRecord | None = None) -> None:
         """It has not served what it accepted; where `record` is given, it is not to be sent there again."""
@@ -374,12 +371,12 @@ class Coordinator:
         if cutter is None:
             return
         under_way = {name: one.track_under_way for name, one in self._primaries.items()}
-        ground = cutter.look(under_way, self._briefing.sweeps_m2(now_ms), self._looked_at())
+        ground = cutter.assess(under_way, self._briefing.sweeps_m2(now_ms), self._claimed())
         columns = ground.columns
         unmatched = [record for record in self.ledger.in_state(StripState.OPEN) if columns[record.window.columns].any()]
         self._coming = [cut for cut in self._coming if not columns[cut.window.columns].any()]
         to_cut = {record.window for record in unmatched}
-        for cut in cutter.cut(ground, [window for window in self._looked_at() if window not in to_cut]):
+        for cut in cutter.cut(ground, [window for window in self._claimed() if window not in to_cut]):
             same = max(unmatched, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
@@ -390,9 +387,9 @@ class Coordinator:
                 self._open(cut, now_ms)
         for record in unmatched:
             self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
-        cutter.remember(self._looked_at())
+        cutter.remember(self._claimed())
 
-    def _looked_at(self) -> list[Window]:
+    def _claimed(self) -> list[Window]:
         """What is a strip's that is open or with a vehicle, or will be one's."""
         records = self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
         return [*(record.window for record in records), *(cut.window for cut in self._coming)]

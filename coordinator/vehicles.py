@@ -8,7 +8,8 @@ from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role, RosterVehicle
 from coordinator.allocate.service import Service
 from coordinator.cut.ground import TrackUnderWay
-from coordinator.cut.strips import SAME_PLACE, Cut, Window
+from coordinator.cut.strips import Cut
+from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
 from planner.dubins import Pose
 from planner.risk import LevelArray
@@ -184,6 +185,4 @@ class KnownVehicle:
 
     def is_not_for_it(self, record: StripRecord) -> bool:
         """Whether it has refused this strip as it is, or failed at its place."""
-        window = record.window
-        failed = any(window.shared(place) >= SAME_PLACE * window.size for place in self.failed_at)
-        return failed or record.strip.number in self.refused
+        return record.strip.number in self.refused or record.window.is_at_one_of(self.failed_at)
