@@ -28,14 +28,14 @@ from comms.said.messages import (
 )
 from comms.said.topics import MISSION_OVER, STRIP, TASK
 from coordinator.allocate.allocators import checked_offers, offers_let_through
-from coordinator.allocate.service import service
+from coordinator.allocate.service import expected_service
 from coordinator.allocate.situation import Helper, Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import Cut, CuttingRules
 from coordinator.cut.window import Window
-from coordinator.keep_apart.right_of_way import Order, RightOfWay, Underway
+from coordinator.keep_apart.right_of_way import Instruction, RightOfWay, Underway
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.fleet_map import FleetMap
@@ -200,7 +200,7 @@ class Coordinator:
         if self._right_of_way is not None:
             if did != (state.mode, state.works_on):
                 self._right_of_way.changed(vehicle.entry.vehicle)
-            self._to_look |= now_ms >= self._right_of_way.look_s * 1000
+            self._to_look |= now_ms >= self._right_of_way.check_s * 1000
         self._to_cut |= vehicle.is_finished and not was_finished
         self._to_assign |= vehicle.is_idle and not was_idle
         if vehicle.is_at_a_strip:
@@ -408,7 +408,7 @@ class Coordinator:
             return
         for cut in [*self._coming]:
             one = self._briefing.coming_strip(cut)
-            leaves_ms = min(math.floor(service(one, helper).leaves_s * 1000) for helper in free)
+            leaves_ms = min(math.floor(expected_service(one, helper).leaves_s * 1000) for helper in free)
             if leaves_ms <= now_ms:
                 self._coming.remove(cut)
                 self._open(cut, now_ms)
@@ -465,7 +465,7 @@ class Coordinator:
             self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
 
     def _offer_of(self, record: StripRecord, helper: Helper, vehicle: KnownVehicle, now_ms: int) -> Offer:
-        expected = service(self._briefing.open_strip(record), helper)
+        expected = expected_service(self._briefing.open_strip(record), helper)
         ends_ms = round(expected.ends_s * 1000)
         due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
         return Offer(record.strip, record.cut, expected, due_ms, self._levels(vehicle, record.window))
@@ -477,10 +477,10 @@ class Coordinator:
     def _keep_apart(self, now_ms: int) -> None:
         """Tells helpers to give way to whom they would come too close."""
         assert self._right_of_way is not None
-        for order in self._right_of_way.look(self._under_way(), now_ms / 1000):
+        for order in self._right_of_way.check(self._under_way(), now_ms / 1000):
             self._tell(order)
 
-    def _tell(self, order: Order) -> None:
+    def _tell(self, order: Instruction) -> None:
         if order.gives_back is not None:
             self._gave_way.setdefault(order.name, set()).add(order.gives_back.number)
             self._ask_back(order.gives_back, self.vehicles[order.name])
