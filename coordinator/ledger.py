@@ -10,6 +10,7 @@ from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from planner.types import Strip
 
+NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
 ENDED = frozenset({StripState.DONE, StripState.FAILED, StripState.WITHDRAWN})
 _ALLOWED: dict[StripState, frozenset[StripState]] = {
