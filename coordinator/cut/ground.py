@@ -12,15 +12,18 @@ be seen as badly as those behind it, so that a helper can follow in its wake.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from comms.said.messages import Hotspot, HotspotState, PlannedTrack
-from coordinator.cut.strips import Window
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.groups import neighbours
 from planner.region import points_inside
 from planner.types import BoolArray, FloatArray, GridSpec
+
+if TYPE_CHECKING:  # strips are cut with what is known of the ground
+    from coordinator.cut.strips import Window
 
 Place = tuple[str, int]
 """A hotspot's vehicle and number."""
