@@ -13,7 +13,7 @@ from secondlook.scenario import load_scenario
 
 
 def check(scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")]) -> None:
-    """Validate a scenario: tell all that is wrong with it by line, or how its area will be surveyed, and whether a
+    """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
     battery is too small for that."""
     valid = load_scenario(scenario)
     build_fleet(valid, record=False)

@@ -22,7 +22,7 @@ def view(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     web: Annotated[bool, typer.Option("--web", help="In a browser on this machine, not in a window.")] = False,
 ) -> None:
-    """Open the recording of a run in Rerun, in a window or in a browser; end with the window or with Ctrl-C."""
+    """Open the recording of a run in Rerun. Ends with the window, or with Ctrl-C."""
     recording = _recording(run)
     try:
         if not web:
