@@ -214,7 +214,7 @@ def _commands(name: str, command: Any) -> Iterator[tuple[str, Any]]:
 def _option(shown: str, told: str) -> tuple[str, str, str]:
     """A row from what the command's own help says, which has default and range in brackets at its end."""
     name, _, value = shown.partition(" ")
-    value = VALUES.get(value, value.strip("<>"))
+    value = VALUES.get(value, value.strip("<>").replace("|", "/"))
     meaning, _, limits = told.partition("  [")
     for word, instead in {"]": "", "default: ": "", "required": REQUIRED, "<=": " ≤ ", ">=": " ≥ "}.items():
         limits = limits.replace(word, instead)
