@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test example pictures golden lock clean
+.PHONY: run test docs example pictures golden lock clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -35,6 +35,11 @@ pictures: .venv/.test-ready
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run headland --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 4995 --out docs/headland.png
+
+# The pages that are made from the program, and of all pages the site: site/index.html.
+docs: .venv/.test-ready
+	@$(BIN)/python -m docs.pages
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
 
 # The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
 GOLDEN := tests/secondlook/recorded/golden
@@ -107,5 +112,6 @@ lock: .venv-lock/.uv-$(UV_VERSION)
 	@touch $@
 
 clean:
-	rm -rf .venv .venv-lock build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf .venv .venv-lock build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis \
+		site
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,3 +1,6 @@
+"""An allocator of one's own."""
+
+
 class LongestFirst:
     """Gives every free helper the longest strip that is left and that it has not refused."""
 

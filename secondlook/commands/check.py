@@ -13,7 +13,8 @@ from secondlook.scenario import load_scenario
 
 
 def check(scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")]) -> None:
-    """Validate a scenario, and tell all that is wrong with it by line."""
+    """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
+    battery is too small for that."""
     valid = load_scenario(scenario)
     build_fleet(valid, record=False)
     across_m, along_m = valid.area.extent_m

@@ -30,7 +30,7 @@ def paper(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="Runs of the six missions, to tell the spread.")] = 1,
 ) -> None:
-    """Fly the paper's three experiments, and compare its tables with what comes of them."""
+    """Fly the paper's three experiments. Prints its tables beside what came of them; needs secondlook[paper]."""
     require_extra()
     if out is not None:
         _make(out)

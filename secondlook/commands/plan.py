@@ -37,7 +37,8 @@ def plan(
         bool, typer.Option("--geojson", help="Print a scenario's area and tracks as GeoJSON alone.")
     ] = False,
 ) -> None:
-    """Lay a scenario's first tracks, or adapt the track spacing to a width with the fewest tracks."""
+    """Lay a scenario's first tracks. Whatever its area, tells its convex parts, their sweep frames and headings,
+    tracks, time, and what is not covered. With --width it adapts the track spacing to a width by itself."""
     if as_json and as_geojson:
         raise UserError("--geojson: is not allowed with --json; one form at a time")
     if scenario is not None:

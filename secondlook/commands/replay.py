@@ -25,7 +25,7 @@ def replay(
         float, typer.Option(min=0, max=1, help="By how much numbers with a fraction may differ; 0: byte for byte.")
     ] = 0.0,
 ) -> None:
-    """Feed one node of a recorded mission what it heard, and compare what it says with the recording."""
+    """Feed one node of a recorded mission what it heard, and tell the first difference in what it says."""
     scenario_file = run / "scenario.yaml"
     recording = read_messages(run / "messages.mpk")
     fleet = build_fleet(load_scenario(str(scenario_file)), record=False)

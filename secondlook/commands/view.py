@@ -20,9 +20,9 @@ from viz.viewer_program import ViewerError, check_display
 
 def view(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
-    web: Annotated[bool, typer.Option("--web", help="In a browser, not in a window.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="In a browser on this machine, not in a window.")] = False,
 ) -> None:
-    """Open the recording of a run in Rerun, and end with its window or with Ctrl-C."""
+    """Open the recording of a run in Rerun. Ends with the window, or with Ctrl-C."""
     recording = _recording(run)
     try:
         if not web:

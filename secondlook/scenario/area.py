@@ -52,7 +52,9 @@ class Priority(Mapping):
     """Ground whose residual risk counts `weight` times when second looks are planned."""
 
     polygon_m: Outline
+    """The corners in order, each once; it shares ground with what is surveyed."""
     weight: Annotated[float, Field(ge=0, le=100)]
+    """How often its residual risk counts. Only how weights compare matters."""
 
     @field_validator("polygon_m")
     @classmethod
@@ -63,14 +65,20 @@ class Priority(Mapping):
 
 
 class Area(Mapping):
-    """A polygon in the mission frame, convex or not, and holes in it that are not surveyed; the compass heading of the
-    tracks, `auto` for the one that needs the fewest; the map's cell; and ground that counts more in second looks."""
+    """What is surveyed: a polygon in the mission frame, and holes in it that are not surveyed; how tracks lie; the
+    map's cell; and ground that counts more in second looks."""
 
     polygon_m: Outline
+    """The corners in order, each once; convex or not."""
     holes_m: Annotated[tuple[Corners, ...], Field(strict=False, max_length=20)] = ()
+    """The corners of each piece that lies in it and is not surveyed."""
     track_heading_deg: TrackHeading = 0.0
+    """Compass heading of the tracks, or `auto` for the one that needs the fewest."""
     cell_m: Annotated[Bin, Field(validate_default=True)] = 5.0
+    """Cell of the residual-risk map, at most the shorter side of the area; the map has at most 20 million cells."""
     priorities: Annotated[tuple[Priority, ...], Field(strict=False, max_length=20)] = ()
+    """Ground whose residual risk counts more in second looks, or less. Where several overlap the last one counts. What
+    is told of the risk that is left stays as it is; recording and report show where it lies."""
 
     @property
     def extent_m(self) -> tuple[float, float]:

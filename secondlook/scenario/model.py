@@ -23,40 +23,43 @@ class Origin(Mapping):
     """The mission frame's origin, WGS84: x points east there, y north."""
 
     latitude_deg: Latitude
+    """Degrees north."""
     longitude_deg: Longitude
+    """Degrees east."""
 
 
 class Mission(Mapping):
-    """When the mission ends, and how its risk is computed.
-
-    `deadline_factor`: times the last survey vehicle's end. `time_limit_s`: the run fails if it is not over by then.
-    `rho`: the correlation of looks in the residual risk, from 0 (independent, the paper's) to 1 (only the best counts).
-    `separation_m`: no helper is sent on a way that comes nearer to another vehicle; 0 for any.
-    """
+    """When the mission ends, and how its risk is computed."""
 
     deadline_factor: Annotated[float, Field(ge=1, le=100)] = 1.05
+    """The mission is over at the latest at so many times the survey's duration, of several the last one's."""
     time_limit_s: Duration = 20_000.0
+    """The run fails if it is not over by then."""
     rho: Share = 0.0
+    """Correlation of looks in the residual risk: 0 independent, as in the paper, 1 only the best look counts."""
     separation_m: Annotated[float, Field(ge=0, le=1000)] = 12.0
+    """Helpers give way to whom they would come nearer; 0: they need not."""
 
 
 class UniformSeabed(Mapping):
     """A seabed that is the same everywhere."""
 
     kind: Literal["uniform"] = "uniform"
+    """`uniform`: the same everywhere. `patchy`: P_d is lower in places, and the keys below are there."""
 
 
 class PatchySeabed(Mapping):
-    """A seabed with fields of sand ripples and patches of vegetation, which lower every vehicle's P_d.
-
-    `scale_m`: least and largest extent of one. `strength`: least and largest share of P_d that one takes.
-    """
+    """A seabed with fields of sand ripples and patches of vegetation, which lower every vehicle's P_d."""
 
     kind: Literal["patchy"]
     ripple_fields: Annotated[int, Field(ge=0, le=1000)] = 4
+    """How many fields of sand ripples."""
     vegetation_patches: Annotated[int, Field(ge=0, le=1000)] = 10
+    """How many patches of vegetation."""
     scale_m: Annotated[tuple[Length, Length], BeforeValidator(check_pair), Field(strict=False)] = (40.0, 200.0)
+    """Least and largest extent of one."""
     strength: Annotated[tuple[Share, Share], BeforeValidator(check_pair), Field(strict=False)] = (0.3, 0.8)
+    """Least and largest share of P_d that one takes."""
 
     @field_validator("scale_m", "strength")
     @classmethod
@@ -70,25 +73,28 @@ class Targets(Mapping):
     """The targets on the seabed, spread at random; no agent knows of them, they serve evaluation alone."""
 
     count: Annotated[int, Field(ge=0, le=1000)] = 200
+    """How many."""
 
 
 class Coordinator(Mapping):
-    """How strips are cut and given out.
-
-    `allocator`: ours by name, or `package.module:Class` of your own; `node`: the same for the whole coordinator.
-    `lost_after_s`: age of a vehicle's last state from which it counts as lost. `min_strip_m`, `max_strip_m`: length
-    of a strip. `worth_risk`: mean residual risk over a helper's swath from which a further metre of strip is worth
-    flying, at most; it falls where helpers have time for more. `switch_margin`: share by which the fleet's plan must
-    get better for a helper to be turned round.
-    """
+    """How strips are cut and given out."""
 
     allocator: Annotated[str, plug_in(ALLOCATOR)] = "plan"
+    """Who is offered which strip: `plan`, `auction`, `greedy`, `nearest`, `first_come`, `none` (strips are cut, but
+    given to nobody), or `package.module:Class` of your own."""
     node: Annotated[str, plug_in(NODE)] | None = None
+    """`package.module:Class` of a whole coordinator of your own."""
     lost_after_s: Duration = 30.0
+    """A vehicle not heard of for so long counts as lost."""
     min_strip_m: Length = 30.0
+    """Least length of a strip."""
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
+    """Largest length of a strip, at least `min_strip_m`."""
     worth_risk: OpenShare = 0.3
+    """Mean residual risk, times the weight of the ground, over the helper's swath from which a further metre of strip
+    is worth flying, at most: less where helpers have time for more."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
+    """A helper is turned round for a plan that is better by at least this share."""
 
     @field_validator("max_strip_m")
     @classmethod
@@ -99,18 +105,28 @@ class Coordinator(Mapping):
 
 
 class Scenario(Mapping):
-    """One mission. `seed`: of everything random in it. `origin`: where on Earth it is, if that matters."""
+    """One mission."""
 
     name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=64)]
+    """a-z, 0-9, `_` and `-`."""
     description: Annotated[str, Field(max_length=1000)] = ""
+    """For people."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    """Of everything random in the mission."""
     area: Area
+    """What is surveyed."""
     origin: Origin | None = None
+    """Where x 0, y 0 is on Earth; for maps alone."""
     mission: Mission = Mission()
+    """When the mission ends, and how its risk is computed."""
     seabed: Annotated[UniformSeabed | PatchySeabed, Field(discriminator="kind")] = UniformSeabed()
+    """What lowers P_d, and where."""
     targets: Targets = Targets()
+    """What there is to find."""
     vehicles: Annotated[dict[VehicleId, Vehicle], Field(max_length=64)]
+    """An entry for each vehicle, under its id (a-z, 0-9, `_` and `-`); at least one surveys."""
     coordinator: Coordinator = Coordinator()
+    """How strips are cut and given out."""
 
     @field_validator("vehicles")
     @classmethod

@@ -16,15 +16,16 @@ from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Map
 
 
 class Curve(Mapping):
-    """A detection curve P(y): P_d over lateral range, linear between its points and 0 outside.
-
-    `noise_cell`, `noise_track`: the noise that was calibrated with it, for sensors that do not name their own.
-    """
+    """A detection curve P(y): P_d over lateral range, linear between its points and 0 outside."""
 
     range_m: Annotated[tuple[LengthOrZero, ...], Field(strict=False, min_length=2, max_length=10_000)]
+    """Lateral ranges, ascending."""
     p_detect: Annotated[tuple[PDetect, ...], Field(strict=False)]
+    """P_d at each of them."""
     noise_cell: Noise | None = None
+    """The noise a cell that was calibrated with it, for sensors that do not name their own."""
     noise_track: Noise | None = None
+    """The same a track."""
 
     @field_validator("range_m")
     @classmethod
@@ -69,7 +70,7 @@ def _take_bundled(value: object) -> object:
     return {"range_m": np.asarray(made.range_m).tolist(), "p_detect": np.asarray(made.p_detect).tolist()}
 
 
-OptionalCurve = Annotated[Curve | None, BeforeValidator(_take_bundled)]
+OptionalCurve = Annotated[Curve | None, BeforeValidator(_take_bundled, json_schema_input_type=Curve | str | None)]
 """A curve inline, a bundled one's name, or `package.module:Class` of what makes one."""
 
 CALIBRATED = "muscle"
@@ -88,24 +89,27 @@ def _noise(name: Literal["noise_cell", "noise_track"]) -> Any:
 
 
 class Sensor(Mapping):
-    """A side-looking sonar.
-
-    What it detects is either a `curve`, bundled, inline or made by `package.module:Class`, or, flat, `p_detect` up to
-    `range_m`; `sonar`: `package.module:Class` of a true model of your own, given that curve and the seabed.
-    `noise_cell`, `noise_track`: standard deviation of P_d per cell and per track, in logits; what is left out is the
-    curve's, or else the calibrated one's. `look_m`: length of track in one look; `along_bin_m`, `range_bin_m`: the bins
-    of a look, in whole centimetres.
-    """
+    """A side-looking sonar. What it detects is either a `curve`, or, flat, `p_detect` up to `range_m`."""
 
     curve: OptionalCurve = None
+    """Detection curve P(y): a bundled one's name (`muscle`), a mapping as below, or `package.module:Class` of what
+    makes one."""
     sonar: Annotated[str, plug_in(SONAR)] | None = None
+    """`package.module:Class` of a true sonar model of your own, which is given that curve and the seabed."""
     p_detect: PDetect | None = None
+    """Instead of a curve: the same P_d at every range up to `range_m`."""
     range_m: Length | None = None
+    """How far that P_d holds."""
     noise_cell: Noise = _noise("noise_cell")
+    """Standard deviation of P_d per cell, in logits; left out, the curve's own, or else that of `muscle`."""
     noise_track: Noise = _noise("noise_track")
+    """The same per track."""
     along_bin_m: Bin = 5.0
+    """Bin of a look along the track, in whole centimetres."""
     range_bin_m: Bin = 1.0
+    """Bin of a look over range, in whole centimetres."""
     look_m: Length = 20.0
+    """Length of track in one look, a multiple of `along_bin_m`."""
 
     @field_validator("along_bin_m", "range_bin_m")
     @classmethod

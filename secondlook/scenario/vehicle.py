@@ -49,33 +49,42 @@ class Start(Mapping):
     """Where a vehicle is when the mission starts: mission frame, compass heading."""
 
     x_m: Coordinate
+    """East."""
     y_m: Coordinate
+    """North."""
     heading_deg: Heading = 0.0
+    """Compass heading."""
 
 
 class VehicleBase(Mapping):
-    """What every vehicle has, whatever its role.
-
-    `body`: what moves it, the simulated world or a program of your own. `endurance_s`: how long its battery lasts.
-    `run_in_m`: straight run before and after each track. `nadir_gap_m`: what it does not see beside its track, per
-    side. `position_error_m`: how far it is from where it believes it is, in a random direction;
-    `position_drift_m_per_h`: by how much it drifts from there, in another. `agent`: `package.module:Class` of a node of
-    your own in its back seat.
-    """
+    """What every vehicle has, whatever its role."""
 
     role: str
+    """`survey`: it surveys the area, track by track. `revisit`: it takes second looks at the strips it is given."""
     body: Literal["simulated", "external"] = "simulated"
+    """What moves it: the simulated world, or `external`, a program of yours."""
     start: Start
+    """Where it is when the mission starts."""
     speed_mps: Speed
+    """The speed at which it flies."""
     turn_radius_m: Length
+    """The tightest circle that it can turn."""
     endurance_s: Duration
+    """How long its battery lasts."""
     altitude_m: Length
+    """Height above the seabed."""
     run_in_m: LengthOrZero
+    """Straight run before and after each track."""
     nadir_gap_m: LengthOrZero
+    """What it does not see beside its track, per side; r_min of the paper."""
     sensor: Sensor
+    """Its sonar, which must see beyond `nadir_gap_m`."""
     position_error_m: LengthOrZero = 0.0
+    """How far it truly is from where it believes it is, in a random direction."""
     position_drift_m_per_h: LengthOrZero = 0.0
+    """By how much it drifts from there, in another."""
     agent: Annotated[str, plug_in(NODE)] | None = None
+    """`package.module:Class` of a node of your own in its back seat."""
 
     @field_validator("sensor")
     @classmethod
@@ -86,26 +95,29 @@ class VehicleBase(Mapping):
 
 
 class SurveyVehicle(VehicleBase):
-    """A vehicle that surveys the area, track by track.
-
-    `spacing`: whether it adapts its track spacing to what it sees, or keeps to the plan. `range_m`: r_max, the range it
-    is told to plan with until it has flown the first pair of tracks. `threshold`: P_d from which data is admissible.
-    `prior_curve`: P(y) as earlier missions have measured it, the one that holds until the first track is flown; where
-    `range_m` is left out, its r_eff is what to plan with. `hotspot_risk`: residual risk from which a cell is worth a
-    second look. `part`: which part of the area is its own, `1 of 3` being the first of three equally wide ones, in the
-    order in which tracks are laid. `revisits`: whether it takes strips itself once it has surveyed all.
-    """
+    """A vehicle that surveys the area, track by track."""
 
     role: Literal["survey"]
     altitude_m: Length = 15.0
     run_in_m: LengthOrZero = 20.0
     range_m: Length | None = None
+    """r_max, the range that it is told to plan with until it has flown the first pair of tracks; at least 3 times
+    `nadir_gap_m`. Left out, r_eff of `prior_curve`."""
     spacing: Annotated[str, plug_in(SPACING)] = "adaptive"
+    """How tracks are spaced: `adaptive`, by what it sees, `fixed`, by the first plan, or `package.module:Class` of your
+    own."""
     threshold: OpenShare = 0.05
+    """P_d from which data is admissible."""
     prior_curve: OptionalCurve = None
+    """P(y) as earlier missions have measured it, in the forms of `sensor.curve`; holds until the first track is
+    flown."""
     hotspot_risk: OpenShare = 0.55
+    """Residual risk from which a cell is worth a second look."""
     part: str | None = None
+    """Which share of the area is its own: `1 of 3` is the first of three equally wide ones, in the order in which
+    tracks are laid. Left out, the whole."""
     revisits: bool = False
+    """Whether it takes strips itself once it has surveyed all."""
 
     @field_validator("range_m")
     @classmethod

@@ -82,7 +82,9 @@ class Fleet(Trouble):
     """The fleet of a scenario. What is to go wrong in it is scheduled with the methods of `Trouble`.
 
     Args:
-        scenario, overrides, seed: see `scenario_from`.
+        scenario: a source as for `scenario_from`.
+        overrides: see there.
+        seed: in place of the scenario's own.
         folder: where the files of each flight go, each into a folder of its own.
         bus: `local`, all in this process, or `zenoh`, a process for each node.
         processes: on `zenoh`, over how many processes the nodes are spread.

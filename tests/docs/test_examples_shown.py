@@ -25,6 +25,6 @@ def test_the_tests_shown_in_testing_md_pass(tmp_path: Path) -> None:
 
 
 def test_the_allocator_shown_is_the_examples() -> None:
-    (shown,) = python_blocks("your-own-parts.md")
+    (shown,) = python_blocks("plug-ins.md")
     example = (ROOT / "examples" / "own_allocator" / "longest_first.py").read_text(encoding="utf-8")
     assert shown == example

@@ -1,3 +1,5 @@
+"""Areas: the rectangle about them, their grid and their legs, by hand and for every convex polygon."""
+
 from __future__ import annotations
 
 import math

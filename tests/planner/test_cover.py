@@ -1,3 +1,5 @@
+"""The fewest single tracks: by hand, and against integer programming."""
+
 from __future__ import annotations
 
 import random

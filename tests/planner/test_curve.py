@@ -1,3 +1,5 @@
+"""Detection curves from looks, and the effective range read off them."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Shortest paths between poses: against every word there is, and many at once as each by itself."""
+
 from __future__ import annotations
 
 import itertools

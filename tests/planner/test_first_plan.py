@@ -1,3 +1,5 @@
+"""First plans over whole regions: what they see, and how many tracks they need."""
+
 from __future__ import annotations
 
 import math

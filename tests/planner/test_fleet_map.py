@@ -1,3 +1,5 @@
+"""The fleet's map: tiles in any order, lost and repeated, end in one map."""
+
 from __future__ import annotations
 
 import math

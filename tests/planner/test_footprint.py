@@ -1,3 +1,5 @@
+"""Where looks fall on the grid: by hand, and bin by bin."""
+
 from __future__ import annotations
 
 import itertools

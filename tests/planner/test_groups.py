@@ -1,3 +1,5 @@
+"""Groups of cells that touch: by hand, and what holds for every map."""
+
 from __future__ import annotations
 
 import numpy as np

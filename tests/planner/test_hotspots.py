@@ -1,3 +1,5 @@
+"""Hotspots: found, cut at blocks, outlined, and kept under their numbers."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""The legs of tracks laid side by side, flown to and fro."""
+
 from __future__ import annotations
 
 import numpy as np

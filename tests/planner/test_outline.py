@@ -1,3 +1,5 @@
+"""Outlines of patches of cells: exact for few vertices, simpler and no smaller for many."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Regions that are concave or have holes: which cells lie inside, and what is refused."""
+
 from __future__ import annotations
 
 import math

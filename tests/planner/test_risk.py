@@ -1,3 +1,5 @@
+"""Residual risk: the paper's equation, layers that add looks up, and their levels."""
+
 from __future__ import annotations
 
 import math

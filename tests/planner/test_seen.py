@@ -1,3 +1,5 @@
+"""Which cells are seen from tracks, by hand and cell by cell."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Settled cells: by hand, and cell by cell as defined."""
+
 from __future__ import annotations
 
 import math

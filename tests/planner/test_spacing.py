@@ -1,3 +1,5 @@
+"""Track spacing: every figure of the paper's experiments, and what holds for every width."""
+
 from __future__ import annotations
 
 import math

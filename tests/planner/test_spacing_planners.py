@@ -1,3 +1,5 @@
+"""The adaptive planner and the fixed one, asked as an agent asks them."""
+
 from __future__ import annotations
 
 import math

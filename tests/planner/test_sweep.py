@@ -1,3 +1,5 @@
+"""Sweeps over strips: where their legs lie, and which way of flying them is the shortest."""
+
 from __future__ import annotations
 
 import itertools

@@ -1,3 +1,5 @@
+"""Tiles: together they hold each cell of the grid once."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""A mission's messages and their recording, made once for the tests of this folder."""
+
 from __future__ import annotations
 
 import os

@@ -1,3 +1,5 @@
+"""Pictures of a recording: the viewer draws them, and is gone afterwards."""
+
 from __future__ import annotations
 
 import socket

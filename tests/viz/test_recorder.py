@@ -1,3 +1,5 @@
+"""What a recording holds of the messages that the recorder has heard."""
+
 from __future__ import annotations
 
 import itertools

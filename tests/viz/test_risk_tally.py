@@ -1,3 +1,5 @@
+"""The statistics of a map that is drawn in blocks are those of the whole map."""
+
 from __future__ import annotations
 
 from typing import Any

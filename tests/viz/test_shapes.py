@@ -1,3 +1,5 @@
+"""The points of what is drawn, by hand."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Which messages are worth a line in the log, and what the line says."""
+
 from __future__ import annotations
 
 import subprocess
