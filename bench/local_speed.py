@@ -24,8 +24,8 @@ from typing import Any
 
 import msgpack
 
+import comms.lockstep.drive
 import comms.runner
-import secondlook.launch.mission
 from comms.lockstep.clock import LockstepClock
 from comms.lockstep.local_bus import run_local
 from comms.node import Publication, Received, Step
@@ -62,7 +62,7 @@ PARTS: tuple[tuple[Any, str, str], ...] = (
     (LockstepClock, "answer", "clock"),
     (MissionFiles, "write", "observer, files"),
     (Metrics, "take", "observer, figures"),
-    (secondlook.launch.mission, "run_local", "local bus"),
+    (comms.lockstep.drive, "run_local", "local bus"),
 )  # fmt: skip
 
 
