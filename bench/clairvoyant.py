@@ -35,7 +35,7 @@ from bench.clairvoyant_schedule import best_schedule
 from bench.flown_legs import FlownLegs
 from bench.legs import Schedule, Simulator
 from bench.removable import Clairvoyance, Removable
-from secondlook.compare.flights import BASELINES, FailedFlight, contenders, fly
+from secondlook.compare.flights import BASELINES, Failure, contenders, fly
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.signals import signals_interrupt
@@ -117,17 +117,17 @@ def one_seed(scenario: Scenario, allocators: list[str], seconds: float) -> Row:
     """Flies the seed with each allocator, and solves it. The survey is the same with all of them."""
     clairvoyance = Clairvoyance(contenders(scenario, ["none"])[0].scenario)
     survey = fly(clairvoyance.scenario, clairvoyance.take)
-    if isinstance(survey, FailedFlight):
+    if isinstance(survey, Failure):
         raise ValueError(f"seed {scenario.seed}: {survey.failure}")
     mission = clairvoyance.removable()
     flown: dict[str, Flown | None] = {}
     for contender in contenders(scenario, allocators):
         legs = FlownLegs()
-        flight = fly(contender.scenario, legs.take)
+        result = fly(contender.scenario, legs.take)
         flown[contender.name] = (
             None
-            if isinstance(flight, FailedFlight)
-            else Flown(legs.schedule(mission.grid, mission.helpers), flight.removed_m2)
+            if isinstance(result, Failure)
+            else Flown(legs.schedule(mission.grid, mission.helpers), result.removed_m2)
         )
     return solve(mission, scenario.seed, flown, seconds)
 

@@ -39,10 +39,11 @@ from rich.table import Table
 
 import secondlook
 from bench.replayed import ReplayedConfig
+from comms.lockstep.drive import Lockstep
 from comms.node import Received
+from comms.said.messages import Role
 from secondlook.fleet.build import build_fleet
-from secondlook.fleet.node_spec import NodeSpec
-from secondlook.launch.host_plans import RECORDER
+from secondlook.fleet.nodes import RECORDER, NodeSpec, node_spec
 from secondlook.launch.mission import recorder_config
 from secondlook.launch.processes import Processes
 from secondlook.scenario import load_scenario
@@ -126,8 +127,8 @@ def replay(run: Path) -> bool:
     again = {node_id: NodeSpec("bench.replayed:Replayed", ReplayedConfig(node_id, run)) for node_id in fleet.specs}
     with tempfile.TemporaryDirectory(prefix="secondlook-cost-") as folder:
         recording = Path(folder) / "mission.rrd"
-        recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, recording))
-        processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), recorder, processes=1)
+        again[RECORDER] = node_spec(Role.RECORDER, recorder_config(scenario, recording))
+        processes = Processes(replace(fleet, specs=again), Path(folder), _Nobody(), Lockstep(), processes=1)
         with processes, _sampling(lambda: processes.process_ids.get(RECORDER), reference) as samples:
             processes.run()
         recording_mb = recording.stat().st_size / 1e6

@@ -16,9 +16,9 @@ import queue
 import time
 from collections.abc import Sequence
 
-from comms.access import access_rules
-from comms.control import HostPlan, RunKeys
-from comms.lockstep.host import serve_nodes
+from comms.keys import HostSpec, RunKeys
+from comms.lockstep.access import access_rules
+from comms.lockstep.host import NodeHost
 from comms.lockstep.hub import Hub
 from comms.node import Node, Publication, Received, Step
 from comms.said.messages import AgentState, ClockMode, Grid, Mode, Role, RunInfo
@@ -113,17 +113,17 @@ def raw_rate(processes: int, seconds: float) -> float:
     return rate
 
 
-def _serve(endpoint: str, plan: HostPlan, agents: int) -> None:
+def _serve(endpoint: str, plan: HostSpec, agents: int) -> None:
     nodes: dict[str, Node] = {name: Chatterer(name) for name in plan.nodes}
     with open_client(endpoint, plan.host, "x") as session:
-        serve_nodes(session, KEYS, plan, nodes, Routing(roster_of(agents)))
+        NodeHost(session, KEYS, plan, nodes, Routing(roster_of(agents))).run()
 
 
 def lockstep_rate(agents: int, processes: int, seconds: float) -> float:
     """Rounds a second of our clock, the agents spread over so many processes beside the hub's."""
     routing = Routing(roster_of(agents))
     names = [f"v{number}" for number in range(agents)]
-    plans = tuple(HostPlan(f"p{number}", tuple(names[number::processes])) for number in range(processes))
+    plans = tuple(HostSpec(f"p{number}", tuple(names[number::processes])) for number in range(processes))
     session, endpoint = open_hub({plan.host: "x" for plan in plans}, access_rules(routing, plans, KEYS))
     with session:
         limit_ms = 500

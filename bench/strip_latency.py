@@ -18,8 +18,9 @@ from pathlib import Path
 import numpy as np
 from rich.progress import track
 
-from comms.latency import STRIP_TO_TASK
+from comms.lockstep.drive import Lockstep
 from comms.node import Received
+from comms.result import STRIP_TO_TASK
 from comms.said.messages import StripState, StripStatus
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
@@ -56,7 +57,7 @@ def latencies_ms(scenario: Scenario, strips: OpenStrips) -> list[float]:
     """Those of one mission, each node in a process of its own."""
     with (
         tempfile.TemporaryDirectory(prefix="secondlook-latency-") as folder,
-        Processes(build_fleet(scenario, record=False), _logs(Path(folder)), strips, None, None) as processes,
+        Processes(build_fleet(scenario, record=False), _logs(Path(folder)), strips, Lockstep()) as processes,
     ):
         return processes.run().latencies_ms.get(STRIP_TO_TASK, [])
 

@@ -6,7 +6,7 @@ A node never reads a clock, a socket or a global random generator; `random_strea
 from __future__ import annotations
 
 import zlib
-from typing import NamedTuple, Protocol
+from typing import TYPE_CHECKING, Generic, NamedTuple, Protocol
 
 import numpy as np
 
@@ -14,16 +14,36 @@ from comms.said.codec import Header
 from comms.said.messages import Message
 from comms.said.topics import Topic, number_of
 
+if TYPE_CHECKING:  # Python's own knows no default before 3.13; without one every Received would have to say Message
+    from typing_extensions import TypeVar
 
-class Received(NamedTuple):
-    """A message as a node gets it: what the key says, who sent it and when, what it says, and its payload's bytes."""
+    M_co = TypeVar("M_co", bound=Message, covariant=True, default=Message)
+else:
+    from typing import TypeVar
+
+    M_co = TypeVar("M_co", covariant=True)
+
+
+class Received(NamedTuple, Generic[M_co]):
+    """A message as it was heard: its key below the run id and what that says, who sent it and when, what it says, and
+    its payload's bytes. `vehicle`: whom the key names, "" for nobody."""
 
     key: str
     topic: Topic
     vehicle: str
     header: Header
-    message: Message
+    message: M_co
     payload: bytes = b""
+
+    @property
+    def sender(self) -> str:
+        """The id of the node that has sent it."""
+        return self.header.sender
+
+    @property
+    def t_s(self) -> float:
+        """When it was sent, simulated seconds since the mission's start."""
+        return self.header.sent_ms / 1000
 
     @property
     def number(self) -> int:

@@ -1,25 +1,24 @@
-"""Runs one node of a lockstep fleet: its mail in order, its sequence numbers and its digest. No I/O."""
+"""The guard around a node or a listener, on every bus: its sequence numbers, its digest, what it may say, how it fails;
+and the check of all that arrives. No I/O."""
 
 from __future__ import annotations
 
-import bisect
 import hashlib
 import logging
+import sys
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from comms.node import Node, Publication, Received, Step
+from comms.errors import NodeError
+from comms.node import Listener, Node, Publication, Received, Step
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
 from comms.said.messages import Message
 from comms.said.routing import Route, Routing
 from comms.said.wire import WireError
 
 log = logging.getLogger("secondlook.comms")
-
-
-class NodeError(Exception):
-    """A node has broken the rules of the house or raised; the text is one sentence that names it."""
 
 
 def failure_of(node_id: str, error: Exception, *, at_ms: int | None = None) -> NodeError:
@@ -128,67 +127,82 @@ class Intake:
             log.warning("dropped a message from %s: %s: %s (said once)", sender, reason, detail)
 
 
-class NodeRunner:
-    """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
+class GuardedNode:
+    """A node under its id, kept to the rules of the house: what it publishes is stamped in order, what it raises is
+    told as its failure. `wake_ms`: the wake-up it has asked for."""
 
     def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
         self.node_id = node_id
-        self.arrived: Counter[str] = Counter()
+        self.wake_ms: int | None = None
         self.stamp = Stamp(node_id, routing, incarnation)
         self._node = node
-        self._wake_ms: int | None = 0
-        self._mail: dict[int, list[Received]] = {}
-        self._late_ms: list[int] = []
 
-    def deliver(self, received: Received, due_ms: int | None = None) -> None:
-        """Puts a message into the mailbox, to be handled when it is due: as its topic says, or at `due_ms`."""
-        if due_ms is None:
-            due_ms = received.header.sent_ms + received.topic.delay_ms
-        self._mail.setdefault(due_ms, []).append(received)
+    def is_due(self, now_ms: int) -> bool:
+        """Whether the wake-up has come."""
+        return self.wake_ms is not None and self.wake_ms <= now_ms
 
-    def deliver_late(self, received: Received, due_ms: int) -> None:
-        """The same for a message that is due later than the clock knows: the runner itself asks to act then."""
-        self.deliver(received, due_ms)
-        if received.topic.wakes:
-            bisect.insort(self._late_ms, due_ms)
-
-    def has_all(self, expected: dict[str, int]) -> bool:
-        """Whether as many messages of each sender have arrived as the clock expects."""
-        return all(self.arrived[sender] >= count for sender, count in expected.items())
-
-    def act(self, now_ms: int, *, start: bool) -> tuple[int | None, list[Outgoing]]:
-        """Starts the node, or handles its due mail in order and then its wake-up if that is due.
-
-        Returns when to act next and what the node publishes. Raises NodeError.
-        """
+    def act(
+        self, now_ms: int, mail: Iterable[Received] = (), *, start: bool = False, wake: bool = False
+    ) -> list[Outgoing]:
+        """Starts the node, gives it mail in order, and then with `wake` its wake-up if that is due; returns what it
+        publishes. Raises NodeError."""
         published: list[Publication] = []
         try:
             if start:
-                self._take(self._node.start(now_ms), published)
-            else:
-                for due in sorted([due for due in self._mail if due <= now_ms]):
-                    mail = self._mail.pop(due)
-                    if len(mail) > 1:
-                        mail.sort(key=lambda one: one.header.order)
-                    for received in mail:
-                        self._take(self._node.on_message(received, now_ms), published)
-                if self._wake_ms is not None and self._wake_ms <= now_ms:
-                    self._take(self._node.on_wake(now_ms), published)
+                self._note(self._node.start(now_ms), published)
+            for received in mail:
+                self._note(self._node.on_message(received, now_ms), published)
+            if wake and self.is_due(now_ms):
+                self._note(self._node.on_wake(now_ms), published)
         except NodeError:
             raise
         except Exception as error:
             raise failure_of(self.node_id, error, at_ms=now_ms) from error
-        if self._wake_ms is not None and self._wake_ms <= now_ms:
-            raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self._wake_ms} ms, which is not later")
-        next_ms = self._wake_ms
-        if self._late_ms:
-            del self._late_ms[: bisect.bisect_right(self._late_ms, now_ms)]
-            next_ms = min((ms for ms in (next_ms, *self._late_ms[:1]) if ms is not None), default=None)
-        return next_ms, [self.stamp(one.key, one.message, now_ms) for one in published]
+        return [self.stamp(one.key, one.message, now_ms) for one in published]
 
-    def _take(self, step: Step, published: list[Publication]) -> None:
-        self._wake_ms = step.wake_ms
+    def check_wake(self, now_ms: int) -> None:
+        """Raises NodeError where the wake-up asked for is not later than now."""
+        if self.is_due(now_ms):
+            raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self.wake_ms} ms, which is not later")
+
+    def _note(self, step: Step, published: list[Publication]) -> None:
+        self.wake_ms = step.wake_ms
         published.extend(step.publish)
+
+
+class GuardedListener:
+    """A listener (`comms.node.Listener`) under its node's id; raises NodeError for what that raises."""
+
+    def __init__(self, node_id: str, listener: Listener) -> None:
+        self._node_id = node_id
+        self._listener = listener
+
+    def on_message(self, received: Received) -> None:
+        """Passes one message on."""
+        try:
+            self._listener.on_message(received)
+        except Exception as error:
+            raise failure_of(self._node_id, error, at_ms=received.header.sent_ms) from error
+
+    def close(self) -> None:
+        """Closes the listener."""
+        try:
+            self._listener.close()
+        except Exception as error:
+            raise failure_of(self._node_id, error) from error
+
+
+def close_all(listeners: Iterable[GuardedListener]) -> None:
+    """Closes each, also when another fails to close; then raises the first NodeError, but never in place of an error
+    that is on its way already."""
+    failures = []
+    for listener in listeners:
+        try:
+            listener.close()
+        except NodeError as failure:
+            failures.append(failure)
+    if failures and sys.exception() is None:
+        raise failures[0]
 
 
 def fleet_digest(senders: list[SenderDigest]) -> str:

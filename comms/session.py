@@ -1,4 +1,9 @@
-"""Opening Zenoh sessions: the hub on a loopback port that the system picks, everyone else as its client."""
+"""Opening Zenoh sessions, and what is done with one.
+
+Within one host, `secondlook run`: a hub on a loopback port that the system picks, everyone else as its client, by user
+name and password. For nodes that are started one by one, on one host or on several: a router at an endpoint, everyone
+else as its guest, over TLS or in the clear.
+"""
 
 from __future__ import annotations
 
@@ -6,21 +11,34 @@ import json
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
+from comms.errors import ConnectionFailedError
+
 CONNECT_TIMEOUT_S = 10.0
 PATIENCE_S = 60.0
+SIGN_OF_LIFE_EVERY_S = 0.5  # so often a hub says that it is alive
 LARGEST_MESSAGE_BYTES = 4 << 20
 PACKET_BYTES = 8 << 10  # each has its memory cleared before it is received, however little comes
 MOST_PACKETS = 16  # that may wait to be sent; the most there may be
 MOST_MAIL = 1 << 20
+LEASE_S = 4.0  # a link of which nothing is heard for so long, not even a sign of life, is given up
+BLOCK_S = 1.0  # so long a message waits for a link that takes nothing, before that is given up
+DROP_S = 0.02  # so long what may be left out waits for room: on a busy machine it takes a while to be made
+RETRY_S = (0.2, 1.0)  # a lost link is tried again after the first of these, in the end every second one
 
 
-class ConnectionFailedError(Exception):
-    """A session that could not be opened; the text is one sentence."""
+@dataclass(frozen=True, slots=True)
+class Certificates:
+    """Files of this process for TLS: who is trusted, and with what it proves who it is, to both sides alike."""
+
+    authority: Path
+    certificate: Path
+    key: Path
 
 
 def open_hub(
@@ -28,25 +46,18 @@ def open_hub(
 ) -> tuple[zenoh.Session, str]:
     """A session that routes for all others, and the endpoint it listens on.
 
-    `users`: a password for each user name that may connect. Only loopback is listened on. `patience_s`: see `_config`.
+    `users`: a password for each user name that may connect. Only loopback is listened on. `patience_s`: see
+    `_on_one_host`.
     """
     with tempfile.TemporaryDirectory(prefix="secondlook-") as folder:
         passwords = Path(folder) / "users"
         with open(os.open(passwords, os.O_WRONLY | os.O_CREAT, 0o600), "w") as file:
             file.writelines(f"{name}:{password}\n" for name, password in users.items())
-        config = _config("router", patience_s, listen=["tcp/127.0.0.1:0"])
-        set_config(config, "scouting/delay", 0)
-        set_config(config, "adminspace", {"enabled": True, "permissions": {"read": True, "write": False}})
-        set_config(config, "transport/auth/usrpwd/dictionary_file", str(passwords))
-        if access_control is not None:
-            set_config(config, "access_control", access_control)
-        session = zenoh.open(config)
-    # The session's own admin space is where the port that the system picked can be read.
-    for reply in session.get(f"@/{session.info.zid()}/router"):
-        if reply.ok is not None:
-            return session, str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
-    session.close()  # type: ignore[no-untyped-call]
-    raise ConnectionFailedError("the hub does not say which port it listens on")
+        settings = _on_one_host("router", patience_s, listen=["tcp/127.0.0.1:0"]) | {
+            "transport/auth/usrpwd/dictionary_file": str(passwords)
+        }
+        session = zenoh.open(_config(settings, access_control))
+    return session, _listening_at(session, "the hub does not say which port it listens on")
 
 
 def open_client(
@@ -58,15 +69,46 @@ def open_client(
     patience_s: float = PATIENCE_S,
 ) -> zenoh.Session:
     """A session that speaks through the hub at `endpoint`; raises ConnectionFailedError where there is none, or none
-    that lets `user` in with `password`. `patience_s`: see `_config`."""
-    config = _config("client", patience_s, connect=[endpoint])
-    set_config(config, "connect/timeout_ms", round(connect_timeout_s * 1000))
-    set_config(config, "transport/auth/usrpwd/user", user)
-    set_config(config, "transport/auth/usrpwd/password", password)
-    try:
-        return zenoh.open(config)
-    except zenoh.ZError as error:
-        raise ConnectionFailedError(f"no connection to the hub at {endpoint} as {user}") from error
+    that lets `user` in with `password`. `patience_s`: see `_on_one_host`."""
+    settings = _on_one_host("client", patience_s, connect=[endpoint]) | {
+        "connect/timeout_ms": round(connect_timeout_s * 1000),
+        "transport/auth/usrpwd/user": user,
+        "transport/auth/usrpwd/password": password,
+    }
+    return _open(_config(settings), lambda cause: f"no connection to the hub at {endpoint} as {user}")
+
+
+def open_router(
+    endpoint: str, certificates: Certificates | None, access_control: dict[str, Any] | None
+) -> tuple[zenoh.Session, str]:
+    """A session through which all others speak, and the endpoint it listens on, which tells a port that the system
+    picked. Raises ConnectionFailedError where it cannot listen there."""
+    config = _config(_on_several_hosts("router", certificates, listen=[endpoint]), access_control)
+    session = _open(config, lambda cause: f"cannot listen on {endpoint}: {cause}")
+    return session, _listening_at(session, f"the router at {endpoint} does not say where it listens")
+
+
+def open_guest(
+    connect: str, listen: str | None, certificates: Certificates | None, *, within_s: float
+) -> zenoh.Session:
+    """A session that speaks through the router at `connect`, and connects again whenever that link is lost. With
+    `listen` others may speak through it in turn: so what is on one vehicle goes on talking without the router.
+
+    Raises ConnectionFailedError where there is no router that lets it in within so many seconds, or it cannot listen.
+    """
+    mode, listens = ("client", []) if listen is None else ("router", [listen])
+    settings = _on_several_hosts(mode, certificates, listen=listens, connect=[connect]) | {
+        "connect/timeout_ms": round(within_s * 1000),
+        "connect/exit_on_failure": True,
+    }
+
+    def why(cause: str) -> str:
+        if listen is not None and "listener" in cause:
+            return f"cannot listen on {listen}: {cause}"
+        hint = ", or it does not accept our certificate, or we not its" if connect.startswith("tls/") else ""
+        return f"no connection to {connect} within {within_s:g} s: nobody listens there{hint}"
+
+    return _open(_config(settings), why)
 
 
 def read_where_packets_are_awaited() -> None:
@@ -109,8 +151,8 @@ def subscribe(
 
 
 class Mailbox:
-    """Subscribes to all expressions and keeps what comes until it is taken: of a message that waits there no thread of
-    Python is woken, which costs more than the rest of receiving it.
+    """Subscribes to all expressions and keeps what comes until it is fetched: of a message that waits there no thread
+    of Python is woken, which costs more than the rest of receiving it.
 
     An expression that another one includes is left out. What waits holds the whole packet that it came in, and a
     mailbox that is full holds up all that comes to the session: it is to be emptied from time to time.
@@ -121,7 +163,7 @@ class Mailbox:
             session.declare_subscriber(one, zenoh.handlers.FifoChannel(MOST_MAIL)) for one in _needed(expressions)
         ]
 
-    def take(self) -> Iterator[tuple[str, bytes]]:
+    def fetch(self) -> Iterator[tuple[str, bytes]]:
         """Key and payload of what has come, of each expression in the order of arrival; then it is gone from here."""
         for one in self._subscribers:
             while (sample := one.try_recv()) is not None:
@@ -133,24 +175,87 @@ def _needed(expressions: Iterable[str]) -> list[zenoh.KeyExpr]:
     return [one for one in wanted if not any(other != one and other.includes(one) for other in wanted)]
 
 
-def _config(mode: str, patience_s: float, *, listen: Iterable[str] = (), connect: Iterable[str] = ()) -> zenoh.Config:
-    """`patience_s`: wall time after which the other side gives up a session from which nothing comes, not even a sign
-    of life, and for which a put waits for one that takes nothing. An end of the process is noticed at once."""
+def _on_one_host(
+    mode: str, patience_s: float, *, listen: Iterable[str] = (), connect: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Settings. `patience_s`: wall time after which the other side gives up a session from which nothing comes, not
+    even a sign of life, and for which a put waits for one that takes nothing. An end of the process is noticed at
+    once."""
+    return _basic(mode, listen, connect) | {
+        "transport/link/tx/lease": round(patience_s * 1000),
+        "transport/link/tx/batch_size": PACKET_BYTES,
+        "transport/link/tx/queue/size/real_time": MOST_PACKETS,
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": round(patience_s * 1e6),
+    }
+
+
+def _on_several_hosts(
+    mode: str, certificates: Certificates | None, *, listen: Iterable[str] = (), connect: Iterable[str] = ()
+) -> dict[str, Any]:
+    first_s, most_s = RETRY_S
+    settings: dict[str, Any] = _basic(mode, listen, connect) | {
+        "scouting/gossip/enabled": False,
+        "scouting/delay": 0,
+        "connect/retry": {
+            "period_init_ms": round(first_s * 1000), "period_max_ms": round(most_s * 1000), "period_increase_factor": 2,
+        },
+        "transport/link/tx/lease": round(LEASE_S * 1000),
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
+        "transport/link/tx/queue/congestion_control/block/wait_before_close": round(BLOCK_S * 1e6),
+    }  # fmt: skip
+    if certificates is not None:
+        authority, certificate, key = map(str, (certificates.authority, certificates.certificate, certificates.key))
+        settings["transport/link/tls"] = {
+            "root_ca_certificate": authority,
+            "enable_mtls": True,
+            "listen_certificate": certificate,
+            "listen_private_key": key,
+            "connect_certificate": certificate,
+            "connect_private_key": key,
+            "verify_name_on_connect": True,
+        }
+    return settings
+
+
+def _basic(mode: str, listen: Iterable[str], connect: Iterable[str]) -> dict[str, Any]:
+    router = {"scouting/delay": 0, "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}}}
+    return {
+        "mode": mode,
+        "scouting/multicast/enabled": False,
+        "listen/endpoints": list(listen),  # always: a router listens on all interfaces by default
+        "connect/endpoints": list(connect),
+        "transport/shared_memory/enabled": False,  # a killed process would leave segments behind
+        "transport/link/rx/max_message_size": LARGEST_MESSAGE_BYTES,
+        **(router if mode == "router" else {}),
+    }
+
+
+def _config(settings: Mapping[str, Any], access_control: dict[str, Any] | None = None) -> zenoh.Config:
     config = zenoh.Config()
-    set_config(config, "mode", mode)
-    set_config(config, "scouting/multicast/enabled", False)
-    set_config(config, "listen/endpoints", list(listen))  # always: a router listens on all interfaces by default
-    set_config(config, "connect/endpoints", list(connect))
-    set_config(config, "transport/shared_memory/enabled", False)  # a killed process would leave segments behind
-    set_config(config, "transport/link/rx/max_message_size", LARGEST_MESSAGE_BYTES)
-    set_config(config, "transport/link/tx/lease", round(patience_s * 1000))
-    set_config(config, "transport/link/tx/batch_size", PACKET_BYTES)
-    set_config(config, "transport/link/tx/queue/size/real_time", MOST_PACKETS)
-    block_us = round(patience_s * 1e6)
-    set_config(config, "transport/link/tx/queue/congestion_control/block/wait_before_close", block_us)
+    for path, value in settings.items():
+        config.insert_json5(path, json.dumps(value))
+    if access_control is not None:
+        config.insert_json5("access_control", json.dumps(access_control))
     return config
 
 
-def set_config(config: zenoh.Config, path: str, value: Any) -> None:
-    """Sets one key of a configuration."""
-    config.insert_json5(path, json.dumps(value))
+def _open(config: zenoh.Config, sentence: Callable[[str], str]) -> zenoh.Session:
+    """Opens a session; raises ConnectionFailedError with the sentence for what the system says, without the path of
+    Zenoh's sources."""
+    try:
+        return zenoh.open(config)
+    except zenoh.ZError as error:
+        told = str(error)
+        known = ("Address already in use", "Cannot assign requested address", "Permission denied")
+        cause = next((one.lower() for one in known if one in told), told.split(" at /", maxsplit=1)[0])
+        raise ConnectionFailedError(sentence(cause)) from error
+
+
+def _listening_at(session: zenoh.Session, failure: str) -> str:
+    """The endpoint that a session listens on: its own admin space is where the port that the system picked can be
+    read."""
+    for reply in session.get(f"@/{session.info.zid()}/router"):
+        if reply.ok is not None:
+            return str(json.loads(reply.ok.payload.to_bytes())["locators"][0])
+    session.close()  # type: ignore[no-untyped-call]
+    raise ConnectionFailedError(failure)

@@ -9,23 +9,16 @@ import numpy as np
 
 from coordinator.allocate.situation import Allocator
 from planner.region import Region
-from planner.types import BoolArray, FloatArray, GridSpec, Point
+from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 
 
-@dataclass(frozen=True)
-class Priority:
-    """Ground, by its corners in the mission frame, whose residual risk counts `weight` times."""
-
-    outline: tuple[Point, ...]
-    weight: float
-
-
-def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priority]) -> FloatArray:
+def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[PriorityGround]) -> FloatArray:
     """The weight of each cell, shape of the grid, as a multiple of their mean over the area: 1, or that of the last
     priority that its centre lies in. `inside`: the area's cells."""
     weights: FloatArray = np.ones(grid.shape)
     for one in priorities:
-        weights[Region(one.outline).inside(grid)] = one.weight
+        within = [Region(outline).inside(grid) for outline in one.outlines_m]
+        weights[np.logical_xor.reduce(within)] = one.weight
     mean = float(weights[inside].mean()) if inside.any() else 1.0
     return weights / mean if mean > 0 else weights
 
@@ -48,4 +41,4 @@ class CoordinatorConfig:
     worth_risk: float
     switch_margin: float
     separation_m: float = 0.0
-    priorities: tuple[Priority, ...] = ()
+    priorities: tuple[PriorityGround, ...] = ()

@@ -162,15 +162,7 @@ class Coordinator:
     def _take_tile(self, received: Received, tile: CoverageTile, now_ms: int) -> None:
         assert self.map is not None
         try:
-            news = self.map.take(
-                received.vehicle,
-                (received.header.incarnation, tile.version),
-                tile.first_row,
-                tile.first_column,
-                tile.sum_levels,
-                tile.largest_levels,
-                tile.settled,
-            )
+            news = self.map.join(received.vehicle, received.header.incarnation, tile)
         except ValueError as error:
             self._drop(received.vehicle, error)
             return

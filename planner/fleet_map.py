@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,34 @@ class VehicleLayer:
     settled: BoolArray
     told: BoolArray
     versions: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
+
+
+class ToldTile(Protocol):
+    """One of the grid's tiles, as its vehicle has told of it; the arrays have the shape of the tile."""
+
+    @property
+    def version(self) -> int:
+        """Counts what the vehicle has told, within one incarnation."""
+
+    @property
+    def first_row(self) -> int:
+        """The tile's first row in the grid."""
+
+    @property
+    def first_column(self) -> int:
+        """Its first column."""
+
+    @property
+    def sum_levels(self) -> LevelArray:
+        """The sum over the vehicle's looks."""
+
+    @property
+    def largest_levels(self) -> LevelArray:
+        """The largest single look."""
+
+    @property
+    def settled(self) -> BoolArray:
+        """Which cells are settled."""
 
 
 class FleetMap:
@@ -54,25 +83,17 @@ class FleetMap:
         self._changed.clear()
         return self._risk
 
-    def take(
-        self,
-        vehicle: str,
-        version: tuple[int, int],
-        first_row: int,
-        first_column: int,
-        sum_levels: LevelArray,
-        largest_levels: LevelArray,
-        settled: BoolArray,
-    ) -> bool:
-        """Takes one tile; returns whether it was news.
+    def join(self, vehicle: str, incarnation: int, tile: ToldTile) -> bool:
+        """Joins one tile, told by an incarnation of a vehicle; returns whether it was news.
 
-        `version`: (incarnation, version). What is not one of the grid's tiles, whole and in its place, raises
-        ValueError and changes nothing: pieces that overlap would make the map depend on the order in which they come.
+        What is not one of the grid's tiles, whole and in its place, raises ValueError and changes nothing: pieces that
+        overlap would make the map depend on the order in which they come.
         """
-        rows, columns = shape = tile_shape(self.grid, first_row, first_column)
-        if not sum_levels.shape == largest_levels.shape == settled.shape == shape:
-            told = f"{sum_levels.shape}, {largest_levels.shape} and {settled.shape}"
-            raise ValueError(f"the tile at {first_row}, {first_column} has {shape} cells, not {told}")
+        place = (tile.first_row, tile.first_column)
+        rows, columns = shape = tile_shape(self.grid, *place)
+        if not tile.sum_levels.shape == tile.largest_levels.shape == tile.settled.shape == shape:
+            told = f"{tile.sum_levels.shape}, {tile.largest_levels.shape} and {tile.settled.shape}"
+            raise ValueError(f"the tile at {place[0]}, {place[1]} has {shape} cells, not {told}")
         layer = self.layers.get(vehicle)
         if layer is None:
             layer = self.layers[vehicle] = VehicleLayer(
@@ -81,15 +102,15 @@ class FleetMap:
                 settled=np.zeros(self.grid.shape, dtype=np.bool_),
                 told=np.zeros(self.grid.shape, dtype=np.bool_),
             )
-        place = (first_row, first_column)
+        version = (incarnation, tile.version)
         known = layer.versions.get(place)
         if known is not None and version <= known:
             return False
         layer.versions[place] = version
-        window = (slice(first_row, first_row + rows), slice(first_column, first_column + columns))
-        layer.sum_levels[window] = sum_levels
-        layer.largest_levels[window] = largest_levels
-        layer.settled[window] = settled
+        window = (slice(place[0], place[0] + rows), slice(place[1], place[1] + columns))
+        layer.sum_levels[window] = tile.sum_levels
+        layer.largest_levels[window] = tile.largest_levels
+        layer.settled[window] = tile.settled
         if known is None:
             layer.told[window] = True
         self._changed[place] = window

@@ -103,53 +103,90 @@ def update_hotspots(
         raise ValueError(f"hotspots need arrays of the grid's shape, {grid.shape}")
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
-    labels, count = label_groups(hot, max(1, int(block_m / grid.cell_m)))
-    occupied = np.flatnonzero(hot)
-    labels_there = labels.ravel()[occupied]
-    sizes = np.bincount(labels_there, minlength=count + 1)
-    large_enough = (sizes > 0) & (sizes * grid.cell_area_m2 >= least_area_m2)
-    kept = np.flatnonzero(large_enough).tolist()
-
-    in_kept = large_enough[labels_there]
-    number_of = _carried_on(labels_there[in_kept], previous.numbers.ravel()[occupied[in_kept]], sizes)
-    next_number = previous.next_number
-    for label in kept:
-        if label not in number_of:
-            number_of[label] = next_number
-            next_number += 1
-    lookup = np.zeros(count + 1, dtype=np.int32)
-    lookup[kept] = [number_of[label] for label in kept]
-    numbers = lookup[labels]
-
-    moved = np.flatnonzero(numbers != previous.numbers)
-    now_and_before = np.concatenate([numbers.ravel()[moved], previous.numbers.ravel()[moved]])
-    reshaped = set(np.flatnonzero(np.bincount(now_and_before)).tolist())
-    risk_sums = np.bincount(labels_there, weights=risk.ravel()[occupied], minlength=count + 1)
-    growing = np.bincount(labels_there[neighbours(unsettled).ravel()[occupied]], minlength=count + 1)
-
-    hotspots, changed = {}, []
-    for label in kept:
-        number = number_of[label]
-        before = previous.hotspots.get(number)
-        now = Hotspot(
-            number=number,
-            outline=(
-                before.outline
-                if before is not None and number not in reshaped
-                else _outline(grid, occupied[labels_there == label])
-            ),
-            mean_risk=round(float(risk_sums[label] / sizes[label]), 4),
-            cells=int(sizes[label]),
-            growing=bool(growing[label]),
-        )
-        hotspots[number] = now
-        if now != before:
-            changed.append(now)
+    patches = _Patches.of(grid, hot, max(1, int(block_m / grid.cell_m)), least_area_m2)
+    numbers, number_of, next_number = _numbered(patches, previous)
+    reshaped = _reshaped(numbers, previous.numbers)
+    outlines = {
+        number: previous.hotspots[number].outline
+        if number in previous.hotspots and number not in reshaped
+        else _outline(grid, patches.cells(label))
+        for label, number in number_of.items()
+    }
+    hotspots = patches.told(number_of, outlines, risk, unsettled)
+    changed = [now for now in hotspots.values() if now != previous.hotspots.get(now.number)]
     return HotspotUpdate(
         HotspotMap(numbers, MappingProxyType(hotspots), next_number),
         tuple(sorted(changed, key=lambda hotspot: hotspot.number)),
         {number: _heir(numbers[previous.numbers == number]) for number in previous.hotspots if number not in hotspots},
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Patches:
+    """Patches of hot cells. `labels`: which one each cell is in, from 1, shape of the grid; `occupied`: the cells that
+    are in one, counted along the rows; `labels_there`: the label of each of these; `sizes`: cells by label; `kept`: the
+    labels of those that are large enough."""
+
+    labels: NumberArray
+    occupied: IndexArray
+    labels_there: NumberArray
+    sizes: IndexArray
+    kept: list[int]
+
+    @classmethod
+    def of(cls, grid: GridSpec, hot: BoolArray, block_cells: int, least_area_m2: float) -> _Patches:
+        labels, count = label_groups(hot, block_cells)
+        occupied = np.flatnonzero(hot)
+        labels_there = labels.ravel()[occupied]
+        sizes = np.bincount(labels_there, minlength=count + 1)
+        kept = np.flatnonzero((sizes > 0) & (sizes * grid.cell_area_m2 >= least_area_m2))
+        return cls(labels, occupied, labels_there, sizes, kept.tolist())
+
+    def told(
+        self, number_of: dict[int, int], outlines: dict[int, tuple[Point, ...]], risk: FloatArray, unsettled: BoolArray
+    ) -> dict[int, Hotspot]:
+        """The hotspots that they are, by number; `outlines` by number, too."""
+        count = self.sizes.size
+        risk_sums = np.bincount(self.labels_there, weights=risk.ravel()[self.occupied], minlength=count)
+        beside_unsettled = neighbours(unsettled).ravel()[self.occupied]
+        growing = np.bincount(self.labels_there[beside_unsettled], minlength=count)
+        return {
+            number: Hotspot(
+                number=number,
+                outline=outlines[number],
+                mean_risk=round(float(risk_sums[label] / self.sizes[label]), 4),
+                cells=int(self.sizes[label]),
+                growing=bool(growing[label]),
+            )
+            for label, number in number_of.items()
+        }
+
+    def cells(self, label: int) -> IndexArray:
+        """The cells of one patch."""
+        found: IndexArray = self.occupied[self.labels_there == label]
+        return found
+
+
+def _numbered(patches: _Patches, previous: HotspotMap) -> tuple[NumberArray, dict[int, int], int]:
+    """The number of each cell's hotspot, that of each patch by its label, and the next new number."""
+    is_kept = np.zeros(patches.sizes.size, dtype=np.bool_)
+    is_kept[patches.kept] = True
+    in_kept = is_kept[patches.labels_there]
+    before = previous.numbers.ravel()[patches.occupied[in_kept]]
+    carried_on = _carried_on(patches.labels_there[in_kept], before, patches.sizes)
+    number_of, next_number = {}, previous.next_number
+    for label in patches.kept:
+        number_of[label] = carried_on.get(label, next_number)
+        next_number += label not in carried_on
+    lookup = np.zeros(patches.sizes.size, dtype=np.int32)
+    lookup[patches.kept] = list(number_of.values())
+    return lookup[patches.labels], number_of, next_number
+
+
+def _reshaped(numbers: NumberArray, before: NumberArray) -> set[int]:
+    """The numbers of hotspots that hold other cells than before, 0 for none among them."""
+    moved = np.flatnonzero(numbers != before)
+    return set(np.flatnonzero(np.bincount(np.concatenate([numbers.ravel()[moved], before.ravel()[moved]]))).tolist())
 
 
 def _carried_on(labels: NumberArray, previous_numbers: NumberArray, sizes: IndexArray) -> dict[int, int]:

@@ -135,6 +135,15 @@ class Strip:
         )
 
 
+@dataclass(frozen=True)
+class PriorityGround:
+    """Ground whose residual risk counts `weight` times, >= 0, in second looks: what lies within an odd number of the
+    outlines, whose corners are in the mission frame, not repeated."""
+
+    outlines_m: tuple[tuple[Point, ...], ...]
+    weight: float
+
+
 @dataclass(frozen=True, eq=False)
 class DetectionCurve:
     """P(y): probability of detection over lateral range (paper, section III-B).

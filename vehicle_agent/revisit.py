@@ -48,7 +48,7 @@ class SecondLooks:
     def on_task(self, task: Task, now_ms: int, *, busy: str = "") -> None:
         """Answers an offer, or gives a strip back. `busy`: why none can be taken now, if so."""
         agent = self._agent
-        strip = Strip(task.strip, (task.start_x_m, task.start_y_m), task.heading_rad, task.length_m, task.width_m)
+        strip = task.as_strip
         known, answer = self._answers.get(task.strip, (None, None))
         if task.action is TaskAction.GIVE_BACK:
             self._give_back(task.strip, now_ms)

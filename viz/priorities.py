@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import rerun as rr
 
 from comms.said.messages import Vertex
+from planner.types import PriorityGround
 from viz import palette, paths
 from viz.canvas import Canvas
-from viz.recorder_config import PriorityGround
 from viz.shapes import OUTLINE_Z_M, ring
 
 

@@ -30,11 +30,10 @@ from viz.canvas import Canvas
 from viz.curves import Curves
 from viz.fleet import Fleet
 from viz.priorities import put_priorities
-from viz.recorder_config import RecorderConfig
+from viz.recorder_config import LogLine, RecorderConfig
 from viz.risk_map import RiskMap
 from viz.second_looks import SecondLooks
 from viz.shapes import extent_of
-from viz.story import TELLING, Line, Story
 from viz.task_table import TaskTable
 from viz.truth import Truth
 
@@ -83,7 +82,7 @@ class _Mission:
         canvas.present(run.scenario, mission_blueprint(extent, run), told)
         self._map = RiskMap(canvas, run, extent, round(config.draw_every_s * 1000))
         put_priorities(canvas, config.priorities)
-        self._story = Story()
+        self._story = config.story()
         self._table = TaskTable(canvas, run)
         self._second_looks = SecondLooks(canvas, extent)
         self._time_ms = -1
@@ -102,7 +101,7 @@ class _Mission:
             TruthLook: (truth.on_look,),
             TruthPose: (truth.on_pose,),
         }
-        for one in TELLING:
+        for one in self._story.telling:
             self._draw[one] = (*self._draw.get(one, ()), self._tell)
 
     def draw(self, received: Received) -> None:
@@ -128,14 +127,14 @@ class _Mission:
     def _tell(self, received: Received, message: Message) -> None:
         self._put_lines(self._story.tell(received))
 
-    def _put_lines(self, lines: Iterable[Line]) -> None:
-        for line in lines:
-            path, text = f"{paths.LOG}/{line.sender}", f"{line.sender}: {line.text}"
-            if line.warns:
+    def _put_lines(self, lines: Iterable[LogLine]) -> None:
+        for time_ms, sender, words, warns in lines:
+            path, text = f"{paths.LOG}/{sender}", f"{sender}: {words}"
+            if warns:
                 warning = rr.TextLog(text, level=rr.TextLogLevel.WARN, color=palette.WARNING)
-                self._canvas.put(line.time_ms, path, warning)
+                self._canvas.put(time_ms, path, warning)
             else:
-                self._canvas.column(path, _plain_lines).add(line.time_ms, text)
+                self._canvas.column(path, _plain_lines).add(time_ms, text)
 
 
 def _plain_lines(texts: Sequence[str]) -> rr.ComponentColumnList:

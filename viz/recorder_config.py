@@ -2,24 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Protocol
 
-from planner.types import Point
+from comms.node import Received
+from planner.types import PriorityGround
+
+LogLine = tuple[int, str, str, bool]
+"""When, in simulated milliseconds, and by whom, in what words, and whether something did not go as planned."""
 
 
-@dataclass(frozen=True)
-class PriorityGround:
-    """Ground whose risk counts `weight` times in second looks, by the corners of its outlines in the mission frame."""
+class Storyteller(Protocol):
+    """Tells a mission in plain words, for the log."""
 
-    outlines_m: tuple[tuple[Point, ...], ...]
-    weight: float
+    @property
+    def telling(self) -> tuple[type, ...]:
+        """The messages that may be worth a line."""
+
+    def tell(self, received: Received) -> Iterable[LogLine]:
+        """The lines that are ready now that this message has come."""
+
+    def rest(self, *, before_ms: int | None = None) -> Iterable[LogLine]:
+        """The lines still held back: all, or those of another time than this."""
 
 
 @dataclass(frozen=True)
 class RecorderConfig:
-    """`path`: the file to write.
+    """`path`: the file to write. `story`: makes who tells of the mission in its log.
 
     `recording_id`: recordings of one id open as one; the name of the file's folder, the run's, if not given.
     `live_pipe`: the named pipe of a LiveServer, to show the mission while it runs; None: the file alone.
@@ -31,6 +42,7 @@ class RecorderConfig:
     """
 
     path: Path
+    story: Callable[[], Storyteller]
     recording_id: str | None = None
     live_pipe: Path | None = None
     draw_every_s: float = 10.0

@@ -155,14 +155,12 @@ class RiskMap:
 
     def on_tile(self, received: Received, tile: CoverageTile) -> None:
         """Takes a tile; one that does not lie on the grid is left out."""
-        version = (received.header.incarnation, tile.version)
-        place = (tile.first_row, tile.first_column)
         try:
-            news = self._map.take(received.vehicle, version, *place, tile.sum_levels, tile.largest_levels, tile.settled)
+            news = self._map.join(received.vehicle, received.header.incarnation, tile)
         except ValueError:
             return
         if news:
-            index = self._blocks.index_at(*place)
+            index = self._blocks.index_at(tile.first_row, tile.first_column)
             self._lookers[index].add(received.vehicle)
             self._changed.add(index)
             self._pace.note(received.header.sent_ms)

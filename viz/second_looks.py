@@ -90,13 +90,13 @@ class SecondLooks:
             return
         wide = strip.width_m >= self._labelled_m
         look = (strip.state, wide)
-        place = (strip.start_x_m, strip.start_y_m, strip.heading_rad, strip.length_m, strip.width_m)
+        place = strip.as_strip(number)
         self._drawn[number] = (look, place)
         # Often nothing but its worth has changed, or nothing but its place and its worth.
         looks_new = look != drawn_look
         lies_new = looks_new or place != drawn_place
         outline = rr.LineStrips3D.from_fields(
-            strips=strip_ring(strip, STRIP_Z_M) if lies_new else None,
+            strips=strip_ring(place, STRIP_Z_M) if lies_new else None,
             labels=f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_whose(strip)}",
         )
         self._canvas.put(time_ms, path, outline, *([_strip_look(*look)] if looks_new else []))
@@ -105,7 +105,7 @@ class SecondLooks:
             self._labelled.add(number)
             told = wide and strip.state is not StripState.DONE
             label = rr.Points3D.from_fields(
-                positions=[label_place(strip, number, STRIP_Z_M)] if lies_new else None,
+                positions=[label_place(place, STRIP_Z_M)] if lies_new else None,
                 labels=f"{number}: {strip.removable_m2:.0f} m²" if told else str(number),  # its colour tells its state
             )
             self._canvas.put(time_ms, f"{path}/label", label, *([_label_look(shows, strip.state)] if looks_new else []))

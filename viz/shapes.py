@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from comms.said.messages import RunInfo, StripStatus, Vertex
-from planner.types import FloatArray
+from comms.said.messages import RunInfo, Vertex
+from planner.types import FloatArray, Strip
 
 # Heights in metres, far enough apart for the depth buffer, too little to shift anything seen from above.
 UNSEEN_Z_M, OUTLINE_Z_M, PLAN_Z_M, HOTSPOT_Z_M, STRIP_Z_M, FLOWN_Z_M, POINT_Z_M, VEHICLE_Z_M = (
@@ -64,28 +64,17 @@ def ring(outline: Iterable[Vertex], z_m: float) -> Line:
     return np.array([*corners, *corners[:1]], dtype=np.float32).reshape(-1, 3)
 
 
-def strip_ring(strip: StripStatus, z_m: float) -> Line:
+def strip_ring(strip: Strip, z_m: float) -> Line:
     """A strip's closed outline, shape (5, 3)."""
-    sin, cos = math.sin(strip.heading_rad), math.cos(strip.heading_rad)
-    right_x_m, right_y_m = cos * strip.width_m / 2, -sin * strip.width_m / 2
-    x_m, y_m = strip.start_x_m, strip.start_y_m
-    end_x_m, end_y_m = x_m + sin * strip.length_m, y_m + cos * strip.length_m
-    start_left = (x_m - right_x_m, y_m - right_y_m, z_m)
-    end_left = (end_x_m - right_x_m, end_y_m - right_y_m, z_m)
-    end_right = (end_x_m + right_x_m, end_y_m + right_y_m, z_m)
-    start_right = (x_m + right_x_m, y_m + right_y_m, z_m)
-    return np.array([start_left, end_left, end_right, start_right, start_left], dtype=np.float32)
+    first, *others = strip.corners
+    return np.array([(*corner, z_m) for corner in (first, *reversed(others), first)], dtype=np.float32)
 
 
-def label_place(strip: StripStatus, number: int, z_m: float) -> tuple[float, float, float]:
+def label_place(strip: Strip, z_m: float) -> tuple[float, float, float]:
     """Where a strip's label hangs on its centre line: at another share of its length for each number, because strips
     often lie side by side and the labels are wider than they."""
-    along_m = strip.length_m * (0.1 + 0.8 * (number * GOLDEN_SHARE % 1.0))
-    return (
-        strip.start_x_m + along_m * math.sin(strip.heading_rad),
-        strip.start_y_m + along_m * math.cos(strip.heading_rad),
-        z_m,
-    )
+    along_m = strip.length_m * (0.1 + 0.8 * (strip.number * GOLDEN_SHARE % 1.0))
+    return (*replace(strip, length_m=along_m).end, z_m)
 
 
 def glyph(size_m: float) -> tuple[FloatArray, list[tuple[int, int, int]]]:

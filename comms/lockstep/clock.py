@@ -15,6 +15,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
+from comms.errors import RunawayError
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent, absent_at_start, timeline
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
@@ -23,10 +24,6 @@ WRAP_UP_MS = 100  # simulated time in which the fleet's last words are delivered
 LATE_WORDS_MS = 10_000  # simulated time in which an agent may still learn that it is over
 MOST_ROUNDS_A_SECOND = 10_000
 MOST_MESSAGES_A_SECOND = 200_000
-
-
-class RunawayError(Exception):
-    """Too many rounds or messages within one simulated second: nodes answer each other without end."""
 
 
 class Said(Protocol):
@@ -133,7 +130,7 @@ class LockstepClock:
                 self._sent_to[reader][sender] += 1
                 self._grown[reader].add(sender)
             if readers and route.topic.wakes:
-                self._make_due(readers, self.now_ms + route.topic.delay_ms)
+                self._make_due(readers, route.topic.due_ms(self.now_ms))
             for watcher in route.watchers:
                 self.watched[watcher][sender] += 1
                 self.watched_bytes[watcher] += one.size

@@ -8,14 +8,19 @@ the same faults strike on every bus. What the clock says of the run reaches ever
 from __future__ import annotations
 
 import enum
-import fnmatch
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from comms.node import Received
+from comms.said.key_expressions import KeyExpression, key_expression
 from comms.said.messages import Role
 from comms.said.routing import RosterNode, Routing
+from comms.said.topics import TOPICS
+
+STRUCK = tuple(topic for topic in TOPICS if Role.CLOCK not in topic.writers)
+"""Whose messages faults may strike."""
 
 
 class FaultKind(enum.Enum):
@@ -33,13 +38,13 @@ class FaultKind(enum.Enum):
 class MessageFault:
     """A fault that strikes messages by chance.
 
-    `keys`: below the run id, with `*` for any characters, e.g. `agent/*/coverage/*`. `probability`: in [0, 1], for each
-    message and receiver. `receiver`: a node id, empty for all. It strikes what is sent in [from_ms, until_ms), without
-    end where that is None. `delay_ms` >= 1 where the kind needs one.
+    `keys`: a key expression, e.g. `agent/*/coverage/*`, that keys of some topic are like. `probability`: in [0, 1], for
+    each message and receiver. `receiver`: a node id, empty for all. It strikes what is sent in [from_ms, until_ms),
+    without end where that is None. `delay_ms` >= 1 where the kind needs one. Raises ValueError.
     """
 
     kind: FaultKind
-    keys: str = "*"
+    keys: str = "**"
     probability: float = 1.0
     receiver: str = ""
     from_ms: int = 0
@@ -51,6 +56,12 @@ class MessageFault:
             raise ValueError(f"a fault's probability must be within 0 and 1, not {self.probability}")
         if self.delay_ms < 1:
             raise ValueError(f"a fault's delay must be at least 1 ms, not {self.delay_ms}")
+        self.expression  # noqa: B018 - raises where it is none
+
+    @cached_property
+    def expression(self) -> KeyExpression:
+        """Which keys are struck."""
+        return key_expression(self.keys, topics=STRUCK)
 
 
 @dataclass(frozen=True)
@@ -130,7 +141,7 @@ def _concerns(fault: MessageFault, receiver: str, key: str, sent_ms: int) -> boo
         fault.receiver in ("", receiver)
         and fault.from_ms <= sent_ms
         and (fault.until_ms is None or sent_ms < fault.until_ms)
-        and fnmatch.fnmatchcase(key, fault.keys)
+        and fault.expression.includes(key)
     )
 
 

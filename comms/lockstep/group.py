@@ -1,16 +1,74 @@
-"""The nodes that share one process: mail is opened once and given to those that read it. No I/O."""
+"""The nodes that share one process in lockstep, each with its mailbox: mail is opened once and given to those that read
+it, and handled in order when the clock grants it. No I/O."""
 
 from __future__ import annotations
 
+import bisect
+from collections import Counter
 from collections.abc import Iterable, Mapping
 
+from comms.kept import Kept
 from comms.lockstep.clock import Grant
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.node import Node, Received
-from comms.runner import Intake, NodeRunner, Outgoing, SenderDigest
+from comms.runner import GuardedNode, Intake, Outgoing, SenderDigest
 from comms.said.routing import Route, Routing
 
 LOST = "lost by a fault"
+
+
+class NodeRunner:
+    """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
+
+    def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
+        self.node_id = node_id
+        self.arrived: Counter[str] = Counter()
+        self._node = GuardedNode(node_id, node, routing, incarnation)
+        self._node.wake_ms = 0
+        self._mail: dict[int, list[Received]] = {}
+        self._late_ms: list[int] = []
+
+    def deliver(self, received: Received, due_ms: int | None = None) -> None:
+        """Puts a message into the mailbox, to be handled when it is due: as its topic says, or at `due_ms`."""
+        if due_ms is None:
+            due_ms = received.topic.due_ms(received.header.sent_ms)
+        self._mail.setdefault(due_ms, []).append(received)
+
+    def deliver_late(self, received: Received, due_ms: int) -> None:
+        """The same for a message that is due later than the clock knows: the runner itself asks to act then."""
+        self.deliver(received, due_ms)
+        if received.topic.wakes:
+            bisect.insort(self._late_ms, due_ms)
+
+    def has_all(self, expected: dict[str, int]) -> bool:
+        """Whether as many messages of each sender have arrived as the clock expects."""
+        return all(self.arrived[sender] >= count for sender, count in expected.items())
+
+    def act(self, now_ms: int, *, start: bool) -> tuple[int | None, list[Outgoing]]:
+        """Starts the node, or handles its due mail in order and then its wake-up if that is due.
+
+        Returns when to act next and what the node publishes. Raises NodeError.
+        """
+        outgoing = self._node.act(now_ms, () if start else self._due_mail(now_ms), start=start, wake=not start)
+        self._node.check_wake(now_ms)
+        next_ms = self._node.wake_ms
+        if self._late_ms:
+            del self._late_ms[: bisect.bisect_right(self._late_ms, now_ms)]
+            next_ms = min((ms for ms in (next_ms, *self._late_ms[:1]) if ms is not None), default=None)
+        return next_ms, outgoing
+
+    def digest(self) -> SenderDigest:
+        """What the node has said so far."""
+        return self._node.stamp.digest()
+
+    def _due_mail(self, now_ms: int) -> list[Received]:
+        found: list[Received] = []
+        for due in sorted([due for due in self._mail if due <= now_ms]):
+            mail = self._mail.pop(due)
+            if len(mail) > 1:
+                mail.sort(key=lambda one: one.header.order)
+            found += mail
+        return found
 
 
 class NodeGroup:
@@ -33,7 +91,7 @@ class NodeGroup:
 
     def leave(self, node_id: str) -> None:
         """From now on the node is not here any more; what it has said counts."""
-        self._departed.append(self.runners.pop(node_id).stamp.digest())
+        self._departed.append(self.runners.pop(node_id).digest())
 
     def holds(self, node_ids: set[str]) -> bool:
         """Whether one of these nodes is here."""
@@ -93,7 +151,7 @@ class NodeGroup:
 
     def digests(self) -> list[SenderDigest]:
         """What the group's nodes have said so far, those that have left included."""
-        return [*self._departed, *(runner.stamp.digest() for runner in self.runners.values())]
+        return [*self._departed, *(runner.digest() for runner in self.runners.values())]
 
     def act(self, grant: Grant, now_ms: int) -> tuple[int | None, list[Outgoing]]:
         """Lets one node act; see `NodeRunner.act`."""
@@ -108,8 +166,33 @@ class NodeGroup:
             if opened is None:
                 continue
             # When it is due depends on when it was sent, whatever a corrupt message says of that.
-            due_ms = received.header.sent_ms + received.topic.delay_ms + one.later_ms
+            due_ms = received.topic.due_ms(received.header.sent_ms) + one.later_ms
             if one.later_ms:
                 runner.deliver_late(opened, due_ms)
             else:
                 runner.deliver(opened, due_ms)
+
+
+class JoinerMail:
+    """What was said so far of all that a node may read, kept for when it joins; `arrived` counts it by sender."""
+
+    def __init__(self, node_id: str, routing: Routing) -> None:
+        self.arrived: Counter[str] = Counter()
+        self._node_id = node_id
+        self._routing = routing
+        self._kept = Kept()
+
+    def add(self, key: str, payload: bytes) -> None:
+        """Takes note of a message; messages of one key come in the order in which they were sent."""
+        route = self._routing.route(key)
+        if route is not None and self._node_id in route.readers:
+            self.arrived[route.writer] += 1
+            self._kept.add(route.topic, key, payload)
+
+    def has_all(self, said: Counter[str]) -> bool:
+        """Whether as much has arrived of each sender as was said."""
+        return all(self.arrived[sender] >= count for sender, count in said.items())
+
+    def messages(self) -> list[tuple[str, bytes]]:
+        """Key and payload of each kept message."""
+        return self._kept.messages()

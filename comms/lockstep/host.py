@@ -12,29 +12,27 @@ from typing import Any
 
 import zenoh
 
-from comms.control import HostPlan, RunKeys, pack, pack_answers, pack_final, unpack, unpack_grants
-from comms.kept_listener import KeptListener, close_all
-from comms.latency import STRIP_TO_TASK, StripLatency
+from comms.errors import Interrupted, NodeError
+from comms.keys import HostSpec, RunKeys
 from comms.lockstep.clock import Grant, Sent
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import NodeGroup
 from comms.lockstep.parcels import publish, unpacked
+from comms.lockstep.words import pack_answers, unpack_grants
 from comms.node import Listener, Node, Received
-from comms.runner import Intake, NodeError
+from comms.result import STRIP_TO_TASK, LastWord, StripLatency
+from comms.runner import GuardedListener, Intake, Outgoing, close_all
 from comms.said.messages import Role
 from comms.said.routing import Routing
 from comms.said.wire import WireError
 from comms.session import Mailbox, put, subscribe
+from comms.words import pack, pack_last_word, unpack
 
 HELLO_EVERY_S = 0.2
 GOODBYE_WITHIN_S = 5.0
 MAIL_EVERY_S = 0.005  # so often is looked for mail that a word tells of and that has not come
 TAKE_EVERY_S = 1.0  # so often is mail taken where no word comes: what waits holds the packets that it came in
 _Mail = tuple[str, bytes]
-
-
-class Interrupted(Exception):  # noqa: N818 - not an error: the launcher has asked for an early end
-    """The run ends early; what was received so far is kept."""
 
 
 class _Line:
@@ -65,7 +63,7 @@ class _Line:
             words = self.words(HELLO_EVERY_S)
         self.say(pack("ready"))
 
-    def part(self, words: bytes) -> None:
+    def leave(self, words: bytes) -> None:
         """A last word; returns when the hub has heard it, or is gone. The session may be closed then: the news of its
         end cannot overtake the word."""
         self.say(words)
@@ -87,63 +85,107 @@ class _Line:
     def mail(self) -> Iterator[_Mail]:
         """Full key and payload of what has come. What a word tells of has come before it as long as both took the same
         way; whoever waits for it looks again."""
-        return self._mailbox.take()
+        return self._mailbox.fetch()
 
     def interrupt(self) -> None:
         """From any thread: whoever waits for words gets Interrupted, after those that are there already."""
         self._words.put(None)
 
 
-def serve_nodes(
-    session: zenoh.Session,
-    keys: RunKeys,
-    plan: HostPlan,
-    nodes: Mapping[str, Node],
-    routing: Routing,
-    faults: Faults = NO_FAULTS,
-) -> None:
+class ServedNodes:
+    """The nodes of one process: what is sent to them over Zenoh, and what they say, with how long strips wait."""
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: RunKeys,
+        nodes: Mapping[str, Node],
+        routing: Routing,
+        faults: Faults,
+        incarnation: int = 0,
+    ) -> None:
+        self.group = NodeGroup(nodes, routing, faults, incarnation)
+        self._session = session
+        self._keys = keys
+        self._latency = StripLatency()
+        self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
+
+    def receive(self, key: str, payload: bytes) -> None:
+        """A message has come, under its full key."""
+        received = self.group.receive(key.removeprefix(self._keys.root), payload)
+        if received is not None and self.group.holds(self._coordinators):
+            self._latency.arrived(received, time.perf_counter())
+
+    def act(self, grants: Iterable[Grant], now_ms: int) -> Iterator[tuple[str, int | None, list[Outgoing]]]:
+        """Lets each granted node act and sends what it publishes: of each its wake-up and that. Raises NodeError."""
+        for grant in grants:
+            wake_ms, outgoing = self.group.act(grant, now_ms)
+            if grant.node_id in self._coordinators:
+                self._latency.sending(outgoing, time.perf_counter())
+            publish(self._session, self._keys, grant.node_id, outgoing)
+            yield grant.node_id, wake_ms, outgoing
+
+    def last_word(self) -> LastWord:
+        """What the nodes have said, what was dropped here, and how long strips waited."""
+        latencies = {STRIP_TO_TASK: self._latency.milliseconds}
+        return LastWord(self.group.digests(), dropped=dict(self.group.intake.dropped), latencies_ms=latencies)
+
+
+class NodeHost:
     """Lets the nodes of a host act as the clock grants, until the run is finished.
 
-    A node that fails is reported to the hub, and NodeError raised.
+    `run` tells the hub of a node that fails, and raises NodeError; after `interrupt` it raises Interrupted.
     """
-    group = NodeGroup(nodes, routing, faults, plan.incarnation)
-    expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
-    line = _Line(session, keys, plan.host, expressions)
-    latency = StripLatency()
-    coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
-    line.shake_hands()
-    granted: tuple[int, list[Grant]] | None = None
-    while True:
-        words = line.words(TAKE_EVERY_S if granted is None else MAIL_EVERY_S)
-        for key, payload in line.mail():
-            received = group.receive(key.removeprefix(keys.root), payload)
-            if received is not None and group.holds(coordinators):
-                latency.arrived(received, time.perf_counter())
-        if words[:1] == ["grant"]:
-            granted = unpack_grants(words)
-        elif words[:1] == ["kept"]:
-            group.give_kept(*words[1:])
-        elif words[:1] in (["last_word"], ["finish"]):
-            final = pack_final(group.digests(), dict(group.intake.dropped), {STRIP_TO_TASK: latency.milliseconds})
-            if words[0] == "finish":
-                line.part(final)
+
+    def __init__(
+        self,
+        session: zenoh.Session,
+        keys: RunKeys,
+        spec: HostSpec,
+        nodes: Mapping[str, Node],
+        routing: Routing,
+        faults: Faults = NO_FAULTS,
+    ) -> None:
+        self._nodes = ServedNodes(session, keys, nodes, routing, faults, spec.incarnation)
+        expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
+        self._line = _Line(session, keys, spec.host, expressions)
+
+    def interrupt(self) -> None:
+        """Ends the run early."""
+        self._line.interrupt()
+
+    def run(self) -> None:
+        """Serves to the end of the run."""
+        line, group = self._line, self._nodes.group
+        line.shake_hands()
+        granted: tuple[int, list[Grant]] | None = None
+        while True:
+            words = line.words(TAKE_EVERY_S if granted is None else MAIL_EVERY_S)
+            for key, payload in line.mail():
+                self._nodes.receive(key, payload)
+            if words[:1] == ["grant"]:
+                granted = unpack_grants(words)
+            elif words[:1] == ["kept"]:
+                group.give_kept(*words[1:])
+            elif words[:1] == ["last_word"]:
+                line.say(pack_last_word(self._nodes.last_word()))
+            elif words[:1] == ["finish"]:
+                line.leave(pack_last_word(self._nodes.last_word()))
                 return
-            line.say(final)
-        if granted is not None and group.has_all(granted[1]):
-            now_ms, grants = granted
-            granted = None
-            answers = []
-            for grant in grants:
-                try:
-                    wake_ms, outgoing = group.act(grant, now_ms)
-                except NodeError as error:
-                    line.say(pack("failed", str(error)))
-                    raise
-                if grant.node_id in coordinators:
-                    latency.sending(outgoing, time.perf_counter())
-                publish(session, keys, grant.node_id, outgoing)
-                answers.append((grant.node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing]))
-            line.say(pack_answers(answers))
+            if granted is not None and group.has_all(granted[1]):
+                self._act(*granted)
+                granted = None
+
+    def _act(self, now_ms: int, grants: list[Grant]) -> None:
+        try:
+            answers = [
+                (node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing])
+                for node_id, wake_ms, outgoing in self._nodes.act(grants, now_ms)
+            ]
+        except NodeError as error:
+            self._line.say(pack("failed", str(error)))
+            raise
+        self._line.say(pack_answers(answers))
 
 
 class ListenerHost:
@@ -157,7 +199,7 @@ class ListenerHost:
     def __init__(
         self, session: zenoh.Session, keys: RunKeys, host: str, node_id: str, listener: Listener, routing: Routing
     ) -> None:
-        self._listener = KeptListener(node_id, listener)
+        self._listener = GuardedListener(node_id, listener)
         self._routing = routing
         self._intake = Intake(routing)
         self._arrived: Counter[str] = Counter()
@@ -183,7 +225,7 @@ class ListenerHost:
                 self._listen()
                 finished = True
             except Interrupted:
-                self._take_mail()
+                self._open_mail()
                 # Without a mark nobody knows whether earlier messages are still missing: what there is, in order.
                 self._release(up_to_ms=None)
                 finished = False
@@ -193,14 +235,14 @@ class ListenerHost:
             self._line.say(pack("failed", str(error)))
             raise
         if finished:
-            self._line.part(pack_final([], dict(self._intake.dropped), {}))
+            self._line.leave(pack_last_word(LastWord(dropped=dict(self._intake.dropped))))
 
     def _listen(self) -> None:
         mark: list[Any] | None = None
         self._line.shake_hands()
         while True:
             words = self._line.words(TAKE_EVERY_S if mark is None else MAIL_EVERY_S)
-            self._take_mail()
+            self._open_mail()
             if words[:1] in (["mark"], ["finish"]):
                 mark = words
             if mark is None or not self._has_all(mark[3]):
@@ -211,7 +253,7 @@ class ListenerHost:
             self._line.say(pack("ack", mark[1]))
             mark = None
 
-    def _take_mail(self) -> None:
+    def _open_mail(self) -> None:
         for key, parcel in self._line.mail():
             # A key that is an expression comes to all whom it fits.
             watchers, sender = self._parcels.get(key, ((), ""))

@@ -4,54 +4,31 @@ from __future__ import annotations
 
 import queue
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import zenoh
 
-from comms.control import (
-    ControlError,
-    HostPlan,
-    RunKeys,
-    pack,
-    pack_grants,
-    unpack,
-    unpack_answers,
-    unpack_final,
-)
-from comms.latency import STRIP_TO_TASK, StripLatency
+from comms.errors import FleetError, HostLostError, WordsError
+from comms.keys import HostSpec, RunKeys
 from comms.lockstep.clock import Grant, LockstepClock, Round
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.group import NodeGroup
-from comms.lockstep.kept_messages import KeptMessages
-from comms.lockstep.local_bus import ending_of
+from comms.lockstep.group import JoinerMail
+from comms.lockstep.host import ServedNodes
+from comms.lockstep.local_bus import result_of
 from comms.lockstep.pacing import MOST_BEHIND_BYTES, Pacing
 from comms.lockstep.parcels import publish
+from comms.lockstep.words import pack_grants, unpack_answers
 from comms.node import Node
-from comms.result import BusResult
-from comms.runner import SenderDigest, Stamp, fleet_digest
+from comms.result import BusResult, LastWord
+from comms.runner import Stamp
 from comms.said.codec import CLOCK
-from comms.said.messages import Role, RunInfo
+from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import RUN
-from comms.session import PATIENCE_S, put, subscribe
-
-SIGN_OF_LIFE_EVERY_S = 0.5
-
-
-class FleetError(Exception):
-    """A process of the fleet has failed or fallen silent; the text is one sentence that names it."""
-
-
-class HostLostError(FleetError):
-    """The connection to a process is gone: it has died, or for too long given no sign of life."""
-
-    def __init__(self, host: str, at_ms: int) -> None:
-        super().__init__(f"{host} was lost at {at_ms / 1000:.3f} s of the mission")
-        self.host = host
-        self.at_ms = at_ms
+from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S, put, subscribe
+from comms.words import pack, unpack, unpack_last_word
 
 
 class Hub:
@@ -71,7 +48,7 @@ class Hub:
         session: zenoh.Session,
         keys: RunKeys,
         routing: Routing,
-        hosts: tuple[HostPlan, ...],
+        hosts: tuple[HostSpec, ...],
         nodes: Mapping[str, Node],
         time_limit_ms: int,
         *,
@@ -90,14 +67,12 @@ class Hub:
         self._alive_at_s = time.monotonic()
         self._change = carry_out
         self._clock = LockstepClock(routing, time_limit_ms, events)
-        self._group = NodeGroup(nodes, routing, faults)
-        self._kept = {node_id: KeptMessages(node_id, routing) for node_id in self._clock.said_to_joiners}
-        self._latency = StripLatency()
-        self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
+        self._nodes = ServedNodes(session, keys, nodes, routing, faults)
+        self._kept = {node_id: JoinerMail(node_id, routing) for node_id in self._clock.said_to_joiners}
         listening = {node.node_id for node in routing.roster if node.listens_only}
-        self._host_of = {node: plan.host for plan in hosts for node in plan.nodes if not plan.joins}
-        self._joining = {(node, plan.incarnation): plan.host for plan in hosts for node in plan.nodes if plan.joins}
-        self._hosts = {plan.host for plan in hosts if not plan.joins}
+        self._host_of = {node: spec.host for spec in hosts for node in spec.nodes if not spec.joins}
+        self._joining = {(node, spec.incarnation): spec.host for spec in hosts for node in spec.nodes if spec.joins}
+        self._hosts = {spec.host for spec in hosts if not spec.joins}
         self._killed: set[str] = set()
         self._frozen: set[str] = set()
         self._listeners = {node: host for node, host in self._host_of.items() if node in listening}
@@ -105,7 +80,7 @@ class Hub:
         self._queue: queue.SimpleQueue[tuple[str, str, bytes]] = queue.SimpleQueue()
         self._ready: set[str] = set()
         self._asked: dict[str, set[str]] = {}
-        self._finals: dict[str, tuple[list[SenderDigest], dict[str, int], dict[str, list[float]]]] = {}
+        self._last_words: dict[str, LastWord] = {}
         expressions = [keys.topic(one) for node_id in (*nodes, *self._kept) for one in routing.subscriptions(node_id)]
         self._subscribers = subscribe(session, expressions, self._on_mail)
         self._subscribers += subscribe(session, [keys.from_host("*")], self._on_words)
@@ -132,10 +107,11 @@ class Hub:
         return self._finish()
 
     def _carry_out(self, turn: Round) -> None:
+        group = self._nodes.group
         here: list[Grant] = []
         away: dict[str, list[Grant]] = {}
         for grant in turn.grants:
-            if grant.node_id in self._group.runners:
+            if grant.node_id in group.runners:
                 here.append(grant)
             else:
                 away.setdefault(self._host_of[grant.node_id], []).append(grant)
@@ -143,13 +119,9 @@ class Hub:
             self._asked[host] = {grant.node_id for grant in grants}
             self._say(host, pack_grants(turn.now_ms, grants))
         if here:
-            self._wait(lambda: self._group.has_all(here), lambda: f"mail is missing: {self._group.missing(here)}")
-            for grant in here:
-                wake_ms, outgoing = self._group.act(grant, turn.now_ms)
-                if grant.node_id in self._coordinators:
-                    self._latency.sending(outgoing, time.perf_counter())
-                publish(self._session, self._keys, grant.node_id, outgoing)
-                self._clock.answer(grant.node_id, wake_ms, outgoing)
+            self._wait(lambda: group.has_all(here), lambda: f"mail is missing: {group.missing(here)}")
+            for node_id, wake_ms, outgoing in self._nodes.act(here, turn.now_ms):
+                self._clock.answer(node_id, wake_ms, outgoing)
         self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
 
     def _happen(self, happening: Happening) -> None:
@@ -160,7 +132,7 @@ class Hub:
             case Change.KILL:
                 host = self._host_of[node_id]
                 self._say(host, pack("last_word"))
-                self._wait(lambda: host in self._finals, lambda: _no("last word", {host}))
+                self._wait(lambda: host in self._last_words, lambda: _no("last word", {host}))
                 self._killed.add(host)
                 self._change(Change.KILL, host)
             case Change.FREEZE:
@@ -200,25 +172,10 @@ class Hub:
             counts = dict(self._clock.watched[nodes[0]]) if nodes else {}
             self._say(host, pack("finish", self._pacing.mark, self._clock.now_ms, counts))
         self._wait(
-            lambda: self._finals.keys() >= self._hosts, lambda: _no("last word", self._hosts - self._finals.keys())
+            lambda: self._last_words.keys() >= self._hosts,
+            lambda: _no("last word", self._hosts - self._last_words.keys()),
         )
-        digests: list[SenderDigest] = self._group.digests()
-        dropped = Counter(self._group.intake.dropped)
-        latencies = list(self._latency.milliseconds)
-        for its_digests, its_dropped, its_latencies in self._finals.values():
-            digests.extend(its_digests)
-            dropped.update(its_dropped)
-            latencies.extend(its_latencies.get(STRIP_TO_TASK, ()))
-        clock = self._clock
-        return BusResult(
-            ending=ending_of(clock),
-            mission_ms=clock.now_ms if clock.over_ms is None else clock.over_ms,
-            digest=fleet_digest(digests),
-            rounds=clock.rounds,
-            messages=dict(clock.messages),
-            dropped=dict(dropped),
-            latencies_ms={STRIP_TO_TASK: latencies},
-        )
+        return result_of(self._clock, [self._nodes.last_word(), *self._last_words.values()])
 
     def _wait(self, done: Callable[[], bool], missing: Callable[[], str]) -> None:
         """Handles what arrives until `done()`; FleetError when nothing arrives for too long."""
@@ -245,26 +202,23 @@ class Hub:
 
     def _handle(self, kind: str, key: str, payload: bytes) -> None:
         if kind == "mail":
-            below = key.removeprefix(self._keys.root)
             for kept in self._kept.values():
-                kept.take(below, payload)
-            received = self._group.receive(below, payload)
-            if received is not None and self._group.holds(self._coordinators):
-                self._latency.arrived(received, time.perf_counter())
+                kept.add(key.removeprefix(self._keys.root), payload)
+            self._nodes.receive(key, payload)
             return
         host = key.rsplit("/", 1)[1]
         if host not in self._hosts:
             return
         if kind == "gone":
-            if host not in self._finals:
+            if host not in self._last_words:
                 raise HostLostError(host, self._clock.now_ms)
             return
         try:
-            self._take_words(host, unpack(payload))
-        except (ControlError, ValueError) as error:
+            self._hear_words(host, unpack(payload))
+        except (WordsError, ValueError) as error:
             raise FleetError(f"{host} has said what makes no sense to the clock: {error}") from error
 
-    def _take_words(self, host: str, words: list[Any]) -> None:
+    def _hear_words(self, host: str, words: list[Any]) -> None:
         match words:
             case ["hello"]:
                 self._say(host, pack("welcome"))
@@ -273,18 +227,18 @@ class Hub:
             case ["answer", *_]:
                 answers = unpack_answers(words)
                 if {node_id for node_id, _, _ in answers} != self._asked.pop(host, None):
-                    raise ControlError("an answer for nodes that were not asked")
+                    raise WordsError("an answer for nodes that were not asked")
                 for node_id, wake_ms, sent in answers:
                     self._clock.answer(node_id, wake_ms, sent)
             case ["ack", int(mark)]:
                 self._pacing.acknowledge(next((n for n, its in self._listeners.items() if its == host), host), mark)
-            case ["final", *_]:
-                self._finals[host] = unpack_final(words)
+            case ["done", *_]:
+                self._last_words[host] = unpack_last_word(words)
                 self._say(host, pack("goodbye"))
             case ["failed", str(sentence)]:
                 raise FleetError(sentence)
             case _:
-                raise ControlError(f"{words[0][:20]!r}")
+                raise WordsError(f"{words[0][:20]!r}")
 
     def _on_mail(self, key: str, payload: bytes) -> None:
         self._queue.put(("mail", key, payload))

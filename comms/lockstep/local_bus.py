@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from comms.kept_listener import KeptListener, close_all
 from comms.lockstep.clock import LockstepClock
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.group import NodeGroup
-from comms.lockstep.kept_messages import KeptMessages
+from comms.lockstep.group import JoinerMail, NodeGroup
 from comms.node import Listener, Node
-from comms.result import BusResult, Ending
-from comms.runner import Outgoing, Stamp, fleet_digest
+from comms.result import BusResult, Ending, LastWord, summed_up
+from comms.runner import GuardedListener, Outgoing, Stamp, close_all, fleet_digest
 from comms.said.codec import CLOCK
 from comms.said.messages import Message, RunInfo
 from comms.said.routing import Routing
@@ -34,7 +32,7 @@ def run_local(
     `nodes` holds what makes each node, `listeners` each listener, keyed by node id and complete for the roster of
     `routing`. Raises NodeError and RunawayError, and ValueError for events that do not fit.
     """
-    kept = {name: KeptListener(name, listener) for name, listener in listeners.items()}
+    kept = {name: GuardedListener(name, listener) for name, listener in listeners.items()}
     try:
         return _Local(routing, nodes, kept, LockstepClock(routing, time_limit_ms, events), faults).run(run_info)
     finally:
@@ -55,7 +53,7 @@ class _Local:
         self.group = NodeGroup({name: makers[name]() for name in clock.present()}, routing, faults)
         self.listeners = listeners
         self.announcer = Stamp(CLOCK, routing)
-        self.kept = {node_id: KeptMessages(node_id, routing) for node_id in clock.said_to_joiners}
+        self.kept = {node_id: JoinerMail(node_id, routing) for node_id in clock.said_to_joiners}
 
     def run(self, run_info: RunInfo) -> BusResult:
         self._carry([self._announce(run_info)])
@@ -70,14 +68,7 @@ class _Local:
             if len(turn.grants) > 1:
                 sent.sort(key=lambda one: one.route.writer)  # stable: a sender's own messages stay in order
             self._carry(sent)
-        return BusResult(
-            ending=ending_of(self.clock),
-            mission_ms=self.clock.now_ms if self.clock.over_ms is None else self.clock.over_ms,
-            digest=fleet_digest(self.group.digests()),
-            rounds=self.clock.rounds,
-            messages=dict(self.clock.messages),
-            dropped=dict(self.group.intake.dropped),
-        )
+        return result_of(self.clock, [LastWord(self.group.digests(), dropped=dict(self.group.intake.dropped))])
 
     def _announce(self, message: Message) -> Outgoing:
         outgoing = self.announcer(RUN.key(), message, 0)
@@ -100,15 +91,23 @@ class _Local:
             received = one.opened()
             self.group.deliver(received, one.route)
             for kept in self.kept.values():
-                kept.take(one.key, one.payload)
+                kept.add(one.key, one.payload)
             for name in one.route.watchers:
                 listener = self.listeners.get(name)
                 if listener is not None:
                     listener.on_message(received)
 
 
-def ending_of(clock: LockstepClock) -> Ending:
-    """Why the clock has no next round."""
-    if clock.over_ms is not None:
-        return Ending.OVER
-    return Ending.TIME_LIMIT if clock.timed_out else Ending.IDLE
+def result_of(clock: LockstepClock, last_words: Iterable[LastWord]) -> BusResult:
+    """The result of a run whose clock has no next round, from the last words of its processes."""
+    last = summed_up(last_words)
+    ended = Ending.TIME_LIMIT if clock.timed_out else Ending.IDLE
+    return BusResult(
+        ending=ended if clock.over_ms is None else Ending.OVER,
+        mission_ms=clock.now_ms if clock.over_ms is None else clock.over_ms,
+        digest=fleet_digest(last.digests),
+        rounds=clock.rounds,
+        messages=dict(clock.messages),
+        dropped=last.dropped,
+        latencies_ms=last.latencies_ms,
+    )

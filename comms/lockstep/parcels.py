@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import zenoh
 
-from comms.control import RunKeys
+from comms.keys import RunKeys
 from comms.runner import Outgoing
 from comms.said.codec import pack, unpack
 from comms.said.wire import WireError
@@ -38,10 +38,10 @@ def parcels(outgoing: Iterable[Outgoing]) -> Iterator[tuple[tuple[str, ...], byt
 
 def unpacked(parcel: bytes) -> Iterator[tuple[str, bytes]]:
     """Key below the run id and payload of each message; raises WireError, and nothing else, where this is no parcel."""
-    parts = unpack(parcel)
-    if type(parts) is not list or len(parts) % 2:
+    pairs = unpack(parcel)
+    if type(pairs) is not list or len(pairs) % 2:
         raise WireError("not a list of keys and payloads")
-    keys, payloads = parts[::2], parts[1::2]
+    keys, payloads = pairs[::2], pairs[1::2]
     if not ({str}.issuperset(map(type, keys)) and {bytes}.issuperset(map(type, payloads))):
         raise WireError("not a list of keys and payloads")
     return zip(keys, payloads, strict=True)

@@ -53,7 +53,7 @@ def encode(header: Header, message: Message) -> bytes:
 
 def decode(payload: bytes, message_type: type[Message]) -> tuple[Header, Message]:
     """Header and message of a payload; raises WireError, and nothing else, where it is not one of `message_type`."""
-    header, body = _parts(payload)
+    header, body = _fields(payload)
     return header, message_of(body, message_type)
 
 
@@ -76,14 +76,14 @@ def packed(header: Header, body: list[Any]) -> bytes:
 
 def header_of(payload: bytes) -> Header:
     """The header alone, whatever the message; raises WireError, and nothing else, where there is none."""
-    return _parts(payload)[0]
+    return _fields(payload)[0]
 
 
-def _parts(payload: bytes) -> tuple[Header, Any]:
-    parts = unpack(payload)
-    if type(parts) is not list or len(parts) != HEADER_FIELDS:
+def _fields(payload: bytes) -> tuple[Header, Any]:
+    fields = unpack(payload)
+    if type(fields) is not list or len(fields) != HEADER_FIELDS:
         raise WireError(f"not a list of {HEADER_FIELDS} parts")
-    version, sender, incarnation, sequence, sent_ms, body = parts
+    version, sender, incarnation, sequence, sent_ms, body = fields
     if type(version) is not int or version != SCHEMA_VERSION:
         raise WireError(f"of another schema version than {SCHEMA_VERSION}")
     _check(sender, incarnation, sequence, sent_ms)

@@ -29,7 +29,7 @@ from comms.said.wire import (
     Text,
     YesNo,
 )
-from planner.types import GridSpec, Point, SweepFrame
+from planner.types import GridSpec, Point, Strip, SweepFrame
 
 
 class Role(enum.Enum):
@@ -44,6 +44,11 @@ class Role(enum.Enum):
     RECORDER = "recorder"
     OBSERVER = "observer"
     SURVEY_REVISIT = "survey_revisit"
+
+    @property
+    def is_single(self) -> bool:
+        """Whether a fleet has one such node at most, whose id is the role's word."""
+        return self in (Role.CLOCK, Role.WORLD, Role.COORDINATOR, Role.RECORDER, Role.OBSERVER)
 
     @property
     def surveys(self) -> bool:
@@ -375,6 +380,10 @@ class StripStatus:
     vehicle: OptionalIdentifier
     reason: Text
 
+    def as_strip(self, number: int) -> Strip:
+        """The strip as planning uses it; its number is in the key."""
+        return Strip(number, (self.start_x_m, self.start_y_m), self.heading_rad, self.length_m, self.width_m)
+
 
 class TaskAction(enum.Enum):
     """What a task message asks. To stand aside is to go to its start point and wait there, without a strip."""
@@ -395,6 +404,11 @@ class Task:
     heading_rad: Radians
     length_m: Metres
     width_m: Metres
+
+    @property
+    def as_strip(self) -> Strip:
+        """The strip as planning uses it."""
+        return Strip(self.strip, (self.start_x_m, self.start_y_m), self.heading_rad, self.length_m, self.width_m)
 
 
 class TaskState(enum.Enum):

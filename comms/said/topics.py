@@ -78,6 +78,10 @@ class Topic:
         """The key below the run id."""
         return self.pattern.format(vehicle=vehicle, number=number, tile=tile)
 
+    def due_ms(self, sent_ms: int) -> int:
+        """When a message that was sent at a time is due in lockstep. A link's own delay belongs here."""
+        return sent_ms + self.delay_ms
+
     @cached_property
     def has_vehicle(self) -> bool:
         """Whether the key names a vehicle."""

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 import enum
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from comms.control import pack
-from comms.result import BusResult, Ending
+from comms.result import BusResult, Ending, LastWord, summed_up
 from comms.said.codec import SCHEMA_VERSION
-from comms.wall.words import Hello, LastWord, pack_finish
+from comms.wall.words import Hello, pack_finish
+from comms.words import pack
 
 SIGNALS_KEPT = 32
 
@@ -109,7 +109,7 @@ class WallClock:
         self._began_s = began_s
         self._until_s = 0.0
         self._last_words_here: list[LastWord] = []
-        self._result = BusResult(Ending.OVER, 0, None, None, {}, {})
+        self._result = BusResult(Ending.OVER, 0)
 
     @property
     def result(self) -> BusResult:
@@ -222,7 +222,7 @@ class WallClock:
         self.notices.append(notice)
 
     def _finish(self, ending: Ending, mission_ms: int, now_s: float) -> None:
-        self._result = BusResult(ending, mission_ms, None, None, {}, {})
+        self._result = BusResult(ending, mission_ms)
         self._to_all(listens=False, now_s=now_s)
         self.phase = Phase.ENDING
 
@@ -242,16 +242,10 @@ class WallClock:
 
     def _sum_up(self) -> None:
         theirs = [known.last_word for known in self._hosts.values() if known.last_word is not None]
-        self._result = sum_up(self._result.ending, self._result.mission_ms, [*self._last_words_here, *theirs])
+        self._result = result_of(self._result.ending, self._result.mission_ms, [*self._last_words_here, *theirs])
 
 
-def sum_up(ending: Ending, mission_ms: int, last_words: Iterable[LastWord]) -> BusResult:
+def result_of(ending: Ending, mission_ms: int, last_words: Iterable[LastWord]) -> BusResult:
     """The result of a run by the wall clock, from the last words of its hosts."""
-    messages, dropped = Counter[str](), Counter[str]()
-    latencies: dict[str, list[float]] = {}
-    for one in last_words:
-        messages.update(one.messages)
-        dropped.update(one.dropped)
-        for name, milliseconds in one.latencies_ms.items():
-            latencies.setdefault(name, []).extend(milliseconds)
-    return BusResult(ending, mission_ms, None, None, dict(messages), dict(dropped), latencies)
+    last = summed_up(last_words)
+    return BusResult(ending, mission_ms, None, None, last.messages, last.dropped, last.latencies_ms)

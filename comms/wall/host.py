@@ -11,17 +11,18 @@ from typing import Any
 
 import zenoh
 
-from comms.control import ControlError, pack
+from comms.errors import Interrupted, NodeError, RefusedError, WordsError
+from comms.keys import RunKeys
 from comms.node import Received
 from comms.result import BusResult
-from comms.runner import NodeError
 from comms.said.codec import LARGEST_INCARNATION, SCHEMA_VERSION
 from comms.said.routing import Routing
 from comms.wall.clock import MissionTime
-from comms.wall.line import Interrupted, WallLine
+from comms.wall.line import WallLine
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import Seat
-from comms.wall.words import Hello, WallKeys, pack_hello, pack_last_word, unpack_finish, unpack_time
+from comms.wall.words import Hello, pack_hello, unpack_finish, unpack_time
+from comms.words import pack, pack_last_word
 
 HELLO_EVERY_S = 1.0
 FIRST_HELLO_EVERY_S = 0.1  # until the clock has answered
@@ -30,10 +31,6 @@ GOODBYE_WITHIN_S = 5.0
 CLOCK_LOST_AFTER_S = 3.0  # of wall time without a time signal; there are four a second
 GIVES_UP_AFTER_S = 20.0  # of wall time beyond the mission's time limit
 COMPLETE_WITHIN_S = 5.0  # so long a listener waits at the end for what is still missing
-
-
-class RefusedError(Exception):
-    """The clock does not let this process take part, or does not answer; the text is one sentence that says why."""
 
 
 class WallHost:
@@ -47,7 +44,7 @@ class WallHost:
     def __init__(
         self,
         session: zenoh.Session,
-        keys: WallKeys,
+        keys: RunKeys,
         host: str,
         seat: Seat,
         routing: Routing,
@@ -117,7 +114,7 @@ class WallHost:
             raise
         if self._result is not None:
             with contextlib.suppress(Interrupted):
-                self._part()
+                self._leave()
         return self._result
 
     def _live(self) -> None:
@@ -142,10 +139,10 @@ class WallHost:
             event = self._line.get(self._next_s(now_s) - time.monotonic())
             if event is None:
                 continue
-            for item in self._post.take(event, self._seat.kept.values):
+            for item in self._post.receive(event, self._seat.kept.values):
                 match item:
                     case Received():
-                        self._take(item)
+                        self._pass_on(item)
                     case Words(key, words):
                         self._hear(key, words)
 
@@ -172,13 +169,13 @@ class WallHost:
             self._clock_is_heard = heard
             self._notice("the router is heard again" if heard else "the router is not heard")
 
-    def _take(self, received: Received) -> None:
+    def _pass_on(self, received: Received) -> None:
         if not self._time.known:
             self._early.append(received)
             return
         now_ms = self._time.now_ms(time.monotonic())
         if self._post.is_in_time(received, now_ms):
-            self._post.publish(self._seat.take(received, now_ms))
+            self._post.publish(self._seat.hear(received, now_ms))
 
     def _hear(self, key: str, words: list[Any]) -> None:
         try:
@@ -186,7 +183,7 @@ class WallHost:
                 self._hear_time(*unpack_time(words))
             elif key == self._to_me:
                 self._hear_clock(words)
-        except ControlError as error:
+        except WordsError as error:
             self._post.intake.drop("senseless words", "clock", str(error))
 
     def _hear_time(self, now_ms: int | None, factor: float, taken_up: bool) -> None:
@@ -207,7 +204,7 @@ class WallHost:
             self._notice("the mission begins" if is_first else f"the mission is at {now_ms / 1000:.0f} s")
             early, self._early = self._early, []
             for received in early:
-                self._take(received)
+                self._pass_on(received)
 
     def _hear_clock(self, words: list[Any]) -> None:
         match words:
@@ -221,7 +218,7 @@ class WallHost:
                 self._result = unpack_finish(words)
                 self._finish_by_s = self._finish_by_s or time.monotonic() + COMPLETE_WITHIN_S
 
-    def _part(self) -> None:
+    def _leave(self) -> None:
         """Gives the last word; returns when the clock has heard it, or is gone. The session may be closed then: the
         news of its end cannot overtake the word."""
         self._post.beat(self._incarnation, self._seat.kept)
@@ -231,7 +228,7 @@ class WallHost:
             event = self._line.get(left_s)
             if event is None:
                 return
-            for item in self._post.take(event, self._seat.kept.values):  # others may still ask for what is kept
+            for item in self._post.receive(event, self._seat.kept.values):  # others may still ask for what is kept
                 if isinstance(item, Words) and item.key == self._to_me and item.words[0] == "goodbye":
                     return
 

@@ -8,23 +8,24 @@ from typing import Any
 
 import zenoh
 
-from comms.control import ControlError, HostPlan
-from comms.lockstep.hub import SIGN_OF_LIFE_EVERY_S, FleetError, HostLostError
+from comms.errors import FleetError, HostLostError, WordsError
+from comms.keys import HostSpec, RunKeys
 from comms.node import Received
-from comms.result import BusResult
+from comms.result import BusResult, LastWord
 from comms.runner import Stamp
 from comms.said.codec import CLOCK
 from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN
-from comms.session import PATIENCE_S
+from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S
 from comms.wall.clock import Phase, WallClock
 from comms.wall.host import BEAT_EVERY_S
 from comms.wall.journal import Journal
 from comms.wall.line import Life, WallLine
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import NodeSeat
-from comms.wall.words import LastWord, WallKeys, pack_time, unpack_hello, unpack_last_word
+from comms.wall.words import pack_time, unpack_hello
+from comms.words import unpack_last_word
 
 TIME_EVERY_S = 0.25
 FROM = "clock/from/"
@@ -41,9 +42,9 @@ class WallHub:
     def __init__(
         self,
         session: zenoh.Session,
-        keys: WallKeys,
+        keys: RunKeys,
         routing: Routing,
-        hosts: tuple[HostPlan, ...],
+        hosts: tuple[HostSpec, ...],
         seat: NodeSeat,
         run_info: RunInfo,
         time_limit_ms: int,
@@ -60,7 +61,7 @@ class WallHub:
         self._patience_s = patience_s
         self._alive = alive
         self._notice = notice
-        listens = {plan.host: all(routing.nodes[node].listens_only for node in plan.nodes) for plan in hosts}
+        listens = {spec.host: all(routing.nodes[node].listens_only for node in spec.nodes) for spec in hosts}
         self._clock = WallClock(listens, run_info.scenario_sha256, time_limit_ms, factor, time.monotonic())
         self._announced = Stamp(CLOCK, routing)(RUN.key(), run_info, 0)
         self._kept = Journal()
@@ -91,10 +92,10 @@ class WallHub:
                 self._post.publish(self._seat.act(clock.time.now_ms(now_s)))
             self._speak(now_s)
             event = self._line.get(self._next_s(now_s) - time.monotonic())
-            for item in [] if event is None else self._post.take(event, self._all_kept):
+            for item in [] if event is None else self._post.receive(event, self._all_kept):
                 match item:
                     case Received():
-                        self._take(item)
+                        self._pass_on(item)
                     case Words(key, words) if key.startswith(FROM):
                         self._hear(key.removeprefix(FROM), words)
                     case Life(host, instance, alive) if not alive:
@@ -115,7 +116,7 @@ class WallHub:
             self._seat_closed = True
             self._post.beat(0, self._seat.kept)
             clock.done_here(self._seat.last_word(self._post.intake.dropped))
-            clock.done_here(LastWord({RUN.name: 1}, {}, {}))
+            clock.done_here(LastWord(messages={RUN.name: 1}))
 
     def _next_s(self, now_s: float) -> float:
         next_s = min(self._time_at_s, self._beat_at_s, now_s + 0.05)
@@ -158,14 +159,14 @@ class WallHub:
             names = ", ".join(sorted(silent))
             raise FleetError(f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission from {names}")
 
-    def _take(self, received: Received) -> None:
+    def _pass_on(self, received: Received) -> None:
         now_ms = self._now_ms(time.monotonic())
         if not self._post.is_in_time(received, now_ms):
             return
         if received.topic is MISSION_OVER:
             self._clock.over(received.header.sent_ms)
         if self._under_way and not self._seat_closed:
-            self._post.publish(self._seat.take(received, now_ms))
+            self._post.publish(self._seat.hear(received, now_ms))
 
     def _hear(self, host: str, words: list[Any]) -> None:
         try:
@@ -178,7 +179,7 @@ class WallHub:
                     if self._strict:
                         raise FleetError(sentence)
                     self._notice(sentence)
-        except ControlError as error:
+        except WordsError as error:
             self._post.intake.drop("senseless words", host, str(error))
 
     def _lose(self, host: str, instance: str) -> None:

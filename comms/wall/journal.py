@@ -8,9 +8,9 @@ message than the sender, so that both sums are equal just where it has everythin
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
+from comms.kept import Kept
 from comms.node import Received
 from comms.runner import Outgoing
 from comms.said.codec import Header
@@ -23,37 +23,17 @@ class Journal:
     """What one sender has said, as far as the topic table says that it is kept."""
 
     def __init__(self) -> None:
-        self._count = 0
-        self._latest: dict[str, tuple[int, bytes]] = {}
-        self._events: list[tuple[int, str, bytes]] = []
-        self._tallies: dict[str, int] = {}
+        self.kept = Kept()
+        self.tallies: dict[str, int] = {}
+        """The tally of each key expression."""
 
     def add(self, sent: Outgoing) -> None:
         """The sender's next message: each has to be told, also those that are not kept."""
-        sequence = self._count
-        self._count += 1
         topic = sent.route.topic
-        if topic.keep is Keep.NOTHING:
-            return
-        gain = sequence + 1
-        if topic.keep is Keep.EVENTS:
-            self._events.append((sequence, sent.key, sent.payload))
-        else:
-            gain -= self._latest[sent.key][0] + 1 if sent.key in self._latest else 0
-            self._latest[sent.key] = (sequence, sent.payload)
-        expression = topic.expression(topic.vehicle_of(sent.key))
-        self._tallies[expression] = self._tallies.get(expression, 0) + gain
-
-    @property
-    def tallies(self) -> dict[str, int]:
-        """The tally of each key expression."""
-        return self._tallies
-
-    def matching(self, matches: Callable[[str], bool]) -> Iterator[tuple[str, bytes]]:
-        """Key and payload of what is kept under matching keys, in the order of sending."""
-        found = [(sequence, key, payload) for key, (sequence, payload) in self._latest.items() if matches(key)]
-        found += [one for one in self._events if matches(one[1])]
-        return ((key, payload) for _, key, payload in sorted(found))
+        gain = self.kept.add(topic, sent.key, sent.payload)
+        if gain:
+            expression = topic.expression(topic.vehicle_of(sent.key))
+            self.tallies[expression] = self.tallies.get(expression, 0) + gain
 
 
 @dataclass
@@ -71,8 +51,8 @@ class HeardMessages:
     def __init__(self) -> None:
         self._senders: dict[str, _FromSender] = {}
 
-    def take(self, received: Received) -> bool:
-        """Whether a message is news; one that came before, or is older than what came, is none."""
+    def add(self, received: Received) -> bool:
+        """Adds a message; whether it is news: one that came before, or is older than what came, is none."""
         header, topic = received.header, received.topic
         sender = self._sender(header.sender, header.incarnation)
         if sender is None:

@@ -12,16 +12,13 @@ from dataclasses import dataclass
 
 import zenoh
 
+from comms.errors import Interrupted
+from comms.keys import RunKeys
 from comms.runner import Outgoing
 from comms.said.topics import Keep
 from comms.session import subscribe
-from comms.wall.words import WallKeys
 
 ANSWER_WITHIN_S = 5.0
-
-
-class Interrupted(Exception):  # noqa: N818 - not an error: someone has asked for an early end
-    """The process is to end early."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +68,7 @@ class WallLine:
     def __init__(
         self,
         session: zenoh.Session,
-        keys: WallKeys,
+        keys: RunKeys,
         *,
         expressions: Iterable[str],
         keeps: Iterable[str] = (),

@@ -7,15 +7,14 @@ from collections import deque
 from collections.abc import Callable, Mapping
 
 from comms.node import Listener, Node
-from comms.result import BusResult, Ending
+from comms.result import BusResult, Ending, LastWord
 from comms.runner import Intake, Outgoing, Stamp
 from comms.said.codec import CLOCK
 from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN
-from comms.wall.clock import MissionTime, sum_up
+from comms.wall.clock import MissionTime, result_of
 from comms.wall.seats import ListenerSeat, NodeSeat
-from comms.wall.words import LastWord
 
 
 def run_local_by_wall(
@@ -75,13 +74,13 @@ class _WallLocal:
             if received.topic is MISSION_OVER:
                 self._over_ms = received.header.sent_ms
             now_ms = self._now_ms()
-            self._watching.take(received, now_ms)
-            under_way.extend(self._acting.take(received, now_ms))
+            self._watching.hear(received, now_ms)
+            under_way.extend(self._acting.hear(received, now_ms))
 
     def _now_ms(self) -> int:
         return self._time.now_ms(time.monotonic())
 
     def _result(self, ending: Ending, mission_ms: int) -> BusResult:
         last = self._acting.last_word(self._intake.dropped)
-        announced = LastWord({RUN.name: 1}, {}, {})
-        return sum_up(ending, mission_ms, [last, announced])
+        announced = LastWord(messages={RUN.name: 1})
+        return result_of(ending, mission_ms, [last, announced])

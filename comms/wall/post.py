@@ -12,13 +12,15 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from comms.control import ControlError, unpack
+from comms.errors import WordsError
+from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake, Outgoing
 from comms.said.routing import Routing
 from comms.wall.journal import HeardMessages, Journal
 from comms.wall.line import Answered, Asked, Event, Life, Mail, WallLine
-from comms.wall.words import Beat, WallKeys, pack_beat, unpack_beat
+from comms.wall.words import Beat, pack_beat, unpack_beat
+from comms.words import unpack
 
 WORDS = "clock/"  # what the keys of words begin with, below the run id
 BEAT = f"{WORDS}beat/"
@@ -39,7 +41,7 @@ Item = Received | Words | Life
 class WallPost:
     """The post of the nodes of one process over its line."""
 
-    def __init__(self, line: WallLine, keys: WallKeys, routing: Routing) -> None:
+    def __init__(self, line: WallLine, keys: RunKeys, routing: Routing) -> None:
         self.line = line
         self.intake = Intake(routing)
         self._keys = keys
@@ -48,17 +50,17 @@ class WallPost:
         self._asked: dict[str, set[str]] = {}
         self._held: dict[str, list[Received]] = {}
 
-    def take(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
+    def receive(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
         """Deals with what has arrived; returns messages that are news, words and news of a life, which are for others
         to deal with. `kept`: what the nodes here keep."""
         match event:
             case Mail(key, payload) if key.startswith(WORDS):
-                return self._take_words(key, payload)
+                return self._receive_words(key, payload)
             case Mail(key, payload):
-                return self._take_message(key, payload)
+                return self._receive_message(key, payload)
             case Asked():
                 found = [
-                    pair for one in kept() for pair in one.matching(lambda key: self.line.is_asked_for(event, key))
+                    pair for one in kept() for pair in one.kept.messages(lambda key: self.line.is_asked_for(event, key))
                 ]
                 self.line.answer(event, found)
             case Answered(sender, expression, tally, answers):
@@ -90,9 +92,9 @@ class WallPost:
         """Whether all is here that those who have told what they keep have kept for us."""
         return not any(self._missing(sender) for sender in self._beats)
 
-    def _take_message(self, key: str, payload: bytes) -> list[Item]:
+    def _receive_message(self, key: str, payload: bytes) -> list[Item]:
         received = self.intake.open(key, payload)
-        if received is None or not self._heard.take(received):
+        if received is None or not self._heard.add(received):
             return []
         if received.header.sender in self._asked:
             self._held.setdefault(received.header.sender, []).append(received)
@@ -107,14 +109,14 @@ class WallPost:
         del self._asked[sender]
         return [*sorted(self._held.pop(sender, []), key=lambda one: one.header.order)]
 
-    def _take_words(self, key: str, payload: bytes) -> list[Item]:
+    def _receive_words(self, key: str, payload: bytes) -> list[Item]:
         try:
             words = unpack(payload)
             if not key.startswith(BEAT):
                 return [Words(key, words)]
             sender = key.removeprefix(BEAT)
             self._beats[sender] = unpack_beat(words)
-        except ControlError as error:
+        except WordsError as error:
             self.intake.drop("senseless words", key, str(error))
             return []
         for expression in self._missing(sender):

@@ -13,15 +13,13 @@ from collections.abc import Iterable, Mapping
 from itertools import count
 from typing import Protocol
 
-from comms.kept_listener import KeptListener, close_all
-from comms.latency import STRIP_TO_TASK, StripLatency
-from comms.node import Listener, Node, Publication, Received, Step
-from comms.runner import NodeError, Outgoing, Stamp, failure_of
+from comms.node import Listener, Node, Received
+from comms.result import STRIP_TO_TASK, LastWord, StripLatency
+from comms.runner import GuardedListener, GuardedNode, Outgoing, close_all
 from comms.said.messages import Role
 from comms.said.routing import Routing
 from comms.said.topics import RUN
 from comms.wall.journal import Journal
-from comms.wall.words import LastWord
 
 
 class OrderWindow:
@@ -53,65 +51,44 @@ class OrderWindow:
 class WallNode:
     """One node. It is started when the run is announced to it; what came before that is held until then.
 
-    `wake_ms`: the wake-up it has asked for. `kept`: what it has said and keeps for others.
+    `kept`: what it has said and keeps for others.
     """
 
     def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
-        self.node_id = node_id
-        self.wake_ms: int | None = None
         self.kept = Journal()
-        self._node = node
-        self._stamp = Stamp(node_id, routing, incarnation)
+        self._node = GuardedNode(node_id, node, routing, incarnation)
         self._held: list[Received] = []
         self._started = False
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    @property
+    def wake_ms(self) -> int | None:
+        """The wake-up that it has asked for."""
+        return self._node.wake_ms
+
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Handles a message; returns what the node publishes. Raises NodeError."""
         if self._started:
-            return self._act(now_ms, [received], start=False)
+            return self._keep(self._node.act(now_ms, [received]))
         self._held.append(received)
         if received.topic is not RUN:
             return []
         self._started = True
         held = sorted(self._held, key=lambda one: one.header.order)
         self._held.clear()
-        return self._act(now_ms, held, start=True)
+        return self._keep(self._node.act(now_ms, held, start=True))
 
     def wake(self, now_ms: int) -> list[Outgoing]:
         """Wakes the node if that is due; returns what it publishes. Raises NodeError."""
-        if not self._is_due(now_ms):
+        if not self._node.is_due(now_ms):
             return []
-        published = self._act(now_ms, [], start=False)
-        if self._is_due(now_ms):
-            raise NodeError(f"{self.node_id} asks at {now_ms} ms to be woken at {self.wake_ms} ms, which is not later")
+        published = self._node.act(now_ms, wake=True)
+        self._node.check_wake(now_ms)
+        return self._keep(published)
+
+    def _keep(self, published: list[Outgoing]) -> list[Outgoing]:
+        for one in published:
+            self.kept.add(one)
         return published
-
-    def _is_due(self, now_ms: int) -> bool:
-        return self.wake_ms is not None and self.wake_ms <= now_ms
-
-    def _act(self, now_ms: int, mail: list[Received], *, start: bool) -> list[Outgoing]:
-        published: list[Publication] = []
-        try:
-            if start:
-                self._note(self._node.start(now_ms), published)
-            for received in mail:
-                self._note(self._node.on_message(received, now_ms), published)
-            if not mail:
-                self._note(self._node.on_wake(now_ms), published)
-        except NodeError:
-            raise
-        except Exception as error:
-            raise failure_of(self.node_id, error, at_ms=now_ms) from error
-        return [self._send(one, now_ms) for one in published]
-
-    def _note(self, step: Step, published: list[Publication]) -> None:
-        self.wake_ms = step.wake_ms
-        published.extend(step.publish)
-
-    def _send(self, publication: Publication, now_ms: int) -> Outgoing:
-        outgoing = self._stamp(publication.key, publication.message, now_ms)
-        self.kept.add(outgoing)
-        return outgoing
 
 
 class WallNodes:
@@ -123,12 +100,12 @@ class WallNodes:
         self.nodes = {node_id: WallNode(node_id, node, routing, incarnation) for node_id, node in nodes.items()}
         self._routing = routing
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Gives a message to those here that read it; returns what they publish. Raises NodeError."""
         route = self._routing.route(received.key)
         readers = () if route is None else route.readers
         return self._count(
-            [one for name in readers if name in self.nodes for one in self.nodes[name].take(received, now_ms)]
+            [one for name in readers if name in self.nodes for one in self.nodes[name].hear(received, now_ms)]
         )
 
     def wake(self, now_ms: int) -> list[Outgoing]:
@@ -158,7 +135,7 @@ class Seat(Protocol):
     def begin(self, incarnation: int, factor: float) -> None:
         """The mission's time is known; nothing else is called before."""
 
-    def take(self, received: Received, now_ms: int) -> Iterable[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> Iterable[Outgoing]:
         """A message has arrived; returns what is to be published."""
 
     def act(self, now_ms: int) -> Iterable[Outgoing]:
@@ -197,11 +174,11 @@ class NodeSeat:
         """Seats the nodes; they are started when the run is announced to them."""
         self._nodes = WallNodes(self._raw, self._routing, incarnation)
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Lets the nodes handle a message."""
         if self._is_coordinators:
             self._latency.arrived(received, time.perf_counter())
-        return self._time(self._nodes.take(received, now_ms))
+        return self._time(self._nodes.hear(received, now_ms))
 
     def act(self, now_ms: int) -> list[Outgoing]:
         """Wakes the nodes for whom it is time."""
@@ -222,7 +199,8 @@ class NodeSeat:
 
     def last_word(self, dropped: Mapping[str, int]) -> LastWord:
         """What the nodes have said, and the latencies measured here."""
-        return LastWord(dict(self._nodes.said), dict(dropped), {STRIP_TO_TASK: self._latency.milliseconds})
+        latencies = {STRIP_TO_TASK: self._latency.milliseconds}
+        return LastWord(messages=dict(self._nodes.said), dropped=dict(dropped), latencies_ms=latencies)
 
     def _time(self, outgoing: list[Outgoing]) -> list[Outgoing]:
         if self._is_coordinators:
@@ -240,7 +218,7 @@ class ListenerSeat:
 
     def __init__(self, listeners: Mapping[str, Listener], routing: Routing) -> None:
         self.reads = tuple(one for node_id in listeners for one in routing.subscriptions(node_id))
-        self._listeners = {node_id: KeptListener(node_id, one) for node_id, one in listeners.items()}
+        self._listeners = {node_id: GuardedListener(node_id, one) for node_id, one in listeners.items()}
         self._routing = routing
         self._window = OrderWindow(0)
 
@@ -248,7 +226,7 @@ class ListenerSeat:
         """Sets the window."""
         self._window = OrderWindow(round(WINDOW_S * 1000 * factor))
 
-    def take(self, received: Received, now_ms: int) -> list[Outgoing]:
+    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Takes a message."""
         self._window.add(received)
         return []
@@ -272,7 +250,7 @@ class ListenerSeat:
 
     def last_word(self, dropped: Mapping[str, int]) -> LastWord:
         """Listeners say nothing, but may have dropped something."""
-        return LastWord({}, dict(dropped), {})
+        return LastWord(dropped=dict(dropped))
 
     def _pass_on(self, messages: list[Received]) -> None:
         for received in messages:

@@ -1,4 +1,4 @@
-"""What the clock and the processes say to each other when the wall clock drives the nodes: keys and packed words.
+"""Words between clock and processes when the wall clock drives the nodes.
 
 Host to clock: `hello`, again and again, `failed`, `done`. Clock to host: `welcome`, `refused`, `finish`, `goodbye`.
 Clock to all: the time signal. Node to all: its beat, with the tallies of what it keeps.
@@ -9,26 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from comms.control import ControlError, RunKeys, pack
+from comms.errors import WordsError
 from comms.result import BusResult, Ending
-
-
-@dataclass(frozen=True)
-class WallKeys(RunKeys):
-    """Full Zenoh keys of a run by the wall clock."""
-
-    @property
-    def time(self) -> str:
-        """The clock's time signal."""
-        return f"{self.root}clock/time"
-
-    def life(self, host: str, instance: str) -> str:
-        """The liveliness token of one process of a host's name; both may be `*`."""
-        return f"{self.alive(host)}/{instance}"
-
-    def beat(self, node: str) -> str:
-        """A node's beat."""
-        return f"{self.root}clock/beat/{node}"
+from comms.words import are_counts, pack
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +30,6 @@ class Hello:
 
 
 @dataclass(frozen=True, slots=True)
-class LastWord:
-    """What a host's nodes have said in all, what was dropped there, what was measured."""
-
-    messages: dict[str, int]
-    dropped: dict[str, int]
-    latencies_ms: dict[str, list[float]]
-
-
-@dataclass(frozen=True, slots=True)
 class Beat:
     """`tallies`: see `comms.wall.journal`."""
 
@@ -71,11 +45,11 @@ def pack_hello(hello: Hello) -> bytes:
 
 
 def unpack_hello(words: list[Any]) -> Hello:
-    """The `hello` of a host; raises ControlError."""
+    """The `hello` of a host; raises WordsError."""
     match words:
         case ["hello", str(instance), int(schema), str(sha), bool(welcomed), None | int() as now_ms]:
             return Hello(instance, schema, sha, welcomed, now_ms)
-    raise ControlError("a hello that is none")
+    raise WordsError("a hello that is none")
 
 
 def pack_time(now_ms: int | None, factor: float, *, taken_up: bool) -> bytes:
@@ -85,11 +59,11 @@ def pack_time(now_ms: int | None, factor: float, *, taken_up: bool) -> bytes:
 
 
 def unpack_time(words: list[Any]) -> tuple[int | None, float, bool]:
-    """The three words of a time signal; raises ControlError."""
+    """The three words of a time signal; raises WordsError."""
     match words:
         case ["time", None | int() as now_ms, float(factor), bool(taken_up)] if factor > 0:
             return now_ms, factor, taken_up
-    raise ControlError("a time signal that is none")
+    raise WordsError("a time signal that is none")
 
 
 def pack_beat(beat: Beat) -> bytes:
@@ -98,25 +72,11 @@ def pack_beat(beat: Beat) -> bytes:
 
 
 def unpack_beat(words: list[Any]) -> Beat:
-    """The `beat` of a node; raises ControlError."""
+    """The `beat` of a node; raises WordsError."""
     match words:
-        case ["beat", int(incarnation), dict(tallies)] if _counts(tallies):
+        case ["beat", int(incarnation), dict(tallies)] if are_counts(tallies):
             return Beat(incarnation, tallies)
-    raise ControlError("a beat that is none")
-
-
-def pack_last_word(last: LastWord) -> bytes:
-    """A host's `done`."""
-    return pack("done", last.messages, last.dropped, last.latencies_ms)
-
-
-def unpack_last_word(words: list[Any]) -> LastWord:
-    """The `done` of a host; raises ControlError."""
-    match words:
-        case ["done", dict(messages), dict(dropped), dict(latencies_ms)]:
-            if _counts(messages) and _counts(dropped) and _lists_of_floats(latencies_ms):
-                return LastWord(messages, dropped, latencies_ms)
-    raise ControlError("a last word that is none")
+    raise WordsError("a beat that is none")
 
 
 def pack_finish(result: BusResult) -> bytes:
@@ -127,20 +87,9 @@ def pack_finish(result: BusResult) -> bytes:
 
 
 def unpack_finish(words: list[Any]) -> BusResult:
-    """The result in a `finish`; raises ControlError."""
+    """The result in a `finish`; raises WordsError."""
     match words:
         case ["finish", str(ending), int(mission_ms), dict(messages), dict(dropped), dict(latencies_ms)]:
             if ending in [one.value for one in Ending]:
                 return BusResult(Ending(ending), mission_ms, None, None, messages, dropped, latencies_ms)
-    raise ControlError("an end that is none")
-
-
-def _counts(table: dict[Any, Any]) -> bool:
-    return all(type(name) is str and type(count) is int for name, count in table.items())
-
-
-def _lists_of_floats(table: dict[Any, Any]) -> bool:
-    return all(
-        type(name) is str and type(values) is list and all(type(one) is float for one in values)
-        for name, values in table.items()
-    )
+    raise WordsError("an end that is none")

@@ -22,7 +22,7 @@ def test_it_keeps_to_what_every_allocator_has_to():
 @pytest.mark.parametrize("fault_seed", [1, 2, 3])
 def test_no_strip_is_lost_where_every_fifth_message_is(make_fleet, fault_seed):
     fleet = make_fleet("tellaro", overrides={"coordinator.allocator": LongestFirst}, fault_seed=fault_seed)
-    fleet.drop("*", probability=0.2)
+    fleet.drop("**", probability=0.2)
     flight = fleet.run()
     assert flight.summary["dropped"]["lost by a fault"] > 1000
     assert_no_strip_lost(flight)
@@ -41,5 +41,5 @@ def test_a_strip_goes_on_when_its_helper_comes_back(fleet):
 
 
 def test_the_mission_is_the_same_over_zenoh(fleet):
-    fleet.drop("*", probability=0.2)
+    fleet.drop("**", probability=0.2)
     assert_repeats(fleet, ["local", "zenoh"])

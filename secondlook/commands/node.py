@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from comms.wall.session import Certificates
+from comms.session import Certificates
 from secondlook.commands.run import check_factor
 from secondlook.errors import UserError
 from secondlook.launch.run_folder import run_folder

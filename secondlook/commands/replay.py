@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from comms.runner import NodeError
+from comms.errors import NodeError
 from comms.said.routing import Routing
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet

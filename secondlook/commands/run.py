@@ -14,6 +14,8 @@ from typing import Annotated
 
 import typer
 
+from comms.lockstep.drive import Lockstep
+from comms.wall.drive import ByWallClock
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
@@ -131,11 +133,12 @@ def run(
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
+    drive = Lockstep() if real_time is None else ByWallClock(real_time)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
             options = RunOptions(
-                folder, bus.value, processes, record=not no_record, factor=real_time, progress=progress, live_pipe=pipe
+                folder, bus.value, processes, drive, record=not no_record, progress=progress, live_pipe=pipe
             )
             try:
                 summary = run_mission(mission, options)

@@ -87,7 +87,7 @@ class Risk:
 
 
 @dataclass(frozen=True)
-class Flight:
+class Result:
     """What came of a mission.
 
     `primary_s`: when the last primary had surveyed all. `at_primary_s`, `at_105`: then, and at 1.05 times that;
@@ -108,14 +108,14 @@ class Flight:
 
 
 @dataclass(frozen=True)
-class FailedFlight:
+class Failure:
     """A mission that failed, and the sentence that says why."""
 
     seed: int
     failure: str
 
 
-def fly(scenario: Scenario, watch: Watch | None = None) -> Flight | FailedFlight:
+def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
     """Flies a mission; its files lie in a folder that is gone afterwards. `watch`: see `RunOptions`."""
     notes = _Notes()
     with tempfile.TemporaryDirectory(prefix="secondlook-compare-") as folder:
@@ -123,14 +123,14 @@ def fly(scenario: Scenario, watch: Watch | None = None) -> Flight | FailedFlight
             options = RunOptions(Path(folder), bus="local", record=False, progress=notes.take, watch=watch)
             summary = run_mission(scenario, options)
         except RunFailedError as error:
-            return FailedFlight(scenario.seed, str(error))
+            return Failure(scenario.seed, str(error))
     primary_s, mission_s = summary["time"]["primary_s"], summary["time"]["mission_s"]
     if primary_s is None or summary["risk"] is None:
-        return FailedFlight(scenario.seed, "the mission was over before the survey")
+        return Failure(scenario.seed, "the mission was over before the survey")
     at_primary_s, at_105 = (Risk(**at) for at in summary["risk_at"])
     at_end = Risk(mission_s, summary["risk"]["mean"], summary["risk"]["worst30_mean"])
     alone = summary["risk_primary_alone"]
-    return Flight(
+    return Result(
         seed=scenario.seed,
         digest=summary["digest"],
         primary_s=primary_s,
@@ -157,7 +157,7 @@ class _Notes:
             self.taken.append(Risk(metrics.now_ms / 1000, risk.mean, risk.worst30_mean))
 
 
-Flown = dict[str, dict[int, Flight | FailedFlight]]
+Flown = dict[str, dict[int, Result | Failure]]
 """By contender and seed; what has not been flown is not there."""
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from planner.types import FloatArray
-from secondlook.compare.flights import Flight, Flown, Risk
+from secondlook.compare.flights import Flown, Result, Risk
 
 BAND_PERCENT = (10.0, 90.0)
 POINTS = 400
@@ -25,10 +25,10 @@ def draw(flown: Flown, title: str, path: Path) -> None:
     for panel, (attribute, label) in enumerate(PANELS, start=1):
         axes = figure.add_subplot(1, 2, panel)
         for index, (name, by_seed) in enumerate(flown.items()):
-            flights = [one for one in by_seed.values() if isinstance(one, Flight)]
-            if not flights:
+            results = [one for one in by_seed.values() if isinstance(one, Result)]
+            if not results:
                 continue
-            shares, lines = _lines(flights, attribute)
+            shares, lines = _lines(results, attribute)
             colour = colours[index % len(colours)]
             low, high = np.percentile(lines, BAND_PERCENT, axis=0)
             axes.fill_between(shares, low, high, color=colour, alpha=0.15, linewidth=0)
@@ -45,14 +45,14 @@ def draw(flown: Flown, title: str, path: Path) -> None:
     figure.savefig(path, dpi=150)
 
 
-def _lines(flights: Sequence[Flight], attribute: str) -> tuple[FloatArray, FloatArray]:
-    """Risk at shares of the survey's duration, up to the last end of a mission; shape (flights, points). What a mission
+def _lines(results: Sequence[Result], attribute: str) -> tuple[FloatArray, FloatArray]:
+    """Risk at shares of the survey's duration, up to the last end of a mission; shape (results, points). What a mission
     that ended earlier has left stays so."""
-    shares = np.linspace(0.0, max(one.at_end.t_s / one.primary_s for one in flights), POINTS)
-    return shares, np.array([_line(one, shares, attribute) for one in flights])
+    shares = np.linspace(0.0, max(one.at_end.t_s / one.primary_s for one in results), POINTS)
+    return shares, np.array([_line(one, shares, attribute) for one in results])
 
 
-def _line(flight: Flight, shares: FloatArray, attribute: str) -> FloatArray:
-    course = (Risk(0.0, 1.0, 1.0), *flight.over_time)
+def _line(result: Result, shares: FloatArray, attribute: str) -> FloatArray:
+    course = (Risk(0.0, 1.0, 1.0), *result.over_time)
     values = [float(getattr(risk, attribute)) for risk in course]
-    return np.asarray(np.interp(shares * flight.primary_s, [risk.t_s for risk in course], values))
+    return np.asarray(np.interp(shares * result.primary_s, [risk.t_s for risk in course], values))

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
-from secondlook.compare.flights import FailedFlight, Flight, Flown
+from secondlook.compare.flights import Failure, Flown, Result
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class Standing:
 
     Residual risk, mean over the area and over the worst 30 % of it, when the last primary had surveyed all, at 1.05
     times that, and at the mission's end, which is `ends_at` times that. `served`: strips done. `removed_m2`: see
-    `Flight`. `wins`, `losses`: on how many seeds its mean risk at the end is lower or higher than the first
+    `Result`. `wins`, `losses`: on how many seeds its mean risk at the end is lower or higher than the first
     contender's, of those that both have flown; with `worst30_` the same over the worst 30 %. `failed`: missions that
     failed.
     """
@@ -53,7 +53,7 @@ class Standing:
 def standings(flown: Flown) -> list[Standing]:
     """Those with at least one mission flown, in their order."""
     done = {
-        name: {seed: one for seed, one in by_seed.items() if isinstance(one, Flight)} for name, by_seed in flown.items()
+        name: {seed: one for seed, one in by_seed.items() if isinstance(one, Result)} for name, by_seed in flown.items()
     }
     first = next(iter(done.values()), {})
     return [
@@ -69,13 +69,13 @@ def failures(flown: Flown) -> list[str]:
         f"{name}, seed {seed}: {one.failure}"
         for name, by_seed in flown.items()
         for seed, one in sorted(by_seed.items())
-        if isinstance(one, FailedFlight)
+        if isinstance(one, Failure)
     ]
 
 
 def as_json(flown: Flown, scenario: str) -> dict[str, Any]:
-    """For programs: the standings, and every flight without its course."""
-    flights = [
+    """For programs: the standings, and every result without its course."""
+    results = [
         {"contender": name, **{key: value for key, value in asdict(one).items() if key != "over_time"}}
         for name, by_seed in flown.items()
         for _, one in sorted(by_seed.items())
@@ -83,19 +83,19 @@ def as_json(flown: Flown, scenario: str) -> dict[str, Any]:
     return {
         "scenario": scenario,
         "contenders": [asdict(standing) for standing in standings(flown)],
-        "missions": flights,
+        "missions": results,
     }
 
 
-def _standing(name: str, flights: Sequence[Flight], failed: int, first: dict[int, Flight]) -> Standing:
-    def spread(what: Callable[[Flight], float]) -> Spread:
-        values = np.array([what(one) for one in flights], dtype=np.float64)
+def _standing(name: str, results: Sequence[Result], failed: int, first: dict[int, Result]) -> Standing:
+    def spread(what: Callable[[Result], float]) -> Spread:
+        values = np.array([what(one) for one in results], dtype=np.float64)
         return Spread(float(values.mean()), float(values.std(ddof=1)) if values.size > 1 else 0.0)
 
-    both = [(one.at_end, first[one.seed].at_end) for one in flights if one.seed in first]
+    both = [(one.at_end, first[one.seed].at_end) for one in results if one.seed in first]
     return Standing(
         name=name,
-        flown=len(flights),
+        flown=len(results),
         failed=failed,
         primary_s=spread(lambda one: one.primary_s),
         mean=spread(lambda one: one.at_primary_s.mean),

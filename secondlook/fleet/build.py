@@ -9,14 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from comms.said.codec import CLOCK, SCHEMA_VERSION, Header, encode
+from comms.said.codec import SCHEMA_VERSION, Header, encode
 from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.routing import RosterNode
-from coordinator.config import CoordinatorConfig, Priority
+from coordinator.config import CoordinatorConfig
 from planner.region import Region
-from planner.types import DetectionCurve, Point
+from planner.types import DetectionCurve, Point, PriorityGround
 from secondlook.errors import UserError
-from secondlook.fleet.node_spec import NodeSpec
+from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
 from secondlook.scenario import (
     PatchySeabed,
@@ -37,28 +37,26 @@ AS_CONVEX = 1e-6
 @dataclass(frozen=True)
 class Fleet:
     """A fleet ready to be run. `roster`: every node, clock, recorder and observer included. `specs`: how to make the
-    acting nodes that are ours, by node id. `factor`: by how much mission time runs faster than the wall clock; None for
-    lockstep."""
+    acting nodes that are ours, by node id."""
 
     run_info: RunInfo
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
     time_limit_ms: int
-    factor: float | None = None
 
 
-def build_fleet(scenario: Scenario, *, record: bool, factor: float | None = None) -> Fleet:
-    """The fleet of a scenario; `record`: with a recorder. `factor`: see `Fleet`.
+def build_fleet(scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode.LOCKSTEP) -> Fleet:
+    """The fleet of a scenario; `record`: with a recorder. `mode`: what makes its time go on, as it is announced.
 
     Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
     """
     try:
-        return _build_fleet(scenario, record, factor)
+        return _build_fleet(scenario, record, mode)
     except ValueError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from error
 
 
-def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Fleet:
+def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     heading_rad = track_heading_rad(scenario)
     grid = region_of(scenario).about(heading_rad).grid(scenario.area.cell_m)
     for primary in scenario.survey_vehicles.values():
@@ -68,7 +66,7 @@ def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Flee
         scenario=scenario.name,
         scenario_sha256=scenario_hash(scenario),
         seed=scenario.seed,
-        mode=ClockMode.LOCKSTEP if factor is None else ClockMode.WALL,
+        mode=mode,
         area=_outline(scenario.area.polygon_m),
         grid=Grid(
             grid.frame.origin_x_m,
@@ -84,24 +82,34 @@ def _build_fleet(scenario: Scenario, record: bool, factor: float | None) -> Flee
     )
     Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
     encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
+    roster = _roster_of(scenario, record=record)
+    specs = {name: _agent_spec(name, vehicle) for name, vehicle in scenario.vehicles.items()}
+    specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
+    if any(one.role is Role.WORLD for one in roster):
+        specs = {WORLD: node_spec(Role.WORLD, _world_config(scenario)), **specs}
+    return Fleet(run_info, roster, specs, round(scenario.mission.time_limit_s * 1000))
+
+
+def _role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
+    """What a vehicle's agent is in the fleet."""
+    if isinstance(vehicle, RevisitVehicle):
+        return Role.REVISIT
+    return Role.SURVEY_REVISIT if vehicle.revisits else Role.SURVEY
+
+
+def _roster_of(scenario: Scenario, *, record: bool) -> tuple[RosterNode, ...]:
+    """Every node of a scenario's fleet; `record`: with a recorder."""
     external = scenario.external_vehicles
-    simulated = [name for name in scenario.vehicles if name not in external]
-    roster = [
-        RosterNode("clock", Role.CLOCK),
-        *([RosterNode("world", Role.WORLD, tuple(simulated))] if simulated else []),
+    simulated = tuple(name for name in scenario.vehicles if name not in external)
+    return (
+        RosterNode(CLOCK, Role.CLOCK),
+        *([RosterNode(WORLD, Role.WORLD, simulated)] if simulated else []),
         *(RosterNode(body_of(name), Role.BODY, (name,)) for name in external),
-        *(RosterNode(name, _role(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
-        RosterNode("coordinator", Role.COORDINATOR),
-        *([RosterNode("recorder", Role.RECORDER)] if record else []),
-        RosterNode("observer", Role.OBSERVER),
-    ]
-    specs = {"world": NodeSpec("sim_world.world:World", _world_config(scenario))} if simulated else {}
-    for name, vehicle in scenario.vehicles.items():
-        specs[name] = _agent_spec(name, vehicle)
-    specs["coordinator"] = NodeSpec(
-        scenario.coordinator.node or "coordinator.coordinator:Coordinator", _coordinator_config(scenario)
+        *(RosterNode(name, _role_of(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
+        RosterNode(COORDINATOR, Role.COORDINATOR),
+        *([RosterNode(RECORDER, Role.RECORDER)] if record else []),
+        RosterNode(OBSERVER, Role.OBSERVER),
     )
-    return Fleet(run_info, tuple(roster), specs, round(scenario.mission.time_limit_s * 1000), factor)
 
 
 def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
@@ -117,17 +125,11 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
     return tuple(Vertex(*corner) for corner in corners if corner in convex)
 
 
-def _role(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
-    if isinstance(vehicle, RevisitVehicle):
-        return Role.REVISIT
-    return Role.SURVEY_REVISIT if vehicle.revisits else Role.SURVEY
-
-
 def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
     curve = vehicle.sensor.detection_curve(vehicle.nadir_gap_m)
     return RosterVehicle(
         vehicle=name,
-        role=_role(vehicle),
+        role=_role_of(vehicle),
         speed_mps=vehicle.speed_mps,
         turn_radius_m=vehicle.turn_radius_m,
         run_in_m=vehicle.run_in_m,
@@ -161,7 +163,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         endurance_ms=roster.endurance_ms,
     )
     if isinstance(vehicle, RevisitVehicle):
-        return NodeSpec(vehicle.agent or "vehicle_agent.revisit:RevisitAgent", revisit)
+        return node_spec(Role.REVISIT, revisit, vehicle.agent)
     survey = SurveyConfig(
         vehicle=name,
         spacing=made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
@@ -175,9 +177,8 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         share=vehicle.share,
     )
     if vehicle.revisits:
-        config = SurveyRevisitConfig(survey, revisit)
-        return NodeSpec(vehicle.agent or "vehicle_agent.survey_revisit:SurveyRevisitAgent", config)
-    return NodeSpec(vehicle.agent or "vehicle_agent.survey:SurveyAgent", survey)
+        return node_spec(Role.SURVEY_REVISIT, SurveyRevisitConfig(survey, revisit), vehicle.agent)
+    return node_spec(Role.SURVEY, survey, vehicle.agent)
 
 
 def _world_config(scenario: Scenario) -> WorldConfig:
@@ -232,5 +233,5 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
         separation_m=scenario.mission.separation_m,
-        priorities=tuple(Priority(one.polygon_m, one.weight) for one in scenario.area.priorities),
+        priorities=tuple(PriorityGround((one.polygon_m,), one.weight) for one in scenario.area.priorities),
     )

@@ -14,61 +14,55 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
 
-from comms.control import HostPlan
-from comms.lockstep.events import NodeEvent
-from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.said.messages import RunInfo
-from comms.said.routing import RosterNode
-from secondlook.fleet.node_spec import NodeSpec
+from comms.drive import Drive, Setup
+from comms.keys import HostSpec
+from secondlook.fleet.nodes import NodeSpec
 from secondlook.launch.verdict import Fate
 
 STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor for words to the launcher
 
 
 @dataclass(frozen=True)
-class ChildOrder:
-    """What a child process is to hold. `passwords` and `hosts` are complete for the hub, which also has the clock and
-    the planned `events`. `patience_s`: wall time after which someone silent is given up. `factor`: by how much mission
-    time runs faster than the wall clock; None for lockstep."""
+class ChildSetup:
+    """What a child process is told: what all of the run are told alike, what makes its time go on, which process it is,
+    with what it connects, and how to make its nodes. `passwords` and `hosts` are complete for the hub, empty for all
+    others."""
 
-    run: str
-    plan: HostPlan
-    password: str
-    roster: tuple[RosterNode, ...]
-    specs: dict[str, NodeSpec]
-    patience_s: float
-    faults: Faults = NO_FAULTS
-    is_hub: bool = False
-    is_listener: bool = False
-    hosts: tuple[HostPlan, ...] = ()
+    setup: Setup
+    drive: Drive
+    spec: HostSpec
+    nodes: dict[str, NodeSpec]
+    password: str = ""
+    hosts: tuple[HostSpec, ...] = ()
     passwords: dict[str, str] = field(default_factory=dict)
-    run_info: RunInfo | None = None
-    time_limit_ms: int = 0
-    events: tuple[NodeEvent, ...] = ()
-    factor: float | None = None
 
     @property
     def host(self) -> str:
         """The process's name."""
-        return self.plan.host
+        return self.spec.host
+
+    @property
+    def listens_only(self) -> bool:
+        """Whether it holds a listener."""
+        return any(one.listens_only for one in self.setup.roster if one.node_id in self.spec.nodes)
 
 
-def write_order(pipe: IO[bytes], order: ChildOrder) -> None:
-    """Sends an order to a child's standard input, with the launcher's import path: a user's own parts may lie there."""
-    pickled = pickle.dumps((sys.path, pickle.dumps(order)))
+def send_setup(pipe: IO[bytes], setup: ChildSetup) -> None:
+    """Tells a child at its standard input, with the launcher's import path: a user's own classes may lie there."""
+    pickled = pickle.dumps((sys.path, pickle.dumps(setup)))
     pipe.write(len(pickled).to_bytes(8, "big") + pickled)
     pipe.flush()
 
 
-def read_order(pipe: IO[bytes]) -> ChildOrder:
-    """Waits for the launcher's order."""
+def receive_setup(pipe: IO[bytes]) -> ChildSetup:
+    """Waits for what the launcher tells."""
     size = int.from_bytes(pipe.read(8), "big")
     path, pickled = pickle.loads(pipe.read(size))
     # Behind our own path, so that nothing there can stand in a room's way.
     sys.path.extend(entry for entry in path if entry not in sys.path)
-    order = pickle.loads(pickled)
-    assert isinstance(order, ChildOrder)
-    return order
+    setup = pickle.loads(pickled)
+    assert isinstance(setup, ChildSetup)
+    return setup
 
 
 CHUNK_BYTES = 65_536
@@ -107,14 +101,14 @@ class StatusLines:
 
 
 class ChildProcess:
-    """Starts the program `secondlook.launch.child_program` with an order. What it prints goes to `<folder>/<host>.txt`.
+    """Starts the program `secondlook.launch.child_program` as it is told. What it prints goes to `<folder>/<host>.txt`.
 
     `status` is what it says.
     """
 
-    def __init__(self, order: ChildOrder, folder: Path) -> None:
-        self.host = order.host
-        self._log = folder / f"{order.host}.txt"
+    def __init__(self, setup: ChildSetup, folder: Path) -> None:
+        self.host = setup.host
+        self._log = folder / f"{setup.host}.txt"
         read_fd, child_fd = os.pipe()
         self.status = StatusLines(read_fd)
         try:
@@ -122,7 +116,7 @@ class ChildProcess:
                 self._process = subprocess.Popen(
                     # -P: a file of the user's in the working directory must not shadow a room of the same name.
                     # Run and host are there for whoever looks at the list of processes.
-                    [sys.executable, "-P", "-m", "secondlook.launch.child_program", order.run, order.host],
+                    [sys.executable, "-P", "-m", "secondlook.launch.child_program", setup.setup.run, setup.host],
                     stdin=subprocess.PIPE,
                     stdout=log,
                     stderr=log,
@@ -135,7 +129,7 @@ class ChildProcess:
         assert self._process.stdin is not None
         self._stdin = self._process.stdin
         with contextlib.suppress(OSError):  # a child that dies at once is noticed by its end
-            write_order(self._stdin, order)
+            send_setup(self._stdin, setup)
 
     @property
     def pid(self) -> int:

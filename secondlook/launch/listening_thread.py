@@ -3,17 +3,10 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
 
-from comms.control import RunKeys
-from comms.lockstep.host import ListenerHost
+from comms.drive import Drive, Host, Setup
 from comms.node import Listener
-from comms.said.routing import Routing
 from comms.session import open_client
-from comms.wall.host import WallHost
-from comms.wall.seats import ListenerSeat
-from comms.wall.words import WallKeys
-from secondlook.fleet.build import Fleet
 from secondlook.recorded.observer import RunStopped
 
 
@@ -24,26 +17,15 @@ class ListeningThread:
     RunStopped.
     """
 
-    def __init__(
-        self,
-        node_id: str,
-        listener: Listener,
-        keys: RunKeys,
-        routing: Routing,
-        password: str,
-        patience_s: float,
-        fleet: Fleet,
-    ) -> None:
+    def __init__(self, node_id: str, listener: Listener, setup: Setup, drive: Drive, password: str) -> None:
         self.error: Exception | None = None
         self.stopped = False
         self._node_id = node_id
         self._listener = listener
-        self._keys = keys
-        self._routing = routing
+        self._setup = setup
+        self._drive = drive
         self._password = password
-        self._patience_s = patience_s
-        self._fleet = fleet
-        self._host: ListenerHost | WallHost | None = None
+        self._host: Host | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._listen, name=node_id, daemon=True)
         self._endpoint = ""
@@ -75,9 +57,10 @@ class ListeningThread:
                 self.error = self.error or error
 
     def _listen(self) -> None:
+        name, setup = self._node_id, self._setup
         try:
-            with open_client(self._endpoint, self._node_id, self._password, patience_s=self._patience_s) as session:
-                self._host = self._make_host(session)
+            with open_client(self._endpoint, name, self._password, patience_s=setup.patience_s) as session:
+                self._host = self._drive.listening(session, setup, name, name, self._listener)
                 if self._stopping.is_set():
                     self._host.interrupt()
                 try:
@@ -86,10 +69,3 @@ class ListeningThread:
                     self.stopped = True
         except Exception as error:
             self.error = error
-
-    def _make_host(self, session: Any) -> ListenerHost | WallHost:
-        if self._fleet.factor is None:
-            return ListenerHost(session, self._keys, self._node_id, self._node_id, self._listener, self._routing)
-        seat = ListenerSeat({self._node_id: self._listener}, self._routing)
-        sha256, limit_ms = self._fleet.run_info.scenario_sha256, self._fleet.time_limit_ms
-        return WallHost(session, WallKeys(self._keys.run), self._node_id, seat, self._routing, sha256, limit_ms)

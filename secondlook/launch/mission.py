@@ -5,36 +5,33 @@ from __future__ import annotations
 import json
 import logging
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 import shapely
 
-from comms.lockstep.clock import RunawayError
-from comms.lockstep.events import NodeEvent, timeline
-from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.local_bus import run_local
+from comms.drive import Drive, Setup
+from comms.errors import NodeError, RunawayError
+from comms.lockstep.drive import Lockstep
 from comms.result import BusResult, Ending
-from comms.runner import NodeError
+from comms.said.messages import Role
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
-from comms.wall.local_bus import run_local_by_wall
-from planner.types import Point
 from secondlook.errors import UserError
 from secondlook.fleet.build import Fleet, build_fleet
-from secondlook.fleet.node_spec import NodeSpec, make_node, make_nodes
-from secondlook.launch.host_plans import OBSERVER, RECORDER
+from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
 from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
+from secondlook.recorded.story import Story
 from secondlook.recorded.summary import summarise
 from secondlook.scenario import Scenario
 from secondlook.scenario.area import priority_grounds
-from viz.recorder_config import PriorityGround, RecorderConfig
+from viz.recorder_config import RecorderConfig
 
 
 def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = None) -> RecorderConfig:
@@ -43,15 +40,11 @@ def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = Non
     grounds = priority_grounds(shapely.Polygon(area.polygon_m, area.holes_m), area.priorities)
     return RecorderConfig(
         path,
+        Story,
         live_pipe=live_pipe,
         thresholds=scenario.thresholds,
-        priorities=tuple(PriorityGround(_rings(ground), weight) for ground, weight in grounds),
+        priorities=tuple(grounds),
     )
-
-
-def _rings(ground: shapely.MultiPolygon) -> tuple[tuple[Point, ...], ...]:
-    rings = [ring for part in ground.geoms for ring in (part.exterior, *part.interiors)]
-    return tuple(tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
 
 
 log = logging.getLogger("secondlook.mission")
@@ -62,23 +55,20 @@ LOGS = "logs"
 
 @dataclass(frozen=True)
 class RunOptions:
-    """`folder`: where the files of the run go; it exists. `processes`: see `host_plans.plan_hosts`. `record`: with
-    recording and messages.mpk. `factor`: flies by the wall clock times this; None for lockstep. `progress`: told the
-    figures as the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
-    `viz.live_server.LiveServer`. `faults`, `events`: what goes wrong on purpose, in lockstep alone; with events each
-    node concerned has a process of its own. `watch`: told each message in the order of sending; by raising
-    `RunStopped` it ends the run early, which is no failure. `patience_s`: wall time after which a node that does not
-    answer is given up."""
+    """`folder`: where the files of the run go; it exists. `drive`: what makes time go on, and what goes wrong on
+    purpose; a node to which something is to happen has a process of its own. `processes`: see
+    `secondlook.fleet.nodes.hosts_of_run`. `record`: with recording and messages.mpk. `progress`: told the figures as
+    the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
+    `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped` it ends
+    the run early, which is no failure. `patience_s`: wall time after which a node that does not answer is given up."""
 
     folder: Path
     bus: Bus = "zenoh"
     processes: int | None = None
+    drive: Drive = field(default_factory=Lockstep)
     record: bool = True
-    factor: float | None = None
     progress: Progress | None = None
     live_pipe: Path | None = None
-    faults: Faults = NO_FAULTS
-    events: tuple[NodeEvent, ...] = ()
     watch: Watch | None = None
     patience_s: float = PATIENCE_S
 
@@ -93,10 +83,8 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """
     began_s = time.perf_counter()
     check_bodies(scenario)
-    fleet = build_fleet(scenario, record=options.record, factor=options.factor)
-    if options.factor is not None and (options.faults or options.events):
-        raise ValueError("faults and events are for lockstep alone")
-    timeline(options.events, Routing(fleet.roster))  # refuses what does not fit
+    fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode)
+    options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
     (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
     run = _Run(scenario, fleet, observer, options)
@@ -123,7 +111,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
         wall_s=time.perf_counter() - began_s,
         ending=ending,
         failure=failure,
-        factor=options.factor,
+        factor=options.drive.factor,
     )
     (options.folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     if failure is not None:
@@ -143,52 +131,40 @@ def check_bodies(scenario: Scenario) -> None:
 class _Run:
     def __init__(self, scenario: Scenario, fleet: Fleet, observer: Observer, options: RunOptions) -> None:
         self.processes = 1
-        self._fleet = fleet
+        config = recorder_config(scenario, options.folder / "mission.rrd", options.live_pipe)
+        recorder = {RECORDER: node_spec(Role.RECORDER, config)} if options.record else {}
+        self._fleet = replace(fleet, specs=fleet.specs | recorder)
         self._observer = observer
         self._options = options
-        config = recorder_config(scenario, options.folder / "mission.rrd", options.live_pipe)
-        self._recorder = {RECORDER: NodeSpec("viz.recorder:Recorder", config)} if options.record else {}
 
     def on_local(self) -> BusResult:
-        fleet = self._fleet
-        options = self._options
+        fleet, patience_s = self._fleet, self._options.patience_s
+        specs = dict(fleet.specs)
+        listeners = {OBSERVER: self._observer}
         try:
-            recorder = make_nodes(self._recorder)
+            if RECORDER in specs:
+                listeners[RECORDER] = make_node(RECORDER, specs.pop(RECORDER))
         except NodeError:
             self._observer.close()
             raise
-        listeners = {OBSERVER: self._observer, **recorder}
+        setup = Setup("local", fleet.roster, fleet.run_info, fleet.time_limit_ms, patience_s)
         try:
-            with Watchdog(options.patience_s) as watchdog:
-                makers = {node_id: partial(_make, node_id, spec, watchdog) for node_id, spec in fleet.specs.items()}
-                if fleet.factor is not None:
-                    return run_local_by_wall(
-                        Routing(fleet.roster), makers, listeners, fleet.run_info, fleet.time_limit_ms, fleet.factor
-                    )
-                return run_local(
-                    Routing(fleet.roster),
-                    makers,
-                    listeners,
-                    fleet.run_info,
-                    fleet.time_limit_ms,
-                    faults=options.faults,
-                    events=options.events,
-                )
+            with Watchdog(patience_s) as watchdog:
+                makers = {node_id: partial(_make, node_id, spec, watchdog) for node_id, spec in specs.items()}
+                return self._options.drive.run_local(setup, makers, listeners)
         except NoReturn as error:
             log.error("%s; it was at", error, exc_info=error)
             raise RunFailedError(str(error)) from None
 
     def on_zenoh(self) -> BusResult:
-        options, recorder = self._options, self._recorder.get(RECORDER)
+        options = self._options
         with Processes(
             self._fleet,
             options.folder / LOGS,
             self._observer,
-            recorder,
+            options.drive,
             options.processes,
             patience_s=options.patience_s,
-            faults=options.faults,
-            events=options.events,
         ) as processes:
             self.processes = processes.count
             return processes.run()

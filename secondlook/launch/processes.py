@@ -9,17 +9,15 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from comms.control import HostPlan, RunKeys
-from comms.lockstep.events import Change, NodeEvent, timeline
-from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.drive import Drive, Setup
+from comms.keys import HostSpec
+from comms.lockstep.events import Change
 from comms.node import Listener
 from comms.result import BusResult, Ending
-from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.fleet.build import Fleet
-from secondlook.fleet.node_spec import NodeSpec
-from secondlook.launch.child_process import ChildOrder, ChildProcess
-from secondlook.launch.host_plans import HUB, OBSERVER, RECORDER, plan_hosts
+from secondlook.fleet.nodes import HUB, NODES, OBSERVER, Process, hosts_of_run
+from secondlook.launch.child_process import ChildProcess, ChildSetup
 from secondlook.launch.listening_thread import ListeningThread
 from secondlook.launch.verdict import Verdict
 from secondlook.recorded.observer import RunStopped
@@ -36,10 +34,10 @@ class RunFailedError(Exception):
 class Processes:
     """The processes of one run over Zenoh. Use as a context: on leaving it, none of them is left.
 
-    `logs`: a folder for what they print; no file is left there of those that print nothing. `recorder`: how to make the
-    recorder in its process, None for none. `observer` lives in this process, and is closed on leaving the context at
-    the latest. `processes`: see `plan_hosts`. `faults` and `events`: see `comms.lockstep`; raises ValueError for events
-    that do not fit. `patience_s`: wall time after which a process that should say something and does not is given up.
+    `logs`: a folder for what they print; no file is left there of those that print nothing. `observer` lives in this
+    process, and is closed on leaving the context at the latest. `drive`: what makes time go on; raises ValueError where
+    that cannot be with this fleet. `processes`: see `hosts_of_run`. `patience_s`: wall time after which a process that
+    should say something and does not is given up.
     """
 
     def __init__(
@@ -47,33 +45,30 @@ class Processes:
         fleet: Fleet,
         logs: Path,
         observer: Listener,
-        recorder: NodeSpec | None,
-        processes: int | None,
+        drive: Drive,
+        processes: int | None = None,
         *,
-        faults: Faults = NO_FAULTS,
-        events: tuple[NodeEvent, ...] = (),
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._fleet = fleet
-        self._faults = faults
-        self._events = events
+        self._drive = drive
         self._logs = logs
-        self._keys = RunKeys(f"{fleet.run_info.scenario}-{secrets.token_hex(4)}")
-        self._in_hub, self._plans = plan_hosts(fleet, processes, timeline(events, Routing(fleet.roster)))
-        self._to_join = {plan.host for plan in self._plans if plan.joins}
+        run = f"{fleet.run_info.scenario}-{secrets.token_hex(4)}"
+        self._setup = Setup(run, fleet.roster, fleet.run_info, fleet.time_limit_ms, patience_s)
+        routing = self._setup.routing()
+        self._in_hub, self._hosts = hosts_of_run(fleet.roster, processes, drive.hosts_apart(routing))
+        self._here = {one.node_id for one in fleet.roster if NODES[one.role].run is Process.LAUNCHER}
+        self._to_join = {spec.host for spec in self._hosts if spec.joins}
         self._killed: set[str] = set()
         self._endpoint = ""
-        self._passwords = {plan.host: secrets.token_hex(16) for plan in self._plans}
-        self._recorder = recorder
+        self._passwords = {spec.host: secrets.token_hex(16) for spec in self._hosts}
         self._patience_s = patience_s
         self._children: dict[str, ChildProcess] = {}
         self._verdict = Verdict(HUB)
         self._hub_heard_s = 0.0
         self._hub_alive_ms = 0
         self._selector = selectors.DefaultSelector()
-        self._listening = ListeningThread(
-            OBSERVER, observer, self._keys, Routing(fleet.roster), self._passwords[OBSERVER], patience_s, fleet
-        )
+        self._listening = ListeningThread(OBSERVER, observer, self._setup, drive, self._passwords[OBSERVER])
 
     def __enter__(self) -> Processes:
         return self
@@ -84,7 +79,7 @@ class Processes:
     @property
     def count(self) -> int:
         """How many processes the run has, this one included: hub, other hosts, and the observer's, which is this."""
-        return 1 + len(self._plans)
+        return 1 + len(self._hosts)
 
     @property
     def process_ids(self) -> dict[str, int]:
@@ -135,47 +130,16 @@ class Processes:
             self._listening.stop(GRACE_S)
 
     def _start_all(self) -> None:
-        fleet = self._fleet
-        self._start(
-            ChildOrder(
-                run=self._keys.run,
-                plan=HostPlan(HUB, tuple(self._in_hub)),
-                password="",
-                roster=fleet.roster,
-                specs={node_id: fleet.specs[node_id] for node_id in self._in_hub},
-                patience_s=self._patience_s,
-                is_hub=True,
-                hosts=self._plans,
-                passwords=self._passwords,
-                run_info=fleet.run_info,
-                time_limit_ms=fleet.time_limit_ms,
-                faults=self._faults,
-                events=self._events,
-                factor=fleet.factor,
-            )
-        )
-        for plan in self._plans:
-            if plan.host == OBSERVER:
-                continue
-            recorder = {RECORDER: self._recorder} if plan.host == RECORDER and self._recorder else None
-            self._start(
-                ChildOrder(
-                    run=self._keys.run,
-                    plan=plan,
-                    password=self._passwords[plan.host],
-                    roster=fleet.roster,
-                    specs=recorder or {node_id: fleet.specs[node_id] for node_id in plan.nodes},
-                    patience_s=self._patience_s,
-                    faults=self._faults,
-                    is_listener=recorder is not None,
-                    run_info=fleet.run_info,
-                    time_limit_ms=fleet.time_limit_ms,
-                    factor=fleet.factor,
-                )
-            )
+        in_hub = tuple(self._in_hub)
+        self._start(HostSpec(HUB, in_hub), hosts=self._hosts, passwords=self._passwords)
+        for spec in self._hosts:
+            if self._here.isdisjoint(spec.nodes):
+                self._start(spec, password=self._passwords[spec.host])
 
-    def _start(self, order: ChildOrder) -> None:
-        child = self._children[order.host] = ChildProcess(order, self._logs)
+    def _start(self, spec: HostSpec, **more: Any) -> None:
+        nodes = {node_id: self._fleet.specs[node_id] for node_id in spec.nodes}
+        child = ChildProcess(ChildSetup(self._setup, self._drive, spec, nodes, **more), self._logs)
+        self._children[spec.host] = child
         self._selector.register(child.status, selectors.EVENT_READ, child)
 
     def _hear(self) -> Iterable[tuple[ChildProcess, dict[str, Any]]]:

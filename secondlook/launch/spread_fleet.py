@@ -4,33 +4,36 @@ from __future__ import annotations
 
 import json
 import logging
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from comms.control import HostPlan
+from comms.errors import ConnectionFailedError, Interrupted, NodeError, RefusedError
+from comms.keys import RunKeys
 from comms.result import BusResult, Ending
-from comms.runner import NodeError
-from comms.said.messages import Role
-from comms.said.routing import RosterNode, Routing
-from comms.session import ConnectionFailedError
-from comms.wall.access import wall_access_rules
-from comms.wall.host import RefusedError, WallHost
+from comms.said.messages import ClockMode, Role
+from comms.said.routing import Routing
+from comms.session import Certificates, open_guest, open_router
+from comms.wall.access import access_rules
+from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
-from comms.wall.line import Interrupted
 from comms.wall.seats import ListenerSeat, NodeSeat, Seat
-from comms.wall.session import Certificates, open_guest, open_router
-from comms.wall.words import WallKeys
 from secondlook.errors import UserError
 from secondlook.fleet.build import Fleet, build_fleet
-from secondlook.fleet.node_spec import NodeSpec, make_nodes
-from secondlook.launch.host_plans import OBSERVER, RECORDER
+from secondlook.fleet.nodes import (
+    OBSERVER,
+    RECORDER,
+    certified_when_spread,
+    hosts_when_spread,
+    make_node,
+    make_nodes,
+    node_spec,
+)
 from secondlook.launch.mission import not_over, recorder_config
 from secondlook.launch.run_display import closing_table
+from secondlook.launch.signals import signals_ask
 from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise
 from secondlook.report import write_report
@@ -56,12 +59,12 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
     """Routes and holds the clock until the mission is over; returns the exit code. Raises UserError where it cannot
     listen. `record`: it waits for a recorder too."""
     _log_to_stderr()
-    fleet = build_fleet(scenario, record=record, factor=factor)
-    routing, keys = Routing(fleet.roster), WallKeys(link.run)
-    hosts = _hosts(fleet.roster)
+    fleet = build_fleet(scenario, record=record, mode=ClockMode.WALL)
+    routing, keys = Routing(fleet.roster), RunKeys(link.run)
+    hosts = hosts_when_spread(fleet.roster)
     rules = None
     if link.certificates is not None:
-        rules = wall_access_rules(routing, _subjects(fleet.roster), keys, "cert_common_names")
+        rules = access_rules(routing, certified_when_spread(fleet.roster), keys, "cert_common_names")
     try:
         session, endpoint = open_router(link.listen or "", link.certificates, rules)
     except ConnectionFailedError as error:
@@ -81,29 +84,29 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
         )
         _say(ROUTER, f"listens on {endpoint}, and waits for {', '.join(plan.host for plan in hosts)}")
         try:
-            with _signals(hub.interrupt):
+            with signals_ask(hub.interrupt):
                 result = hub.run()
         except Interrupted:
             _say(ROUTER, "interrupted; the others go on, and connect again when it is back")
             return FAILED
-    part = _Part(result)
-    failure = part.failure(scenario)
-    _say(ROUTER, failure or part.closing_words)
+    outcome = _Outcome(result)
+    failure = outcome.failure(scenario)
+    _say(ROUTER, failure or outcome.closing_words)
     return FAILED if failure else 0
 
 
 def run_node(scenario: Scenario, link: Link, node_id: str) -> int:
     """Runs an acting node of the fleet; returns the exit code. Raises UserError where it cannot take part."""
     _log_to_stderr()
-    fleet = build_fleet(scenario, record=True, factor=1.0)
+    fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     try:
         nodes = make_nodes({node_id: fleet.specs[node_id]})
-        part = _take_part(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))
+        outcome = _run_as_guest(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))
     except NodeError as error:
         _say(node_id, str(error))
         return FAILED
-    failure = part.failure(scenario)
-    _say(node_id, failure or part.closing_words)
+    failure = outcome.failure(scenario)
+    _say(node_id, failure or outcome.closing_words)
     return FAILED if failure else 0
 
 
@@ -112,27 +115,27 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     cannot take part."""
     _log_to_stderr()
     began_s = time.perf_counter()
-    fleet = build_fleet(scenario, record=True, factor=1.0)
+    fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     (folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
     observer = Observer(folder, with_messages=True)
-    recorder = NodeSpec("viz.recorder:Recorder", recorder_config(scenario, folder / "mission.rrd"))
-    part = _Part()
+    recorder = node_spec(Role.RECORDER, recorder_config(scenario, folder / "mission.rrd"))
+    outcome = _Outcome()
     try:
-        listeners = {OBSERVER: observer, **make_nodes({RECORDER: recorder})}
-        part = _take_part(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
-        failure = part.failure(scenario)
+        listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
+        outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
+        failure = outcome.failure(scenario)
     except NodeError as error:
         failure = str(error)
     summary = summarise(
         scenario,
         observer,
-        part.result,
+        outcome.result,
         bus="zenoh",
-        processes=1 + len(_hosts(fleet.roster)),
+        processes=1 + len(hosts_when_spread(fleet.roster)),
         wall_s=time.perf_counter() - began_s,
-        ending=part.ending,
+        ending=outcome.ending,
         failure=failure,
-        factor=part.factor,
+        factor=outcome.factor,
     )
     (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     try:
@@ -147,8 +150,8 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
 
 
 @dataclass(frozen=True)
-class _Part:
-    """A process's part in a mission, once it has ended."""
+class _Outcome:
+    """What came of a mission for one process."""
 
     result: BusResult | None = None
     factor: float = 1.0
@@ -174,7 +177,7 @@ class _Part:
         return None if self.result.ending is Ending.OVER else not_over(self.result, scenario)
 
 
-def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
+def _run_as_guest(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Outcome:
     try:
         session = open_guest(link.connect, link.listen, link.certificates, within_s=link.wait_s)
     except ConnectionFailedError as error:
@@ -183,7 +186,7 @@ def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
     with session:
         guest = WallHost(
             session,
-            WallKeys(link.run),
+            RunKeys(link.run),
             host,
             seat,
             Routing(fleet.roster),
@@ -193,52 +196,11 @@ def _take_part(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Part:
             notice=_say_as(host),
         )
         try:
-            with _signals(guest.interrupt):
+            with signals_ask(guest.interrupt):
                 result = guest.run()
         except RefusedError as error:
             raise UserError(str(error)) from error
-        return _Part(result, guest.factor, guest.now_ms if guest.interrupted else None)
-
-
-def _hosts(roster: tuple[RosterNode, ...]) -> tuple[HostPlan, ...]:
-    """The processes that the mission waits for: one for each node that acts and is ours, one for those that listen."""
-    acting = [node for node in roster if not node.listens_only and node.role not in (Role.CLOCK, Role.BODY)]
-    plans = [HostPlan(node.node_id, (node.node_id,)) for node in acting]
-    if any(node.role is Role.RECORDER for node in roster):
-        plans.append(HostPlan(RECORDER, (RECORDER, OBSERVER)))
-    return tuple(plans)
-
-
-def _subjects(roster: tuple[RosterNode, ...]) -> tuple[HostPlan, ...]:
-    """Whose certificates the router knows. A body that is not ours has one of its own, or speaks through its agent."""
-    bodies = {node.vehicles[0]: node.node_id for node in roster if node.role is Role.BODY}
-    hosts = tuple(
-        HostPlan(plan.host, (*plan.nodes, bodies[plan.host])) if plan.host in bodies else plan
-        for plan in _hosts(roster)
-    )
-    return (*hosts, *(HostPlan(body, (body,)) for body in bodies.values()))
-
-
-@contextmanager
-def _signals(interrupt: Callable[[], None]) -> Iterator[None]:
-    """Within it Ctrl-C, SIGTERM and SIGHUP ask for an early end; a second one does not wait for it."""
-    numbers = [
-        number
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        if signal.getsignal(number) is not signal.SIG_IGN
-    ]
-
-    def handle(*_: object) -> None:
-        for number in numbers:
-            signal.signal(number, signal.SIG_DFL)
-        interrupt()
-
-    before = {number: signal.signal(number, handle) for number in numbers}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        return _Outcome(result, guest.factor, guest.now_ms if guest.interrupted else None)
 
 
 def _log_to_stderr() -> None:

@@ -1,21 +1,34 @@
-"""Runs read back from their files: messages, figures, maps and geometry of a mission that was flown."""
+"""Runs read back from their files: messages, figures, maps and geometry of a mission that was flown.
 
-from secondlook.recorded.geojson import GeographicOrigin, to_geojson
-from secondlook.recorded.ground import PriorityRecord, RiskMap, TargetRecord
-from secondlook.recorded.mission import RecordedMission, load_run
-from secondlook.recorded.said import Said
-from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord
-from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord
+The recorder's process needs one small module of this package: what is named here is imported when it is asked for.
+"""
 
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from secondlook.recorded.geojson import GeographicOrigin, to_geojson
+    from secondlook.recorded.ground import RiskMap, TargetRecord
+    from secondlook.recorded.mission import RecordedMission, load_run
+    from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord
+    from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord
+
+_NAMES = {
+    "geojson": ("GeographicOrigin", "to_geojson"),
+    "ground": ("RiskMap", "TargetRecord"),
+    "mission": ("RecordedMission", "load_run"),
+    "second_looks": ("HotspotRecord", "StripEvent", "StripRecord"),
+    "vehicles": ("Activity", "PathRecord", "TrackRecord"),
+}
 __all__ = [
     "Activity",
     "GeographicOrigin",
     "HotspotRecord",
     "PathRecord",
-    "PriorityRecord",
     "RecordedMission",
     "RiskMap",
-    "Said",
     "StripEvent",
     "StripRecord",
     "TargetRecord",
@@ -23,3 +36,10 @@ __all__ = [
     "load_run",
     "to_geojson",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    for module, names in _NAMES.items():
+        if name in names:
+            return getattr(import_module(f"{__name__}.{module}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

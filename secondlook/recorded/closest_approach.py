@@ -61,7 +61,7 @@ class ClosestApproaches:
             self._under_way.add(name)
         if name not in self._under_way or (isinstance(message, Nav) and name in self._told_true):
             return
-        now_s, place = received.header.sent_ms / 1000, (message.x_m, message.y_m)
+        now_s, place = received.t_s, (message.x_m, message.y_m)
         before = self._legs.get(name)
         self._legs[name] = leg = _Leg(before.to_s if before else now_s, now_s, before.end if before else place, place)
         for other, its in self._legs.items():

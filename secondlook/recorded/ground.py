@@ -15,12 +15,12 @@ import shapely
 from pydantic import TypeAdapter, ValidationError
 from shapely.geometry.base import BaseGeometry
 
+from comms.node import Received
 from comms.said.messages import TruthLook, TruthTargets
 from planner.risk import RiskStatistics, risk_statistics
-from planner.types import BoolArray, FloatArray, GridSpec
+from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from secondlook.errors import UserError
 from secondlook.recorded.metrics import Metrics
-from secondlook.recorded.said import Said
 from secondlook.scenario.area import Priority, priority_grounds
 
 Cells = tuple[np.ndarray[tuple[int], np.dtype[np.intp]], np.ndarray[tuple[int], np.dtype[np.intp]]]
@@ -112,23 +112,17 @@ def _span(places: FloatArray, count: int) -> slice:
 _PRIORITIES = TypeAdapter(list[Priority])
 
 
-@dataclass(frozen=True)
-class PriorityRecord:
-    """One such ground, as far as it lies in the area and under no later one, mission frame; its risk counts `weight`
-    times."""
+def priorities(scenario: Mapping[str, Any], area: shapely.Polygon, folder: Path) -> list[PriorityGround]:
+    """Those of a scenario as a run's folder holds it, each as far as it lies in the area and under no later one.
 
-    ground: shapely.MultiPolygon
-    weight: float
-
-
-def priorities(scenario: Mapping[str, Any], area: shapely.Polygon, folder: Path) -> list[PriorityRecord]:
-    """Those of a scenario as a run's folder holds it; raises UserError where they are not as the run wrote them."""
+    Raises UserError where they are not as the run wrote them.
+    """
     told = scenario.get("area")
     try:
         read = _PRIORITIES.validate_python(told.get("priorities", []) if isinstance(told, dict) else [])
     except ValidationError:
         raise UserError(f"{folder / 'scenario.yaml'}: area.priorities must be as the run wrote them") from None
-    return [PriorityRecord(ground, weight) for ground, weight in priority_grounds(area, read)]
+    return priority_grounds(area, read)
 
 
 @dataclass(frozen=True)
@@ -142,9 +136,9 @@ class TargetRecord:
     point: shapely.Point
 
 
-def targets(truth: Iterable[Said[TruthTargets]], looks: Iterable[Said[TruthLook]]) -> list[TargetRecord]:
+def targets(truth: Iterable[Received[TruthTargets]], looks: Iterable[Received[TruthLook]]) -> list[TargetRecord]:
     """All targets; none where nobody knows them."""
-    first: dict[int, Said[TruthLook]] = {}
+    first: dict[int, Received[TruthLook]] = {}
     for look in looks:
         for number in look.message.detected:
             first.setdefault(number, look)

@@ -221,17 +221,8 @@ class Metrics:
     def _take_tile(self, received: Received, tile: CoverageTile) -> None:
         if self.map is None:
             return
-        version = (received.header.incarnation, tile.version)
         try:
-            self.map.take(
-                received.vehicle,
-                version,
-                tile.first_row,
-                tile.first_column,
-                tile.sum_levels,
-                tile.largest_levels,
-                tile.settled,
-            )
+            self.map.join(received.vehicle, received.header.incarnation, tile)
         except ValueError:
             self.misfits += 1
 

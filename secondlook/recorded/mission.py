@@ -1,19 +1,21 @@
-"""A mission that was flown, read back from the files of its run: its messages, and what can be told from them."""
+"""A mission that was flown: its messages, and what can be told from them; read back from the files of its run."""
 
 from __future__ import annotations
 
 import json
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import shapely
 import yaml
 
 from comms.node import Received
 from comms.said.codec import decode, header_of
+from comms.said.key_expressions import KeyExpression, key_expression
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -26,65 +28,55 @@ from comms.said.messages import (
     TruthLook,
     TruthTargets,
 )
-from comms.said.topics import Topic, topic_of
+from comms.said.topics import TOPICS, Topic, topic_of
 from comms.said.wire import WireError
+from planner.fleet_map import FleetMap
+from planner.types import PriorityGround
 from secondlook.errors import UserError
-from secondlook.recorded.ground import PriorityRecord, RiskMap, TargetRecord, priorities, targets
-from secondlook.recorded.key_pattern import key_matcher
+from secondlook.recorded.closest_approach import Closest
+from secondlook.recorded.ground import RiskMap, TargetRecord, priorities, targets
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
-from secondlook.recorded.said import M, Said
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
 from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord, activities, paths, tracks
 
 T = TypeVar("T")
+M = TypeVar("M", bound=Message)
 
 
-class RecordedMission:
-    """Made by `secondlook.load`. Times are simulated seconds since the start, places the mission frame (ENU metres).
+class Mission(ABC):
+    """A mission that was flown: its messages, and what can be told from them. Times are simulated seconds since the
+    start, places the mission frame (ENU metres).
 
-    `folder`: the run's. `summary`: summary.json. `scenario`: scenario.yaml, the scenario as it was run. Both are empty
-    where the run was killed before it could write them. What tells of the mission raises UserError where the run ended
-    before `has_begun`.
+    `folder`: the run's. `summary`: what summary.json holds; empty where the run was killed before it could write it.
+    What tells of the mission raises UserError where the run ended before `has_begun`.
+
+    `keys`: a key expression as Zenoh has it, `agent/*/state` or `coord/**`, for keys of `comms.said.topics` below the
+    run id: `*` is one chunk of a key, `**` any number of chunks, `$*` any characters within one. Raises UserError for
+    what is none, and where no key is ever like it.
     """
 
-    def __init__(
-        self,
-        folder: Path,
-        *,
-        summary: Mapping[str, Any],
-        scenario: Mapping[str, Any],
-        messages: Sequence[tuple[str, bytes]],
-    ) -> None:
-        self.folder = folder
-        self.summary = summary
-        self.scenario = scenario
-        self._messages = messages
-        self._topics = {key: topic_of(key) for key in {key for key, _ in messages}}
+    folder: Path
+    summary: Mapping[str, Any]
 
-    def messages(self, pattern: str = "**") -> Iterator[Said[Message]]:
-        """Every message whose key fits a pattern, in the order of sending.
+    @abstractmethod
+    def received(self, *kinds: type, keys: str = "**") -> Iterator[Received]:
+        """The messages of some types, or of all if none is named, in the order of sending."""
 
-        `pattern`: as in `agent/*/state` or `coord/**`: `*` is one chunk of a key or a part of it, `**` any number of
-        chunks. Keys are those of `comms.said.topics`, below the run id. Raises UserError for a message that cannot be
-        read.
-        """
-        return (_said(one, one.message) for one in self.received(pattern=pattern))
+    def said(self, kind: type[M], keys: str = "**") -> list[Received[M]]:
+        """The messages of one type, such as `comms.said.messages.Plan`, in the order of sending."""
+        return cast("list[Received[M]]", list(self.received(kind, keys=keys)))
 
-    def said(self, kind: type[M], pattern: str = "**") -> list[Said[M]]:
-        """The messages of one type, such as `comms.said.messages.Plan`, in the order of sending; `pattern` as above."""
-        opened = self.received(kind, pattern=pattern)
-        return [_said(one, one.message) for one in opened if isinstance(one.message, kind)]
-
-    def received(self, *kinds: type, pattern: str = "**") -> Iterator[Received]:
-        """The messages of some types, or of all if none is named, in the form in which listeners are told them."""
-        fits = key_matcher(pattern)
-        return self._open(lambda key, topic: fits(key) and (not kinds or topic.message in kinds))
+    @property
+    def digest(self) -> str | None:
+        """The digest over all that was said; None for a mission that was not flown to its end."""
+        digest: str | None = self.summary.get("digest")
+        return digest
 
     @cached_property
     def has_begun(self) -> bool:
         """Whether the run came so far that the mission was announced."""
-        return bool(self.said(RunInfo))
+        return any(self.received(RunInfo))
 
     @cached_property
     def run(self) -> RunInfo:
@@ -106,18 +98,12 @@ class RecordedMission:
     @cached_property
     def end_s(self) -> float:
         """When the last message was sent; 0 if there is none."""
-        sent_ms = (self._read(entry, lambda payload: header_of(payload).sent_ms) for entry in self._entries())
-        return max(sent_ms, default=0) / 1000
+        return max((one.t_s for one in self.received()), default=0.0)
 
     @cached_property
     def area(self) -> shapely.Polygon:
         """The survey area."""
         return shapely.Polygon(self.run.outline, self.run.hole_outlines)
-
-    @cached_property
-    def priorities(self) -> list[PriorityRecord]:
-        """Ground of the area whose risk counts for more or less in second looks, as the scenario says."""
-        return priorities(self.scenario, self.area, self.folder)
 
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.
@@ -132,6 +118,26 @@ class RecordedMission:
             if not tile or (one.header.sent_ms <= until_ms and (vehicles is None or one.vehicle in vehicles)):
                 metrics.take(one)
         return RiskMap.of(until_ms / 1000, metrics)
+
+    @property
+    def risk_map(self) -> FleetMap:
+        """The joined map at the end: `risk`, each vehicle's layer in `layers`, `grid`; arrays of shape (rows,
+        columns)."""
+        self.run  # noqa: B018 - raises where there is none
+        assert self._figures.map is not None
+        return self._figures.map
+
+    @property
+    def closest(self) -> list[Closest]:
+        """How near each two vehicles came to each other while both were under way, the nearest first."""
+        return self._figures.approaches.found()
+
+    @cached_property
+    def _figures(self) -> Metrics:
+        figures = Metrics()
+        for one in self.received():
+            figures.take(one)
+        return figures
 
     @cached_property
     def activities(self) -> list[Activity]:
@@ -162,6 +168,54 @@ class RecordedMission:
     def targets(self) -> list[TargetRecord]:
         """The targets and which of them were found; none where the truth is not known."""
         return targets(self.said(TruthTargets), self.said(TruthLook))
+
+
+class RecordedMission(Mission):
+    """Made by `secondlook.load`, from the files of a run; a message that cannot be read raises UserError.
+
+    `scenario`: scenario.yaml, the scenario as it was run, empty where the run was killed before it could write it.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        summary: Mapping[str, Any],
+        scenario: Mapping[str, Any],
+        messages: Sequence[tuple[str, bytes]],
+    ) -> None:
+        self.folder = folder
+        self.summary = summary
+        self.scenario = scenario
+        self._messages = messages
+        self._topics = {key: topic_of(key) for key in {key for key, _ in messages}}
+
+    def messages(self, keys: str = "**") -> Iterator[Received]:
+        """Every message whose key is like `keys`, in the order of sending."""
+        return self.received(keys=keys)
+
+    def received(self, *kinds: type, keys: str = "**") -> Iterator[Received]:
+        """The messages of some types, or of all if none is named, in the order of sending."""
+        chosen = None if keys == "**" else chosen_keys(keys, self._vehicles)
+        return self._open(
+            lambda key, topic: (not kinds or topic.message in kinds) and (chosen is None or chosen.includes(key))
+        )
+
+    @cached_property
+    def end_s(self) -> float:
+        """When the last message was sent; 0 if there is none."""
+        sent_ms = (self._read(entry, lambda payload: header_of(payload).sent_ms) for entry in self._entries())
+        return max(sent_ms, default=0) / 1000
+
+    @cached_property
+    def priorities(self) -> list[PriorityGround]:
+        """Ground of the area whose risk counts for more or less in second looks, as the scenario says."""
+        return priorities(self.scenario, self.area, self.folder)
+
+    @cached_property
+    def _vehicles(self) -> tuple[str, ...]:
+        """Those of the fleet, as far as it is known."""
+        return tuple(one.vehicle for one in self.run.vehicles) if self.has_begun else ()
 
     def _open(self, wanted: Callable[[str, Topic], bool]) -> Iterator[Received]:
         for entry in self._entries(wanted):
@@ -195,9 +249,12 @@ class _Entry(NamedTuple):
     vehicle: str
 
 
-def _said(received: Received, message: M) -> Said[M]:
-    header = received.header
-    return Said(received.key, received.vehicle, header.sender, header.sent_ms / 1000, message)
+def chosen_keys(keys: str, vehicles: tuple[str, ...], topics: tuple[Topic, ...] = TOPICS) -> KeyExpression:
+    """What chooses messages by their keys; see `Mission`. Raises UserError."""
+    try:
+        return key_expression(keys, vehicles, topics)
+    except ValueError as error:
+        raise UserError(str(error)) from error
 
 
 def load_run(run: str | os.PathLike[str]) -> RecordedMission:

@@ -49,7 +49,7 @@ class MissionFiles:
         if self._messages is not None:
             self._messages.write(self._pack([received.key, received.payload]))
         if received.topic not in NOT_FOR_PEOPLE:
-            event = {"t_s": received.header.sent_ms / 1000, "key": received.key, **_plain(received.message)}
+            event = {"t_s": received.t_s, "key": received.key, **_plain(received.message)}
             self._events.write(self._json(event) + "\n")
 
     def close(self) -> None:

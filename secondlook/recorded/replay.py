@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from comms.lockstep.clock import WRAP_UP_MS
+from comms.lockstep.group import NodeRunner
 from comms.node import Node, Received
-from comms.runner import Intake, NodeRunner, Outgoing
+from comms.runner import Intake, Outgoing
 from comms.said.codec import decode
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
@@ -64,7 +65,7 @@ def replay_node(
         if route is not None and node_id in route.readers:
             runner.deliver(one)
             if one.topic.wakes:
-                due_times.add(one.header.sent_ms + one.topic.delay_ms)
+                due_times.add(one.topic.due_ms(one.header.sent_ms))
     overs = [one.header.sent_ms for one in messages if one.topic is MISSION_OVER]
     end_ms = max(overs[0] + WRAP_UP_MS, last_ms) if overs else last_ms
     agreed = 0
@@ -113,7 +114,7 @@ def _near(one: Any, other: Any, tolerance: float) -> bool:
 
 
 def _difference(agreed: int, now_ms: int, recorded: Received | None, replayed: Outgoing | None) -> Difference:
-    before = "nothing" if recorded is None else f"{recorded.key} at {recorded.header.sent_ms / 1000:.3f} s"
+    before = "nothing" if recorded is None else f"{recorded.key} at {recorded.t_s:.3f} s"
     after = "nothing" if replayed is None else f"{replayed.key} at {now_ms / 1000:.3f} s"
     if recorded is not None and replayed is not None and recorded.key == replayed.key:
         # The payload is what was compared; the replayed message is not quantised, so only clear differences are named.

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
 import shapely
 
+from comms.node import Received
 from comms.said.messages import Hotspot, HotspotState, StripState, StripStatus
 from planner.types import Strip
-from secondlook.recorded.said import Said
 
 
 @dataclass(frozen=True)
@@ -31,10 +30,10 @@ class HotspotRecord:
     polygon: shapely.Polygon
 
 
-def hotspots(published: Iterable[Said[Hotspot]]) -> list[HotspotRecord]:
+def hotspots(published: Iterable[Received[Hotspot]]) -> list[HotspotRecord]:
     """Every hotspot that was ever published, in the order of finding."""
     first: dict[str, float] = {}
-    last: dict[str, Said[Hotspot]] = {}
+    last: dict[str, Received[Hotspot]] = {}
     for one in published:
         first.setdefault(one.key, one.t_s)
         last[one.key] = one
@@ -85,12 +84,7 @@ class StripRecord:
     @cached_property
     def polygon(self) -> shapely.Polygon:
         """Its rectangle, mission frame."""
-        one = self.strip
-        right = (math.cos(one.heading_rad) * one.width_m / 2, -math.sin(one.heading_rad) * one.width_m / 2)
-        return shapely.Polygon([
-            (x_m + side * right[0], y_m + side * right[1])
-            for (x_m, y_m), side in ((one.start, -1), (one.start, 1), (one.end, 1), (one.end, -1))
-        ])  # fmt: skip
+        return shapely.Polygon(self.strip.corners)
 
     @property
     def centre_line(self) -> shapely.LineString:
@@ -102,15 +96,15 @@ class StripRecord:
         return next((event.t_s for event in self.history if event.state is state), None)
 
 
-def strips(published: Iterable[Said[StripStatus]]) -> list[StripRecord]:
+def strips(published: Iterable[Received[StripStatus]]) -> list[StripRecord]:
     """Every strip that was ever published, by number."""
-    told: dict[int, list[Said[StripStatus]]] = {}
+    told: dict[int, list[Received[StripStatus]]] = {}
     for one in published:
         told.setdefault(one.number, []).append(one)
     return [_record(number, statuses) for number, statuses in sorted(told.items())]
 
 
-def _record(number: int, told: list[Said[StripStatus]]) -> StripRecord:
+def _record(number: int, told: list[Received[StripStatus]]) -> StripRecord:
     last = told[-1].message
     history: list[StripEvent] = []
     for said in told:
@@ -118,7 +112,7 @@ def _record(number: int, told: list[Said[StripStatus]]) -> StripRecord:
         if not history or (event.state, event.vehicle) != (history[-1].state, history[-1].vehicle):
             history.append(event)
     return StripRecord(
-        Strip(number, (last.start_x_m, last.start_y_m), last.heading_rad, last.length_m, last.width_m),
+        last.as_strip(number),
         last.state,
         next((event.vehicle for event in reversed(history) if event.vehicle), ""),
         told[0].message.removable_m2,

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from comms.latency import STRIP_TO_TASK
-from comms.result import BusResult
+from comms.result import STRIP_TO_TASK, BusResult
 from secondlook.recorded.observer import Observer
 from secondlook.scenario import Scenario
 
@@ -41,7 +40,7 @@ def summarise(
     messages = observer.messages if result is None else result.messages
     lost = Counter(messages)
     lost.subtract(observer.messages)
-    if factor is not None and +lost:
+    if +lost:
         dropped["lost on the way to the observer"] = (+lost).total()
     return {
         "scenario": scenario.name,

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from comms.node import Received
 from comms.said.messages import AgentState, Mode, Nav, Plan
 from planner.types import FloatArray
-from secondlook.recorded.said import Said
 
 
 @dataclass(frozen=True)
@@ -25,10 +25,10 @@ class Activity:
     ended_s: float
 
 
-def activities(states: Iterable[Said[AgentState]], end_s: float) -> list[Activity]:
+def activities(states: Iterable[Received[AgentState]], end_s: float) -> list[Activity]:
     """The activities of every vehicle, in the order of their beginning; the last of each goes on until `end_s`."""
     found: list[Activity] = []
-    latest: dict[str, Said[AgentState]] = {}
+    latest: dict[str, Received[AgentState]] = {}
     for one in states:
         before = latest.get(one.vehicle)
         if before is None:
@@ -40,11 +40,11 @@ def activities(states: Iterable[Said[AgentState]], end_s: float) -> list[Activit
     return sorted(found, key=lambda one: one.begun_s)
 
 
-def _what(said: Said[AgentState]) -> tuple[Mode, int]:
+def _what(said: Received[AgentState]) -> tuple[Mode, int]:
     return said.message.mode, said.message.works_on
 
 
-def _activity(said: Said[AgentState], ended_s: float) -> Activity:
+def _activity(said: Received[AgentState], ended_s: float) -> Activity:
     return Activity(said.vehicle, *_what(said), said.t_s, ended_s)
 
 
@@ -68,11 +68,11 @@ class TrackRecord:
     line: shapely.LineString
 
 
-def tracks(plans: Iterable[Said[Plan]], done: Iterable[Activity]) -> list[TrackRecord]:
+def tracks(plans: Iterable[Received[Plan]], done: Iterable[Activity]) -> list[TrackRecord]:
     """The tracks of each vehicle's last plan, by vehicle and number."""
     surveys = {(one.vehicle, one.works_on): one for one in done if one.mode is Mode.SURVEY}
     ranges_m: dict[tuple[str, int], int] = {}
-    last: dict[str, Said[Plan]] = {}
+    last: dict[str, Received[Plan]] = {}
     for said in plans:
         last[said.vehicle] = said
         # What is still to be flown is laid for the latest range.
@@ -82,7 +82,7 @@ def tracks(plans: Iterable[Said[Plan]], done: Iterable[Activity]) -> list[TrackR
 
 
 def _tracks(
-    said: Said[Plan], ranges_m: dict[tuple[str, int], int], surveys: dict[tuple[str, int], Activity]
+    said: Received[Plan], ranges_m: dict[tuple[str, int], int], surveys: dict[tuple[str, int], Activity]
 ) -> Iterator[TrackRecord]:
     found_m = iter(said.message.r_eff_m)
     for track in said.message.tracks:
@@ -125,7 +125,7 @@ class PathRecord:
         return float(self.line.length)
 
 
-def paths(positions: Iterable[Said[Nav]]) -> dict[str, PathRecord]:
+def paths(positions: Iterable[Received[Nav]]) -> dict[str, PathRecord]:
     """The path of each vehicle that told where it is."""
     rows: dict[str, list[tuple[float, float, float, float]]] = {}
     for one in positions:

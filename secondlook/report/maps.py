@@ -11,8 +11,8 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from comms.said.messages import StripState
-from planner.types import GridSpec, Point
-from secondlook.recorded import PathRecord, PriorityRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
+from planner.types import GridSpec, Point, PriorityGround
+from secondlook.recorded import PathRecord, RecordedMission, RiskMap, StripRecord, TrackRecord
 from secondlook.report.drawing import Element, as_pixels, data_url, drawing, element, indexed_png, palette, ticks
 from secondlook.report.words import FATE_CLASS, fate_in_words
 
@@ -157,8 +157,8 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     )
 
 
-def _priority(frame: MapFrame, priority: PriorityRecord) -> Element:
-    line = frame.line(priority.ground)
+def _priority(frame: MapFrame, priority: PriorityGround) -> Element:
+    line = frame.line(shapely.GeometryCollection([shapely.Polygon(outline) for outline in priority.outlines_m]))
     return element(
         "g",
         element("title", _counts(priority)),
@@ -168,16 +168,16 @@ def _priority(frame: MapFrame, priority: PriorityRecord) -> Element:
     )
 
 
-def _weight(frame: MapFrame, priority: PriorityRecord, unit_m: float) -> Element:
+def _weight(frame: MapFrame, priority: PriorityGround, unit_m: float) -> Element:
     """What the ground counts, in its northernmost corner, where strips seldom have their numbers."""
-    corners = shapely.get_coordinates(priority.ground)
-    x_m, y_m = min(corners.tolist(), key=lambda corner: (-corner[1], corner[0]))
+    corners = (corner for outline in priority.outlines_m for corner in outline)
+    x_m, y_m = min(corners, key=lambda corner: (-corner[1], corner[0]))
     x, y = frame.place(x_m, y_m)
     text = element("text", f"× {priority.weight:g}", x=x + 5 * unit_m, y=y + LINE_PX * unit_m)
     return element("g", element("title", _counts(priority)), text, class_="priority")
 
 
-def _counts(priority: PriorityRecord) -> str:
+def _counts(priority: PriorityGround) -> str:
     return f"risk counts {priority.weight:g} times here"
 
 

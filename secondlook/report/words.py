@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from comms.said.messages import Hotspot, MissionOver, Mode, Plan, StripState
 from secondlook.recorded import RecordedMission, RiskMap, StripRecord
-from viz.story import TELLING, Line, Story
+from secondlook.recorded.story import Line, Story
 
 # The classes under which the style sheet knows the states.
 FATE_CLASS = {
@@ -93,7 +93,7 @@ class Moment:
 def log_lines(mission: RecordedMission) -> list[Line]:
     """The whole mission in plain words, as the recording has it."""
     story = Story()
-    lines = [line for received in mission.received(*TELLING) for line in story.tell(received)]
+    lines = [line for received in mission.received(*Story.telling) for line in story.tell(received)]
     return sorted([*lines, *story.rest()], key=lambda line: line.time_ms)
 
 

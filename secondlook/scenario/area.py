@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates, get_parts
 from shapely.geometry.base import BaseGeometry
 
-from planner.types import SweepFrame
+from planner.types import PriorityGround, SweepFrame
 from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapping, check_pair, refused
 
 LARGEST_GRID_CELLS = 20_000_000
@@ -136,15 +136,17 @@ def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["
     return float(np.ptp(across_m)), float(np.ptp(along_m))
 
 
-def priority_grounds(area: Polygon, priorities: Sequence[Priority]) -> list[tuple[MultiPolygon, float]]:
-    """What counts more or less of an area, with its weight: where several overlap the last one alone."""
-    found: list[tuple[MultiPolygon, float]] = []
+def priority_grounds(area: Polygon, priorities: Sequence[Priority]) -> list[PriorityGround]:
+    """What counts more or less of an area: where several overlap the last one alone."""
+    found: list[PriorityGround] = []
     left: BaseGeometry = area
     for one in reversed(priorities):
         outline = Polygon(one.polygon_m)
         # Where they only touch it is a line or a point.
         parts = [part for part in get_parts(outline.intersection(left)) if isinstance(part, Polygon) and part.area]
         if parts:
-            found.append((MultiPolygon(parts), one.weight))
+            rings = [ring for part in parts for ring in (part.exterior, *part.interiors)]
+            outlines = tuple(tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
+            found.append(PriorityGround(outlines, one.weight))
         left = left.difference(outline)
     return found[::-1]

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 from secondlook.scenario.area import Area
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
-from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, part, refused
+from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, plug_in, refused
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
 # Beyond, a metre of easting is more degrees than a map can show.
@@ -79,10 +79,10 @@ class Targets(Mapping):
 class Coordinator(Mapping):
     """How strips are cut and given out."""
 
-    allocator: Annotated[str, part(ALLOCATOR)] = "plan"
+    allocator: Annotated[str, plug_in(ALLOCATOR)] = "plan"
     """Who is offered which strip: `plan`, `auction`, `greedy`, `nearest`, `first_come`, `none` (strips are cut, but
     given to nobody), or `package.module:Class` of your own."""
-    node: Annotated[str, part(NODE)] | None = None
+    node: Annotated[str, plug_in(NODE)] | None = None
     """`package.module:Class` of a whole coordinator of your own."""
     lost_after_s: Duration = 30.0
     """A vehicle not heard of for so long counts as lost."""

@@ -1,4 +1,4 @@
-"""The parts that a scenario may choose: ours by name, a user's own as `package.module:Class`."""
+"""Plug-ins, the classes that a scenario may choose: ours by name, a user's own as `package.module:Class`."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from secondlook.errors import UserError
 _OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
 
 
-class PartError(Exception):
-    """A part that cannot be used; the text says what must be, and why this is not."""
+class PlugInError(Exception):
+    """A plug-in that cannot be used; the text says what must be, and why this is not."""
 
 
 @dataclass(frozen=True)
-class PartKind:
-    """A kind of part.
+class PlugInKind:
+    """A kind of plug-in.
 
     `ours`: what makes each of our own, by name. `arguments`: what a maker is called with, by keyword. `methods`: what a
-    part must be able to do, each with the names of its arguments; checked on classes before anything is made.
+    plug-in must be able to do, each with the names of its arguments; checked on classes before anything is made.
     """
 
     what: str
@@ -36,27 +36,27 @@ class PartKind:
     ours: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
 
     def maker(self, text: str) -> Callable[..., Any]:
-        """What makes the part that `text` names: one of ours, or a class or function of the user's.
+        """What makes the plug-in that `text` names: one of ours, or a class or function of the user's.
 
-        Raises PartError.
+        Raises PlugInError.
         """
         if text in self.ours:
             return self.ours[text]
         match = _OWN.fullmatch(text)
         if match is None:
-            raise PartError(f"must be {self._names()}")
+            raise PlugInError(f"must be {self._names()}")
         return self.checked(_import(match.group(1), match.group(2)), text)
 
     def checked(self, found: Any, text: str) -> Callable[..., Any]:
-        """`found`, which is called `text`, as the maker of a part; raises PartError where it cannot be one."""
+        """`found`, which is called `text`, as the maker of a plug-in; raises PlugInError where it cannot be one."""
         if not callable(found):
-            raise PartError(f"must be {self._names()}; that is a {type(found).__name__}")
+            raise PlugInError(f"must be {self._names()}; that is a {type(found).__name__}")
         self._check_call(found, self.arguments, f"{text} must take ({', '.join(self.arguments)})")
         if inspect.isclass(found):
             for method, arguments in self.methods.items():
                 must = f"{self.what} must have {method}({', '.join(arguments)})"
                 if not callable(getattr(found, method, None)):
-                    raise PartError(f"{must}; {text} has no {method}")
+                    raise PlugInError(f"{must}; {text} has no {method}")
                 self._check_call(getattr(found, method), ("self", *arguments), must, by_place=True)
         maker: Callable[..., Any] = found
         return maker
@@ -78,7 +78,7 @@ class PartKind:
             else:
                 signature.bind(**dict.fromkeys(arguments))
         except TypeError as error:
-            raise PartError(f"{must}; {error}") from error
+            raise PlugInError(f"{must}; {error}") from error
 
 
 def _import(module: str, name: str) -> Any:
@@ -89,40 +89,40 @@ def _import(module: str, name: str) -> Any:
     try:
         return getattr(import_module(module), name)
     except AttributeError:
-        raise PartError(f"must be importable; {module} has no {name}") from None
+        raise PlugInError(f"must be importable; {module} has no {name}") from None
     except Exception as error:
-        raise PartError(f"must be importable; {type(error).__name__}: {error}") from error
+        raise PlugInError(f"must be importable; {type(error).__name__}: {error}") from error
 
 
-ALLOCATOR = PartKind(
+ALLOCATOR = PlugInKind(
     "an allocator",
     methods={"assign": ("situation",)},
     ours=ALLOCATORS,
 )
-SPACING = PartKind(
+SPACING = PlugInKind(
     "a spacing planner",
     arguments=("nadir_gap_m", "told_range_m"),
     methods={"decide": ("width_m", "covered_m", "r_eff_m")},
     ours={"adaptive": AdaptiveSpacing, "fixed": FixedSpacing},
 )
-SONAR = PartKind(
+SONAR = PlugInKind(
     "a sonar model",
     arguments=("curve", "seabed"),
     methods={"p_detect": ("range_m", "look_bearing_rad", "altitude_m", "position_m", "time_s")},
 )
-CURVE = PartKind("a detection curve's maker")
-NODE = PartKind(
+CURVE = PlugInKind("a detection curve's maker")
+NODE = PlugInKind(
     "a node",
     arguments=("config",),
     methods={"start": ("now_ms",), "on_message": ("received", "now_ms"), "on_wake": ("now_ms",)},
 )
 
 
-def made(kind: PartKind, text: str, **arguments: object) -> Any:
-    """The part that `text` names, made of these arguments. Raises UserError where there is none or that fails."""
+def made(kind: PlugInKind, text: str, **arguments: object) -> Any:
+    """The plug-in that `text` names, made of these arguments. Raises UserError where there is none or that fails."""
     try:
         return kind.maker(text)(**arguments)
-    except PartError as error:
+    except PlugInError as error:
         raise UserError(f"{text}: {error}") from error
     except Exception as error:
         raise UserError(f"{text} cannot be made: {type(error).__name__}: {error}") from error

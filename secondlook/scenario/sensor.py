@@ -10,9 +10,9 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, mo
 
 from planner.types import DetectionCurve
 from secondlook.scenario import bundled
-from secondlook.scenario.plug_ins import CURVE, SONAR, PartError
+from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
 from secondlook.scenario.text import Value
-from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, part, refused
+from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, plug_in, refused
 
 
 class Curve(Mapping):
@@ -61,7 +61,7 @@ def _take_bundled(value: object) -> object:
         )
     try:
         made = CURVE.maker(value)()
-    except PartError as error:
+    except PlugInError as error:
         raise refused(str(error)) from error
     except Exception as error:
         raise refused(f"must make a DetectionCurve; {type(error).__name__}: {error}") from error
@@ -94,7 +94,7 @@ class Sensor(Mapping):
     curve: OptionalCurve = None
     """Detection curve P(y): a bundled one's name (`muscle`), a mapping as below, or `package.module:Class` of what
     makes one."""
-    sonar: Annotated[str, part(SONAR)] | None = None
+    sonar: Annotated[str, plug_in(SONAR)] | None = None
     """`package.module:Class` of a true sonar model of your own, which is given that curve and the seabed."""
     p_detect: PDetect | None = None
     """Instead of a curve: the same P_d at every range up to `range_m`."""

@@ -11,7 +11,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
 from pydantic_core import PydanticCustomError
 
-from secondlook.scenario.plug_ins import PartError, PartKind
+from secondlook.scenario.plug_ins import PlugInError, PlugInKind
 
 TOLERANCE = 1e-6
 """By how much numbers may differ that must fit each other."""
@@ -35,13 +35,13 @@ def refused(allowed: str) -> PydanticCustomError:
     return PydanticCustomError("refused", "{allowed}", {"allowed": allowed})
 
 
-def part(kind: PartKind) -> AfterValidator:
-    """Accepts the names of our parts of a kind, and `package.module:Class` of a user's own that can be used."""
+def plug_in(kind: PlugInKind) -> AfterValidator:
+    """Accepts the names of our plug-ins of a kind, and `package.module:Class` of a user's own that can be used."""
 
     def check(text: str) -> str:
         try:
             kind.maker(text)
-        except PartError as error:
+        except PlugInError as error:
             raise refused(str(error)) from error
         return text
 

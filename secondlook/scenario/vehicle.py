@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
+from comms.said.messages import Role
 from planner.curve import effective_range_m
 from secondlook.scenario.plug_ins import NODE, SPACING
 from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
@@ -20,13 +21,13 @@ from secondlook.scenario.values import (
     Mapping,
     OpenShare,
     Speed,
+    plug_in,
     refused,
 )
-from secondlook.scenario.values import part as named
 
-_PART = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
+_SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
-RESERVED_IDS = ("clock", "coordinator", "observer", "recorder", "world")
+RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
 """Ids of the nodes that are no vehicles."""
 
 
@@ -82,7 +83,7 @@ class VehicleBase(Mapping):
     """How far it truly is from where it believes it is, in a random direction."""
     position_drift_m_per_h: LengthOrZero = 0.0
     """By how much it drifts from there, in another."""
-    agent: Annotated[str, named(NODE)] | None = None
+    agent: Annotated[str, plug_in(NODE)] | None = None
     """`package.module:Class` of a node of your own in its back seat."""
 
     @field_validator("sensor")
@@ -102,7 +103,7 @@ class SurveyVehicle(VehicleBase):
     range_m: Length | None = None
     """r_max, the range that it is told to plan with until it has flown the first pair of tracks; at least 3 times
     `nadir_gap_m`. Left out, r_eff of `prior_curve`."""
-    spacing: Annotated[str, named(SPACING)] = "adaptive"
+    spacing: Annotated[str, plug_in(SPACING)] = "adaptive"
     """How tracks are spaced: `adaptive`, by what it sees, `fixed`, by the first plan, or `package.module:Class` of your
     own."""
     threshold: OpenShare = 0.05
@@ -153,7 +154,7 @@ class SurveyVehicle(VehicleBase):
     @field_validator("part")
     @classmethod
     def _check_part(cls, part: str | None) -> str | None:
-        match = None if part is None else _PART.fullmatch(part)
+        match = None if part is None else _SHARE.fullmatch(part)
         if part is not None and (match is None or not 1 <= int(match[1]) <= int(match[2])):
             raise refused("must be such as 1 of 3: which part, and of how many, at most 99")
         return part
@@ -161,7 +162,7 @@ class SurveyVehicle(VehicleBase):
     @property
     def part_of(self) -> tuple[int, int]:
         """Which part of how many is its own, from 1; the whole is 1 of 1."""
-        match = None if self.part is None else _PART.fullmatch(self.part)
+        match = None if self.part is None else _SHARE.fullmatch(self.part)
         return (1, 1) if match is None else (int(match[1]), int(match[2]))
 
     @property

@@ -11,6 +11,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from comms.lockstep.drive import Lockstep
 from comms.node import Received
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
@@ -125,7 +126,7 @@ class Fleet(Trouble):
     @property
     def now_s(self) -> float:
         """How far the mission has come: the simulated time at which `run_until` has ended it, 0 before."""
-        return self._until_now[-1].header.sent_ms / 1000 if self._until_now else 0.0
+        return self._until_now[-1].t_s if self._until_now else 0.0
 
     @property
     def heard(self) -> Heard:
@@ -134,8 +135,8 @@ class Fleet(Trouble):
             raise UserError("nothing was heard yet: the fleet was not flown")
         return self._heard
 
-    def messages(self, keys: str = "*") -> list[Received]:
-        """The messages of the latest flight whose keys are like a pattern; see `Heard.messages`."""
+    def messages(self, keys: str = "**") -> list[Received]:
+        """The messages of the latest flight whose keys are like `keys`; see `Heard.messages`."""
         return self.heard.messages(keys)
 
     def run(self, *, bus: Bus | None = None) -> Flight:
@@ -159,7 +160,8 @@ class Fleet(Trouble):
         until_s = self.now_s + timeout_s
         flight, holds = self._fly(_Watch(self._new_heard(), self._until_now, condition, until_s), self.bus)
         if not holds:
-            when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {flight.end_s:g} s"
+            over_s = flight.summary["time"]["mission_s"]
+            when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {over_s:g} s"
             raise AssertionError(f"the condition did not come to hold {when}; heard last:\n{_last_words(flight.heard)}")
         self._until_now = list(flight.heard)
         self._from_ms = flight.heard.now_ms + 1
@@ -178,8 +180,7 @@ class Fleet(Trouble):
             bus,
             self._processes,
             record=self._record,
-            faults=faults,
-            events=events,
+            drive=Lockstep(faults, events),
             watch=watch.take,
             patience_s=self._patience_s,
         )
@@ -261,7 +262,7 @@ def _last_words(heard: Heard) -> str:
 def _told(one: Received) -> str:
     said = repr(one.message)
     said = said if len(said) <= _LONGEST else said[: _LONGEST - 3] + "..."
-    return f"{one.key} from {one.header.sender} at {one.header.sent_ms / 1000:.3f} s: {said}"
+    return f"{one.key} from {one.sender} at {one.t_s:.3f} s: {said}"
 
 
 def _checked(bus: Bus) -> Bus:

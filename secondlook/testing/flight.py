@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
 from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
 from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, NodeEvent, absent_at_start
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.kept_messages import KeptMessages
+from comms.lockstep.group import JoinerMail
 from comms.node import Received
 from comms.runner import Intake
-from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
-from planner.fleet_map import FleetMap
-from planner.types import BoolArray
 from secondlook.launch.mission import Bus
-from secondlook.recorded.closest_approach import Closest
-from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.mission import Mission, chosen_keys
 from secondlook.scenario import Scenario
-from secondlook.testing.patterns import key_pattern
 
 
 class Heard(Sequence[Received]):
-    """All messages so far. Each has its `key`, its typed `message` and its `header`: who sent it, and when.
+    """All messages so far. Each has its `key`, its typed `message`, its `sender` and `t_s`, when it was sent.
 
-    Asking again and again for the same pattern while the mission goes on looks at each message once.
+    Asking again and again for the same keys while the mission goes on looks at each message once.
     """
 
     def __init__(self, vehicles: tuple[str, ...], messages: Iterable[Received] = ()) -> None:
@@ -43,15 +37,14 @@ class Heard(Sequence[Received]):
         """Takes one more message."""
         self._all.append(received)
 
-    def messages(self, keys: str = "*") -> list[Received]:
-        """The messages whose keys are like a pattern, `agent/*/hotspot/*` say; UserError where none ever can be."""
-        if keys == "*":
-            return list(self._all)
+    def messages(self, keys: str = "**") -> list[Received]:
+        """The messages whose keys are like `keys`, `agent/*/hotspot/*` say: `*` is one chunk of a key, `**` any number
+        of chunks, `$*` any characters within one. Raises UserError where no key ever can be like it."""
         return list(self._like(keys))
 
-    def last(self, keys: str = "*") -> Received | None:
-        """The newest message whose key is like a pattern, None if there is none yet."""
-        found = self._all if keys == "*" else self._like(keys)
+    def last(self, keys: str = "**") -> Received | None:
+        """The newest of these messages, None if there is none yet."""
+        found = self._like(keys)
         return found[-1] if found else None
 
     @property
@@ -78,15 +71,17 @@ class Heard(Sequence[Received]):
         return iter(self._all)
 
     def _like(self, keys: str) -> list[Received]:
+        if keys == "**":
+            return self._all
         found, looked_at = self._found.get(keys, ([], 0))
-        pattern = key_pattern(keys, self._vehicles)
-        found.extend(one for one in self._all[looked_at:] if pattern.match(one.key))
+        chosen = chosen_keys(keys, self._vehicles)
+        found.extend(one for one in self._all[looked_at:] if chosen.includes(one.key))
         self._found[keys] = found, len(self._all)
         return found
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Mission):
     """`heard`: every message but the clock's control words, in the order of sending. `summary`: summary.json's content.
     `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`: what went
     wrong on purpose."""
@@ -95,56 +90,18 @@ class Flight:
     bus: Bus
     folder: Path
     heard: Heard
-    summary: dict[str, Any]
+    summary: Mapping[str, Any]
     routing: Routing
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
 
-    @property
-    def digest(self) -> str | None:
-        """The digest over all that was said; None for a mission that was not flown to its end."""
-        digest: str | None = self.summary["digest"]
-        return digest
-
-    @property
-    def end_s(self) -> float:
-        """Simulated time of the mission's end, or of the last message so far."""
-        end_s: float = self.summary["time"]["mission_s"]
-        return end_s
-
-    def messages(self, keys: str = "*") -> list[Received]:
-        """The messages whose keys are like a pattern; see `Heard.messages`."""
+    def messages(self, keys: str = "**") -> list[Received]:
+        """The messages whose keys are like `keys`; see `Heard.messages`."""
         return self.heard.messages(keys)
 
-    @property
-    def run_info(self) -> RunInfo:
-        """What the run was announced with: area, grid, vehicles."""
-        message = self.messages("run")[0].message
-        assert isinstance(message, RunInfo)
-        return message
-
-    @property
-    def risk_map(self) -> FleetMap:
-        """The joined map: `risk`, each vehicle's layer in `layers`, `grid`; arrays of shape (rows, columns)."""
-        assert self._figures.map is not None
-        return self._figures.map
-
-    @property
-    def inside(self) -> BoolArray:
-        """Which of the map's cells lie in the survey area."""
-        return self._figures.inside
-
-    @property
-    def closest(self) -> list[Closest]:
-        """How near each two vehicles came to each other while both were under way, the nearest first."""
-        return self._figures.approaches.found()
-
-    @cached_property
-    def _figures(self) -> Metrics:
-        figures = Metrics()
-        for one in self.heard:
-            figures.take(one)
-        return figures
+    def received(self, *kinds: type, keys: str = "**") -> Iterator[Received]:
+        """The messages of some types, or of all if none is named, in the order of sending."""
+        return (one for one in self.messages(keys) if not kinds or type(one.message) in kinds)
 
 
 @dataclass(frozen=True)
@@ -183,7 +140,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
     """The messages that a node was given in one of its lives, each with the time in milliseconds, in that order."""
     if flight.routing.nodes[node_id].listens_only:  # no trouble strikes what it hears
         return [(one.header.sent_ms, one) for one in flight.heard]
-    intake, kept = Intake(flight.routing), KeptMessages(node_id, flight.routing)
+    intake, kept = Intake(flight.routing), JoinerMail(node_id, flight.routing)
     found: list[tuple[int, Received]] = []
     for one in flight.heard:
         route = flight.routing.route(one.key)
@@ -191,12 +148,12 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
             continue
         sent_ms = one.header.sent_ms
         if sent_ms < life.start_ms:
-            kept.take(one.key, one.payload)
+            kept.add(one.key, one.payload)
             continue
         for delivery in flight.faults.deliveries(node_id, one, flight.routing):
             opened = one if delivery.payload is one.payload else intake.open(one.key, delivery.payload)
             if opened is not None:
-                found.append((sent_ms + one.topic.delay_ms + delivery.later_ms, opened))
+                found.append((one.topic.due_ms(sent_ms) + delivery.later_ms, opened))
     for key, payload in kept.messages():
         opened = intake.open(key, payload)
         if opened is not None:

@@ -23,10 +23,10 @@ def assert_maps_converged(flight: Flight, *, reader: str = "coordinator") -> Non
     whose map is asked for; of one that was started anew, that of its last start. The observer hears everything.
     """
     __tracebackhide__ = True
-    if not any(isinstance(one.message, MissionOver) for one in flight.heard):
+    if not flight.said(MissionOver):
         raise UserError("assert_maps_converged needs a mission that was flown to its end: maps need not agree before")
     problems = []
-    published = _joined(flight, [one for one in flight.heard if isinstance(one.message, CoverageTile)])
+    published = flight.risk_map
     killed = {one.node_id for one in flight.events if isinstance(one, Kill)}
     for vehicle in flight.scenario.vehicles:
         if vehicle not in killed:
@@ -36,7 +36,7 @@ def assert_maps_converged(flight: Flight, *, reader: str = "coordinator") -> Non
     its_lives = lives(flight, reader)
     if not its_lives:
         raise UserError(f"reader: {reader!r} is not allowed; it was absent to the end")
-    got = [one for _, one in reached(flight, reader, its_lives[-1]) if isinstance(one.message, CoverageTile)]
+    got = (one for _, one in reached(flight, reader, its_lives[-1]))
     problems += _has_all(flight, reader, _joined(flight, got), published)
     fail_if(problems, "the maps have not converged")
 
@@ -55,7 +55,7 @@ def assert_risk_at_most(
     limits = {"mean": mean, "worst30_mean": worst30_mean, "uncovered_share": uncovered_share}
     fail_if(
         [
-            f"{name} is {risk[name]:.4f} at {flight.end_s:g} s, and not at most {limit:g}"
+            f"{name} is {risk[name]:.4f} at {flight.summary['time']['mission_s']:g} s, and not at most {limit:g}"
             for name, limit in limits.items()
             if limit is not None and not risk[name] <= limit
         ],
@@ -63,27 +63,18 @@ def assert_risk_at_most(
     )
 
 
-def _joined(flight: Flight, tiles: Iterable[Received]) -> FleetMap:
-    joined = FleetMap(flight.run_info.grid.spec, flight.run_info.rho)
-    for one in tiles:
-        tile = one.message
-        assert isinstance(tile, CoverageTile)
-        joined.take(
-            one.vehicle,
-            (one.header.incarnation, tile.version),
-            tile.first_row,
-            tile.first_column,
-            tile.sum_levels,
-            tile.largest_levels,
-            tile.settled,
-        )
+def _joined(flight: Flight, heard: Iterable[Received]) -> FleetMap:
+    joined = FleetMap(flight.run.grid.spec, flight.run.rho)
+    for one in heard:
+        if isinstance(one.message, CoverageTile):
+            joined.join(one.vehicle, one.header.incarnation, one.message)
     return joined
 
 
 def _own_layer_is_told(flight: Flight, vehicle: str, told: VehicleLayer | None) -> list[str]:
     """What the vehicle's looks sum up to, as far as it had them when it last spoke, is in its tiles."""
-    own = CoverageLayer(vehicle, flight.run_info.grid.spec)
-    spoke_ms = [one.header.sent_ms for one in flight.messages(f"agent/{vehicle}/state") if _is_state(one)]
+    own = CoverageLayer(vehicle, flight.run.grid.spec)
+    spoke_ms = [one.header.sent_ms for one in flight.said(AgentState, f"agent/{vehicle}/state")]
     taken: set[tuple[int, int]] = set()
     for life in lives(flight, vehicle):
         for due_ms, one in reached(flight, vehicle, life):
@@ -93,7 +84,7 @@ def _own_layer_is_told(flight: Flight, vehicle: str, told: VehicleLayer | None) 
                 if name not in taken:  # one that is delivered twice is one look
                     taken.add(name)
                     own.add(look)
-    shape = flight.run_info.grid.spec.shape
+    shape = flight.run.grid.spec.shape
     nothing = np.zeros(shape, dtype=np.uint8)
     sums, largest = (nothing, nothing) if told is None else (told.sum_levels, told.largest_levels)
     differs = (own.layer.sum_levels != sums) | (own.layer.largest_levels != largest)
@@ -107,10 +98,6 @@ def _own_layer_is_told(flight: Flight, vehicle: str, told: VehicleLayer | None) 
     ]
 
 
-def _is_state(one: Received) -> bool:
-    return isinstance(one.message, AgentState)
-
-
 def _has_all(flight: Flight, reader: str, has: FleetMap, published: FleetMap) -> list[str]:
     """The reader's newest tiles are those that were published last."""
     problems = []
@@ -118,22 +105,17 @@ def _has_all(flight: Flight, reader: str, has: FleetMap, published: FleetMap) ->
         versions = has.layers[vehicle].versions if vehicle in has.layers else {}
         for place, newest in layer.versions.items():
             if versions.get(place) != newest:
-                missed = next(one for one in flight.heard if _is_tile(one, vehicle, place, newest))
+                missed = next(
+                    one
+                    for one in flight.said(CoverageTile, f"agent/{vehicle}/**")
+                    if (one.message.first_row, one.message.first_column) == place
+                    and (one.header.incarnation, one.message.version) == newest
+                )
                 instead = f"in version {versions[place][1]}" if place in versions else "not at all"
                 problems.append(
                     f"{reader} has {missed.key} {instead}: version {newest[1]}, the last, was sent at"
-                    f" {missed.header.sent_ms / 1000:.3f} s and did not reach it"
+                    f" {missed.t_s:.3f} s and did not reach it"
                 )
     if not problems and not np.array_equal(has.risk, published.risk):
         problems.append(f"{reader} has the newest tiles, but another residual risk")
     return problems
-
-
-def _is_tile(one: Received, vehicle: str, place: tuple[int, int], version: tuple[int, int]) -> bool:
-    tile = one.message
-    return (
-        isinstance(tile, CoverageTile)
-        and one.vehicle == vehicle
-        and (tile.first_row, tile.first_column) == place
-        and (one.header.incarnation, tile.version) == version
-    )

@@ -18,21 +18,19 @@ def assert_all_finished(flight: Flight) -> None:
     it has finished."""
     __tracebackhide__ = True
     problems = []
-    if not any(isinstance(one.message, MissionOver) for one in flight.heard):
+    if not flight.said(MissionOver):
         problems.append(f"the coordinator has not said by {flight.heard.now_s:.3f} s that the mission is over")
     for vehicle in flight.scenario.vehicles:
         its_lives = lives(flight, vehicle)
         if not its_lives or its_lives[-1].killed:
             continue
-        states = [one for one in flight.messages(f"agent/{vehicle}/state") if isinstance(one.message, AgentState)]
+        states = flight.said(AgentState, f"agent/{vehicle}/state")
         if not states:
             problems.append(f"{vehicle} has never told its state")
             continue
-        last = states[-1].message
-        if isinstance(last, AgentState) and last.mode is not Mode.FINISHED:
-            problems.append(
-                f"{vehicle} was last heard at {states[-1].header.sent_ms / 1000:.3f} s, and in {last.mode.value}"
-            )
+        last = states[-1]
+        if last.message.mode is not Mode.FINISHED:
+            problems.append(f"{vehicle} was last heard at {last.t_s:.3f} s, and in {last.message.mode.value}")
     fail_if(problems, "not everyone has finished")
 
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TypeVar
 
 from comms.lockstep.events import Kill
 from comms.node import Received
 from comms.said.messages import (
     AgentState,
-    Message,
     MissionOver,
     Mode,
     Role,
@@ -24,7 +22,6 @@ from coordinator.coordinator import ANSWER_WITHIN_MS, NUMBERS_A_SECOND
 from coordinator.ledger import ENDED, WITH_A_VEHICLE
 from secondlook.testing.flight import Flight, fail_if, lives, reached
 
-M = TypeVar("M", bound=Message)
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
 
 
@@ -38,24 +35,24 @@ def assert_no_strip_lost(flight: Flight) -> None:
     """
     __tracebackhide__ = True
     problems = []
-    strips: dict[int, tuple[Received, StripStatus]] = {}
+    strips: dict[int, Received[StripStatus]] = {}
     incarnation, first = 0, None
-    for one, status in _all(flight, StripStatus):
-        number = one.number
+    for one in flight.said(StripStatus):
+        number, status = one.number, one.message
         if first is None or one.header.incarnation != incarnation:  # started anew it gives numbers of its own
             incarnation, strips, first = one.header.incarnation, {}, _first_number(number)
         before = strips.get(number)
         at = f"at {_s(one)} s"
         if before is None and number != first + len(strips):
             problems.append(f"strip {number} is published {at}, but strip {first + len(strips)} never was")
-        expected = 1 if before is None else before[1].revision + 1
+        expected = 1 if before is None else before.message.revision + 1
         if status.revision != expected:
             problems.append(f"strip {number} comes in revision {status.revision} {at}, where {expected} was due")
-        if before is not None and before[1].state in ENDED:
-            was = f"was {before[1].state.value} at {_s(before[0])} s"
+        if before is not None and before.message.state in ENDED:
+            was = f"was {before.message.state.value} at {_s(before)} s"
             problems.append(f"strip {number} {was}, and is {status.state.value} {at}")
-        strips[number] = one, status
-    problems += [word for number, last in strips.items() if (word := _lost(flight, number, *last))]
+        strips[number] = one
+    problems += [word for last in strips.values() if (word := _lost(flight, last))]
     problems += _left_too_early(flight, strips)
     fail_if(problems, "strips are lost")
 
@@ -65,13 +62,14 @@ def _first_number(number: int) -> int:
     return number - (number - 1) % NUMBERS_A_SECOND
 
 
-def _lost(flight: Flight, number: int, said: Received, status: StripStatus) -> str | None:
+def _lost(flight: Flight, said: Received[StripStatus]) -> str | None:
+    number, status = said.number, said.message
     if status.state not in WITH_A_VEHICLE:
         return None
     vehicle, signs_ms = status.vehicle, [said.header.sent_ms] if status.state is StripState.OFFERED else []
     if vehicle not in flight.scenario.vehicles:
         return f"strip {number} is {status.state.value} with nobody since {_s(said)} s"
-    for one in flight.messages(f"agent/{vehicle}/*"):
+    for one in flight.messages(f"agent/{vehicle}/**"):
         message = one.message
         at_it = isinstance(message, TaskStatus) and message.strip == number and message.state in _AT_WORK
         working = isinstance(message, AgentState) and message.works_on == number and message.mode is not Mode.SURVEY
@@ -85,19 +83,19 @@ def _lost(flight: Flight, number: int, said: Received, status: StripStatus) -> s
     return f"strip {number} {at_the_end}, but {vehicle} {last} at it"
 
 
-def _left_too_early(flight: Flight, strips: dict[int, tuple[Received, StripStatus]]) -> list[str]:
-    overs = _all(flight, MissionOver)
+def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) -> list[str]:
+    overs = flight.said(MissionOver)
     primary_s = flight.summary["time"]["primary_s"]
     if not overs or primary_s is None:
         return []
-    over_ms = overs[0][0].header.sent_ms
+    over_ms = overs[0].header.sent_ms
     if over_ms >= int(primary_s * 1000 * flight.scenario.mission.deadline_factor):
         return []
     return [
-        f"strip {number} was still {status.state.value} when the mission was over at {over_ms / 1000:.3f} s, before its"
-        " deadline"
-        for number, (_, status) in strips.items()
-        if status.state not in ENDED
+        f"strip {number} was still {last.message.state.value} when the mission was over at {over_ms / 1000:.3f} s,"
+        " before its deadline"
+        for number, last in strips.items()
+        if last.message.state not in ENDED
     ]
 
 
@@ -160,10 +158,10 @@ def assert_one_strip_at_a_time(flight: Flight) -> None:
     problems = []
     strip_of: dict[str, int] = {}
     incarnation = 0
-    for one, status in _all(flight, StripStatus):
+    for one in flight.said(StripStatus):
         if one.header.incarnation != incarnation:  # started anew it has books of its own
             incarnation, strip_of = one.header.incarnation, {}
-        number = one.number
+        number, status = one.number, one.message
         strip_of = {vehicle: its for vehicle, its in strip_of.items() if its != number}
         if status.state not in WITH_A_VEHICLE:
             continue
@@ -185,8 +183,8 @@ def assert_never_assigned_to_lost(flight: Flight) -> None:
     problems = []
     for life in lives(flight, "coordinator"):
         states = [(due_ms, one) for due_ms, one in reached(flight, "coordinator", life) if one.topic.name == "state"]
-        for one, task in _all(flight, Task):
-            now_ms = one.header.sent_ms
+        for one in flight.said(Task):
+            now_ms, task = one.header.sent_ms, one.message
             if task.action is not TaskAction.TAKE or one.header.incarnation != life.incarnation:
                 continue
             sent_ms = [
@@ -209,7 +207,7 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
     idle_since: dict[str, int] = {}
     not_for: set[tuple[int, str]] = set()
     serving: dict[int, str] = {}
-    helpers = {one.vehicle for one in flight.run_info.vehicles if one.role.revisits}
+    helpers = {one.vehicle for one in flight.run.vehicles if one.role.revisits}
     told: set[int] = set()
     for one in flight.heard:
         now_ms, message = one.header.sent_ms, one.message
@@ -242,13 +240,9 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
     fail_if(problems, "strips wait for a helper that is free")
 
 
-def _all(flight: Flight, kind: type[M]) -> list[tuple[Received, M]]:
-    return [(one, one.message) for one in flight.heard if isinstance(one.message, kind)]
-
-
 def _lost_after_ms(flight: Flight) -> int:
     return round(flight.scenario.coordinator.lost_after_s * 1000)
 
 
 def _s(received: Received) -> str:
-    return f"{received.header.sent_ms / 1000:.3f}"
+    return f"{received.t_s:.3f}"

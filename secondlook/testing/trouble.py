@@ -8,10 +8,10 @@ from __future__ import annotations
 import math
 
 from comms.lockstep.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
-from comms.lockstep.faults import CutOff, FaultKind, Faults, MessageFault
+from comms.lockstep.faults import STRUCK, CutOff, FaultKind, Faults, MessageFault
 from comms.said.routing import Routing
 from secondlook.errors import UserError
-from secondlook.testing.patterns import key_pattern
+from secondlook.recorded.mission import chosen_keys
 
 
 class Trouble:
@@ -61,7 +61,8 @@ class Trouble:
     def drop(
         self, keys: str, *, probability: float = 1.0, to: str = "", from_s: float | None = None, for_s: float = math.inf
     ) -> None:
-        """Messages whose keys are like a pattern, `agent/*/coverage/*` say, are lost.
+        """Messages whose keys are like `keys`, `agent/*/coverage/*` say, are lost: `*` is one chunk of a key, `**` any
+        number of chunks, `$*` any characters within one. What the clock says of the run is never struck.
 
         `probability`: for each message and reader by itself. `to`: the only reader concerned, by its node id; all if
         left out. What is sent from `from_s` on, for `for_s`, is concerned. So it is with the faults that follow.
@@ -123,7 +124,7 @@ class Trouble:
         for_s: float,
         delay_ms: int = 1,
     ) -> None:
-        key_pattern(keys, self._vehicles())
+        chosen_keys(keys, self._vehicles(), STRUCK)
         readers = [one.node_id for one in self.routing.roster if not one.listens_only and one.role.value != "clock"]
         if to and to not in readers:
             raise UserError(f"{kind.value}: to: {to!r} is not allowed; must be one of {', '.join(readers)}")

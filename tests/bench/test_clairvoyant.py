@@ -198,8 +198,7 @@ class TestALegOnTheMap:
             coverage.add(looks.look(stretch, 0, (0, 0), 0)[0])
         for _, tile in coverage.changed_tiles():
             assert isinstance(tile, CoverageTile)
-            sums, largest = tile.sum_levels, tile.largest_levels
-            fleet_map.take("helper", (0, tile.version), tile.first_row, tile.first_column, sums, largest, tile.settled)
+            fleet_map.join("helper", 0, tile)
 
         # What is there is different everywhere, so that a leg in the wrong place would show.
         risk = np.random.default_rng(1).uniform(0, 1, grid.shape)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import pytest
 from fleets import BUSES, Bus, Notes, Scripted, fleet_that_talks, nav, say_nav, say_over, say_state, say_status, says
 
+from comms.errors import NodeError, RunawayError
 from comms.lockstep import clock
-from comms.lockstep.clock import RunawayError
 from comms.node import Step
 from comms.result import Ending
-from comms.runner import NodeError
 from comms.said.messages import RunInfo
 from comms.said.topics import TRUTH_TARGETS
 

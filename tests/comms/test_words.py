@@ -9,19 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.control import (
-    ControlError,
-    pack,
-    pack_answers,
-    pack_final,
-    pack_grants,
-    unpack,
-    unpack_answers,
-    unpack_final,
-    unpack_grants,
-)
+from comms.errors import WordsError
 from comms.lockstep.clock import Grant, Sent
+from comms.lockstep.words import pack_answers, pack_grants, unpack_answers, unpack_grants
+from comms.result import LastWord
 from comms.runner import SenderDigest
+from comms.words import pack, pack_last_word, unpack, unpack_last_word
 
 names = st.text(max_size=8)
 counts = st.integers(0, 2**40)
@@ -45,32 +38,35 @@ def test_answers_come_back(answers: list[tuple[str, int | None, list[Sent]]]) ->
     assert unpack_answers(unpack(pack_answers(answers))) == answers
 
 
-@given(
+some_last_words = st.builds(
+    LastWord,
     st.lists(st.builds(SenderDigest, names, counts, counts, names)),
+    st.dictionaries(names, counts),
     st.dictionaries(names, counts),
     st.dictionaries(names, st.lists(st.floats(allow_nan=False))),
 )
-def test_last_words_come_back(
-    digests: list[SenderDigest], dropped: dict[str, int], latencies_ms: dict[str, list[float]]
-) -> None:
-    assert unpack_final(unpack(pack_final(digests, dropped, latencies_ms))) == (digests, dropped, latencies_ms)
+
+
+@given(some_last_words)
+def test_last_words_come_back(last: LastWord) -> None:
+    assert unpack_last_word(unpack(pack_last_word(last))) == last
 
 
 @given(st.binary(max_size=40) | anything.map(msgpack.packb) | st.lists(anything, max_size=4).map(msgpack.packb))
 def test_whatever_comes_is_words_or_refused(payload: bytes) -> None:
     try:
         words = unpack(payload)
-    except ControlError:
+    except WordsError:
         return
     assert isinstance(words[0], str)
 
 
 @given(st.lists(anything, max_size=4))
 def test_of_answers_and_last_words_only_those_are_taken_that_could_have_been_packed(rest: list[object]) -> None:
-    with contextlib.suppress(ControlError):
+    with contextlib.suppress(WordsError):
         assert pack_answers(unpack_answers(["answer", *rest])) == pack("answer", *rest)
-    with contextlib.suppress(ControlError):
-        assert pack_final(*unpack_final(["final", *rest])) == pack("final", *rest)
+    with contextlib.suppress(WordsError):
+        assert pack_last_word(unpack_last_word(["done", *rest])) == pack("done", *rest)
 
 
 @pytest.mark.parametrize(
@@ -90,7 +86,7 @@ def test_of_answers_and_last_words_only_those_are_taken_that_could_have_been_pac
     ids=repr,
 )
 def test_an_answer_with_a_part_of_the_wrong_kind_is_refused(rest: list[object]) -> None:
-    with pytest.raises(ControlError, match="an answer that is none"):
+    with pytest.raises(WordsError, match="an answer that is none"):
         unpack_answers(["answer", *rest])
 
 
@@ -109,5 +105,5 @@ def test_an_answer_with_a_part_of_the_wrong_kind_is_refused(rest: list[object]) 
     ids=repr,
 )
 def test_a_last_word_with_a_part_of_the_wrong_kind_is_refused(rest: list[object]) -> None:
-    with pytest.raises(ControlError, match="a last word that is none"):
-        unpack_final(["final", *rest])
+    with pytest.raises(WordsError, match="a last word that is none"):
+        unpack_last_word(["done", *rest])

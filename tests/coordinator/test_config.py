@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.config import Priority, weights_over
-from planner.types import GridSpec, SweepFrame
+from coordinator.config import weights_over
+from planner.types import GridSpec, PriorityGround, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 10, 4, 6)  # 40 m across, 60 m along; cell centres 0, 10, 20, 30 and 5 to 55
 ALL = np.ones(GRID.shape, dtype=np.bool_)
@@ -21,8 +21,8 @@ def test_without_priorities_all_counts_alike() -> None:
 
 
 def test_where_they_overlap_the_last_one_counts() -> None:
-    south = Priority(((-100.0, -100.0), (100.0, -100.0), (100.0, 20.0), (-100.0, 20.0)), 3.0)  # rows 0 and 1
-    west = Priority(((-100.0, -100.0), (5.0, -100.0), (5.0, 100.0), (-100.0, 100.0)), 0.5)  # column 0
+    south = PriorityGround((((-100.0, -100.0), (100.0, -100.0), (100.0, 20.0), (-100.0, 20.0)),), 3.0)  # rows 0 and 1
+    west = PriorityGround((((-100.0, -100.0), (5.0, -100.0), (5.0, 100.0), (-100.0, 100.0)),), 0.5)  # column 0
     weights = weights_over(GRID, ALL, (south, west))
     mean = (6 * 0.5 + 6 * 3 + 12 * 1) / 24
     assert weights * mean == pytest.approx(np.array([[0.5, 3.0, 3.0, 3.0]] * 2 + [[0.5, 1.0, 1.0, 1.0]] * 4))
@@ -32,12 +32,12 @@ def test_where_they_overlap_the_last_one_counts() -> None:
 def test_what_all_of_the_area_counts_changes_nothing(weight: float) -> None:
     inside = ALL.copy()
     inside[0] = False
-    around = Priority(((-50.0, 9.0), (90.0, 9.0), (90.0, 90.0), (-50.0, 90.0)), weight)
+    around = PriorityGround((((-50.0, 9.0), (90.0, 9.0), (90.0, 90.0), (-50.0, 90.0)),), weight)
     assert weights_over(GRID, inside, [around])[inside] == pytest.approx(1)
 
 
 def test_where_nothing_counts_it_stays_nothing() -> None:
-    around = Priority(((-50.0, -50.0), (90.0, -50.0), (90.0, 90.0), (-50.0, 90.0)), 0.0)
+    around = PriorityGround((((-50.0, -50.0), (90.0, -50.0), (90.0, 90.0), (-50.0, 90.0)),), 0.0)
     assert (weights_over(GRID, ALL, [around]) == 0).all()
 
 
@@ -47,7 +47,9 @@ def test_they_lie_in_the_mission_frame_whatever_way_tracks_run(heading_deg: floa
     across_m, along_m = np.meshgrid(grid.across_m, grid.along_m)
     x_m, y_m = grid.frame.to_mission(across_m, along_m)
     inside = np.ones(grid.shape, dtype=np.bool_)
-    weights = weights_over(grid, inside, [Priority(((20.0, -60.0), (120.0, -60.0), (120.0, 60.0), (20.0, 60.0)), 2.0)])
+    weights = weights_over(
+        grid, inside, [PriorityGround((((20.0, -60.0), (120.0, -60.0), (120.0, 60.0), (20.0, 60.0)),), 2.0)]
+    )
     within = (x_m > 20) & (x_m < 120) & (y_m > -60) & (y_m < 60)
     assert within.any()
     assert (weights[within] == 2 * weights.min()).all()

@@ -21,6 +21,16 @@ PLACES = ((0, 0, 20, 20), (0, 20, 20, 3), (20, 0, 2, 20), (20, 20, 2, 3))
 
 
 @dataclass(frozen=True, eq=False)
+class Tile:
+    version: int
+    first_row: int
+    first_column: int
+    sum_levels: LevelArray
+    largest_levels: LevelArray
+    settled: BoolArray
+
+
+@dataclass(frozen=True, eq=False)
 class TileNews:
     vehicle: str
     version: tuple[int, int]
@@ -30,9 +40,9 @@ class TileNews:
     settled: BoolArray
 
     def give(self, fleet: FleetMap) -> bool:
-        row, column, _, _ = self.place
-        arrays = (self.sum_levels, self.largest_levels, self.settled)
-        return fleet.take(self.vehicle, self.version, row, column, *arrays)
+        incarnation, version = self.version
+        tile = Tile(version, *self.place[:2], self.sum_levels, self.largest_levels, self.settled)
+        return fleet.join(self.vehicle, incarnation, tile)
 
 
 def tile(

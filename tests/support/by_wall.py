@@ -10,23 +10,22 @@ from functools import partial
 
 from fleets import EACH_ALONE, ROSTER, RUN_INFO, Scripted, password
 
-from comms.control import HostPlan
+from comms.errors import NodeError
+from comms.keys import HostSpec, RunKeys
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.runner import NodeError
 from comms.said.messages import ClockMode, Role
 from comms.said.routing import Routing
 from comms.session import open_client, open_hub
-from comms.wall.access import wall_access_rules
+from comms.wall.access import access_rules
 from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.local_bus import run_local_by_wall
 from comms.wall.seats import ListenerSeat, NodeSeat
-from comms.wall.words import WallKeys
 
 FACTOR = 100.0
 WALL_RUN = replace(RUN_INFO, mode=ClockMode.WALL)
-WALL_KEYS = WallKeys("toy")
+WALL_KEYS = RunKeys("toy")
 ROUTING = Routing(ROSTER)
 
 
@@ -51,7 +50,7 @@ def on_zenoh_by_wall(
     listener: Listener,
     *,
     time_limit_ms: int = 60_000,
-    plans: tuple[HostPlan, ...] = EACH_ALONE,
+    plans: tuple[HostSpec, ...] = EACH_ALONE,
     before: Callable[[str], None] = lambda endpoint: None,
 ) -> BusResult:
     """Runs the toy fleet over Zenoh on loopback, the world at the hub, each host of `plans` behind a session.
@@ -60,9 +59,9 @@ def on_zenoh_by_wall(
     """
     seated = filled(nodes)
     users = {plan.host: password(plan.host) for plan in plans}
-    session, endpoint = open_hub(users, wall_access_rules(ROUTING, plans, WALL_KEYS))
+    session, endpoint = open_hub(users, access_rules(ROUTING, plans, WALL_KEYS))
 
-    def serve(plan: HostPlan) -> None:
+    def serve(plan: HostSpec) -> None:
         with contextlib.suppress(NodeError), open_client(endpoint, plan.host, password(plan.host)) as own:
             seat = (
                 ListenerSeat({"observer": listener}, ROUTING)
@@ -98,9 +97,9 @@ def on_zenoh_by_wall_grouped(
 ) -> BusResult:
     """The same with coordinator and one agent behind one session."""
     plans = (
-        HostPlan("alpha", ("alpha",)),
-        HostPlan("both", ("beta", "coordinator")),
-        HostPlan("observer", ("observer",)),
+        HostSpec("alpha", ("alpha",)),
+        HostSpec("both", ("beta", "coordinator")),
+        HostSpec("observer", ("observer",)),
     )
     return on_zenoh_by_wall(nodes, listener, plans=plans, time_limit_ms=time_limit_ms)
 

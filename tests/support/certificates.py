@@ -7,7 +7,7 @@ import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 
-from comms.wall.session import Certificates
+from comms.session import Certificates
 
 PAGE = Path(__file__).parents[2] / "docs" / "several-hosts.md"
 ADDRESS = "192.0.2.1"

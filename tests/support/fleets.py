@@ -9,16 +9,16 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from comms.access import access_rules
-from comms.control import HostPlan, RunKeys, pack
+from comms.errors import FleetError, NodeError
+from comms.keys import HostSpec, RunKeys
+from comms.lockstep.access import access_rules
 from comms.lockstep.events import Change, NodeEvent, timeline
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.host import ListenerHost, serve_nodes
-from comms.lockstep.hub import FleetError, Hub
+from comms.lockstep.host import ListenerHost, NodeHost
+from comms.lockstep.hub import Hub
 from comms.lockstep.local_bus import run_local
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.result import BusResult
-from comms.runner import NodeError
 from comms.said.messages import (
     AgentState,
     ClockMode,
@@ -34,6 +34,7 @@ from comms.said.messages import (
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import MANEUVER_STATUS, MISSION_OVER, NAV, STATE
 from comms.session import open_client, open_hub, put
+from comms.words import pack
 
 RUN_INFO = RunInfo(
     schema=1,
@@ -170,10 +171,10 @@ def on_zenoh_grouped(
     nodes: Mapping[str, Node], listener: Listener, *, events: tuple[NodeEvent, ...] = (), **options: Any
 ) -> BusResult:
     """The same with coordinator and one agent behind one session, but for whom something is to happen to."""
-    plans: tuple[HostPlan, ...] = (
-        HostPlan("alpha", ("alpha",)),
-        HostPlan("both", ("beta", "coordinator")),
-        HostPlan("observer", ("observer",)),
+    plans: tuple[HostSpec, ...] = (
+        HostSpec("alpha", ("alpha",)),
+        HostSpec("both", ("beta", "coordinator")),
+        HostSpec("observer", ("observer",)),
     )
     if {event.node_id for event in events} & {"beta", "coordinator"}:
         plans = EACH_ALONE
@@ -181,16 +182,16 @@ def on_zenoh_grouped(
 
 
 BUSES: dict[str, Bus] = {"local": on_local, "zenoh": on_zenoh, "zenoh-grouped": on_zenoh_grouped}
-EACH_ALONE = tuple(HostPlan(name, (name,)) for name in ("alpha", "beta", "coordinator", "observer"))
+EACH_ALONE = tuple(HostSpec(name, (name,)) for name in ("alpha", "beta", "coordinator", "observer"))
 KEYS = RunKeys("toy")
 
 
-def plans_with(events: tuple[NodeEvent, ...], plans: tuple[HostPlan, ...]) -> tuple[HostPlan, ...]:
+def plans_with(events: tuple[NodeEvent, ...], plans: tuple[HostSpec, ...]) -> tuple[HostSpec, ...]:
     """These plans with those for whoever joins later."""
     joins = [one for one in timeline(events, Routing(ROSTER)) if one.change is Change.JOIN]
     late = {one.node_id for one in joins if one.incarnation == 0}
     later = [
-        HostPlan(f"{one.node_id}.1" if one.incarnation else one.node_id, (one.node_id,), one.incarnation, joins=True)
+        HostSpec(f"{one.node_id}.1" if one.incarnation else one.node_id, (one.node_id,), one.incarnation, joins=True)
         for one in joins
     ]
     return (*(plan for plan in plans if late.isdisjoint(plan.nodes)), *later)
@@ -205,7 +206,7 @@ def over_zenoh(
     nodes: Mapping[str, Node],
     listener: Listener,
     *,
-    plans: tuple[HostPlan, ...] = EACH_ALONE,
+    plans: tuple[HostSpec, ...] = EACH_ALONE,
     absent: tuple[str, ...] = (),
     before: Callable[[str], None] = lambda endpoint: None,
     on_failure: Callable[[], None] = lambda: None,
@@ -225,7 +226,7 @@ def over_zenoh(
     users = {plan.host: password(plan.host) for plan in plans}
     hub_session, endpoint = open_hub(users, access_rules(routing, plans, KEYS) if rules else None)
 
-    def serve(plan: HostPlan) -> None:
+    def serve(plan: HostSpec) -> None:
         with (
             contextlib.suppress(NodeError, SystemExit),  # the hub is told of the one and notices the other
             open_client(endpoint, plan.host, password(plan.host)) as session,
@@ -234,7 +235,7 @@ def over_zenoh(
                 ListenerHost(session, KEYS, plan.host, "observer", listener, routing).run()
             else:
                 its_nodes = {name: nodes.get(plan.host, filled[name]) for name in plan.nodes}
-                serve_nodes(session, KEYS, plan, its_nodes, routing, faults)
+                NodeHost(session, KEYS, plan, its_nodes, routing, faults).run()
 
     threads = {
         plan.host: threading.Thread(target=serve, args=(plan,), name=plan.host, daemon=True)

@@ -110,15 +110,7 @@ def joined(agent: OneNode, said: list[Said], fleet: FleetMap | None = None) -> F
     assert node.coverage is not None
     fleet = fleet or FleetMap(node.coverage.grid)
     for tile in agent.all(CoverageTile, said):
-        fleet.take(
-            PRIMARY,
-            (0, tile.version),
-            tile.first_row,
-            tile.first_column,
-            tile.sum_levels,
-            tile.largest_levels,
-            tile.settled,
-        )
+        fleet.join(PRIMARY, 0, tile)
     return fleet
 
 

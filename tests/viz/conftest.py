@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from comms.node import Received
+from secondlook.recorded.story import Story
 from tests.viz.mission_stream import mission
 from viz import picture
 from viz.picture import what_is_missing
@@ -26,7 +27,7 @@ def messages() -> list[Received]:
 @pytest.fixture(scope="session")
 def record() -> Record:
     def write(stream: list[Received], path: Path) -> Path:
-        recorder = Recorder(RecorderConfig(path))
+        recorder = Recorder(RecorderConfig(path, Story))
         for received in stream:
             recorder.on_message(received)
         recorder.close()

@@ -23,6 +23,7 @@ from rerun.experimental import ViewerClient
 
 from comms.node import Received
 from comms.said.messages import Hotspot, Nav, RunInfo
+from secondlook.recorded.story import Story
 from tests.viz.mission_stream import PRIMARY
 from tests.viz.recordings import entities, rows, rows_so_far, verify
 from viz import canvas, live_server, viewer_program
@@ -87,7 +88,7 @@ def record_all(pipe: Path, folder: Path, messages: list[Received], in_the_middle
     """Records with a live view to which something happens half way."""
     path = folder / RUN / "mission.rrd"
     path.parent.mkdir()
-    recorder = Recorder(RecorderConfig(path, live_pipe=pipe))
+    recorder = Recorder(RecorderConfig(path, Story, live_pipe=pipe))
     half = len(messages) // 2
     for received in messages[:half]:
         recorder.on_message(received)
@@ -214,7 +215,7 @@ def recorded_live(
     pipe, shown = tmp_path / "pipe", tmp_path / "shown.rrd"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", live_pipe=pipe, piece_s=60.0))
+    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", Story, live_pipe=pipe, piece_s=60.0))
     for received in stream:
         recorder.on_message(received)
 

@@ -44,11 +44,13 @@ from comms.said.messages import (
 )
 from comms.said.topics import TOPICS
 from planner.region import Region
+from planner.types import PriorityGround
+from secondlook.recorded.story import Story
 from tests.viz.mission_stream import HELPER, PRIMARY, mission
 from tests.viz.recordings import entities, rows, rows_so_far, static, timelines, verify
 from viz import palette
 from viz.recorder import Recorder
-from viz.recorder_config import PriorityGround, RecorderConfig
+from viz.recorder_config import RecorderConfig
 from viz.task_table import HEAD
 
 Record = Callable[[list[Received], Path], Path]
@@ -137,7 +139,7 @@ def test_cells_outside_the_area_look_like_the_background(
 
 def test_ground_that_counts_more_is_told_on_the_map(messages: list[Received], tmp_path: Path) -> None:
     corners = ((100.0, 50.0), (200.0, 50.0), (200.0, 90.0))
-    recorder = Recorder(RecorderConfig(tmp_path / "one.rrd", priorities=(PriorityGround((corners,), 2.5),)))
+    recorder = Recorder(RecorderConfig(tmp_path / "one.rrd", Story, priorities=(PriorityGround((corners,), 2.5),)))
     for received in messages[:50]:
         recorder.on_message(received)
     recorder.close()
@@ -149,7 +151,7 @@ def test_ground_that_counts_more_is_told_on_the_map(messages: list[Received], tm
 
 @pytest.mark.parametrize("every_s", [10, 60])
 def test_the_map_is_drawn_no_more_often_than_asked(messages: list[Received], tmp_path: Path, every_s: int) -> None:
-    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", draw_every_s=every_s))
+    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", Story, draw_every_s=every_s))
     for received in messages:
         recorder.on_message(received)
     recorder.close()
@@ -399,8 +401,9 @@ from tests.viz.mission_stream import mission
 from viz import canvas
 from viz.recorder import Recorder
 from viz.recorder_config import RecorderConfig
+from secondlook.recorded.story import Story
 canvas.TOGETHER_S = 0.01  # the mission is over within less than it is
-recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1])))
+recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1]), Story))
 for received in mission(tracks=1):
     recorder.on_message(received)
 signal.pause()
@@ -432,7 +435,7 @@ def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated:
     stream = [FEW[place] for place in (*order, *repeated)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mission.rrd"
-        recorder = Recorder(RecorderConfig(path))
+        recorder = Recorder(RecorderConfig(path, Story))
         for received in stream:
             recorder.on_message(received)
         recorder.close()
@@ -459,7 +462,7 @@ def test_the_table_tells_who_has_which_strip(messages: list[Received], recording
 
 def test_r_eff_and_threshold_are_told(messages: list[Received], tmp_path: Path) -> None:
     path = tmp_path / "mission.rrd"
-    recorder = Recorder(RecorderConfig(path, thresholds={PRIMARY: 0.05}))
+    recorder = Recorder(RecorderConfig(path, Story, thresholds={PRIMARY: 0.05}))
     for received in messages:
         recorder.on_message(received)
     recorder.close()

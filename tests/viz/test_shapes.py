@@ -10,7 +10,8 @@ import rerun.blueprint as rrb
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.said.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, StripState, StripStatus, Vertex
+from comms.said.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
+from planner.types import Strip
 from viz.blueprint import FIELD_OF_VIEW_RAD, MARGIN, mission_blueprint
 from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring, swath
 
@@ -18,8 +19,8 @@ PRIMARY = RosterVehicle("primary", Role.SURVEY, 1.5, 20, 20, 40, 145, 0.4, 36_00
 RUN = RunInfo(1, "x", "0" * 64, 1, ClockMode.WALL, (), Grid(0, 0, 0, 10, 4, 2), 0.0, (PRIMARY,))
 
 
-def strip(heading_rad: float) -> StripStatus:
-    return StripStatus(1, StripState.OPEN, 10, 20, heading_rad, 100, 40, 1, "", "")
+def strip(heading_rad: float, number: int = 1) -> Strip:
+    return Strip(number, (10, 20), heading_rad, 100, 40)
 
 
 def test_a_strip_runs_along_its_heading() -> None:
@@ -33,7 +34,7 @@ def test_a_strip_runs_along_its_heading() -> None:
 def test_labels_hang_on_the_centre_line_apart_from_their_neighbours(number: int, heading_rad: float) -> None:
     along = []
     for neighbour in (number, number + 1, number + 2):
-        x_m, y_m, z_m = label_place(strip(heading_rad), neighbour, 1.5)
+        x_m, y_m, z_m = label_place(strip(heading_rad, neighbour), 1.5)
         ahead_m = (x_m - 10) * math.sin(heading_rad) + (y_m - 20) * math.cos(heading_rad)
         assert math.hypot(x_m - 10, y_m - 20) == pytest.approx(ahead_m)
         assert 10 <= ahead_m <= 90

@@ -1,4 +1,4 @@
-"""Conformance checks for parts of a user's own: what each kind has to keep to, tried on many examples."""
+"""Conformance checks for plug-ins of a user's own: what each kind has to keep to, tried on many examples."""
 
 from secondlook.testing.checks.allocator import check_allocator
 from secondlook.testing.checks.node import check_node

@@ -48,9 +48,9 @@ def check_allocator(allocator: Any, *, examples: int = EXAMPLES, patience_s: flo
     checked.against(check, examples, situations=asked)
 
 
-def _answer(checked: Checked, part: Any, situation: Situation) -> dict[Any, Any]:
+def _answer(checked: Checked, plug_in: Any, situation: Situation) -> dict[Any, Any]:
     told = deepcopy(situation)
-    answer = checked.ask(part, "assign", told)
+    answer = checked.ask(plug_in, "assign", told)
     if not isinstance(answer, Mapping):
         raise AssertionError(f"{checked.name} must answer with a mapping from vehicle to strip number, not {answer!r}")
     if told != situation:

@@ -1,4 +1,4 @@
-"""Checks a part against many examples: what it is made from, how it is called, and that it comes back."""
+"""Checks a plug-in against many examples: what it is made from, how it is called, and that it comes back."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.errors import Flaky
 
 from secondlook.launch.watchdog import NoReturn, Watchdog
-from secondlook.scenario.plug_ins import PartError, PartKind
+from secondlook.scenario.plug_ins import PlugInError, PlugInKind
 
 EXAMPLES = 100
 PATIENCE_S = 10.0
@@ -24,38 +24,38 @@ class _SmallEnough(BaseException):
 
 
 class Checked:
-    """A maker of parts under check, a class of the user's, say; `kind` says what is asked of it.
+    """A maker of plug-ins under check, a class of the user's, say; `kind` says what is asked of it.
 
     `patience_s`: wall time in which each of its calls has to come back. Whatever is wrong raises AssertionError.
     """
 
-    def __init__(self, kind: PartKind, part: Any, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, kind: PlugInKind, plug_in: Any, patience_s: float = PATIENCE_S) -> None:
         __tracebackhide__ = True
-        self.name = part if isinstance(part, str) else getattr(part, "__qualname__", repr(part))
+        self.name = plug_in if isinstance(plug_in, str) else getattr(plug_in, "__qualname__", repr(plug_in))
         try:
-            self._maker = kind.maker(part) if isinstance(part, str) else kind.checked(part, self.name)
-        except PartError as error:
+            self._maker = kind.maker(plug_in) if isinstance(plug_in, str) else kind.checked(plug_in, self.name)
+        except PlugInError as error:
             raise AssertionError(f"{self.name}: {error}") from error
         self._kind = kind
         self.watchdog = Watchdog(patience_s)
 
     def make(self, **arguments: Any) -> Any:
-        """One part; what it must have is there."""
-        part = self._within("being made", lambda: self._maker(**arguments))
+        """One plug-in; what it must have is there."""
+        plug_in = self._within("being made", lambda: self._maker(**arguments))
         for method, names in self._kind.methods.items():
             must = f"{self._kind.what} must have {method}({', '.join(names)})"
-            found = getattr(part, method, None)
+            found = getattr(plug_in, method, None)
             if not callable(found):
                 raise AssertionError(f"{self.name}: {must}; it has no {method}")
             try:
                 inspect.signature(found).bind(*names)
             except TypeError as error:
                 raise AssertionError(f"{self.name}: {must}; {error}") from error
-        return part
+        return plug_in
 
-    def ask(self, part: Any, method: str, *arguments: Any) -> Any:
-        """What a part answers."""
-        return self._within(method, lambda: getattr(part, method)(*arguments))
+    def ask(self, plug_in: Any, method: str, *arguments: Any) -> Any:
+        """What a plug-in answers."""
+        return self._within(method, lambda: getattr(plug_in, method)(*arguments))
 
     def against(
         self, check: Callable[..., None], examples: int, *, small: bool = True, **strategies: st.SearchStrategy[Any]

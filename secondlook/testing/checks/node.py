@@ -9,7 +9,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from comms.runner import Intake, NodeError, NodeRunner, Outgoing
+from comms.errors import NodeError
+from comms.lockstep.group import NodeRunner
+from comms.runner import Intake, Outgoing
 from comms.said.codec import CLOCK, Header, encode
 from comms.said.messages import Maneuver, Message
 from comms.said.routing import Routing

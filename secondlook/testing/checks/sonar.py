@@ -86,11 +86,11 @@ def check_sonar_model(sonar: Any, *, examples: int = EXAMPLES, patience_s: float
     )
 
 
-def _answer(checked: Checked, part: Any, question: tuple[Any, ...]) -> Any:
+def _answer(checked: Checked, plug_in: Any, question: tuple[Any, ...]) -> Any:
     range_m, bearing_rad, altitude_m, position_m, time_s = question
     arrays = (range_m, bearing_rad, *position_m)
     before = [np.array(one) for one in arrays]
-    answer = checked.ask(part, "p_detect", *question)
+    answer = checked.ask(plug_in, "p_detect", *question)
     told = f"{checked.name}, at {time_s:g} s from {altitude_m:g} m above the seabed,"
     if any(not np.array_equal(was, one) for was, one in zip(before, arrays, strict=True)):
         raise AssertionError(f"{told} has changed what it was given")

@@ -72,9 +72,9 @@ def _survey(checked: Checked, given: dict[str, float], width_m: float, r_eff_m: 
 
 
 def _decision(
-    checked: Checked, part: Any, question: tuple[float, float, int | None]
+    checked: Checked, plug_in: Any, question: tuple[float, float, int | None]
 ) -> tuple[int, tuple[float, ...], bool, str]:
-    decision = checked.ask(part, "decide", *question)
+    decision = checked.ask(plug_in, "decide", *question)
     told = f"{checked.name}, asked for {question},"
     try:
         range_m, offsets_m = decision.range_m, tuple(decision.offsets_m)

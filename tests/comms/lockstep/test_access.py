@@ -14,18 +14,19 @@ from fleets import EACH_ALONE, KEYS, ROSTER, Notes, fleet_that_talks, nav, on_lo
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.access import access_rules
-from comms.control import HostPlan, RunKeys, pack
-from comms.lockstep.hub import FleetError
+from comms.errors import ConnectionFailedError, FleetError
+from comms.keys import HostSpec, RunKeys
+from comms.lockstep.access import access_rules
 from comms.node import Step
 from comms.said.codec import Header, encode
 from comms.said.messages import Maneuver, ManeuverKind, Role, Task, TaskAction, TruthPose
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import TOPICS
-from comms.session import ConnectionFailedError, open_client, open_hub, put, subscribe
+from comms.session import open_client, open_hub, put, subscribe
+from comms.words import pack
 
 routing = Routing((*ROSTER, RosterNode("recorder", Role.RECORDER)))
-ALONE = (*EACH_ALONE, HostPlan("recorder", ("recorder",)))
+ALONE = (*EACH_ALONE, HostSpec("recorder", ("recorder",)))
 HOSTED = tuple(plan.host for plan in ALONE)
 TOPIC_KEYS = sorted(
     {topic.key(vehicle=vehicle, number=7, tile="0-1") for topic in TOPICS for vehicle in ("alpha", "beta", "gamma")}
@@ -51,7 +52,7 @@ def allowed(rules: dict[str, Any], host: str, flow: str, message: str, key: str)
     )
 
 
-def may_write(plan: HostPlan, key: str) -> bool:
+def may_write(plan: HostSpec, key: str) -> bool:
     """What the routing lets the nodes of a host write, for those that only listen in parcels, and the clock's part."""
     if key.startswith("parcel/"):
         return key.rpartition("/")[2] in plan.nodes
@@ -59,7 +60,7 @@ def may_write(plan: HostPlan, key: str) -> bool:
     return key == f"clock/from/{plan.host}" or (route is not None and route.writer in plan.nodes)
 
 
-def may_read(plan: HostPlan, key: str) -> bool:
+def may_read(plan: HostSpec, key: str) -> bool:
     """What the routing lets the nodes of a host read, those that only listen in parcels, and the clock's part."""
     if key.startswith("parcel/"):
         return not set(key.split("/")[1].split("+")).isdisjoint(plan.nodes)
@@ -69,17 +70,17 @@ def may_read(plan: HostPlan, key: str) -> bool:
 
 
 @st.composite
-def groupings(draw: st.DrawFn) -> tuple[HostPlan, ...]:
+def groupings(draw: st.DrawFn) -> tuple[HostSpec, ...]:
     """The three nodes that act, world apart, spread over up to three hosts and the hub's own; and those that listen."""
     places: dict[int, list[str]] = {}
     for node in ("alpha", "beta", "coordinator"):
         places.setdefault(draw(st.integers(0, 3)), []).append(node)
     places.pop(0, None)
-    return (*(HostPlan(f"host{place}", tuple(nodes)) for place, nodes in places.items()), *ALONE[-2:])
+    return (*(HostSpec(f"host{place}", tuple(nodes)) for place, nodes in places.items()), *ALONE[-2:])
 
 
 @given(groupings())
-def test_the_rules_of_any_grouping_allow_what_the_routing_says_and_nothing_more(plans: tuple[HostPlan, ...]) -> None:
+def test_the_rules_of_any_grouping_allow_what_the_routing_says_and_nothing_more(plans: tuple[HostSpec, ...]) -> None:
     rules = access_rules(routing, plans, KEYS)
     assert (rules["enabled"], rules["default_permission"]) == (True, "deny")
     assert {rule["permission"] for rule in rules["rules"]} == {"allow"}
@@ -156,7 +157,7 @@ CLOCK_KEYS = [f"clock/{way}/{host}" for way in ("to", "from", "alive") for host 
 
 
 @pytest.mark.parametrize("plan", ALONE, ids=lambda plan: plan.host)
-def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: HostPlan) -> None:
+def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: HostSpec) -> None:
     ears = Ears(guarded.hub, ["**"])
     client = guarded.client(plan.host)
     last = f"clock/from/{plan.host}"
@@ -171,7 +172,7 @@ def test_the_hub_lets_a_host_write_its_own_keys_alone(guarded: Guarded, plan: Ho
 
 
 @pytest.mark.parametrize("plan", ALONE, ids=lambda plan: plan.host)
-def test_the_hub_tells_a_host_what_it_may_read_alone(guarded: Guarded, plan: HostPlan) -> None:
+def test_the_hub_tells_a_host_what_it_may_read_alone(guarded: Guarded, plan: HostSpec) -> None:
     keys = [key for key in TOPIC_KEYS if routing.route(key)] + PARCEL_KEYS + CLOCK_KEYS
     last = f"clock/to/{plan.host}"
     client = guarded.client(plan.host)

@@ -134,7 +134,7 @@ def test_who_was_killed_and_comes_back_begins_anew(bus: Bus) -> None:
 
 
 def test_late_mail_comes_when_it_is_due_although_the_clock_does_not_know(bus: Bus) -> None:
-    faults = Faults(1, [MessageFault(FaultKind.DELAY, "*/maneuver_status", delay_ms=500, until_ms=15)])
+    faults = Faults(1, [MessageFault(FaultKind.DELAY, "**/maneuver_status", delay_ms=500, until_ms=15)])
     world = Scripted(
         starts=lambda now_ms: Step(wake_ms=10),
         wakes=lambda now_ms: says(say_status("alpha"), wake_ms=20 if now_ms == 10 else None),
@@ -145,14 +145,14 @@ def test_late_mail_comes_when_it_is_due_although_the_clock_does_not_know(bus: Bu
 
 
 def test_late_mail_that_wakes_nobody_wakes_nobody(bus: Bus) -> None:
-    faults = Faults(1, [MessageFault(FaultKind.DELAY, "*/nav", delay_ms=50)])
+    faults = Faults(1, [MessageFault(FaultKind.DELAY, "**/nav", delay_ms=50)])
     world = Scripted(starts=lambda now_ms: says(say_nav("alpha")))
     alpha = Scripted(starts=lambda now_ms: Step(wake_ms=300))
     bus({"world": world, "alpha": alpha, "coordinator": ends()}, Notes(), faults=faults)
     assert heard_from(alpha, "veh/alpha/nav") == [(300, 0, 0)]
 
 
-KINDS = [MessageFault(kind, "agent/*", 0.4, delay_ms=1500) for kind in FaultKind]
+KINDS = [MessageFault(kind, "agent/**", 0.4, delay_ms=1500) for kind in FaultKind]
 
 
 @pytest.mark.parametrize("fault", KINDS, ids=lambda fault: fault.kind.value)
@@ -197,7 +197,7 @@ def events_of(node_id: str) -> st.SearchStrategy[list[NodeEvent]]:
         st.builds(
             MessageFault,
             st.sampled_from(FaultKind),
-            st.sampled_from(["*", "agent/*", "veh/*", "*/state"]),
+            st.sampled_from(["**", "agent/**", "veh/**", "**/state"]),
             st.sampled_from([0.1, 0.5, 1.0]),
             delay_ms=st.integers(1, 3000),
         ),

@@ -128,3 +128,16 @@ def test_faults_apply_in_their_order() -> None:
 def test_what_is_no_fault_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"^a fault's (probability|delay) must be"):
         MessageFault(FaultKind.DROP, **wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("keys", "sentence"),
+    [
+        ("agent/*/state/", "'agent/[*]/state/' is no key expression"),
+        ("agent/*", "no key is like 'agent/[*]'; there are veh/"),
+        ("run", "no key is like 'run'; there are veh/"),  # it reaches everyone
+    ],
+)
+def test_what_would_strike_nothing_is_refused(keys: str, sentence: str) -> None:
+    with pytest.raises(ValueError, match=f"^{sentence}"):
+        MessageFault(FaultKind.DROP, keys)

@@ -15,15 +15,17 @@ import zenoh
 from fleets import EACH_ALONE, KEYS, ROSTER, Notes, Scripted, nav, password, says, state
 from flights import until
 
-from comms.control import HostPlan, pack, pack_grants, unpack, unpack_answers
+from comms.keys import HostSpec
 from comms.lockstep.clock import Grant
-from comms.lockstep.host import ListenerHost, serve_nodes
+from comms.lockstep.host import ListenerHost, NodeHost
 from comms.lockstep.parcels import publish
+from comms.lockstep.words import pack_grants, unpack_answers
 from comms.runner import Outgoing, Stamp
 from comms.said.messages import Look, Message, Role, TruthPose
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import LOOK, NAV, STATE, TRUTH_POSE
 from comms.session import Mailbox, open_client, open_hub, put, subscribe
+from comms.words import pack, unpack
 
 PATIENCE_S = 20.0
 WATCHED = Routing((*ROSTER, RosterNode("recorder", Role.RECORDER)))  # by two, of whom one may not read all
@@ -100,13 +102,13 @@ class Aside:
 def takes(monkeypatch: pytest.MonkeyPatch) -> list[None]:
     """Grows each time that a mailbox is looked into."""
     found: list[None] = []
-    take = Mailbox.take
+    take = Mailbox.fetch
 
     def counted(mailbox: Mailbox) -> Iterator[tuple[str, bytes]]:
         found.append(None)
         return take(mailbox)
 
-    monkeypatch.setattr(Mailbox, "take", counted)
+    monkeypatch.setattr(Mailbox, "fetch", counted)
     return found
 
 
@@ -123,7 +125,7 @@ def test_a_mark_that_comes_before_its_mail_is_acknowledged_when_all_is_there(hub
         assert hub.hears("ack") == ["ack", 1]
         assert [one.header.sequence for one in notes.heard] == [0, 1]
         hub.say("observer", "finish", 1, 1000, {"world": 2})
-        hub.hears("final")
+        hub.hears("done")
         hub.say("observer", "goodbye")
         running.end()
     assert notes.closed == 1
@@ -165,12 +167,12 @@ def test_what_does_not_fit_is_counted_and_dropped_and_not_waited_for(hub: HubByH
         put(hub.session, KEYS.parcel(first.route.watchers, "world"), broken, at_once=False)
         hub.sends_parcels(second)
         hub.say("observer", "finish", 1, 1000, {"world": 3})
-        final = hub.hears("final")
+        final = hub.hears("done")
         hub.say("observer", "goodbye")
         running.end()
     assert [(one.key, one.header.sequence) for one in notes.heard] == [(first.key, 0), (second.key, 1)]
     senders = 5  # under the keys of each of which the expression comes once
-    assert final[2] == {"malformed": 2, "not for here": senders + 2}
+    assert final[3] == {"malformed": 2, "not for here": senders + 2}
 
 
 def test_a_listener_hears_what_it_shares_with_others_and_what_it_does_not(hub: HubByHand) -> None:
@@ -185,7 +187,7 @@ def test_a_listener_hears_what_it_shares_with_others_and_what_it_does_not(hub: H
         hub.welcomes("observer")
         hub.sends_parcels(shared, alone)
         hub.say("observer", "finish", 1, 1000, {"world": 2})
-        hub.hears("final")
+        hub.hears("done")
         hub.say("observer", "goodbye")
         running.end()
     assert [one.key for one in notes.heard] == [shared.key, alone.key]
@@ -202,9 +204,9 @@ def test_what_only_listeners_read_goes_out_in_a_parcel_alone(monkeypatch: pytest
 
 def test_a_grant_that_comes_before_its_mail_is_carried_out_when_all_is_there(hub: HubByHand, takes: list[None]) -> None:
     alpha, (position,) = Scripted(starts=lambda now_ms: says(wake_ms=5000)), positions(1)
-    plan = HostPlan("alpha", ("alpha",))
+    plan = HostSpec("alpha", ("alpha",))
     with open_client(hub.endpoint, "alpha", password("alpha")) as session:
-        running = Aside.run(lambda: serve_nodes(session, KEYS, plan, {"alpha": alpha}, Routing(ROSTER)))
+        running = Aside.run(lambda: NodeHost(session, KEYS, plan, {"alpha": alpha}, Routing(ROSTER)).run())
         hub.welcomes("alpha")
         put(hub.session, KEYS.to_host("alpha"), pack_grants(0, [Grant("alpha", True, {}, start=True)]))
         assert unpack_answers(hub.hears("answer")) == [("alpha", 5000, [])]
@@ -215,7 +217,7 @@ def test_a_grant_that_comes_before_its_mail_is_carried_out_when_all_is_there(hub
         assert unpack_answers(hub.hears("answer")) == [("alpha", 5000, [])]
         assert alpha.log[-1] == (1000, position.key, "world", 0, 0)
         hub.say("alpha", "finish", 0, 1000, {})
-        hub.hears("final")
+        hub.hears("done")
         hub.say("alpha", "goodbye")
         running.end()
 
@@ -236,6 +238,6 @@ def test_what_two_expressions_include_comes_once(hub: HubByHand) -> None:
             put(hub.session, "toy/a/one", b"%d" % number, at_once=False)
         put(hub.session, "told", b"")
         told.get(timeout=PATIENCE_S)  # it came the same way as the mail, after it
-        assert list(mailbox.take()) == [("toy/a/one", b"0"), ("toy/a/one", b"1"), ("toy/a/one", b"2")]
-        assert list(mailbox.take()) == []
+        assert list(mailbox.fetch()) == [("toy/a/one", b"0"), ("toy/a/one", b"1"), ("toy/a/one", b"2")]
+        assert list(mailbox.fetch()) == []
         del listens

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.control import RunKeys
+from comms.keys import RunKeys
 from comms.lockstep.parcels import MOST_BYTES, parcels, unpacked
 from comms.runner import Outgoing
 from comms.said.codec import Header

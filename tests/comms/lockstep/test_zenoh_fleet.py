@@ -24,11 +24,11 @@ from fleets import (
     says,
 )
 
-from comms.control import HostPlan, pack
-from comms.lockstep.hub import FleetError, HostLostError
+from comms.errors import FleetError, HostLostError, NodeError
+from comms.keys import HostSpec
 from comms.node import Received, Step
-from comms.runner import NodeError
 from comms.session import open_client, put
+from comms.words import pack
 
 
 def test_nothing_is_lost_at_the_start_in_whatever_order_the_hosts_come() -> None:
@@ -122,7 +122,7 @@ def test_a_host_that_dies_is_named_at_once() -> None:
         raise SystemExit
 
     beta = Scripted(starts=lambda now_ms: Step(wake_ms=1500), wakes=die)
-    plans = (HostPlan("both", ("beta", "coordinator")), HostPlan("alpha", ("alpha",)), EACH_ALONE[-1])
+    plans = (HostSpec("both", ("beta", "coordinator")), HostSpec("alpha", ("alpha",)), EACH_ALONE[-1])
     with pytest.raises(HostLostError, match=r"^both was lost at 1\.500 s of the mission$") as caught:
         over_zenoh({"beta": beta}, Notes(), plans=plans)
     assert (caught.value.host, caught.value.at_ms) == ("both", 1500)
@@ -195,7 +195,7 @@ def test_what_a_node_raises_is_not_hidden_by_a_listener_that_cannot_be_closed() 
         pack("answer", []),
         pack("ack", 1),
         pack("ack", "1"),
-        pack("final", 1),
+        pack("done", 1),
     ],
     ids=repr,
 )

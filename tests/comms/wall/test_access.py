@@ -15,13 +15,13 @@ from fleets import EACH_ALONE
 from flights import until
 from required import missing_for_certificates, require
 
-from comms.control import HostPlan
-from comms.session import ConnectionFailedError, subscribe
-from comms.wall.access import wall_access_rules
-from comms.wall.session import Certificates, open_guest, open_router
+from comms.errors import ConnectionFailedError
+from comms.keys import HostSpec
+from comms.session import Certificates, open_guest, open_router, subscribe
+from comms.wall.access import access_rules
 
 NAMES = ("router", "world", "alpha", "beta", "coordinator", "observer")
-HOSTS = (HostPlan("world", ("world",)), *EACH_ALONE)
+HOSTS = (HostSpec("world", ("world",)), *EACH_ALONE)
 SOON_S = 20.0
 
 
@@ -37,7 +37,7 @@ class Guarded:
     def __init__(self, sessions: ExitStack, certificates: dict[str, Certificates]) -> None:
         self._sessions = sessions
         self._certificates = certificates
-        rules = wall_access_rules(ROUTING, HOSTS, WALL_KEYS, "cert_common_names")
+        rules = access_rules(ROUTING, HOSTS, WALL_KEYS, "cert_common_names")
         self.router, self.endpoint = open_router("tls/127.0.0.1:0", certificates["router"], rules)
         sessions.enter_context(self.router)
 

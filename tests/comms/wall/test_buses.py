@@ -9,10 +9,9 @@ import pytest
 from by_wall import WALL_BUSES, WALL_KEYS, on_zenoh_by_wall
 from fleets import Notes, Scripted, fleet_that_talks, password, say_nav, say_over, say_state, say_status, says, state
 
-from comms.lockstep.hub import FleetError
+from comms.errors import FleetError, NodeError
 from comms.node import Received, Step
 from comms.result import BusResult, Ending
-from comms.runner import NodeError
 from comms.said.codec import Header, encode
 from comms.said.messages import ClockMode, RunInfo
 from comms.session import open_client, put

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from comms.control import unpack
-from comms.result import Ending
+from comms.result import Ending, LastWord
 from comms.said.codec import SCHEMA_VERSION
 from comms.wall.clock import HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, Phase, WallClock
-from comms.wall.words import Hello, LastWord, unpack_finish
+from comms.wall.words import Hello, unpack_finish
+from comms.words import unpack
 
 SHA = "a" * 64
 LIMIT_MS = 100_000
@@ -114,11 +114,11 @@ def test_the_end_first_has_the_last_words_of_those_who_act_then_of_those_who_lis
     assert phase(told) is Phase.RUNNING
     told.pass_time(2.0 + WRAP_UP_S)
     assert words(told) == [("alpha", "finish"), ("beta", "finish")]
-    told.done_here(LastWord({"run": 1}, {}, {}))
-    told.done("alpha", LastWord({"state": 3}, {"malformed": 1}, {}))
+    told.done_here(LastWord([], {"run": 1}))
+    told.done("alpha", LastWord([], {"state": 3}, {"malformed": 1}))
     told.pass_time(2.6)
     assert (phase(told), words(told)) == (Phase.ENDING, [("alpha", "goodbye")])
-    told.done("beta", LastWord({"state": 4}, {}, {"strip_to_task": [1.5]}))
+    told.done("beta", LastWord([], {"state": 4}, {}, {"strip_to_task": [1.5]}))
     told.pass_time(2.7)
     assert phase(told) is Phase.CLOSING
     (_, (host, finish)) = told.words
@@ -126,7 +126,7 @@ def test_the_end_first_has_the_last_words_of_those_who_act_then_of_those_who_lis
     assert (host, result.ending, result.mission_ms) == ("observer", Ending.OVER, 30_000)
     assert (result.messages, result.dropped) == ({"run": 1, "state": 7}, {"malformed": 1})
     assert (result.latencies_ms, result.digest, result.rounds) == ({"strip_to_task": [1.5]}, None, None)
-    told.done("observer", LastWord({}, {"ahead of time": 2}, {}))
+    told.done("observer", LastWord([], {}, {"ahead of time": 2}))
     told.pass_time(2.8)
     assert phase(told) is Phase.ENDED
     assert told.result.dropped == {"malformed": 1, "ahead of time": 2}
@@ -139,7 +139,7 @@ def test_at_the_end_nobody_is_waited_for_who_is_not_there() -> None:
     told.pass_time(10.0)
     told.pass_time(10.0 + WRAP_UP_S)
     assert words(told) == [("alpha", "finish")]  # nothing heard of the others for long
-    told.done("alpha", LastWord({}, {}, {}))
+    told.done("alpha", LastWord())
     told.pass_time(10.6)
     told.pass_time(10.7)
     assert phase(told) is Phase.ENDED
@@ -184,5 +184,5 @@ def test_the_silent_are_those_of_whom_nothing_was_heard_for_so_long() -> None:
     told.hello("alpha", hello(), 5.0)
     assert told.silent(8.0, 10.0) == []
     assert told.silent(10.0, 10.0) == ["beta", "observer"]
-    told.done("beta", LastWord({}, {}, {}))
+    told.done("beta", LastWord())
     assert told.silent(15.0, 10.0) == ["alpha", "observer"]

@@ -12,15 +12,16 @@ import zenoh
 from by_wall import ROUTING, WALL_KEYS, WALL_RUN
 from fleets import Scripted, say_state, says
 
-from comms.control import pack, unpack
+from comms.errors import RefusedError
 from comms.result import BusResult, Ending
 from comms.runner import Stamp
 from comms.said.codec import CLOCK, header_of
 from comms.said.topics import RUN
 from comms.session import open_client, open_hub, put, subscribe
-from comms.wall.host import RefusedError, WallHost, incarnation_at
+from comms.wall.host import WallHost, incarnation_at
 from comms.wall.seats import NodeSeat
 from comms.wall.words import pack_finish, pack_time
+from comms.words import pack, unpack
 
 SOON_S = 10.0
 LIMIT_MS = 60_000
@@ -93,7 +94,7 @@ def test_only_who_waited_for_a_mission_to_begin_is_the_first_of_its_name(
     put(beta.session, WALL_KEYS.topic(announced.key), announced.payload)
     assert header_of(beta.hears("agent/beta/state")).incarnation == incarnation
     beta.say(pack_finish(BusResult(Ending.OVER, 7_000, None, None, {}, {})))
-    assert unpack(beta.hears("clock/from/beta", "done"))[1] == {"state": 1}
+    assert unpack(beta.hears("clock/from/beta", "done"))[2] == {"state": 1}
     beta.say(pack("goodbye"))
     beta.thread.join(SOON_S)
     assert beta.result is not None

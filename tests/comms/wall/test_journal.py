@@ -44,8 +44,8 @@ class Sender:
 
     def resend(self, receiver: HeardMessages) -> list[Received]:
         """What is news of all that is kept."""
-        opened = [self._intake.open(key, payload) for key, payload in self.kept.matching(lambda key: True)]
-        return [one for one in opened if one is not None and receiver.take(one)]
+        opened = [self._intake.open(key, payload) for key, payload in self.kept.kept.messages()]
+        return [one for one in opened if one is not None and receiver.add(one)]
 
 
 def contact(number: int) -> Publication:
@@ -69,7 +69,7 @@ def test_something_is_missing_just_where_not_all_that_is_kept_has_come(
         if data.draw(st.booleans()):
             lost.append(received)
         else:
-            receiver.take(received)
+            receiver.add(received)
     newest = {one.key: one for one in sender.said}
     wanted = {STATE.expression("alpha"): False, CONTACT.expression("alpha"): False}
     for one in lost:
@@ -84,29 +84,29 @@ def test_something_is_missing_just_where_not_all_that_is_kept_has_come(
 def test_what_came_before_or_is_older_is_no_news() -> None:
     sender, receiver = Sender(), HeardMessages()
     first, second = sender.say(say_state("alpha", 1)), sender.say(say_state("alpha", 2))
-    assert [receiver.take(one) for one in (second, second, first)] == [True, False, False]
+    assert [receiver.add(one) for one in (second, second, first)] == [True, False, False]
     events = [sender.say(contact(number)) for number in (1, 2)]
-    assert [receiver.take(one) for one in (events[1], events[0], events[1])] == [True, True, False]
+    assert [receiver.add(one) for one in (events[1], events[0], events[1])] == [True, True, False]
 
 
 def test_what_is_kept_comes_in_the_order_of_its_sending() -> None:
     sender = Sender()
     for one in (say_state("alpha", 1), contact(1), say_state("alpha", 2), contact(2)):
         sender.say(one)
-    kept = [topic_of(key) for key, _ in sender.kept.matching(lambda key: True)]
+    kept = [topic_of(key) for key, _ in sender.kept.kept.messages(lambda key: True)]
     assert [found[0] for found in kept if found] == [CONTACT, STATE, CONTACT]
     only = [
         decode(payload, CONTACT.message)[0].sequence
-        for _, payload in sender.kept.matching(lambda key: "contact" in key)
+        for _, payload in sender.kept.kept.messages(lambda key: "contact" in key)
     ]
     assert only == [1, 3]
 
 
 def test_a_new_incarnation_is_heard_from_its_beginning_and_the_old_one_no_more() -> None:
     old, new, receiver = Sender(), Sender(incarnation=7), HeardMessages()
-    assert receiver.take(old.say(say_state("alpha", 1)))
-    assert receiver.take(new.say(say_state("alpha", 1)))
-    assert not receiver.take(old.say(say_state("alpha", 2)))
+    assert receiver.add(old.say(say_state("alpha", 1)))
+    assert receiver.add(new.say(say_state("alpha", 1)))
+    assert not receiver.add(old.say(say_state("alpha", 2)))
     assert old.missing(receiver) == []
     assert new.missing(receiver) == []
     new.say(say_state("alpha", 3))
@@ -117,8 +117,8 @@ def test_what_is_not_kept_is_always_news_and_never_missing() -> None:
     assert LOOK.keep.value == "nothing"
     look = Received(LOOK.key(vehicle="alpha"), LOOK, "alpha", Header("world", 0, 4, 0), say_state("alpha").message)
     receiver = HeardMessages()
-    assert receiver.take(look)
-    assert receiver.take(look)
+    assert receiver.add(look)
+    assert receiver.add(look)
 
 
 def test_a_sender_that_cannot_give_what_it_tells_of_is_asked_a_few_times_only() -> None:

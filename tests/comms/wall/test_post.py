@@ -9,7 +9,6 @@ from typing import Any, cast
 from by_wall import ROUTING, WALL_KEYS
 from fleets import say_state
 
-from comms.control import pack
 from comms.node import Publication, Received
 from comms.runner import Outgoing, Stamp
 from comms.said.messages import Contact
@@ -18,6 +17,7 @@ from comms.wall.journal import Journal
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
 from comms.wall.words import Beat, pack_beat, pack_time
+from comms.words import pack
 
 STATES, CONTACTS = STATE.expression("alpha"), CONTACT.expression("alpha")
 
@@ -73,7 +73,7 @@ def post_over(line: FakeLine) -> WallPost:
 
 def sequences(post: WallPost, *events: Event) -> list[int]:
     """The sequence numbers of the messages that are passed on."""
-    items = [item for event in events for item in post.take(event, list)]
+    items = [item for event in events for item in post.receive(event, list)]
     return [item.header.sequence for item in items if isinstance(item, Received)]
 
 
@@ -119,23 +119,23 @@ def test_who_asks_is_given_what_is_kept() -> None:
     line, alpha = FakeLine(), Alpha()
     sent = [alpha.say(one) for one in (say_state("alpha", 1), contact(1), say_state("alpha", 2))]
     asked = Asked(cast(Any, STATE.key(vehicle="alpha")))
-    assert post_over(line).take(asked, lambda: [alpha.journal, Journal()]) == []
+    assert post_over(line).receive(asked, lambda: [alpha.journal, Journal()]) == []
     assert line.answered == [(sent[2].key, sent[2].payload)]
 
 
 def test_words_are_passed_on_and_senseless_ones_dropped() -> None:
     post = post_over(FakeLine())
-    assert post.take(Mail("clock/time", pack_time(5, 2.0, taken_up=True)), list) == [
+    assert post.receive(Mail("clock/time", pack_time(5, 2.0, taken_up=True)), list) == [
         Words("clock/time", ["time", 5, 2.0, True])
     ]
     for payload in (b"\xc1", pack("beat", "no number", {}), pack("beat", 0, {"state": "many"})):
-        assert post.take(Mail("clock/beat/alpha", payload), list) == []
+        assert post.receive(Mail("clock/beat/alpha", payload), list) == []
     assert post.intake.dropped == {"senseless words": 3}
 
 
 def test_a_message_up_to_five_seconds_ahead_is_in_time() -> None:
     post, alpha = post_over(FakeLine()), Alpha()
-    (received,) = post.take(mail(alpha.say(contact(1))), list)
+    (received,) = post.receive(mail(alpha.say(contact(1))), list)
     assert isinstance(received, Received)
     assert post.is_in_time(received, 0)
     assert post.is_in_time(received, 1000 - AHEAD_MS)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from comms.said.messages import CoverageTile
 from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import Cut, CuttingRules
 from planner.fleet_map import FleetMap
@@ -23,8 +24,9 @@ def fleet_that_left(risk: FloatArray) -> FleetMap:
     levels = np.rint(-np.log(risk) / NATS_PER_LEVEL).astype(np.uint8)
     settled = np.ones(GRID.shape, dtype=np.bool_)
     for tile in tiles(GRID):
-        cells = tile.window
-        fleet.take("primary", (0, 1), tile.first_row, tile.first_column, levels[cells], levels[cells], settled[cells])
+        cells = levels[tile.window]
+        told = CoverageTile(1, tile.first_row, tile.first_column, cells, cells, settled[tile.window])
+        fleet.join("primary", 0, told)
     return fleet
 
 

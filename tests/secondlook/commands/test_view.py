@@ -79,8 +79,9 @@ import os, pathlib, signal, sys
 from tests.viz.mission_stream import mission
 from viz.recorder import Recorder
 from viz.recorder_config import RecorderConfig
+from secondlook.recorded.story import Story
 messages = mission(tracks=1)
-recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1])))
+recorder = Recorder(RecorderConfig(pathlib.Path(sys.argv[1]), Story))
 for received in messages[:int(sys.argv[2])]:
     recorder.on_message(received)
 os.kill(os.getpid(), signal.SIGKILL)

@@ -18,7 +18,7 @@ import pytest
 from flights import BRIEF, until
 
 from secondlook import cli
-from secondlook.compare.flights import FailedFlight, Flight, Flown, Risk, contenders, equal_vehicle_seconds, fly
+from secondlook.compare.flights import Failure, Flown, Result, Risk, contenders, equal_vehicle_seconds, fly
 from secondlook.compare.plot import _lines
 from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
@@ -27,11 +27,11 @@ from secondlook.scenario import load_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR
 
 
-def flight(seed: int, end: float, *, served: int = 3, ends_at: float = 1.05, worse: float = 0.2) -> Flight:
+def result(seed: int, end: float, *, served: int = 3, ends_at: float = 1.05, worse: float = 0.2) -> Result:
     """A mission over 1000 s of survey, with this mean risk from then on, and so much more over the worst 30 %."""
     then, later = Risk(1000, end, end + worse), Risk(1050, end, end + worse)
     at_end = Risk(1000 * ends_at, end, end + worse)
-    return Flight(seed, "", 1000, then, later, at_end, 0.7, (0.7 - end) * 100, served, (Risk(500, 0.9, 1.0), at_end))
+    return Result(seed, "", 1000, then, later, at_end, 0.7, (0.7 - end) * 100, served, (Risk(500, 0.9, 1.0), at_end))
 
 
 class TestWhoIsCompared:
@@ -73,9 +73,9 @@ class TestWhoIsCompared:
 
 
 FLOWN: Flown = {
-    "first": {1: flight(1, 0.40), 2: flight(2, 0.50), 3: flight(3, 0.30)},
-    "other": {1: flight(1, 0.42, worse=0.1), 2: flight(2, 0.46), 3: FailedFlight(3, "it failed")},
-    "equal": {1: flight(1, 0.40)},
+    "first": {1: result(1, 0.40), 2: result(2, 0.50), 3: result(3, 0.30)},
+    "other": {1: result(1, 0.42, worse=0.1), 2: result(2, 0.46), 3: Failure(3, "it failed")},
+    "equal": {1: result(1, 0.40)},
     "nothing yet": {},
 }
 
@@ -103,7 +103,7 @@ class TestStandings:
     def test_columns_that_say_nothing_are_left_out(self) -> None:
         full = table(standings(FLOWN), "")
         fewer = table(standings({"first": FLOWN["first"]}), "")
-        longer = table(standings({"first": {1: flight(1, 0.4, ends_at=2)}}), "")
+        longer = table(standings({"first": {1: result(1, 0.4, ends_at=2)}}), "")
         assert [len(one.columns) for one in (fewer, full, longer)] == [9, 10, 12]
 
 
@@ -111,7 +111,7 @@ def test_a_mission_is_flown_as_by_run(tmp_path: Path) -> None:
     scenario = load_scenario(BRIEF)
     summary = run_mission(scenario, RunOptions(tmp_path, bus="local", record=False))
     flown = fly(scenario)
-    assert isinstance(flown, Flight)
+    assert isinstance(flown, Result)
     assert flown.digest == summary["digest"]
     assert (flown.at_end.mean, flown.served) == (summary["risk"]["mean"], summary["hotspots"]["revisited"])
     removed = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
@@ -186,7 +186,7 @@ class TestCommand:
         self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
     ) -> None:
         def fail(chosen: object, seeds: object, jobs: object, flown: Flown, progress: object) -> None:
-            flown["greedy"] = {1: flight(1, 0.4)}
+            flown["greedy"] = {1: result(1, 0.4)}
             raise raised
 
         monkeypatch.setattr("secondlook.commands.compare.fly_all", fail)
@@ -253,7 +253,7 @@ def _group_is_gone(group: int) -> bool:
 
 
 def test_lines_of_missions_that_ended_earlier_stay_as_they_were() -> None:
-    shares, lines = _lines([flight(1, 0.4, ends_at=1.05), replace(flight(2, 0.3), at_end=Risk(2000, 0.3, 0.5))], "mean")
+    shares, lines = _lines([result(1, 0.4, ends_at=1.05), replace(result(2, 0.3), at_end=Risk(2000, 0.3, 0.5))], "mean")
     assert (shares[0], shares[-1]) == (0, 2)
     assert lines[:, 0].tolist() == [1, 1]
     assert lines[:, -1].tolist() == [0.4, 0.3]

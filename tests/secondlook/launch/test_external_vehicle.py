@@ -15,7 +15,17 @@ import pytest
 from spread import PATIENT, loopback_endpoint, lost_of_what_is_kept, spread_fleet
 
 from comms.said.codec import Header, decode, encode
-from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav, Role
+from comms.said.messages import (
+    ClockMode,
+    Look,
+    Maneuver,
+    ManeuverKind,
+    ManeuverState,
+    ManeuverStatus,
+    Message,
+    Nav,
+    Role,
+)
 from comms.said.topics import topic_of
 from secondlook import cli
 from secondlook.fleet.build import build_fleet
@@ -96,7 +106,7 @@ def test_of_a_manoeuvre_that_is_asked_for_again_it_says_how_far_it_got(example: 
 
 
 def test_an_external_body_has_its_vehicles_topics_and_the_world_has_not() -> None:
-    fleet = build_fleet(load_scenario(str(BAY)), record=False, factor=1.0)
+    fleet = build_fleet(load_scenario(str(BAY)), record=False, mode=ClockMode.WALL)
     roster = {node.node_id: (node.role, node.vehicles) for node in fleet.roster}
     assert roster["world"] == (Role.WORLD, ("primary",))
     assert roster["helper-body"] == (Role.BODY, ("helper",))
@@ -106,7 +116,7 @@ def test_an_external_body_has_its_vehicles_topics_and_the_world_has_not() -> Non
 
 def test_without_a_simulated_vehicle_there_is_no_world() -> None:
     scenario = load_scenario(str(BAY), ["vehicles.primary.body=external"])
-    fleet = build_fleet(scenario, record=False, factor=1.0)
+    fleet = build_fleet(scenario, record=False, mode=ClockMode.WALL)
     assert sorted(fleet.specs) == ["coordinator", "helper", "primary"]
     assert "world" not in {node.node_id for node in fleet.roster}
 

@@ -185,7 +185,7 @@ class TestACoordinatorThatIsKilled:
     @pytest.mark.parametrize("away_s", [0.5, 45])
     def test_the_one_that_comes_after_goes_on_with_numbers_of_its_own(self, slow: MakeFleet, away_s: float) -> None:
         fleet = slow()
-        fleet.run_until(lambda heard: len(heard.messages("coord/task/*")) >= 3, timeout_s=5000)
+        fleet.run_until(lambda heard: len(heard.messages("coord/task/**")) >= 3, timeout_s=5000)
         fleet.kill("coordinator")
         fleet.join("coordinator", at_s=fleet.now_s + away_s)
         flight = fleet.run()
@@ -225,7 +225,7 @@ class TestBadLinks:
     @pytest.mark.parametrize("name", ["tellaro", "patchy"])
     def test_of_a_fifth_of_all_words_lost_maps_converge_and_all_finish(self, tmp_path: Path, name: str) -> None:
         fleet = Fleet(name, folder=tmp_path)
-        fleet.drop("*", probability=0.2)
+        fleet.drop("**", probability=0.2)
         flight = fleet.run()
         assert_maps_converged(flight)
         assert_all_finished(flight)

@@ -16,14 +16,14 @@ import numpy as np
 import pytest
 from flights import BRIEF, LONG, SLOW, Flight, events, flight, has_ended, until
 
+from comms.lockstep.drive import Lockstep
 from comms.node import Received
 from comms.said.codec import decode
 from comms.said.topics import topic_of
 from secondlook import cli
 from secondlook.fleet.build import Fleet, build_fleet
-from secondlook.fleet.node_spec import NodeSpec
+from secondlook.fleet.nodes import HUB, RECORDER, NodeSpec
 from secondlook.launch import mission, processes
-from secondlook.launch.host_plans import HUB, RECORDER
 from secondlook.launch.processes import GRACE_S, Processes, RunFailedError
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import load_scenario
@@ -174,7 +174,8 @@ def run_fleet(
     fleet: Fleet, logs: Path, observer: Saboteur, recorder: NodeSpec, sabotage: Sabotage, patience_s: float
 ) -> str:
     """The sentence with which a run of the fleet fails; no process of it is left, and the observer closed."""
-    with Processes(fleet, logs, observer, recorder, None, patience_s=patience_s) as running:
+    fleet = replace(fleet, specs=fleet.specs | {RECORDER: recorder})
+    with Processes(fleet, logs, observer, Lockstep(), patience_s=patience_s) as running:
         observer.act = lambda: sabotage(running.process_ids)
         with pytest.raises(RunFailedError) as caught:
             running.run()

@@ -36,7 +36,9 @@ def test_where_grounds_overlap_the_last_one_counts() -> None:
     scenario = load_scenario(str(BRIEF), [f"area.priorities=[{', '.join(outlines)}]"])
     area = shapely.Polygon(scenario.area.polygon_m)
     grounds = priority_grounds(area, scenario.area.priorities)
-    assert [(weight, ground.area) for ground, weight in grounds] == [(3, 1500), (0.5, 100), (2, 1000)]
+    areas_m2 = [shapely.Polygon(one.outlines_m[0], one.outlines_m[1:]).area for one in grounds]
+    assert [one.weight for one in grounds] == [3, 0.5, 2]
+    assert areas_m2 == [1500, 100, 1000]
     (around, *_) = recorder_config(scenario, Path("mission.rrd")).priorities
     assert sorted(shapely.Polygon(outline).area for outline in around.outlines_m) == [100, 1600]
     assert priority_grounds(shapely.box(50, 60, 90, 90), scenario.area.priorities) == []

@@ -10,7 +10,7 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +18,14 @@ import numpy as np
 import pytest
 from flights import BRIEF, events, flight
 
-from comms.control import HostPlan
+from comms.keys import HostSpec
+from comms.lockstep.drive import Lockstep
 from comms.result import BusResult
 from comms.said.codec import decode
 from comms.said.topics import topic_of
 from secondlook.fleet.build import build_fleet
-from secondlook.fleet.node_spec import NodeSpec
+from secondlook.fleet.nodes import RECORDER, NodeSpec, hosts_of_run
 from secondlook.launch import processes
-from secondlook.launch.host_plans import plan_hosts
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE, read_messages
@@ -204,7 +204,8 @@ def test_every_bundled_mission_has_one_digest_on_both_buses(tmp_path: Path, name
 def run_with(folder: Path, recorder: NodeSpec | None) -> BusResult:
     """A run of the brief mission with this recorder."""
     fleet = build_fleet(load_scenario(str(BRIEF)), record=recorder is not None)
-    with Processes(fleet, folder, Observer(folder, with_messages=False), recorder, None) as started:
+    fleet = replace(fleet, specs=fleet.specs | ({RECORDER: recorder} if recorder else {}))
+    with Processes(fleet, folder, Observer(folder, with_messages=False), Lockstep()) as started:
         return started.run()
 
 
@@ -217,12 +218,12 @@ def test_the_digest_is_the_same_with_a_recorder_that_cannot_keep_up(tmp_path: Pa
 def test_the_digest_is_the_same_in_whatever_order_processes_start(
     tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch, turn: int
 ) -> None:
-    def turned(*arguments: Any) -> tuple[list[str], tuple[HostPlan, ...]]:
-        in_hub, plans = plan_hosts(*arguments)
+    def turned(*arguments: Any) -> tuple[list[str], tuple[HostSpec, ...]]:
+        in_hub, plans = hosts_of_run(*arguments)
         order = [*plans[turn:], *plans[:turn]]
         return in_hub, tuple(order[::-1])
 
-    monkeypatch.setattr(processes, "plan_hosts", turned)
+    monkeypatch.setattr(processes, "hosts_of_run", turned)
     assert run_with(tmp_path, None).digest == digest
 
 

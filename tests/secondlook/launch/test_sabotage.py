@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
+from comms.lockstep.drive import Lockstep
 from comms.lockstep.events import Freeze, Join, Kill, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, FaultKind, Faults, MessageFault
 from comms.result import Ending
@@ -28,12 +29,12 @@ SABOTAGE: dict[str, tuple[NodeEvent, ...]] = {
     "a late and frozen coordinator": (Join("coordinator", 50_000), Freeze("coordinator", 200_000, 280_000)),
     "a primary frozen on its track": (Freeze("primary", 100_000, 160_000),),
 }
-LOSSY = Faults(3, [MessageFault(FaultKind.DROP, "*", 0.2), MessageFault(FaultKind.CORRUPT, "*/coverage/*", 0.1)])
+LOSSY = Faults(3, [MessageFault(FaultKind.DROP, "**", 0.2), MessageFault(FaultKind.CORRUPT, "**/coverage/*", 0.1)])
 
 
 def fly(folder: Path, bus: Any, events: tuple[NodeEvent, ...], faults: Faults = NO_FAULTS, **options: Any) -> Any:
     folder.mkdir()
-    flown = RunOptions(folder, bus=bus, record=False, events=events, faults=faults, **options)
+    flown = RunOptions(folder, bus=bus, record=False, drive=Lockstep(faults, events), **options)
     summary = run_mission(load_scenario(str(BRIEF), SLOW), flown)
     return {name: summary[name] for name in ("digest", "ending", "risk", "hotspots", "dropped", "messages")}
 
@@ -73,7 +74,7 @@ def test_kill_and_freeze_are_done_to_the_processes(tmp_path: Path, monkeypatch: 
     fleet = build_fleet(load_scenario(str(BRIEF), SLOW), record=False)
     events = (Freeze("coordinator", 100_000, 150_000), Kill("helper", 200_000), Join("helper", 300_000))
     observer = Observer(tmp_path, with_messages=False)
-    with Processes(fleet, tmp_path, observer, None, None, events=events) as processes:
+    with Processes(fleet, tmp_path, observer, Lockstep(events=events)) as processes:
         assert sorted(processes.process_ids) == []
         assert processes.run().ending is Ending.OVER
         done = list(seen)

@@ -9,7 +9,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgpack
 import numpy as np
@@ -22,14 +22,18 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import secondlook
-from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
+from comms.node import Received
+from comms.said.codec import Header
+from comms.said.messages import AgentState, Message, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
+from comms.said.topics import PLAN, STATE, STRIP, Topic
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
-from secondlook.recorded import Activity, RecordedMission, RiskMap, Said
-from secondlook.recorded.key_pattern import key_matcher
+from secondlook.recorded import Activity, RecordedMission, RiskMap
 from secondlook.recorded.second_looks import strips
 from secondlook.recorded.vehicles import activities, tracks
+
+M = TypeVar("M", bound=Message)
 
 
 @pytest.fixture(scope="module")
@@ -66,21 +70,17 @@ def test_messages_are_typed_and_know_where_they_come_from(mission: RecordedMissi
     assert (strip.key, strip.number, strip.message.state) == ("coord/strip/1", 1, StripState.OPEN)
 
 
-@pytest.mark.parametrize(
-    ("pattern", "fits", "fits_not"),
-    [
-        ("**", ["run", "agent/a/state"], []),
-        ("agent/*/state", ["agent/a/state", "agent/b-2/state"], ["agent/state", "agent/a/b/state", "agent/a/states"]),
-        ("agent/**", ["agent", "agent/a", "agent/a/b"], ["agents/a", "x/agent"]),
-        ("**/state", ["state", "a/b/state"], ["a/states", "a/state/b"]),
-        ("agent/**/9", ["agent/9", "agent/a/9", "agent/a/b/9"], ["agent/99", "agent/a/19"]),
-        ("agent/*-0/plan", ["agent/a-0/plan"], ["agent/a-1/plan", "agent/a/-0/plan"]),
-        ("a.b", ["a.b"], ["axb", ""]),
-    ],
-)
-def test_patterns_choose_by_chunks(pattern: str, fits: list[str], fits_not: list[str]) -> None:
-    matches = key_matcher(pattern)
-    assert [key for key in fits + fits_not if matches(key)] == fits
+def test_keys_that_no_message_can_have_are_refused(mission: RecordedMission, brief_copy: Path) -> None:
+    with pytest.raises(UserError, match=r"^'agent/' is no key expression; must be "):
+        mission.said(AgentState, "agent/")
+    with pytest.raises(UserError, match=r"^no key is like 'coord/[*]/x'; there are run, "):
+        mission.messages("coord/*/x")
+    with pytest.raises(
+        UserError, match=r"^no key is like 'agent/h/[*]'; there are run, .*, and the vehicles primary, help"
+    ):
+        mission.messages("agent/h/*")
+    (brief_copy / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", 1]))
+    assert list(secondlook.load(brief_copy).messages("agent/h/*")) == []  # who may be there nobody has said
 
 
 def test_the_risk_map_at_the_end_is_the_runs_own(mission: RecordedMission, brief_run: Path) -> None:
@@ -188,6 +188,12 @@ def test_strips_hotspots_and_targets_are_those_of_the_summary(
     assert all(shapely.covers(mission.area, target.point) for target in targets)
 
 
+def heard(topic: Topic, sender: str, t_s: float, message: M, *, number: int = 0) -> Received[M]:
+    vehicle = sender if topic.has_vehicle else ""
+    header = Header(sender, 0, 0, round(t_s * 1000))
+    return Received(topic.key(vehicle=vehicle, number=number), topic, vehicle, header, message)
+
+
 def status(state: StripState, vehicle: str = "", removable_m2: float = 90.0) -> StripStatus:
     return StripStatus(1, state, 100.0, 50.0, math.pi / 2, 40.0, 10.0, removable_m2, vehicle, state.value)
 
@@ -200,7 +206,7 @@ def test_a_strip_is_its_rectangle_and_tells_its_changes() -> None:
         (4.0, status(StripState.OPEN)),
         (5.0, status(StripState.WITHDRAWN)),
     ]
-    (strip,) = strips(Said("coord/strip/7", "", "coordinator", t_s, one) for t_s, one in told)
+    (strip,) = strips(heard(STRIP, "coordinator", t_s, one, number=7) for t_s, one in told)
     # Ten metres wide about a line of 40 m that runs east.
     assert shapely.equals(strip.polygon, shapely.box(100, 45, 140, 55))
     assert strip.centre_line.coords[-1] == pytest.approx((140, 50))
@@ -215,8 +221,8 @@ def test_a_strip_is_its_rectangle_and_tells_its_changes() -> None:
 
 
 def test_activities_go_on_until_the_next_begins() -> None:
-    def said(vehicle: str, t_s: float, mode: Mode, works_on: int = 0) -> Said[AgentState]:
-        return Said("", vehicle, vehicle, t_s, AgentState(mode, works_on, 1.0, 0, 0.0, 0.0, 0.0))
+    def said(vehicle: str, t_s: float, mode: Mode, works_on: int = 0) -> Received[AgentState]:
+        return heard(STATE, vehicle, t_s, AgentState(mode, works_on, 1.0, 0, 0.0, 0.0, 0.0))
 
     told = [
         said("a", 0, Mode.TRANSIT, 1),
@@ -295,9 +301,9 @@ def test_the_example_runs(brief_copy: Path) -> None:
 
 
 def test_a_track_was_laid_for_the_latest_range_before_it_was_flown() -> None:
-    def said(t_s: float, tracks: int, flown: int, r_adpt_m: tuple[int, ...]) -> Said[Plan]:
+    def said(t_s: float, tracks: int, flown: int, r_adpt_m: tuple[int, ...]) -> Received[Plan]:
         planned = (PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 80, flown=n <= flown) for n in range(1, tracks + 1))
-        return Said("", "p", "p", t_s, Plan(1, tuple(planned), r_adpt_m, (130, 125, 120)[:flown], ""))
+        return heard(PLAN, "p", t_s, Plan(1, tuple(planned), r_adpt_m, (130, 125, 120)[:flown], ""))
 
     told = [
         said(0.0, 4, 0, (138,)),

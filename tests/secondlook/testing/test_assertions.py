@@ -87,9 +87,9 @@ def killed_and_back(fleet: Fleet) -> None:
 
 def words_twice_and_late(fleet: Fleet) -> None:
     """Half of all messages between agents and coordinator come again, and some overtake others."""
-    fleet.repeat("agent/*", after_s=3, probability=0.5, to="coordinator", for_s=380)
-    fleet.reorder("agent/*", within_s=2, probability=0.2, to="coordinator", for_s=380)
-    fleet.repeat("coord/task/*", after_s=2)
+    fleet.repeat("agent/**", after_s=3, probability=0.5, to="coordinator", for_s=380)
+    fleet.reorder("agent/**", within_s=2, probability=0.2, to="coordinator", for_s=380)
+    fleet.repeat("coord/task/**", after_s=2)
 
 
 def coordinator_anew(fleet: Fleet) -> None:
@@ -188,7 +188,7 @@ class TestNoStripLost:
         done = strips(two, 1)[-1]
         vehicle = done.message.vehicle  # type: ignore[union-attr]
         last = max(
-            (one for one in two.messages(f"agent/{vehicle}/*") if getattr(one.message, "works_on", 0) == 1),
+            (one for one in two.messages(f"agent/{vehicle}/**") if getattr(one.message, "works_on", 0) == 1),
             key=lambda one: one.header.sent_ms,
         )
         end = re.escape(f"{two.heard.now_s:.3f} s")
@@ -268,7 +268,7 @@ class TestOneStripAtATime:
 
 class TestNeverAssignedToLost:
     def test_one_that_said_nothing_for_long(self, two: Flight) -> None:
-        task = two.messages("coord/task/*")[0]
+        task = two.messages("coord/task/**")[0]
         since_ms = task.header.sent_ms - 31_000
         silent = f"agent/{task.vehicle}/state"
         last = [one for one in two.messages(silent) if one.header.sent_ms < since_ms][-1]
@@ -278,14 +278,14 @@ class TestNeverAssignedToLost:
             assert_never_assigned_to_lost(flight)
 
     def test_one_that_could_not_be_heard(self, two: Flight) -> None:
-        task = two.messages("coord/task/*")[0]
+        task = two.messages("coord/task/**")[0]
         deaf = Faults(0, (), [CutOff(task.vehicle, 0, task.header.sent_ms + 1)])
         said = f"was given to {task.vehicle} at {at(task)}, which the coordinator had never heard of"
         with pytest.raises(AssertionError, match=said):
             assert_never_assigned_to_lost(replace(two, faults=deaf))
 
     def test_a_coordinator_started_anew_knows_what_is_kept_for_it(self, two: Flight) -> None:
-        task = two.messages("coord/task/*")[-1]
+        task = two.messages("coord/task/**")[-1]
         at_ms = task.header.sent_ms - 2
         new = with_changed_header(two, lambda one: one.header.sender == "coordinator" and one.header.sent_ms > at_ms)
         events = (Kill("coordinator", at_ms - 1), Join("coordinator", at_ms))
@@ -339,7 +339,7 @@ class TestMapsConverged:
             assert_maps_converged(replace(two, faults=deaf))
 
     def test_a_tile_that_comes_too_late_for_the_mission(self, two: Flight) -> None:
-        late = Faults(0, [MessageFault(FaultKind.DELAY, "*/coverage/*", delay_ms=1_000_000)])
+        late = Faults(0, [MessageFault(FaultKind.DELAY, "**/coverage/*", delay_ms=1_000_000)])
         with pytest.raises(AssertionError, match="not at all"):
             assert_maps_converged(replace(two, faults=late))
 
@@ -433,7 +433,7 @@ class Fickle:
 class TestRepeats:
     def test_a_mission_repeats_on_both_buses(self, tmp_path: Path) -> None:
         fleet = Fleet(BRIEF, folder=tmp_path)
-        fleet.drop("*", probability=0.1)
+        fleet.drop("**", probability=0.1)
         first = assert_repeats(fleet, ["local", "zenoh"])
         assert first.bus == "local"
         assert first.digest

@@ -17,7 +17,7 @@ from secondlook.testing import Fleet
 @pytest.mark.fleet("bay.yaml", overrides={"coordinator.allocator": "none"}, seed=5)
 def test_marked(fleet):
     assert (fleet.scenario.seed, fleet.scenario.name, fleet.bus) == (5, "brief", "local")
-    assert fleet.run().messages("coord/task/*") == []
+    assert fleet.run().messages("coord/task/**") == []
 
 def test_unmarked(fleet):
     assert fleet.scenario.name == "tellaro"

@@ -30,7 +30,7 @@ def times_s(flight: Flight, sender: str) -> list[float]:
 
 def first_task(heard: Heard) -> bool:
     """The coordinator has offered a strip."""
-    return heard.last("coord/task/*") is not None
+    return heard.last("coord/task/**") is not None
 
 
 class TestNodes:
@@ -46,7 +46,7 @@ class TestNodes:
         fleet.join("helper", at_s=70)
         flight = fleet.run()
         assert not any(60 <= at_s < 70 for at_s in times_s(flight, "helper"))
-        incarnations = [one.header.incarnation for one in flight.messages("agent/helper/*")]
+        incarnations = [one.header.incarnation for one in flight.messages("agent/helper/**")]
         assert set(incarnations) == {0, 1}
         assert incarnations == sorted(incarnations)
 
@@ -91,16 +91,16 @@ class TestMessages:
         [
             (lambda fleet: fleet.drop("agent/*/hotspot/*"), []),
             (lambda fleet: fleet.delay("agent/*/hotspot/*", by_s=2.5), [2500]),
-            (lambda fleet: fleet.repeat("agent/primary/*", after_s=3), [0, 3000]),
-            (lambda fleet: fleet.reorder("*", within_s=0.001), [1]),
-            (lambda fleet: fleet.corrupt("*/hotspot/?"), [0]),
-            (lambda fleet: fleet.drop("*", to="coordinator"), []),
-            (lambda fleet: fleet.drop("*", to="helper"), [0]),
-            (lambda fleet: fleet.drop("*", probability=0), [0]),
-            (lambda fleet: fleet.drop("agent/helper/*"), [0]),
-            (lambda fleet: fleet.drop("*", for_s=50), [0]),
-            (lambda fleet: fleet.drop("*", from_s=50), []),
-            (lambda fleet: fleet.drop("*", from_s=50, for_s=0.5), [0]),
+            (lambda fleet: fleet.repeat("agent/primary/**", after_s=3), [0, 3000]),
+            (lambda fleet: fleet.reorder("**", within_s=0.001), [1]),
+            (lambda fleet: fleet.corrupt("**/hotspot/*"), [0]),
+            (lambda fleet: fleet.drop("**", to="coordinator"), []),
+            (lambda fleet: fleet.drop("**", to="helper"), [0]),
+            (lambda fleet: fleet.drop("**", probability=0), [0]),
+            (lambda fleet: fleet.drop("agent/helper/**"), [0]),
+            (lambda fleet: fleet.drop("**", for_s=50), [0]),
+            (lambda fleet: fleet.drop("**", from_s=50), []),
+            (lambda fleet: fleet.drop("**", from_s=50, for_s=0.5), [0]),
             (lambda fleet: fleet.cut_off("primary", from_s=50, for_s=100), []),
             (lambda fleet: fleet.cut_off("helper", from_s=50, for_s=100), [0]),
         ],
@@ -118,7 +118,7 @@ class TestMessages:
         digests = []
         for fault_seed in (1, 1, 2):
             fleet = brief(fault_seed=fault_seed)
-            fleet.drop("*", probability=0.2)
+            fleet.drop("**", probability=0.2)
             digests.append(fleet.run().digest)
         assert digests[0] == digests[1] != digests[2]
 
@@ -163,7 +163,7 @@ class TestInMidMission:
         too_late: list[Callable[[], None]] = [
             lambda: fleet.kill("helper", at_s=fleet.now_s),
             lambda: fleet.freeze("helper", at_s=1, for_s=1),
-            lambda: fleet.drop("*", from_s=0),
+            lambda: fleet.drop("**", from_s=0),
             lambda: fleet.cut_off("helper", from_s=3, for_s=1),
         ]
         for schedule in too_late:
@@ -203,18 +203,20 @@ def times_s_of(heard: Heard, keys: str) -> list[float]:
         (lambda fleet: fleet.cut_off("helper", for_s=float("inf")), "for_s: inf is not allowed; must be at least"),
         (
             lambda fleet: fleet.drop("agent/*/hotspots/*"),
-            "no key is like 'agent/*/hotspots/*'; there are run, veh",
+            "no key is like 'agent/*/hotspots/*'; there are veh",
         ),
-        (lambda fleet: fleet.drop("*", probability=20), "drop: probability: 20 is not allowed; must be from 0 to 1"),
+        (lambda fleet: fleet.drop("*"), "no key is like '*'; there are veh/*/nav, "),  # but the run, which reaches all
+        (lambda fleet: fleet.delay("agent/", by_s=1), "'agent/' is no key expression; must be chunks between single /"),
+        (lambda fleet: fleet.drop("**", probability=20), "drop: probability: 20 is not allowed; must be from 0 to 1"),
         (
-            lambda fleet: fleet.drop("*", to="observer"),
+            lambda fleet: fleet.drop("**", to="observer"),
             "drop: to: 'observer' is not allowed; must be one of world",
         ),
-        (lambda fleet: fleet.delay("*", by_s=0), "by_s: 0 is not allowed; must be at least 0.001 simulated seconds"),
-        (lambda fleet: fleet.repeat("*", after_s=-1), "after_s: -1 is not allowed; must be at least 0.001 simulated"),
-        (lambda fleet: fleet.reorder("*", within_s=0), "within_s: 0 is not allowed; must be at least 0.001 simulated"),
+        (lambda fleet: fleet.delay("**", by_s=0), "by_s: 0 is not allowed; must be at least 0.001 simulated seconds"),
+        (lambda fleet: fleet.repeat("**", after_s=-1), "after_s: -1 is not allowed; must be at least 0.001 simulated"),
+        (lambda fleet: fleet.reorder("**", within_s=0), "within_s: 0 is not allowed; must be at least 0.001 simulated"),
         (
-            lambda fleet: fleet.corrupt("*", for_s=0),
+            lambda fleet: fleet.corrupt("**", for_s=0),
             "for_s: 0 is not allowed; must be at least 0.001 simulated seconds",
         ),
     ],

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fleets import ROSTER
 
-from comms.latency import StripLatency
 from comms.node import Received
+from comms.result import StripLatency
 from comms.runner import Outgoing
 from comms.said.codec import Header
 from comms.said.messages import Message, StripState, StripStatus, Task, TaskAction, TaskState, TaskStatus

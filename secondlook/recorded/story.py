@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from comms.node import Received
 from comms.said.messages import (
@@ -25,12 +26,9 @@ from comms.said.messages import (
 from planner.types import Point
 
 MOST_NAMED = 3
-TELLING = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, MissionOver)
-"""Messages that may be worth a line; of the others there is nothing to tell."""
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(NamedTuple):
     """One line of the log: when and by whom, in what words; `warns` where something did not go as planned."""
 
     time_ms: int
@@ -49,7 +47,12 @@ class _HotspotNews:
 
 
 class Story:
-    """Turns messages into lines. It remembers what it told of each strip, task and hotspot, and tells changes only."""
+    """Turns messages into lines. It remembers what it told of each strip, task and hotspot, and tells changes only.
+
+    `telling`: the messages that may be worth a line; of the others there is nothing to tell.
+    """
+
+    telling = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, MissionOver)
 
     def __init__(self) -> None:
         self._told: dict[Hashable, object] = {}
@@ -60,7 +63,7 @@ class Story:
         """The lines that are ready now that this message has come; none where it has nothing new for a person."""
         header = received.header
         lines = self.rest(before_ms=header.sent_ms) if self._hotspots else []
-        told = self._words(received) if type(received.message) in TELLING else None
+        told = self._words(received) if type(received.message) in self.telling else None
         if told is not None:
             text, warns = told
             lines.append(Line(header.sent_ms, header.sender, text, warns))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -48,7 +50,8 @@ from comms.said.topics import (
     TASK_STATUS,
     Topic,
 )
-from viz.story import TELLING, Line, Story
+from secondlook.recorded.story import Line, Story
+from tests.viz.mission_stream import mission
 
 TIME_MS = 5000
 
@@ -168,11 +171,19 @@ def test_hotspots_of_one_time_share_a_line() -> None:
     assert story.rest() == []
 
 
-def test_of_other_messages_there_is_nothing_to_tell(messages: list[Received]) -> None:
+def test_of_other_messages_there_is_nothing_to_tell() -> None:
+    messages = mission()
+
     def told(heard: list[Received]) -> list[Line]:
         story = Story()
         return [line for received in heard for line in story.tell(received)] + story.rest()
 
-    telling = [one for one in messages if isinstance(one.message, TELLING)]
+    telling = [one for one in messages if isinstance(one.message, Story.telling)]
     assert len(telling) < len(messages) / 10
     assert told(telling) == told(messages)
+
+
+def test_telling_needs_nothing_that_takes_long_to_import() -> None:
+    program = "import sys, secondlook.recorded.story; print(sorted({'pydantic', 'shapely', 'yaml'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"  # the recorder's process would be late

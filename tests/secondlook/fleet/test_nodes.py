@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from comms.said.messages import Role
 from comms.said.routing import RosterNode
 from secondlook.fleet.build import Fleet, build_fleet
-from secondlook.fleet.node_spec import NodeSpec
-from secondlook.launch.host_plans import LONGEST_HOST, plan_hosts
+from secondlook.fleet.nodes import LONGEST_HOST, NodeSpec, hosts_of_run
 from secondlook.scenario import load_scenario
 
 ids = st.from_regex(r"[a-z0-9_-]{1,40}", fullmatch=True)
@@ -21,9 +20,15 @@ ids = st.from_regex(r"[a-z0-9_-]{1,40}", fullmatch=True)
 def fleet_of(vehicles: list[str]) -> Fleet:
     """A fleet of these vehicles, of which nothing is made."""
     run_info: Any = None
+    roster = (
+        RosterNode("world", Role.WORLD, tuple(vehicles)),
+        *(RosterNode(name, Role.REVISIT, (name,)) for name in vehicles),
+        RosterNode("coordinator", Role.COORDINATOR),
+        RosterNode("recorder", Role.RECORDER),
+        RosterNode("observer", Role.OBSERVER),
+    )
     acting = ["world", *vehicles, "coordinator"]
-    listening = (RosterNode("recorder", Role.RECORDER), RosterNode("observer", Role.OBSERVER))
-    return Fleet(run_info, listening, {name: NodeSpec("none:None", None) for name in acting}, 0)
+    return Fleet(run_info, roster, {name: NodeSpec("none:None", None) for name in acting}, 0)
 
 
 @pytest.mark.parametrize(
@@ -40,7 +45,7 @@ def test_nodes_are_spread_over_so_many_processes(
     processes: int | None, in_hub: list[str], hosts: dict[str, tuple[str, ...]]
 ) -> None:
     fleet = build_fleet(load_scenario(str(BRIEF)), record=True)
-    here, plans = plan_hosts(fleet, processes)
+    here, plans = hosts_of_run(fleet.roster, processes)
     assert here == in_hub
     assert {plan.host: plan.nodes for plan in plans} == {**hosts, "recorder": ("recorder",), "observer": ("observer",)}
 
@@ -49,7 +54,7 @@ def test_nodes_are_spread_over_so_many_processes(
 def test_every_node_has_one_place_and_every_host_a_name_of_its_own(vehicles: list[str], processes: int) -> None:
     taken = {"world", "coordinator", "recorder", "observer", "clock"}
     fleet = fleet_of([name for name in vehicles if name not in taken])
-    here, plans = plan_hosts(fleet, processes)
+    here, plans = hosts_of_run(fleet.roster, processes)
     placed = [*here, *(node for plan in plans for node in plan.nodes)]
     assert sorted(placed) == sorted([*fleet.specs, "recorder", "observer"])
     names = [plan.host for plan in plans]
@@ -59,5 +64,5 @@ def test_every_node_has_one_place_and_every_host_a_name_of_its_own(vehicles: lis
 
 def test_groups_that_could_be_spelled_alike_have_different_names() -> None:
     # Two processes: `a-b` with `c`, and `a` with `b-c`.
-    _, plans = plan_hosts(fleet_of(["a-b", "a", "c", "b-c"]), 3)
+    _, plans = hosts_of_run(fleet_of(["a-b", "a", "c", "b-c"]).roster, 3)
     assert {plan.host for plan in plans} >= {"a-b+c+coordinator", "a+b-c"}

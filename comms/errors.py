@@ -1,0 +1,40 @@
+"""How a run goes wrong: the text of each error is one sentence that names who, and what."""
+
+from __future__ import annotations
+
+
+class NodeError(Exception):
+    """A node has broken the rules of the house or raised."""
+
+
+class FleetError(Exception):
+    """A process of the fleet has failed or fallen silent."""
+
+
+class HostLostError(FleetError):
+    """The connection to a process is gone: it has died, or for too long given no sign of life."""
+
+    def __init__(self, host: str, at_ms: int) -> None:
+        super().__init__(f"{host} was lost at {at_ms / 1000:.3f} s of the mission")
+        self.host = host
+        self.at_ms = at_ms
+
+
+class RunawayError(Exception):
+    """Too many rounds or messages within one simulated second: nodes answer each other without end."""
+
+
+class ConnectionFailedError(Exception):
+    """A session that could not be opened."""
+
+
+class RefusedError(Exception):
+    """The clock does not let this process take part, or does not answer."""
+
+
+class WordsError(Exception):
+    """Words between clock and processes that make no sense."""
+
+
+class Interrupted(Exception):  # noqa: N818 - not an error: someone has asked for an early end
+    """The run ends early; what was received so far is kept."""

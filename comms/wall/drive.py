@@ -1,0 +1,83 @@
+"""The wall clock as a drive: what `comms.drive.Drive` asks, for a fleet of which everyone is there from the start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from comms.drive import Host, Setup
+from comms.keys import HostSpec
+from comms.node import Listener, Node
+from comms.result import BusResult
+from comms.said.messages import ClockMode
+from comms.said.routing import Routing
+from comms.wall.access import access_rules
+from comms.wall.host import WallHost
+from comms.wall.hub import WallHub
+from comms.wall.local_bus import run_local_by_wall
+from comms.wall.seats import ListenerSeat, NodeSeat, Seat
+
+
+@dataclass(frozen=True)
+class ByWallClock:
+    """See `comms.drive.Drive`. `factor`: > 0. Whoever is lost ends the run."""
+
+    factor: float
+
+    mode = ClockMode.WALL
+
+    def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:
+        """None: nothing is planned to happen to anyone."""
+        return ()
+
+    def run_local(
+        self, setup: Setup, nodes: Mapping[str, Callable[[], Node]], listeners: Mapping[str, Listener]
+    ) -> BusResult:
+        """See `comms.drive.Drive`."""
+        return run_local_by_wall(setup.routing(), nodes, listeners, setup.run_info, setup.time_limit_ms, self.factor)
+
+    def access_rules(self, setup: Setup, hosts: tuple[HostSpec, ...]) -> dict[str, Any]:
+        """See `comms.drive.Drive`."""
+        return access_rules(setup.routing(), hosts, setup.keys)
+
+    def hub(
+        self,
+        session: zenoh.Session,
+        setup: Setup,
+        hosts: tuple[HostSpec, ...],
+        nodes: Mapping[str, Node],
+        *,
+        carry_out: Callable[[str, str], None],
+        alive: Callable[[int], None],
+    ) -> Callable[[], BusResult]:
+        """See `comms.drive.Drive`; nothing is to be carried out."""
+        routing = setup.routing()
+        hub = WallHub(
+            session,
+            setup.keys,
+            routing,
+            hosts,
+            NodeSeat(nodes, routing),
+            setup.run_info,
+            setup.time_limit_ms,
+            self.factor,
+            strict=True,
+            patience_s=setup.patience_s,
+            alive=alive,
+        )
+        return hub.run
+
+    def acting(self, session: zenoh.Session, setup: Setup, spec: HostSpec, nodes: Mapping[str, Node]) -> Host:
+        """See `comms.drive.Drive`."""
+        return self._host(session, setup, spec.host, NodeSeat(nodes, setup.routing()))
+
+    def listening(self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener) -> Host:
+        """See `comms.drive.Drive`."""
+        return self._host(session, setup, host, ListenerSeat({node_id: listener}, setup.routing()))
+
+    def _host(self, session: zenoh.Session, setup: Setup, host: str, seat: Seat) -> Host:
+        sha256 = setup.run_info.scenario_sha256
+        return WallHost(session, setup.keys, host, seat, setup.routing(), sha256, setup.time_limit_ms)
