@@ -18,8 +18,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.allocate.rolling import RollingPlan
-from coordinator.allocate.service import service
+from coordinator.allocate.rolling import RollingAllocator
+from coordinator.allocate.service import expected_service
 from coordinator.allocate.simple import NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 from planner.dubins import Pose
@@ -57,7 +57,7 @@ def situation(strips: int, helpers: int, seed: int) -> Situation:
         if number % 2 == 0:
             return free
         task = strip(strips + number)
-        served = service(task, free)
+        served = expected_service(task, free)
         return Helper(**{**vars(free), "task": task, "free_at": served.free_at, "free_s": served.free_s})
 
     open_strips = tuple(strip(number) for number in range(1, strips + 1))
@@ -80,7 +80,7 @@ def measure(seeds: int) -> list[dict[str, float]]:
     rows = []
     for strips, helpers in SIZES:
         situations = [situation(strips, helpers, seed) for seed in range(1, seeds + 1)]
-        plan = [milliseconds(RollingPlan(), one) for one in situations]
+        plan = [milliseconds(RollingAllocator(), one) for one in situations]
         nearest = [milliseconds(NearestAllocator(), one) for one in situations]
         rows.append(
             {

@@ -3,38 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import Cut, strip_of
-from coordinator.cut.worth import Supply, worth_later_m2ps
+from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
-from planner.types import GridSpec, Strip
 
 SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on the way
 
 
 class Briefing:
-    """Looks at ledger, vehicles and cutter as they are when it is asked; changes none of them."""
+    """Reads ledger, vehicles and cutter as they are when it is asked; changes none of them."""
 
-    def __init__(
-        self,
-        config: CoordinatorConfig,
-        grid: GridSpec,
-        ledger: Ledger,
-        vehicles: Mapping[str, KnownVehicle],
-        cutter: Cutter,
-    ) -> None:
+    def __init__(self, config: CoordinatorConfig, ledger: Ledger, fleet: KnownFleet, cutter: Cutter) -> None:
         self._config = config
-        self._grid = grid
+        self._grid = fleet.map.grid
         self._ledger = ledger
-        self._vehicles = vehicles
-        self._primaries = [one for one in vehicles.values() if one.entry.role.surveys]
+        self._vehicles = fleet.vehicles
+        self._primaries = fleet.primaries.values()
         self._cutter = cutter
 
     def situation(self, now_ms: int, coming: Sequence[Cut]) -> Situation:
@@ -69,7 +62,8 @@ class Briefing:
 
     def coming_strip(self, cut: Cut) -> OpenStrip:
         """What will be a strip, as an allocator sees it."""
-        return OpenStrip(self.strip_of(cut, 0), self._risk_m2(cut), cut.settles_s)
+        strip = strip_of(self._grid, cut.window, 0, descending=cut.descending)
+        return OpenStrip(strip, self._risk_m2(cut), cut.settles_s)
 
     def open_strip(self, record: StripRecord) -> OpenStrip:
         """A strip as an allocator sees it."""
@@ -82,10 +76,6 @@ class Briefing:
             return math.inf
         helpers = self.helpers(now_ms)
         return SWEEPING_SHARE * sum(max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m for one in helpers)
-
-    def strip_of(self, cut: Cut, number: int) -> Strip:
-        """The strip that is cut there."""
-        return strip_of(self._grid, cut.window, number, descending=cut.descending)
 
     def _worth_later_m2ps(self, helpers: Sequence[Helper], deadline_s: float, coming: Sequence[Cut]) -> float:
         """Of what is open, and of what is to come if the rest of the area is like what has settled."""
@@ -141,3 +131,23 @@ class Briefing:
 
     def _risk_m2(self, cut: Cut) -> float:
         return cut.counts_m2 / self._cutter.rules.p_detect
+
+
+@dataclass(frozen=True)
+class Supply:
+    """Strips of a kind: what one look removes at each (residual risk times m2), the seconds it takes, and how many."""
+
+    removed_m2: float
+    service_s: float
+    count: float
+
+
+def worth_later_m2ps(supplies: Iterable[Supply], helpers_s: float) -> float:
+    """The rate of the last strip served if `helpers_s` seconds go to the strips of the best rates first; 0 where the
+    time suffices for all of them."""
+    left_s = helpers_s
+    for supply in sorted(supplies, key=lambda one: -one.removed_m2 / one.service_s):
+        left_s -= supply.service_s * supply.count
+        if left_s < 0:
+            return supply.removed_m2 / supply.service_s
+    return 0.0

@@ -1,4 +1,4 @@
-"""What the coordinator is told before the mission; everything about the fleet it takes from the run's announcement."""
+"""What the coordinator is told before the mission; everything about the fleet it has from the run's announcement."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priorit
 @dataclass(frozen=True)
 class CoordinatorConfig:
     """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
-    age of a vehicle's state from which it is taken for lost. `min_strip_m`, `max_strip_m`: length of a strip.
+    age of a vehicle's state from which it counts as lost. `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, at most:
     it falls where helpers have time for more.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.

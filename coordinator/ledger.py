@@ -1,4 +1,4 @@
-"""The ledger of strips: each has one state at a time, and each change a reason. Nothing is ever taken out."""
+"""The ledger of strips: each has one state at a time, and each change a reason. Nothing is ever removed."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from comms.said.messages import StripState
-from coordinator.cut.strips import Cut, Window
+from coordinator.cut.strips import Cut
+from coordinator.cut.window import Window
 from planner.types import Strip
 
+NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
 ENDED = frozenset({StripState.DONE, StripState.FAILED, StripState.WITHDRAWN})
 _ALLOWED: dict[StripState, frozenset[StripState]] = {

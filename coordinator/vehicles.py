@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, field
 
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role, RosterVehicle
 from coordinator.allocate.service import Service
 from coordinator.cut.ground import TrackUnderWay
-from coordinator.cut.strips import SAME_PLACE, Cut, Window
+from coordinator.cut.strips import Cut
+from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
 from planner.dubins import Pose
 from planner.risk import LevelArray
 from planner.sweep import Run, distance_over, run_over
 from planner.types import Strip
 
+log = logging.getLogger("secondlook.coordinator")
+
 
 def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int) -> int | None:
     """Milliseconds since the mission's start; None where that cannot be told.
 
-    The track that the state tells it works on ends when the state expects; each further one takes the shortest way
-    there, with run-in and run-out. `heard_ms`: when the state was sent. Tracks that a later plan adds or drops are not
-    known.
+    The track that the state tells it works on ends when the state expects; each further one is reached the
+    shortest way, with run-in and run-out. `heard_ms`: when the state was sent. Tracks that a later plan adds or drops
+    are not known.
     """
     if state is None or plan is None or state.mode is Mode.FINISHED:
         return None
@@ -71,10 +75,11 @@ class KnownVehicle:
     """One vehicle of the fleet.
 
     `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was given up; for a primary.
-    `refused`: strips that it has refused as they are. `failed_at`: where it has failed. `offers`: by number the newest
-    offer of each strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in
-    a row that it has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its
-    newest one, for a primary.
+    `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
+    pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
+    strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
+    has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, for a
+    primary.
     """
 
     entry: RosterVehicle
@@ -83,6 +88,7 @@ class KnownVehicle:
     lost: bool = False
     finished_ms: int | None = None
     refused: set[int] = field(default_factory=set)
+    gave_way: set[int] = field(default_factory=set)
     failed_at: list[Window] = field(default_factory=list)
     offers: dict[int, Offer] = field(default_factory=dict)
     asked_back: int = 0
@@ -98,7 +104,7 @@ class KnownVehicle:
 
     @property
     def is_idle(self) -> bool:
-        """Whether it is there and without work; a primary that takes strips is so once it has surveyed all."""
+        """Whether it is there and without work; a primary that serves strips is so once it has surveyed all."""
         free = (Mode.IDLE, Mode.FINISHED) if self.entry.role is Role.SURVEY_REVISIT else (Mode.IDLE,)
         return not self.lost and self.state is not None and self.state.mode in free
 
@@ -115,8 +121,8 @@ class KnownVehicle:
         """Whether it has said that it will do no more."""
         return self.state is not None and self.state.mode is Mode.FINISHED
 
-    def take_state(self, header: Header, state: AgentState, now_ms: int) -> bool:
-        """Takes its state; returns False, and changes nothing, for one that is not newer than the newest."""
+    def hear_state(self, header: Header, state: AgentState, now_ms: int) -> bool:
+        """Hears its state; returns False, and changes nothing, for one that is not newer than the newest."""
         order = (header.incarnation, header.sequence)
         if order <= self._state_order:
             return False
@@ -133,8 +139,8 @@ class KnownVehicle:
             self.finished_ms = None
         return True
 
-    def take_plan(self, header: Header, plan: Plan) -> None:
-        """Takes its plan, if it is newer than the newest."""
+    def hear_plan(self, header: Header, plan: Plan) -> None:
+        """Hears its plan; the newest counts."""
         order = (header.incarnation, plan.revision)
         if order > self._plan_order:
             self._plan_order = order
@@ -145,8 +151,26 @@ class KnownVehicle:
         """Whether it may be offered a strip: it has not failed, nor been silent, too often in a row."""
         return self.failures < MOST_FAILURES and self.unanswered < MOST_UNANSWERED
 
+    def note_failure(self, place: Window | None = None) -> None:
+        """Notes that it has not served what it accepted; where `place` is given it is not to be sent there again."""
+        if place is not None:
+            self.failed_at.append(place)
+        was_trusted = self.is_trusted
+        self.failures += 1
+        self._tell_if_given_up(was_trusted, f"it has not served {self.failures} strips in a row")
+
+    def note_silence(self) -> None:
+        """Notes that it has not answered an offer."""
+        was_trusted = self.is_trusted
+        self.unanswered += 1
+        self._tell_if_given_up(was_trusted, f"{self.unanswered} offers in a row are not answered")
+
+    def _tell_if_given_up(self, was_trusted: bool, why: str) -> None:
+        if was_trusted and not self.is_trusted:
+            log.warning("%s is offered nothing more: %s", self.entry.vehicle, why)
+
     def note_tile(self, incarnation: int, version: int) -> None:
-        """Takes note that a tile of it has come."""
+        """Notes that a tile of it has come."""
         if incarnation > self._tiles_of:
             self._tiles_of, self._tile_versions = incarnation, set()
         if incarnation == self._tiles_of:
@@ -175,7 +199,7 @@ class KnownVehicle:
         return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps, self.entry.swath_m)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
-        """Whether a message about a strip is newer than all that it has told of it; takes note of it."""
+        """Whether a message about a strip is newer than all that it has told of it; notes it."""
         order = (header.incarnation, header.sequence)
         if order <= self._task_orders.get(strip, _NONE_YET):
             return False
@@ -184,6 +208,4 @@ class KnownVehicle:
 
     def is_not_for_it(self, record: StripRecord) -> bool:
         """Whether it has refused this strip as it is, or failed at its place."""
-        window = record.window
-        failed = any(window.shared(place) >= SAME_PLACE * window.size for place in self.failed_at)
-        return failed or record.strip.number in self.refused
+        return record.strip.number in self.refused - self.gave_way or record.window.is_at_one_of(self.failed_at)

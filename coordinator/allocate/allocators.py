@@ -10,13 +10,13 @@ from types import MappingProxyType
 from typing import Protocol
 
 from coordinator.allocate.auction import AuctionAllocator
-from coordinator.allocate.rolling import RollingPlan
+from coordinator.allocate.rolling import RollingAllocator
 from coordinator.allocate.simple import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 
 ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
     {
-        "plan": RollingPlan,
+        "plan": RollingAllocator,
         "auction": AuctionAllocator,
         "greedy": GreedyAllocator,
         "nearest": NearestAllocator,

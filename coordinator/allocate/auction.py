@@ -65,7 +65,7 @@ class _Bidder:
         self._table = StripTable(strips, helper, deadline_s)
         self._pose, self._free_s = helper.free_at, helper.free_s
         self._unsold = np.ones(len(strips), dtype=np.bool_)
-        self._look_ahead()
+        self._rate_strips()
 
     def bid(self) -> Bid | None:
         """Its best bid; None where nothing is left that it wants."""
@@ -87,8 +87,8 @@ class _Bidder:
             self.leaves_s = float(self._found.leaves_s[0, place])
         self.bought.append(bid.number)
         self._pose, self._free_s = Pose(*self._found.leave[0, place].tolist()), float(self._found.free_s[0, place])
-        self._look_ahead()
+        self._rate_strips()
 
-    def _look_ahead(self) -> None:
-        self._found = self._table.services(np.array([self._pose]), np.array([self._free_s]))
+    def _rate_strips(self) -> None:
+        self._found = self._table.served_from(np.array([self._pose]), np.array([self._free_s]))
         self._m2ps = self._found.removed_m2[0] / (self._found.free_s[0] - self._free_s)

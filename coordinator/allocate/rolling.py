@@ -34,7 +34,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class RollingPlan:
+class RollingAllocator:
     """The default allocator: see the module.
 
     First each helper has the strip kept for it at which it removes the most risk per second, the best pair first; one
@@ -59,10 +59,10 @@ class RollingPlan:
         strips = [*open_strips, *sorted(situation.coming, key=lambda one: (one.settles_s, one.strip.start))]
         searches = {one.vehicle: _Search(self, situation, strips, one) for one in helpers}
         kept = _best_pairs(searches, {one.vehicle for one in situation.free})
-        taken: set[int] = set()
+        planned: set[int] = set()
         offers: dict[str, int] = {}
         for helper in helpers:
-            not_for_it = taken | {strip for vehicle, strip in kept.items() if vehicle != helper.vehicle}
+            not_for_it = planned | {strip for vehicle, strip in kept.items() if vehicle != helper.vehicle}
             plan = searches[helper.vehicle].plan(not_for_it)
             to_offer = helper.task is None and plan.leaves_s <= situation.now_s + SOON_S
             if helper.task is not None and not helper.sweeping:
@@ -70,9 +70,8 @@ class RollingPlan:
                 plan, to_offer = other or plan, other is not None
             if to_offer and plan.strips and plan.strips[0] < len(open_strips):
                 offers[helper.vehicle] = strips[plan.strips[0]].strip.number
-            taken |= {
-                strip for strip in plan.strips if strip < len(strips)
-            }  # one turned round may come back to its task
+            # One that is turned round may come back to its task.
+            planned |= {strip for strip in plan.strips if strip < len(strips)}
             kept.pop(helper.vehicle, None)
         return offers
 
@@ -101,7 +100,7 @@ class _Search:
     """The search for a helper's plan from where and when it is free."""
 
     def __init__(
-        self, allocator: RollingPlan, situation: Situation, strips: Sequence[OpenStrip], helper: Helper
+        self, allocator: RollingAllocator, situation: Situation, strips: Sequence[OpenStrip], helper: Helper
     ) -> None:
         self._allocator = allocator
         self._situation = situation
@@ -109,7 +108,7 @@ class _Search:
         self._deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
         self._table = StripTable(strips, helper, self._deadline_s)
         self._pose = np.array([helper.free_at], dtype=np.float64)
-        self.first = self._table.services(self._pose, np.array([helper.free_s]))
+        self.first = self._table.served_from(self._pose, np.array([helper.free_s]))
         self.rates: FloatArray = self.first.removed_m2[0] / (self.first.free_s[0] - helper.free_s)
 
     def plan(self, not_for_it: set[int]) -> Plan:
@@ -133,7 +132,7 @@ class _Search:
         sequences: list[tuple[int, ...]] = [()]
         leaves_s = [0.0]
         for depth in range(min(self._allocator.depth, chosen.size)):
-            found = table.services(poses, times_s)
+            found = table.served_from(poses, times_s)
             possible = (found.removed_m2 > 0) & ~used
             if not possible.any():
                 break

@@ -35,15 +35,10 @@ def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
     return sweeps_over(strip, helper.swath_m, helper.turn_radius_m, helper.run_in_m)
 
 
-def service(one: OpenStrip, helper: Helper) -> Service:
-    """The service of a strip from where and when a helper is free, flown the shortest way, which its agent takes. Where
-    the strip is still settling the helper sets out as late as it must."""
+def expected_service(one: OpenStrip, helper: Helper) -> Service:
+    """The service of a strip from where and when a helper is free, flown the shortest way, as its agent does. Where the
+    strip is still settling the helper sets out as late as it must."""
     sweep, way_m = shortest_sweep(sweeps(one.strip, helper), helper.free_at, helper.turn_radius_m)
-    return timed(one, sweep, way_m, helper)
-
-
-def timed(one: OpenStrip, sweep: Sweep, way_m: float, helper: Helper) -> Service:
-    """The service that flies a sweep after a way of this length."""
     to_begin_s = (way_m + helper.run_in_m) / helper.speed_mps
     sonar_on_s = (sweep.length_m - 2 * helper.run_in_m) / helper.speed_mps
     begins_s = helper.free_s + to_begin_s
@@ -68,9 +63,9 @@ def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: floa
 
 
 @dataclass(frozen=True)
-class Services:
-    """Arrays of shape (n, strips), for n places: what each service removes by the deadline, 0 where it cannot be; when
-    the helper sets out; when it is free; and `leave`, shape (n, strips, 3), its pose then."""
+class ServiceArrays:
+    """Services as arrays of shape (n, strips), for n places: what each removes by the deadline, 0 where it cannot be;
+    when the helper sets out; when it is free; and `leave`, shape (n, strips, 3), its pose then."""
 
     removed_m2: FloatArray
     leaves_s: FloatArray
@@ -107,7 +102,7 @@ class StripTable:
         }
         return table
 
-    def services(self, poses: FloatArray, times_s: FloatArray) -> Services:
+    def served_from(self, poses: FloatArray, times_s: FloatArray) -> ServiceArrays:
         """The services of all strips, each by itself, from poses, shape (n, 3), at these times, shape (n,)."""
         helper, (count, ways) = self._helper, self._length_m.shape
         speed_mps, run_in_m = helper.speed_mps, helper.run_in_m
@@ -122,7 +117,7 @@ class StripTable:
         sonar_on_s = (self._length_m[strips, which] - 2 * run_in_m) / speed_mps
         share = np.clip((self._deadline_s - begins_s) / sonar_on_s, 0.0, 1.0)
         ends_s = begins_s + sonar_on_s
-        return Services(
+        return ServiceArrays(
             removed_m2=np.where(ends_s <= helper.lasts_until_s, self._removable_m2 * share, 0.0),
             leaves_s=begins_s - to_begin_s,
             free_s=ends_s + run_in_m / speed_mps,

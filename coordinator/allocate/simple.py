@@ -1,11 +1,11 @@
-"""The simple allocators: they look at the open strips and the free helpers alone."""
+"""The simple allocators: they weigh the open strips and the free helpers alone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from coordinator.allocate.service import Service, removed_m2, service
+from coordinator.allocate.service import Service, expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
 SOON_S = 1.0
@@ -62,16 +62,14 @@ def _best_pairs(
     for helper in situation.free:
         for one in situation.strips:
             if one.strip.number not in helper.refused:
-                served = service(one, helper)
+                served = expected_service(one, helper)
                 removed = removed_m2(one, helper, served, situation.deadline_s)
                 if removed > 0 and served.leaves_s <= situation.now_s + SOON_S:
                     rated.append((merit(helper, one, served, removed), -one.strip.number, helper.vehicle))
     rated.sort(key=lambda pair: pair[2])
     rated.sort(key=lambda pair: pair[:2], reverse=True)
     offers: dict[str, int] = {}
-    taken: set[int] = set()
     for _, minus_number, vehicle in rated:
-        if vehicle not in offers and -minus_number not in taken:
+        if vehicle not in offers and -minus_number not in offers.values():
             offers[vehicle] = -minus_number
-            taken.add(-minus_number)
     return offers

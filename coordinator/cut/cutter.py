@@ -11,10 +11,25 @@ import numpy as np
 
 from comms.said.messages import Hotspot
 from coordinator.cut.ground import BadlySeen, ExpectedLooks, Growth, Place, Revision, TrackUnderWay
-from coordinator.cut.strips import Cut, CuttingRules, Window, cut_strips, stretches
-from coordinator.cut.worth import worth_risk
+from coordinator.cut.strips import Cut, CuttingRules, cut_strips, stretches
+from coordinator.cut.window import Window
 from planner.fleet_map import FleetMap
+from planner.risk import NATS_PER_LEVEL
 from planner.types import BoolArray, FloatArray, GridSpec
+
+RISK_STEP = 0.05
+"""Worth is told in steps, so that it does not change with every look."""
+
+
+def worth_risk(risk: FloatArray, cells: float, least_weight: float = 1.0) -> float:
+    """Residual risk from which a cell is worth a second look, if helpers have time for so many: rounded down to a step,
+    at least one, of what counts least. `risk`: as it counts, of the cells that may be worth one."""
+    count = int(cells)
+    least_step = RISK_STEP * least_weight
+    if count >= risk.size:
+        return least_step
+    least = float(np.partition(risk, risk.size - 1 - count)[risk.size - 1 - count])
+    return max(least_step, int(least / RISK_STEP + 1e-9) * RISK_STEP)
 
 
 @dataclass
@@ -24,7 +39,7 @@ class LastCut:
     grid: GridSpec
     _arrays: tuple[FloatArray | BoolArray, ...] = ()
     _rules: CuttingRules | None = None
-    _looked_at: frozenset[Window] = frozenset()
+    _claimed: frozenset[Window] = frozenset()
 
     def changed_columns(
         self,
@@ -32,12 +47,12 @@ class LastCut:
         open_cells: BoolArray,
         growth: Growth,
         rules: CuttingRules,
-        looked_at: Iterable[Window],
+        claimed: Iterable[Window],
     ) -> BoolArray:
         """Columns, shape (columns,), with a cell whose risk, settling or strip is another than at the last cut, and
         those two swaths beside; all of them where the rules are others.
 
-        `looked_at`: the windows that are a strip's, or will be; where one has gone its cells have changed. Remembers
+        `claimed`: the windows that are a strip's, or will be; where one has gone its cells have changed. Remembers
         the arrays and the rules.
         """
         arrays = (risk, open_cells, growth.risk, growth.settles_s, growth.descending)
@@ -49,7 +64,7 @@ class LastCut:
             changed |= now != before
         found = np.zeros(self.grid.columns, dtype=np.bool_)
         found |= changed.any(axis=0)
-        for window in self._looked_at.difference(looked_at):
+        for window in self._claimed.difference(claimed):
             found[window.columns] = True
         self._arrays = arrays
         reach = 2 * rules.columns(self.grid)
@@ -58,14 +73,14 @@ class LastCut:
             columns[max(0, stretch.start - reach) : stretch.stop + reach] = True
         return columns
 
-    def remember(self, looked_at: Iterable[Window]) -> None:
+    def remember(self, claimed: Iterable[Window]) -> None:
         """Remembers the windows that are a strip's, or will be, after the cut."""
-        self._looked_at = frozenset(looked_at)
+        self._claimed = frozenset(claimed)
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """The area as it was looked at once. `columns`: those to be cut anew; for the other arrays see `cut_strips`."""
+    """The area as it was at one time. `columns`: those to be cut anew; for the other arrays see `cut_strips`."""
 
     columns: BoolArray
     risk: FloatArray
@@ -95,21 +110,27 @@ class Cutter:
         self._expected_looks = ExpectedLooks(fleet.grid)
         self._last_cut = LastCut(fleet.grid)
 
-    def take_hotspot(self, place: Place, revision: Revision, message: Hotspot) -> bool:
-        """Takes a hotspot's newest word; returns whether it was news."""
-        return self._badly_seen.take(place, revision, message)
+    def hear_hotspot(self, place: Place, revision: Revision, message: Hotspot) -> bool:
+        """Hears a hotspot's newest word; returns whether it was news."""
+        return self._badly_seen.hear(place, revision, message)
 
-    def learn(self, window: Window, p_detect: FloatArray, typical: float) -> None:
-        """Learns what a helper's looks have found: see `ExpectedLooks.learn`."""
-        self._expected_looks.learn(window, p_detect, typical)
+    def learn(self, window: Window, helper: str, typical: float) -> None:
+        """Learns what second looks find, from what a helper that has swept a window has told of it.
 
-    def look(
-        self, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, looked_at: Sequence[Window]
+        `typical`: its P_d as the run tells it.
+        """
+        layer = self._fleet.layers.get(helper)
+        if layer is not None:
+            p_detect = -np.expm1(-NATS_PER_LEVEL * layer.largest_levels[window.cells].astype(np.float64))
+            self._expected_looks.learn(window, p_detect, typical)
+
+    def assess(
+        self, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, claimed: Sequence[Window]
     ) -> Ground:
-        """Looks at the area as it is now.
+        """Assesses the area as it is now: what is badly seen, what still grows, and what a look must bring.
 
         `primaries`: the track that each flies. `sweeps_m2`: what helpers have time for until the mission ends, infinite
-        while nobody can tell. `looked_at`: the windows that are a strip's, or will be.
+        while nobody can tell. `claimed`: the windows that are a strip's, or will be.
         """
         fleet, inside = self._fleet, self._inside
         settled = fleet.settled_by(primaries)
@@ -128,22 +149,22 @@ class Cutter:
             marginal = worth_risk(counts[counts > 0], cells, self._least_weight)
             worth = min(self._most_worth_risk, marginal)
             self.rules = replace(self.rules, worth_risk=worth, marginal_risk=marginal)
-        columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, looked_at)
+        columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, claimed)
         return Ground(columns, risk, open_cells, growth)
 
-    def cut(self, ground: Ground, looked_at: Sequence[Window]) -> list[Cut]:
-        """The strips in the columns to be cut anew, best first; `looked_at`: windows that are a strip's already."""
+    def cut(self, ground: Ground, claimed: Sequence[Window]) -> list[Cut]:
+        """The strips in the columns to be cut anew, best first; `claimed`: windows that are a strip's already."""
         return cut_strips(
             self._fleet.grid,
             ground.risk,
             ground.open_cells,
             self.rules,
-            looked_at,
+            claimed,
             ground.growth,
             ground.columns,
             self._weights,
         )
 
-    def remember(self, looked_at: Sequence[Window]) -> None:
+    def remember(self, claimed: Sequence[Window]) -> None:
         """Remembers the windows that are a strip's, or will be, after the cut."""
-        self._last_cut.remember(looked_at)
+        self._last_cut.remember(claimed)

@@ -12,18 +12,15 @@ be seen as badly as those behind it, so that a helper can follow in its wake.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from comms.said.messages import Hotspot, HotspotState, PlannedTrack
+from coordinator.cut.window import Window
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.groups import neighbours
 from planner.region import points_inside
 from planner.types import BoolArray, FloatArray, GridSpec
-
-if TYPE_CHECKING:  # strips are cut with what is known of the ground
-    from coordinator.cut.strips import Window
 
 Place = tuple[str, int]
 """A hotspot's vehicle and number."""
@@ -41,7 +38,7 @@ class _Standing:
 
 
 class BadlySeen:
-    """Takes hotspots as they come; of one hotspot's revisions the newest counts."""
+    """Hears hotspots as they come; of one hotspot's revisions the newest counts."""
 
     def __init__(self, grid: GridSpec, inside: BoolArray) -> None:
         self._grid = grid
@@ -51,8 +48,8 @@ class BadlySeen:
         self._hot: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
         self._told_risk: FloatArray = np.zeros(grid.shape)
 
-    def take(self, place: Place, revision: Revision, message: Hotspot) -> bool:
-        """Takes a hotspot's newest word; returns whether it was news."""
+    def hear(self, place: Place, revision: Revision, message: Hotspot) -> bool:
+        """Hears a hotspot's newest word; returns whether it was news."""
         known = self._hotspots.get(place)
         if known is not None and revision <= known.revision:
             return False
@@ -196,7 +193,7 @@ class Growth:
             np.array([track.start_x_m, track.end_x_m]), np.array([track.start_y_m, track.end_y_m])
         )
         descending = bool(end_m < start_m)
-        far_m = under_way.range_m + 2 * grid.cell_m  # cells are taken for settled with a margin
+        far_m = under_way.range_m + 2 * grid.cell_m  # cells settle with a margin
         first, end = np.searchsorted(grid.across_m, [across_m - far_m, across_m + far_m]).tolist()
         beside = (slice(None, None, -1 if descending else 1), slice(first, end))
         settled, still_open = inside[beside] & layer.settled[beside], inside[beside] & ~layer.settled[beside]

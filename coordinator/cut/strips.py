@@ -1,26 +1,26 @@
 """Cuts strips: rectangles along the tracks, as wide as the helper's swath, where a second look removes the most risk.
 
 The risk that one look would remove is summed over every window as wide as the swath; along the window each metre has to
-pay for the time it takes. Where helpers have not the time for all that is worth a look, windows side by side are chosen
-that together remove most of what they do have time for. Then the best window becomes a strip, its cells count as looked
-at, and the search goes on.
+pay for its time. Where helpers have not the time for all that is worth a look, windows side by side are chosen
+that together remove most of what they do have time for. Then the best window becomes a strip, its cells count as if it
+had been flown, and the search goes on.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
+from coordinator.cut.bands import TOLERANCE, Bands
 from coordinator.cut.ground import Growth
-from coordinator.cut.runs import TOLERANCE, Runs
+from coordinator.cut.window import Window
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
 MOST_STRIPS_A_CUT = 100
-SAME_PLACE = 0.75  # share of a run's cells
 
 
 @dataclass(frozen=True)
@@ -44,47 +44,6 @@ class CuttingRules:
 
 
 @dataclass(frozen=True)
-class Window:
-    """A rectangle of whole cells: rows [first_row, end_row), columns [first_column, end_column)."""
-
-    first_row: int
-    end_row: int
-    first_column: int
-    end_column: int
-
-    @property
-    def cells(self) -> tuple[slice, slice]:
-        """The window of the grid's arrays."""
-        return slice(self.first_row, self.end_row), slice(self.first_column, self.end_column)
-
-    def overlap(self, other: Window) -> float:
-        """Shared cells as a share of the cells of both together."""
-        shared = self.shared(other)
-        return shared / (self.size + other.size - shared)
-
-    def shared(self, other: Window) -> int:
-        """Number of cells that lie in both."""
-        rows = min(self.end_row, other.end_row) - max(self.first_row, other.first_row)
-        columns = min(self.end_column, other.end_column) - max(self.first_column, other.first_column)
-        return max(rows, 0) * max(columns, 0)
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return self.end_row - self.first_row
-
-    @property
-    def size(self) -> int:
-        """Number of cells."""
-        return self.rows * (self.end_column - self.first_column)
-
-    @property
-    def columns(self) -> slice:
-        """Its columns of the grid's arrays."""
-        return slice(self.first_column, self.end_column)
-
-
-@dataclass(frozen=True)
 class Cut:
     """A strip's window and the risk that one look along it is expected to remove (residual risk times m2); `counts_m2`:
     what that counts in the objective.
@@ -102,7 +61,7 @@ def cut_strips(
     risk: FloatArray,
     open_cells: BoolArray,
     rules: CuttingRules,
-    taken: Sequence[Window] = (),
+    claimed: Sequence[Window] = (),
     growth: Growth | None = None,
     columns: BoolArray | None = None,
     weights: FloatArray | None = None,
@@ -111,73 +70,100 @@ def cut_strips(
 
     `risk`: residual risk of the cells that a strip may serve, 0 elsewhere. `open_cells`: inside the area and not
     settled; what still grows towards such cells is left for later, unless it is as long as a strip may be. A strip is
-    from `min_strip_m` to `max_strip_m` long, in whole cells. Best first: by what a run of rows removes beyond its cost.
-    `taken`: strips that are being served; their cells count as looked at. No strip lies by three quarters or more on
-    another one, or on one that is taken: whether a place is worth two looks is asked when it has had the first.
-    `growth`: what is about to settle counts as if it had. `columns`: where to look, shape (columns,); windows that hold
-    none of them are left out; None for everywhere. `weights`: how many times a cell's risk counts
+    from `min_strip_m` to `max_strip_m` long, in whole cells. Best first: by what a band of rows removes beyond its
+    cost. `claimed`: strips that are being served; their cells count as if they had been. No strip lies by three
+    quarters or more on another one, or on a claimed one: whether a place is worth two looks is asked when it has had
+    the first. `growth`: what is about to settle counts as if it had. `columns`: where to search, shape (columns,);
+    windows that hold none of them are left out; None for everywhere. `weights`: how many times a cell's risk counts
     when strips are compared, 1 if left out.
     """
     growth = growth or Growth.none(grid)
-    risk = np.where(growth.settles_s > 0, growth.risk, risk)
-    open_cells = open_cells & (growth.settles_s == 0)
-    width = rules.columns(grid)
-    removable = risk * (rules.p_detect * grid.cell_area_m2)
+    removable = np.where(growth.settles_s > 0, growth.risk, risk) * (rules.p_detect * grid.cell_area_m2)
     counts = removable.copy() if weights is None else removable * weights
-    looked_at = list(taken)
-    for window in taken:
-        removable[window.cells] *= 1.0 - rules.p_detect
-        counts[window.cells] *= 1.0 - rules.p_detect
-    shortest = max(1, round(rules.min_strip_m / grid.cell_m))
-    longest = max(shortest, round(rules.max_strip_m / grid.cell_m))
-    row_cost = rules.worth_risk * rules.p_detect * width * grid.cell_area_m2
-    fixed_cost = row_cost * rules.overhead_m / grid.cell_m
-    runs = Runs(counts, width, row_cost, fixed_cost)
-    to_look_at = np.ones(grid.columns, dtype=np.bool_) if columns is None else columns
-    for stretch in stretches(counts.any(axis=0) & to_look_at):
-        runs.look(stretch)
+    cutting = _Cutting(grid, rules, removable, counts, open_cells & (growth.settles_s == 0), growth, claimed)
+    cutting.search(counts.any(axis=0) & (np.ones(grid.columns, dtype=np.bool_) if columns is None else columns))
     dearer = rules.marginal_risk / rules.worth_risk
     together = dearer > 1
-    cuts: list[Cut] = []
     for _ in range(MOST_STRIPS_A_CUT):
-        found = runs.side_by_side(dearer) if together else []
+        found = cutting.bands.side_by_side(dearer) if together else []
         if not found:
-            together, found = False, runs.best()
-        if not found or len(cuts) >= MOST_STRIPS_A_CUT:
+            together, found = False, cutting.bands.best()
+        if not found or len(cutting.cuts) >= MOST_STRIPS_A_CUT:
             break
-        chosen = [Window(one.first_row, one.end_row, one.first_column, one.first_column + width) for one in found]
-        no_strips = []
-        for run in chosen:
-            beside = slice(max(0, run.first_row - 1), run.end_row + 1), run.columns
-            least = longest if open_cells[beside].any() else shortest
-            if run.rows < least or _is_one_of(run, looked_at):
-                no_strips.append(run)
-                counts[run.cells] = 0.0  # the search goes on elsewhere, and others are chosen
-        for run in [] if no_strips else chosen:
-            for begin, end in _pieces(run.first_row, run.end_row, shortest, longest):
-                window = Window(begin, end, run.first_column, run.end_column)
-                settles_s = float(growth.settles_s[window.cells].max())
-                descending = bool(growth.descending[window.cells].any())
-                removed_m2, counts_m2 = (float(each[window.cells].sum()) for each in (removable, counts))
-                pays = counts_m2 > ((end - begin) * row_cost + fixed_cost) * (1 + TOLERANCE)
-                if pays and not _is_one_of(window, looked_at):
-                    cuts.append(Cut(window, removed_m2, counts_m2, settles_s, descending))
-                    looked_at.append(window)
-                    removable[window.cells] *= 1.0 - rules.p_detect
-                    counts[window.cells] *= 1.0 - rules.p_detect
-                else:
-                    counts[window.cells] = 0.0
-        changed = np.zeros(grid.columns, dtype=np.bool_)
-        for run in no_strips or chosen:
-            changed[run.columns] = True
-        for stretch in stretches(changed):
-            runs.look(stretch)
-    return cuts
+        cutting.cut(found)
+    return cutting.cuts
 
 
-def _is_one_of(window: Window, others: Iterable[Window]) -> bool:
-    """Whether one of these is at the same place."""
-    return any(window.shared(other) >= SAME_PLACE * window.size for other in others)
+class _Cutting:
+    """Cuts one strip after another from the same ground; for `open_cells`, `growth` and `claimed` see `cut_strips`.
+
+    `removable`: what one look removes of each cell (residual risk times m2), and `counts`: what that counts; both are
+    changed, so that they tell what the strips cut so far leave. `cuts`: these.
+    """
+
+    def __init__(
+        self,
+        grid: GridSpec,
+        rules: CuttingRules,
+        removable: FloatArray,
+        counts: FloatArray,
+        open_cells: BoolArray,
+        growth: Growth,
+        claimed: Iterable[Window],
+    ) -> None:
+        self.cuts: list[Cut] = []
+        self._p_detect = rules.p_detect
+        self._width = rules.columns(grid)
+        self._shortest = max(1, round(rules.min_strip_m / grid.cell_m))
+        self._longest = max(self._shortest, round(rules.max_strip_m / grid.cell_m))
+        self._row_cost = rules.worth_risk * rules.p_detect * self._width * grid.cell_area_m2
+        self._fixed_cost = self._row_cost * rules.overhead_m / grid.cell_m
+        self._removable, self._counts, self._open_cells, self._growth = removable, counts, open_cells, growth
+        self._claimed: list[Window] = []
+        for window in claimed:
+            self._claim(window)
+        self.bands = Bands(counts, self._width, self._row_cost, self._fixed_cost)
+
+    def search(self, columns: BoolArray) -> None:
+        """Searches these columns, shape (columns,), for the best bands."""
+        for stretch in stretches(columns):
+            self.bands.search(stretch)
+
+    def cut(self, windows: Sequence[Window]) -> None:
+        """Cuts strips from these bands; where one of them gives none the search goes on without it, as others may then
+        be chosen beside."""
+        no_strips = [window for window in windows if not self._gives_strips(window)]
+        for window in no_strips:
+            self._counts[window.cells] = 0.0
+        for window in [] if no_strips else windows:
+            for begin, end in _pieces(window.first_row, window.end_row, self._shortest, self._longest):
+                self._cut_piece(replace(window, first_row=begin, end_row=end))
+        changed = np.zeros(self._counts.shape[1], dtype=np.bool_)
+        for window in no_strips or windows:
+            changed[window.columns] = True
+        self.search(changed)
+
+    def _gives_strips(self, window: Window) -> bool:
+        beside = slice(max(0, window.first_row - 1), window.end_row + 1), window.columns
+        least = self._longest if self._open_cells[beside].any() else self._shortest
+        return window.rows >= least and not window.is_at_one_of(self._claimed)
+
+    def _cut_piece(self, window: Window) -> None:
+        settles_s = float(self._growth.settles_s[window.cells].max())
+        descending = bool(self._growth.descending[window.cells].any())
+        removed_m2, counts_m2 = (float(each[window.cells].sum()) for each in (self._removable, self._counts))
+        pays = counts_m2 > (window.rows * self._row_cost + self._fixed_cost) * (1 + TOLERANCE)
+        if pays and not window.is_at_one_of(self._claimed):
+            self.cuts.append(Cut(window, removed_m2, counts_m2, settles_s, descending))
+            self._claim(window)
+        else:
+            self._counts[window.cells] = 0.0
+
+    def _claim(self, window: Window) -> None:
+        """What a look leaves in a window is all that counts there from now on."""
+        self._claimed.append(window)
+        self._removable[window.cells] *= 1.0 - self._p_detect
+        self._counts[window.cells] *= 1.0 - self._p_detect
 
 
 def strip_of(grid: GridSpec, window: Window, number: int, *, descending: bool = False) -> Strip:
@@ -205,7 +191,7 @@ def stretches(columns: BoolArray) -> list[slice]:
 
 
 def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:
-    """A run of rows in equal pieces; where these would be too short, in longest ones, and a rest that is left out."""
+    """A band of rows in equal pieces; where these would be too short, in longest ones, and a rest that is left out."""
     count = -(-(end - first) // longest)
     if end - first < count * shortest:
         edges = list(range(first, end + 1, longest))

@@ -138,7 +138,7 @@ class Approach:
 def too_close(one: Course, other: Course, least_m: float, from_s: float, until_s: float) -> Approach | None:
     """The first time at which two vehicles come nearer to each other than `least_m`, and how near; None for never.
 
-    Between two steps both are taken to go straight, which in a turn of 6 m at 2 m/s is wrong by 0.3 m. Vehicles that
+    Between two steps both are assumed to go straight, which in a turn of 6 m at 2 m/s is wrong by 0.3 m. Vehicles that
     are nearer at the beginning are too close only if they come nearer still, or again after they were apart.
     """
     first = max(one.first, other.first, int(from_s / STEP_S))

@@ -32,7 +32,7 @@ RESTS_S = 20.0
 """A way must be clear so long after its end, too."""
 STANDS_ASIDE_S = 60.0
 """So long a helper that is free needs at most to stand aside."""
-LOOK_AHEAD_S = 90.0
+CLEAR_AHEAD_S = 90.0
 """A helper that is free stands aside, and one that sets out must have a clear way, for so long."""
 GIVES_BACK_S = 50.0
 """So long before it would come too close a helper gives its strip back: until then the other's plan may change. So
@@ -61,7 +61,7 @@ class Underway:
 
 
 @dataclass(frozen=True)
-class Order:
+class Instruction:
     """What a helper is told: to give back its strip, if it has one, and to wait at a place, if one is named."""
 
     name: str
@@ -74,15 +74,15 @@ class RightOfWay:
 
     def __init__(self, separation_m: float, is_inside: Callable[[Point], bool]) -> None:
         self.separation_m = separation_m
-        self.look_s = 0.0
-        """When to look next."""
+        self.check_s = 0.0
+        """When to check next."""
         self._is_inside = is_inside
         self._traffic = Traffic()
         self._due_s: dict[tuple[str, str], float] = {}
         self._sent_s: dict[str, float] = {}
         self._told_s: dict[str, float] = {}
         self._to_sweep: dict[str, float] = {}
-        """When a helper on its way begins to sweep, until that was looked at."""
+        """When a helper on its way begins to sweep, until that was checked."""
         self._complained_of: set[tuple[str, str]] = set()
 
     def departures(self, fleet: Sequence[Underway], now_s: float) -> Departures:
@@ -99,24 +99,24 @@ class RightOfWay:
             self.changed(name)
 
     def changed(self, name: str) -> None:
-        """What a vehicle does is another now: to be looked at soon."""
+        """What a vehicle does is another now: to be checked soon."""
         self._due_s = {pair: due_s for pair, due_s in self._due_s.items() if name not in pair}
-        self.look_s = 0.0
+        self.check_s = 0.0
 
-    def make_room(self, departures: Departures, fleet: Sequence[Underway]) -> list[Order]:
+    def make_room(self, departures: Departures, fleet: Sequence[Underway]) -> list[Instruction]:
         """Sends those aside that are free and keep others from setting out. `fleet`: as it is with the offers made."""
-        orders = []
+        instructions = []
         for one in fleet:
             wanted = [course for name, course in departures.in_the_way if name == one.name and one.strip is None]
-            order = self._order(one, [], wanted, fleet, departures.now_s) if wanted else None
-            orders += [] if order is None else [order]
-        return orders
+            instruction = self._instruction(one, [], wanted, fleet, departures.now_s) if wanted else None
+            instructions += [] if instruction is None else [instruction]
+        return instructions
 
-    def look(self, fleet: Sequence[Underway], now_s: float) -> list[Order]:
+    def check(self, fleet: Sequence[Underway], now_s: float) -> list[Instruction]:
         """Whom to tell what, so that nobody comes too close to one that goes first."""
-        orders = []
+        instructions = []
         ranked = sorted((one for one in fleet if not one.vehicle.lost), key=self._rank)
-        next_s = now_s + LOOK_AHEAD_S
+        next_s = now_s + CLEAR_AHEAD_S
         for place, one in enumerate(ranked):
             if not one.gives_way:
                 continue
@@ -125,7 +125,7 @@ class RightOfWay:
             for other in ranked[:place]:
                 pair = (one.name, other.name)
                 if self._due_s.get(pair, 0.0) <= now_s or begins:
-                    self._due_s[pair] = self._next_look_s(one, other, now_s)
+                    self._due_s[pair] = self._next_check_s(one, other, now_s)
                     if self._due_s[pair] <= now_s or begins:
                         self._due_s[pair] = max(self._due_s[pair], now_s + 1.0)
                         approach = self._approach(one, other, now_s, begins=begins)
@@ -135,10 +135,10 @@ class RightOfWay:
             if begins:
                 del self._to_sweep[one.name]
             next_s = min(next_s, self._to_sweep.get(one.name, math.inf) - GIVES_BACK_S)
-            order = self._order(one, approaches, [], fleet, now_s) if approaches else None
-            orders += [] if order is None else [order]
-        self.look_s = next_s
-        return orders
+            instruction = self._instruction(one, approaches, [], fleet, now_s) if approaches else None
+            instructions += [] if instruction is None else [instruction]
+        self.check_s = next_s
+        return instructions
 
     def _rank(self, one: Underway) -> tuple[int, float, str]:
         """The lower goes first."""
@@ -151,34 +151,34 @@ class RightOfWay:
         mine, its = (self._traffic.course(each.vehicle, each.strip, now_s) for each in (one, other))
         if mine is None or its is None:
             return None
-        until_s = now_s + (LOOK_AHEAD_S if one.strip is None else GIVES_BACK_S)
+        until_s = now_s + (CLEAR_AHEAD_S if one.strip is None else GIVES_BACK_S)
         if begins and one.strip is not None:
             until_s = max(until_s, mine.arrives_s + RESTS_S)
         return too_close(mine, its, self.separation_m + MARGIN_M, now_s, until_s)
 
-    def _next_look_s(self, one: Underway, other: Underway, now_s: float) -> float:
+    def _next_check_s(self, one: Underway, other: Underway, now_s: float) -> float:
         """Until when one cannot come near enough to the other, whatever both do, to be told anything."""
         mine, its = one.vehicle, other.vehicle
         if mine.state is None or its.state is None:
-            return now_s + LOOK_AHEAD_S
+            return now_s + CLEAR_AHEAD_S
         closing_mps = mine.entry.speed_mps + its.entry.speed_mps
         apart_m = math.dist((mine.state.x_m, mine.state.y_m), (its.state.x_m, its.state.y_m))
         apart_m -= mine.entry.speed_mps * (now_s - mine.heard_ms / 1000)
         apart_m -= its.entry.speed_mps * (now_s - its.heard_ms / 1000)
         if one.strip is None:  # it circles
-            near_m = its.entry.speed_mps * LOOK_AHEAD_S + 2 * mine.entry.turn_radius_m
+            near_m = its.entry.speed_mps * CLEAR_AHEAD_S + 2 * mine.entry.turn_radius_m
         else:
             near_m = closing_mps * GIVES_BACK_S
         return now_s + (apart_m - near_m - self.separation_m - MARGIN_M) / closing_mps
 
-    def _order(
+    def _instruction(
         self,
         one: Underway,
         approaches: list[tuple[Approach, Underway]],
         wanted: list[Course],
         fleet: Sequence[Underway],
         now_s: float,
-    ) -> Order | None:
+    ) -> Instruction | None:
         if now_s - self._told_s.get(one.name, -math.inf) < TOLD_AGAIN_S:
             return None
         if one.strip is not None and one.vehicle.state is not None and one.vehicle.state.works_on != one.strip.number:
@@ -189,7 +189,7 @@ class RightOfWay:
             self._traffic.holding(one.vehicle, one.strip, now_s), courses, now_s, STANDS_ASIDE_S
         ):
             self._told_s[one.name] = now_s
-            return Order(one.name, one.strip, None)
+            return Instruction(one.name, one.strip, None)
         place = self._place_aside(one, courses, now_s)
         if place is None:
             for approach, other in approaches:
@@ -197,12 +197,12 @@ class RightOfWay:
             return None
         self._told_s[one.name] = now_s
         self._traffic.sent_aside(one.vehicle, one.strip, place, now_s)
-        return Order(one.name, one.strip, place)
+        return Instruction(one.name, one.strip, place)
 
     def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
         """The nearest place in the area at which it can wait; None where there is none."""
         here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)[0]
-        for for_s in (2 * LOOK_AHEAD_S, STANDS_ASIDE_S):
+        for for_s in (2 * CLEAR_AHEAD_S, STANDS_ASIDE_S):
             for share, number in product((2.0, 3.5, 5.0), range(BEARINGS)):
                 bearing_rad = here.heading_rad + 2 * math.pi * number / BEARINGS
                 far_m = share * self.separation_m
@@ -262,7 +262,7 @@ class Departures:
         begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
         self.sweeps_s[name, one.strip.number] = begins_s
         # What it would meet later on its way it is told when it is nearer, if it still is so then.
-        soon_s = now_s + LOOK_AHEAD_S
+        soon_s = now_s + CLEAR_AHEAD_S
         until_s = course.arrives_s + RESTS_S if begins_s <= soon_s else soon_s
         free, busy = self._others(name)
         for delay_s in DELAYS_S:

@@ -18,8 +18,8 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.coordinator import ANSWER_WITHIN_MS, NUMBERS_A_SECOND
-from coordinator.ledger import ENDED, WITH_A_VEHICLE
+from coordinator.ledger import ENDED, NUMBERS_A_SECOND, WITH_A_VEHICLE
+from coordinator.strip_life import ANSWER_WITHIN_MS
 from secondlook.testing.flight import Flight, fail_if, lives, reached
 
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)

@@ -22,7 +22,8 @@ from bench.row_packing import RowPacking
 from bench.swath import Swath
 from comms.node import Received
 from comms.said.messages import CoverageTile, Maneuver, ManeuverKind, StripState, StripStatus
-from coordinator.cut.strips import Window, strip_of
+from coordinator.cut.strips import strip_of
+from coordinator.cut.window import Window
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.sweep import legs_over_strip

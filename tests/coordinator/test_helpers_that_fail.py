@@ -112,7 +112,7 @@ class TestOneThatFailsAgainAndAgain:
         told = coordinator()
         for place in range(MOST_FAILURES):
             fail(told, place)
-        last = told.node.node.vehicles[HELPER].state  # type: ignore[attr-defined]
+        last = told.node.node.fleet.vehicles[HELPER].state  # type: ignore[attr-defined]
         told.node.hear(f"agent/{HELPER}/state", last, incarnation=1)
         told.hotspot(HOT, number=50)
         told.settle()
@@ -198,4 +198,4 @@ def test_a_primary_started_anew_is_believed_although_its_plans_count_from_1() ->
     plans = [Plan(5, (), (), (), "before"), Plan(1, (), (), (), "anew"), Plan(4, (), (), (), "late")]
     for plan, incarnation in zip(plans, (0, 1, 0), strict=True):
         told.node.hear(f"agent/{PRIMARY}/plan", plan, incarnation=incarnation)
-    assert told.node.node.vehicles[PRIMARY].plan == plans[1]  # type: ignore[attr-defined]
+    assert told.node.node.fleet.vehicles[PRIMARY].plan == plans[1]  # type: ignore[attr-defined]

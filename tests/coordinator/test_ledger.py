@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from comms.said.messages import StripState
-from coordinator.cut.strips import Cut, Window
+from coordinator.cut.strips import Cut
+from coordinator.cut.window import Window
 from coordinator.ledger import ENDED, WITH_A_VEHICLE, Ledger, StripRecord
 from planner.types import Strip
 

@@ -124,7 +124,7 @@ class Told:
     def _state_of(self, name: str) -> AgentState:
         coordinator = self.node.node
         assert isinstance(coordinator, Coordinator)
-        state = coordinator.vehicles[name].state
+        state = coordinator.fleet.vehicles[name].state
         assert state is not None
         return state
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from coordinator.allocate.service import service
+from coordinator.allocate.service import expected_service
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
@@ -41,7 +41,7 @@ def situation(
 
 def at_work(free: Helper, one: OpenStrip) -> Helper:
     """A helper that has been sent to a strip."""
-    served = service(one, free)
+    served = expected_service(one, free)
     return replace(free, task=one, free_at=served.free_at, free_s=served.free_s)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from coordinator.allocate.service import service
+from coordinator.allocate.service import expected_service
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 from planner.types import Strip
@@ -130,7 +130,7 @@ def _helper(draw: st.DrawFn) -> Helper:
     if not draw(st.booleans()):
         return helper
     task = _numbered(draw(_open_strips()), 10)
-    served = service(task, helper)
+    served = expected_service(task, helper)
     sweeping = draw(st.booleans())
     return replace(helper, task=task, free_at=served.free_at, free_s=served.free_s, sweeping=sweeping)
 

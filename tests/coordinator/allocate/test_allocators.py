@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from situations import at_work, helper, open_strip, situation, situations, strip
 
 from coordinator.allocate.allocators import ALLOCATORS
-from coordinator.allocate.service import removed_m2, service
+from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
 HELPER = helper()
@@ -30,33 +30,33 @@ def greedy(strips: list[OpenStrip], helpers: list[Helper], deadline_s: float = 3
 class TestServiceTime:
     def test_straight_ahead(self) -> None:
         # 95 m to the run-in, 5 m of it, 200 m along the strip and 5 m beyond it, at 2 m/s.
-        served = service(open_strip(strip(1)), HELPER)
+        served = expected_service(open_strip(strip(1)), HELPER)
         assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((50, 150, 152.5))
         assert served.free_at == pytest.approx((0, 305, 0))
 
     def test_from_the_far_end_when_that_is_nearer(self) -> None:
         beyond = helper(y_m=400, heading_rad=math.pi)
-        assert service(open_strip(strip(1)), beyond).ends_s == pytest.approx(150)
-        assert service(open_strip(strip(1, heading_rad=math.pi, y_m=300)), HELPER).ends_s == pytest.approx(150)
+        assert expected_service(open_strip(strip(1)), beyond).ends_s == pytest.approx(150)
+        assert expected_service(open_strip(strip(1, heading_rad=math.pi, y_m=300)), HELPER).ends_s == pytest.approx(150)
 
     def test_a_turn_about_costs_half_a_circle_at_least(self) -> None:
         # Heading south at the place where the run-in begins, 12 m aside: half a circle of 6 m brings it onto the strip.
         aside = helper(x_m=12, y_m=95, heading_rad=math.pi)
-        assert service(open_strip(strip(1)), aside).ends_s == pytest.approx((math.pi * 6 + 5 + 200) / 2)
+        assert expected_service(open_strip(strip(1)), aside).ends_s == pytest.approx((math.pi * 6 + 5 + 200) / 2)
 
     def test_a_strip_wider_than_the_swath_takes_a_leg_more(self) -> None:
         # Legs 25 m apart: a turn about of 12 m diameter and 13 m across, between run-out and run-in.
         narrow = helper(swath_m=30, x_m=-12.5)
-        assert service(open_strip(strip(1)), narrow).ends_s == pytest.approx(
+        assert expected_service(open_strip(strip(1)), narrow).ends_s == pytest.approx(
             (100 + 2 * 200 + 10 + math.pi * 6 + 13) / 2
         )
 
     def test_it_begins_where_and_when_the_helper_is_free(self) -> None:
-        assert service(open_strip(strip(1)), replace(HELPER, free_s=100)).ends_s == pytest.approx(250)
+        assert expected_service(open_strip(strip(1)), replace(HELPER, free_s=100)).ends_s == pytest.approx(250)
 
     @pytest.mark.parametrize(("deadline_s", "share"), [(50, 0), (100, 0.5), (150, 1), (math.inf, 1)])
     def test_what_is_flown_by_the_deadline_counts(self, deadline_s: float, share: float) -> None:
-        served = service(open_strip(strip(1)), HELPER)
+        served = expected_service(open_strip(strip(1)), HELPER)
         assert removed_m2(open_strip(strip(1)), HELPER, served, deadline_s) == pytest.approx(700 * share)
 
 
@@ -134,7 +134,7 @@ class TestEveryAllocator:
             free = helpers[vehicle]
             assert number not in free.refused
             if free.task is None:
-                assert service(strips[number], free).ends_s <= free.lasts_until_s
+                assert expected_service(strips[number], free).ends_s <= free.lasts_until_s
         shuffled = replace(
             told,
             strips=tuple(data.draw(st.permutations(told.strips))),
@@ -151,7 +151,7 @@ def test_whatever_greedy_does_not_offer_clashes_with_an_offer_at_least_as_good(t
         (free.vehicle, one.strip.number): removed / (served.ends_s - free.free_s)
         for free in told.free
         for one in told.strips
-        for served in (service(one, free),)
+        for served in (expected_service(one, free),)
         for removed in (removed_m2(one, free, served, told.deadline_s),)
         if one.strip.number not in free.refused and removed > 0 and served.leaves_s <= told.now_s + 1
     }

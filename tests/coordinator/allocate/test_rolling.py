@@ -10,19 +10,19 @@ from hypothesis import given, settings
 from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
-from coordinator.allocate.rolling import RollingPlan
-from coordinator.allocate.service import removed_m2, service
+from coordinator.allocate.rolling import RollingAllocator
+from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
-PLAN = RollingPlan()
+PLAN = RollingAllocator()
 
 
 def removed_in_order(order: tuple[OpenStrip, ...], one: Helper, deadline_s: float) -> float:
     """What a sequence of services removes by the deadline."""
     total_m2 = 0.0
     for job in order:
-        served = service(job, one)
+        served = expected_service(job, one)
         total_m2 += removed_m2(job, one, served, deadline_s)
         one = replace(one, free_at=served.free_at, free_s=served.free_s)
     return total_m2
@@ -77,7 +77,7 @@ class TestLookingAhead:
         one = replace(told.helpers[0], task=None, free_at=told.helpers[0].pose, free_s=0.0, refused=frozenset())
         settled = tuple(replace(job, settles_s=0.0) for job in told.strips)
         told = replace(told, helpers=(one,), strips=settled, later_m2ps=0.0)
-        found = RollingPlan(beam=1000).assign(told)
+        found = RollingAllocator(beam=1000).assign(told)
 
         def best(first: OpenStrip | None) -> float:
             orders = [o for n in range(len(settled) + 1) for o in permutations(settled, n)]
@@ -133,6 +133,6 @@ class TestTurningRound:
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_in_a_large_fleet_each_strip_goes_to_one_and_only_the_free_and_those_turned_round_are_told(seed: int) -> None:
     asked = replace(large_situation(100, 10, seed), later_m2ps=0.0)
-    offers = RollingPlan().assign(asked)
+    offers = RollingAllocator().assign(asked)
     assert len(set(offers.values())) == len(offers)
     assert {one.vehicle for one in asked.free} <= set(offers) <= {one.vehicle for one in asked.helpers}

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.allocate.service import StripTable, removed_m2, service
+from coordinator.allocate.service import StripTable, expected_service, removed_m2
 from coordinator.allocate.situation import Situation
 from planner.dubins import Pose
 
@@ -25,12 +25,12 @@ def test_each_is_as_by_itself(told: Situation, late_s: float, picked: st.DataObj
         places = np.array(picked.draw(st.lists(st.sampled_from(range(len(told.strips))), min_size=1, unique=True)))
         poses = [one.free_at, Pose(50, -20, 2.0)]
         times_s = np.array([one.free_s, one.free_s + late_s])
-        found = table.of(places).services(np.array(poses), times_s)
+        found = table.of(places).served_from(np.array(poses), times_s)
         for row, (pose, time_s) in enumerate(zip(poses, times_s, strict=True)):
             there = replace(one, free_at=pose, free_s=float(time_s))
             for column, place in enumerate(places):
                 job = told.strips[place]
-                served = service(job, there)
+                served = expected_service(job, there)
                 expected = 0.0 if job.strip.number in one.refused else removed_m2(job, there, served, told.deadline_s)
                 assert found.removed_m2[row, column] == pytest.approx(expected)
                 assert found.leaves_s[row, column] == pytest.approx(served.leaves_s)
@@ -41,13 +41,13 @@ def test_each_is_as_by_itself(told: Situation, late_s: float, picked: st.DataObj
 class TestInTheWake:
     def test_a_helper_sets_out_so_that_it_does_not_overtake(self) -> None:
         # 100 s for the 200 m of the strip, which has settled at 400 s: on it from 300 s, 50 s on the way.
-        served = service(replace(open_strip(strip(1)), settles_s=400), helper())
+        served = expected_service(replace(open_strip(strip(1)), settles_s=400), helper())
         assert (served.leaves_s, served.begins_s, served.ends_s) == pytest.approx((250, 300, 400))
 
     def test_against_the_wake_it_waits_until_all_has_settled(self) -> None:
-        served = service(replace(open_strip(strip(1)), settles_s=400), helper(y_m=400, heading_rad=np.pi))
+        served = expected_service(replace(open_strip(strip(1)), settles_s=400), helper(y_m=400, heading_rad=np.pi))
         assert (served.leaves_s, served.begins_s, served.ends_s) == pytest.approx((350, 400, 500))
 
     def test_who_comes_late_goes_at_once(self) -> None:
-        served = service(replace(open_strip(strip(1)), settles_s=120), helper())
+        served = expected_service(replace(open_strip(strip(1)), settles_s=120), helper())
         assert (served.leaves_s, served.ends_s) == pytest.approx((0, 150))

@@ -1,4 +1,4 @@
-"""Cutting again and again: what time is worth, and what ground counts, reaches the cut."""
+"""Cutting again and again: what time is worth, by hand, and that it, and what ground counts, reaches the cut."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from comms.said.messages import CoverageTile
-from coordinator.cut.cutter import Cutter
+from coordinator.cut.cutter import RISK_STEP, Cutter, worth_risk
 from coordinator.cut.strips import Cut, CuttingRules
 from planner.fleet_map import FleetMap
 from planner.risk import NATS_PER_LEVEL
@@ -33,7 +33,7 @@ def fleet_that_left(risk: FloatArray) -> FleetMap:
 def cuts(risk: FloatArray, sweeps_m2: float, weights: FloatArray | None = None) -> tuple[Cutter, list[Cut]]:
     inside = np.ones(GRID.shape, dtype=np.bool_)
     cutter = Cutter(fleet_that_left(risk), inside, RULES, np.ones(GRID.shape) if weights is None else weights)
-    ground = cutter.look({"primary": None}, sweeps_m2, ())
+    ground = cutter.assess({"primary": None}, sweeps_m2, ())
     return cutter, cutter.cut(ground, ())
 
 
@@ -72,6 +72,20 @@ def test_ground_that_counts_more_raises_what_time_is_worth(ridge: FloatArray) ->
     assert found[0].counts_m2 == pytest.approx(3 * found[0].removable_m2)
 
 
-def test_ground_that_counts_little_is_looked_at_where_there_is_time() -> None:
+def test_ground_that_counts_little_is_cut_where_there_is_time() -> None:
     _, found = cuts(np.full(GRID.shape, 0.8), 100 * COLUMN_M2, np.full(GRID.shape, 0.02))
     assert len(found) == 4  # the whole of it, 40 columns
+
+
+class TestWorthRisk:
+    RISK = np.array([0.9, 0.62, 0.62, 0.41, 0.3, 0.12, 0.01])
+
+    @pytest.mark.parametrize(
+        ("cells", "worth"),
+        [(0, 0.9), (1, 0.6), (2.9, 0.6), (3, 0.4), (4, 0.3), (5, 0.1), (6, 0.05), (7, 0.05), (99, 0.05)],
+    )
+    def test_it_is_the_risk_of_the_first_cell_there_is_no_time_for_in_steps(self, cells: float, worth: float) -> None:
+        assert worth_risk(self.RISK, cells) == pytest.approx(worth)
+
+    def test_where_nothing_is_left_it_is_the_least(self) -> None:
+        assert worth_risk(np.array([]), 0) == RISK_STEP

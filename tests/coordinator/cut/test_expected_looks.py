@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from coordinator.cut.ground import LEAST_SHARE, ExpectedLooks
-from coordinator.cut.strips import Window
+from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, 6, 8)

@@ -9,7 +9,8 @@ import pytest
 
 from comms.said.messages import PlannedTrack
 from coordinator.cut.ground import REPORTED_WITHIN_S, Growth, TrackUnderWay
-from coordinator.cut.strips import CuttingRules, Window, cut_strips, strip_of
+from coordinator.cut.strips import CuttingRules, cut_strips, strip_of
+from coordinator.cut.window import Window
 from planner.fleet_map import VehicleLayer
 from planner.types import BoolArray, GridSpec, SweepFrame
 

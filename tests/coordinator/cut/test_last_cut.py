@@ -9,7 +9,8 @@ import pytest
 
 from coordinator.cut.cutter import LastCut
 from coordinator.cut.ground import Growth
-from coordinator.cut.strips import CuttingRules, Window
+from coordinator.cut.strips import CuttingRules
+from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
 GRID = GridSpec(SweepFrame(0, 0, 0), 5, 40, 30)

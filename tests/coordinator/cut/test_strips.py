@@ -12,7 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from coordinator.cut.strips import Cut, CuttingRules, Window, cut_strips, strip_of
+from coordinator.cut.strips import Cut, CuttingRules, cut_strips, strip_of
+from coordinator.cut.window import Window
 from planner.types import BoolArray, FloatArray, GridSpec, SweepFrame
 
 EAST = SweepFrame(0, 0, 0)
@@ -137,7 +138,7 @@ class TestByHand:
         assert [one.window for one in cuts] == [Window(10, 40, 10, 20), Window(10, 40, 15, 25)]
         assert [one.removable_m2 for one in cuts] == pytest.approx([300 * 25 * 0.7, (150 + 150 * 0.3) * 25 * 0.7])
 
-    def test_a_place_is_cut_once_until_it_has_been_looked_at(self) -> None:
+    def test_a_place_is_cut_once_until_it_has_had_its_look(self) -> None:
         poor = replace(RULES, p_detect=0.4)  # leaves 0.6, worth another look; but not before the first
         risk = hot(np.s_[10:40, 10:20])
         assert [one.window for one in cut(risk, poor)] == [Window(10, 40, 10, 20)]
@@ -251,7 +252,7 @@ class TestEveryMap:
         marginal_risk=st.sampled_from([0.0, 0.4, 0.7]),
         first_column=st.integers(0, 5),
     )
-    def test_each_tells_what_those_before_it_and_those_that_are_taken_leave(
+    def test_each_tells_what_those_before_it_and_those_that_are_claimed_leave(
         self,
         risk: FloatArray,
         open_cells: BoolArray,
@@ -261,20 +262,20 @@ class TestEveryMap:
         first_column: int,
     ) -> None:
         rules = replace(rules, marginal_risk=marginal_risk)
-        taken = Window(2, 7, first_column, first_column + rules.columns(SMALL))
-        looked_at = [taken]
+        served = Window(2, 7, first_column, first_column + rules.columns(SMALL))
+        claimed = [served]
         left = risk * rules.p_detect * SMALL.cell_area_m2
-        left[taken.cells] *= 1 - rules.p_detect
-        for one in cut_strips(SMALL, risk, open_cells, rules, [taken], weights=weights):
+        left[served.cells] *= 1 - rules.p_detect
+        for one in cut_strips(SMALL, risk, open_cells, rules, [served], weights=weights):
             assert one.removable_m2 == pytest.approx(left[one.window.cells].sum())
             counts_m2 = (left * weights)[one.window.cells].sum()
             assert one.counts_m2 <= counts_m2 * (1 + 1e-9)  # what has led to no strip is left out
             row_m2 = rules.worth_risk * rules.p_detect * rules.columns(SMALL) * SMALL.cell_area_m2
             assert counts_m2 > row_m2 * (one.window.rows + rules.overhead_m / SMALL.cell_m)
             left[one.window.cells] *= 1 - rules.p_detect
-            shared = max(one.window.shared(other) for other in looked_at)
+            shared = max(one.window.shared(other) for other in claimed)
             assert shared < 0.75 * one.window.size
-            looked_at.append(one.window)
+            claimed.append(one.window)
 
     @settings(max_examples=80, deadline=None)
     @given(risk=risks, open_cells=masks, rules=rules_of_all_kinds, marginal_risk=st.sampled_from([0.0, 0.4, 0.7]))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from situations import helper, strip
 
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
-from coordinator.allocate.service import service, sweeps
+from coordinator.allocate.service import expected_service, sweeps
 from coordinator.allocate.situation import OpenStrip
 from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close
 from planner.dubins import Pose
@@ -42,7 +42,7 @@ class TestCourses:
         one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
         laid = sweep_course(free.pose, 0, free.speed_mps, free.turn_radius_m, sweep)
-        served = service(OpenStrip(one, 1), free)
+        served = expected_service(OpenStrip(one, 1), free)
         assert laid.arrives_s == pytest.approx(served.free_s)
         there, at_s = laid.at(served.free_s)
         assert math.dist(there[:2], served.free_at[:2]) <= free.speed_mps * (at_s - served.free_s) + 1e-6

@@ -101,21 +101,21 @@ class TestDepartures:
         fleet = [Underway(one, None) for one in (me, other)]
         departures = right.departures(fleet, 0.0)
         assert departures.wait_s(helper("helper"), open_strip(strip(1, 0, 50))) == 10
-        (order,) = right.make_room(departures, fleet)
-        assert (order.name, order.gives_back) == ("second", None)
+        (told,) = right.make_room(departures, fleet)
+        assert (told.name, told.gives_back) == ("second", None)
         # It lies elsewhere once it is there, and the way is clear.
-        assert order.place is not None
-        other.state = AgentState(Mode.IDLE, 0, 1, 0, *order.place, NORTH)
+        assert told.place is not None
+        other.state = AgentState(Mode.IDLE, 0, 1, 0, *told.place, NORTH)
         assert self.wait_s(right_of_way(), [me, other], strip(1, 0, 50)) == 0
 
 
-class TestLooking:
+class TestCheck:
     def test_a_free_helper_stands_aside_for_a_primary(self) -> None:
         fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
         right = right_of_way()
-        (order,) = right.look(fleet, 0.0)
-        assert (order.name, order.gives_back) == ("helper", None)
-        assert order.place is not None
+        (told,) = right.check(fleet, 0.0)
+        assert (told.name, told.gives_back) == ("helper", None)
+        assert told.place is not None
         its = right._traffic.course(fleet[0].vehicle, None, 0.0)
         mine = right._traffic.course(fleet[1].vehicle, None, 0.0)
         assert its is not None
@@ -124,13 +124,13 @@ class TestLooking:
 
     def test_one_that_is_far_does_not(self) -> None:
         fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]
-        assert right_of_way().look(fleet, 0.0) == []
+        assert right_of_way().check(fleet, 0.0) == []
 
     def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
         to = strip(7, 0, 20, length_m=100)
         at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, 140, 7)
-        (order,) = right_of_way().look([Underway(primary(0), None), Underway(at_work, to)], 0.0)
-        assert (order.name, order.gives_back) == ("helper", to)
+        (told,) = right_of_way().check([Underway(primary(0), None), Underway(at_work, to)], 0.0)
+        assert (told.name, told.gives_back) == ("helper", to)
 
     def test_of_two_at_work_the_one_sent_later(self) -> None:
         right = right_of_way()
@@ -144,5 +144,5 @@ class TestLooking:
             right.offered(name, to[name].number, departures)
             assert one.state is not None
             one.state = replace(one.state, mode=Mode.TRANSIT, works_on=to[name].number)
-        orders = right.look([Underway(one, to[one.entry.vehicle]) for one in (first, second)], 1.0)
-        assert [order.name for order in orders] == ["helper"]
+        all_told = right.check([Underway(one, to[one.entry.vehicle]) for one in (first, second)], 1.0)
+        assert [told.name for told in all_told] == ["helper"]

@@ -131,7 +131,7 @@ class TestEveryMission:
         assert (everyone.risk <= everyone.risk_of(primary)[0]).all()
 
     def test_everyone_sees_one_map(self, mission: Flown) -> None:
-        fleet, coordinators = mission.metrics.map, mission.nodes["coordinator"].map
+        fleet, coordinators = mission.metrics.map, mission.nodes["coordinator"].fleet.map
         assert fleet is not None
         for name, layer in fleet.layers.items():
             own = mission.nodes[name].coverage

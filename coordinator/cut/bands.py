@@ -1,30 +1,21 @@
-"""The best runs of rows in windows as wide as the swath: one alone, or those side by side that together bring most."""
+"""The best bands, rows of windows as wide as the swath: one alone, or those side by side that together bring most."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from coordinator.cut.window import Window
 from planner.types import FloatArray
 
 MOST_ADDED = 16  # columns that are faster added one by one
-TOLERANCE = 1e-9  # relative: sums that differ by no more are taken as equal
+TOLERANCE = 1e-9  # relative: sums that differ by no more count as equal
 
 
-class Run(NamedTuple):
-    """Rows [first_row, end_row) of the window of columns from `first_column`."""
+class Bands:
+    """The best band in every window of columns as wide as the swath: what it removes beyond what its rows cost.
 
-    first_row: int
-    end_row: int
-    first_column: int
-
-
-class Runs:
-    """The best run of rows in every window of columns as wide as the swath: what it removes beyond what its rows cost.
-
-    `removable`: what one look removes of each cell, as it counts; `look` again where it has changed. `fixed_cost`: of
-    each strip.
+    `removable`: what one look removes of each cell, as it counts; `search` again where it has changed. `fixed_cost`:
+    of each strip.
     """
 
     def __init__(self, removable: FloatArray, width: int, row_cost: float, fixed_cost: float) -> None:
@@ -36,28 +27,28 @@ class Runs:
         self._value = np.zeros(self._windows)
         self._first_row, self._end_row = np.zeros((2, self._windows), dtype=np.intp)
 
-    def look(self, columns: slice) -> None:
-        """Looks for the best runs in these columns' windows."""
+    def search(self, columns: slice) -> None:
+        """Searches for the best bands in these columns' windows."""
         near = slice(max(0, columns.start - self._width + 1), min(self._windows, columns.stop))
         profit = (
             _window_sums(self._removable[:, near.start : near.stop + self._width - 1], self._width) - self._row_cost
         )
-        # No run brings more than all rows that bring anything.
+        # No band brings more than all rows that bring anything.
         promising = np.flatnonzero(np.maximum(profit, 0.0).sum(axis=0) > self._fixed_cost * (1 - TOLERANCE))
         self._value[near] = 0.0
         places = near.start + promising
-        self._value[places], self._first_row[places], self._end_row[places] = _best_runs(profit[:, promising])
+        self._value[places], self._first_row[places], self._end_row[places] = _best_bands(profit[:, promising])
 
-    def best(self) -> list[Run]:
-        """The best run, if one is worth its costs."""
+    def best(self) -> list[Window]:
+        """The best band, if one is worth its costs."""
         best = float(self._value.max())
-        return [self._run(int((self._value >= best * (1 - TOLERANCE)).argmax()))] if best > self._fixed_cost else []
+        return [self._band(int((self._value >= best * (1 - TOLERANCE)).argmax()))] if best > self._fixed_cost else []
 
-    def side_by_side(self, dearer: float) -> list[Run]:
-        """The runs in windows that do not overlap which together bring most, if all costs so much more; best first.
+    def side_by_side(self, dearer: float) -> list[Window]:
+        """The bands in windows that do not overlap which together bring most, if all costs so much more; best first.
 
-        Their rows are those of the best runs at the price as it is. Each is then moved to the middle of what it holds,
-        where it may overlap the next one on what holds nothing, or is looked at twice.
+        Their rows are those of the best bands at the price as it is. Each is then moved to the middle of what it holds,
+        where it may overlap the next one on what holds nothing, or is flown over twice.
         """
         rows_cost = (self._end_row - self._first_row) * self._row_cost
         profits = self._value - (dearer - 1.0) * rows_cost - dearer * self._fixed_cost
@@ -75,11 +66,12 @@ class Runs:
             else:
                 chosen.append(place - self._width)
                 place -= self._width
-        return [self._run(column) for column in sorted(chosen, key=lambda one: -profit[one])]
+        return [self._band(column) for column in sorted(chosen, key=lambda one: -profit[one])]
 
-    def _run(self, column: int) -> Run:
+    def _band(self, column: int) -> Window:
         first, end = int(self._first_row[column]), int(self._end_row[column])
-        return Run(first, end, _centred(self._removable[first:end], column, self._width))
+        moved_to = _centred(self._removable[first:end], column, self._width)
+        return Window(first, end, moved_to, moved_to + self._width)
 
 
 def _window_sums(values: FloatArray, width: int) -> FloatArray:
@@ -95,8 +87,8 @@ def _window_sums(values: FloatArray, width: int) -> FloatArray:
     return sums
 
 
-def _best_runs(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
-    """For each window the run of rows with the largest sum: the sum, its first row, the row behind its last."""
+def _best_bands(profit: FloatArray) -> tuple[FloatArray, np.ndarray, np.ndarray]:
+    """For each window the band with the largest sum: the sum, its first row, the row behind its last."""
     rows, windows = profit.shape
     total = np.zeros((rows + 1, windows))
     profit.cumsum(axis=0, out=total[1:])

@@ -1,0 +1,53 @@
+"""A rectangle of the grid's cells, where a strip is cut, and what it shares with others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+SAME_PLACE = 0.75  # share of a window's cells
+
+
+@dataclass(frozen=True)
+class Window:
+    """A rectangle of whole cells: rows [first_row, end_row), columns [first_column, end_column)."""
+
+    first_row: int
+    end_row: int
+    first_column: int
+    end_column: int
+
+    @property
+    def cells(self) -> tuple[slice, slice]:
+        """The window of the grid's arrays."""
+        return slice(self.first_row, self.end_row), self.columns
+
+    @property
+    def columns(self) -> slice:
+        """Its columns of the grid's arrays."""
+        return slice(self.first_column, self.end_column)
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.end_row - self.first_row
+
+    @property
+    def size(self) -> int:
+        """Number of cells."""
+        return self.rows * (self.end_column - self.first_column)
+
+    def shared(self, other: Window) -> int:
+        """Number of cells that lie in both."""
+        rows = min(self.end_row, other.end_row) - max(self.first_row, other.first_row)
+        columns = min(self.end_column, other.end_column) - max(self.first_column, other.first_column)
+        return max(rows, 0) * max(columns, 0)
+
+    def overlap(self, other: Window) -> float:
+        """Shared cells as a share of the cells of both together."""
+        shared = self.shared(other)
+        return shared / (self.size + other.size - shared)
+
+    def is_at_one_of(self, others: Iterable[Window]) -> bool:
+        """Whether three quarters of it lie in one of these."""
+        return any(self.shared(other) >= SAME_PLACE * self.size for other in others)

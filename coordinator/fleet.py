@@ -1,0 +1,78 @@
+"""What the coordinator knows of the fleet: its vehicles, which of them are lost, and the map that their tiles make."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+
+import numpy as np
+
+from comms.node import Received
+from comms.said.messages import CoverageTile, RunInfo
+from coordinator.cut.window import Window
+from coordinator.vehicles import KnownVehicle
+from planner.fleet_map import FleetMap
+from planner.risk import LevelArray
+
+log = logging.getLogger("secondlook.coordinator")
+
+GIVEN_UP_AFTER = 10  # times as long as for a lost vehicle must a primary be silent before the mission ends without it
+
+
+class KnownFleet:
+    """The fleet that the run's announcement names: `vehicles`, by name, and of these the `primaries`, which survey.
+
+    `map`: the tiles of all, joined. `lost_after_ms`: age of a vehicle's state from which it counts as lost.
+    """
+
+    def __init__(self, run: RunInfo, lost_after_ms: int, now_ms: int) -> None:
+        self.map = FleetMap(run.grid.spec, run.rho)
+        self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
+        self.primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
+        self._lost_after_ms = lost_after_ms
+        self._given_up_after_ms = GIVEN_UP_AFTER * lost_after_ms
+        self._complained_of: set[str] = set()
+
+    @property
+    def surveying(self) -> list[KnownVehicle]:
+        """The primaries that have not surveyed all and are not given up."""
+        return [one for one in self.primaries.values() if one.finished_ms is None]
+
+    def hear_tile(self, received: Received, tile: CoverageTile) -> bool:
+        """Joins a tile to the map; returns whether it was news. One that does not fit the grid is dropped."""
+        name, incarnation = received.vehicle, received.header.incarnation
+        try:
+            news = self.map.join(name, incarnation, tile)
+        except ValueError as error:
+            if name not in self._complained_of:
+                self._complained_of.add(name)
+                log.warning("dropped a message from %s: %s (said once)", name, error)
+            return False
+        if name in self.vehicles:
+            self.vehicles[name].note_tile(incarnation, tile.version)
+        return news
+
+    def levels(self, name: str, window: Window) -> LevelArray:
+        """What a vehicle's own layer tells of a window's cells: the sum over its looks."""
+        layer = self.map.layers.get(name)
+        if layer is None:
+            return np.zeros((window.rows, window.end_column - window.first_column), dtype=np.uint8)
+        return layer.sum_levels[window.cells].copy()
+
+    def find_lost(self, now_ms: int) -> list[str]:
+        """Finds of whom too long nothing was heard; returns who is lost that was not before."""
+        lost = []
+        for name, vehicle in self.vehicles.items():
+            if not vehicle.lost and now_ms - vehicle.heard_ms >= self._lost_after_ms:
+                vehicle.lost = True
+                lost.append(name)
+                log.info("%s is lost: nothing heard of it since %.0f s", name, vehicle.heard_ms / 1000)
+        for vehicle in self.surveying:
+            if now_ms - vehicle.heard_ms >= self._given_up_after_ms:
+                vehicle.finished_ms = now_ms
+        return lost
+
+    def deadlines_ms(self) -> Iterator[int]:
+        """When somebody is lost, or given up, if nothing is heard until then."""
+        yield from (one.heard_ms + self._lost_after_ms for one in self.vehicles.values() if not one.lost)
+        yield from (one.heard_ms + self._given_up_after_ms for one in self.surveying)

@@ -1,0 +1,50 @@
+"""What the coordinator says: how strips stand, tasks for helpers, and that the mission is over."""
+
+from __future__ import annotations
+
+from comms.node import Publication
+from comms.said.messages import MissionOver, StripStatus, Task, TaskAction
+from comms.said.topics import MISSION_OVER, STRIP, TASK
+from coordinator.ledger import StripRecord
+from planner.types import Strip
+
+
+class Outbox:
+    """Keeps what is to be published until the node's step, in order. Tasks are numbered from 1."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Publication] = []
+        self._tasks = 0
+
+    def add_strip(self, record: StripRecord) -> None:
+        """Says how a strip stands."""
+        strip = record.strip
+        message = StripStatus(
+            revision=record.revision,
+            state=record.state,
+            start_x_m=strip.start[0],
+            start_y_m=strip.start[1],
+            heading_rad=strip.heading_rad,
+            length_m=strip.length_m,
+            width_m=strip.width_m,
+            removable_m2=record.cut.removable_m2,
+            vehicle=record.vehicle,
+            reason=record.reason[:200],
+        )
+        self._waiting.append(Publication(STRIP.key(number=strip.number), message))
+
+    def add_task(self, action: TaskAction, vehicle: str, strip: Strip) -> None:
+        """Tells a vehicle to do something with a strip, or at its start."""
+        self._tasks += 1
+        task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
+        self._waiting.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
+
+    def add_over(self, over: MissionOver) -> None:
+        """Says that the mission is over."""
+        self._waiting.append(Publication(MISSION_OVER.key(), over))
+
+    def empty(self) -> tuple[Publication, ...]:
+        """All that is to be published; it is then no longer here."""
+        waiting = tuple(self._waiting)
+        self._waiting.clear()
+        return waiting

@@ -1,0 +1,244 @@
+"""The life of a strip: what moves it from open, through offered, accepted and under way, to done, failed or withdrawn.
+
+A vehicle's word on a strip counts if it is newer than all that the vehicle has told of that strip. Whether a strip is
+done the map decides, not the word.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+from comms.said.codec import Header
+from comms.said.messages import AgentState, Mode, StripState, TaskAction, TaskState, TaskStatus
+from coordinator.agenda import Agenda, Item
+from coordinator.allocate.service import Service
+from coordinator.cut.cutter import Cutter
+from coordinator.cut.strips import Cut, strip_of
+from coordinator.fleet import KnownFleet
+from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
+from coordinator.outbox import Outbox
+from coordinator.vehicles import KnownVehicle, Offer
+from planner.types import BoolArray, Strip
+
+WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is published again
+ANSWER_WITHIN_MS = 10_000
+COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen anew for the map to agree that it is done
+LATE_SHARE = 0.5  # of the time that a service was expected to take, that it may take longer
+LATE_MS = 60_000  # and so much more
+FULL_LEVEL = 255  # a cell that has it cannot show another look
+
+
+class StripLife:
+    """Writes the `ledger`, and says each change of it; nobody else does.
+
+    `inside`: the area's cells, shape of the grid. `cutter`: learns from strips that are done; None where there is no
+    helper, and so no strip.
+    """
+
+    def __init__(
+        self,
+        ledger: Ledger,
+        fleet: KnownFleet,
+        inside: BoolArray,
+        cutter: Cutter | None,
+        agenda: Agenda,
+        outbox: Outbox,
+    ) -> None:
+        self.ledger = ledger
+        self._fleet = fleet
+        self._inside = inside
+        self._cutter = cutter
+        self._agenda = agenda
+        self._outbox = outbox
+
+    def open(self, cut: Cut, now_ms: int) -> None:
+        """Opens a new strip where it is cut."""
+        strip = self._strip_of(cut, self.ledger.next_number)
+        self._outbox.add_strip(self.ledger.open(strip, cut, now_ms, "badly seen"))
+
+    def revise(self, record: StripRecord, cut: Cut) -> None:
+        """Moves an open strip to where it is cut now, if that is news; who has refused it may be offered it again."""
+        change_m2 = abs(cut.counts_m2 - record.cut.counts_m2)
+        if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
+            return
+        self.ledger.revise(record, self._strip_of(cut, record.strip.number), cut)
+        for vehicle in self._fleet.vehicles.values():
+            vehicle.refused.discard(record.strip.number)
+        self._outbox.add_strip(record)
+
+    def withdraw(self, record: StripRecord, now_ms: int) -> None:
+        """Withdraws an open strip, where none is cut any more."""
+        self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
+
+    def offer(self, number: int, name: str, expected: Service, now_ms: int) -> None:
+        """Offers an open strip to a vehicle. `expected`: how the service is expected to go."""
+        record, vehicle = self.ledger.get(number), self._fleet.vehicles[name]
+        assert record is not None
+        self._outbox.add_task(TaskAction.TAKE, name, record.strip)
+        vehicle.asked_back = 0
+        ends_ms = round(expected.ends_s * 1000)
+        due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
+        levels = self._fleet.levels(name, record.window)
+        vehicle.offers[number] = Offer(record.strip, record.cut, expected, due_ms, levels)
+        self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
+
+    def ask_back(self, strip: Strip, vehicle: KnownVehicle) -> None:
+        """Tells a vehicle to give a strip back."""
+        vehicle.asked_back = strip.number
+        self._outbox.add_task(TaskAction.GIVE_BACK, vehicle.entry.vehicle, strip)
+
+    def hear_state(
+        self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int, *, was_idle: bool
+    ) -> None:
+        """A vehicle's newest state tells of its work, too: an answer, or its last word on a strip, may be lost.
+
+        `was_idle`: whether it was idle by the state before.
+        """
+        if vehicle.is_at_a_strip:
+            if vehicle.tells_news_of(state.works_on, header):
+                self._hear_at_work(state.works_on, vehicle, now_ms, under_way=state.mode is Mode.REVISIT)
+        elif was_idle and vehicle.is_idle:
+            self._hear_no_work(vehicle, header, now_ms)
+
+    def hear_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:
+        """A vehicle tells how far it is with a strip."""
+        if not vehicle.tells_news_of(status.strip, header):
+            return
+        vehicle.unanswered = 0
+        if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
+            self._hear_at_work(status.strip, vehicle, now_ms, under_way=status.state is TaskState.UNDER_WAY)
+            return
+        record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
+        if record is None or record.vehicle != name or record.state not in WITH_A_VEHICLE:
+            if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
+                self._agenda.add(Item.CUT, now_ms)
+            return
+        self._agenda.add(Item.ASSIGN if status.state is TaskState.REFUSED else Item.CUT, now_ms)
+        match status.state:
+            case TaskState.REFUSED:
+                vehicle.refused.add(status.strip)
+                self._move(record, StripState.OPEN, now_ms, f"{name} refused: {status.reason}")
+            case TaskState.GIVEN_BACK:
+                vehicle.refused.add(status.strip)
+                if vehicle.asked_back != status.strip:
+                    vehicle.note_failure()
+                self._move(record, StripState.OPEN, now_ms, f"given back by {name}")
+            case TaskState.FAILED:
+                vehicle.note_failure(record.window)
+                self._move(record, StripState.FAILED, now_ms, f"{name} failed: {status.reason}", name)
+            case TaskState.DONE:
+                self._hear_done(record, vehicle, now_ms)
+
+    def find_overdue(self, lost: Iterable[str], now_ms: int) -> None:
+        """Opens again what vehicles had that are `lost` now, have not answered, or are late."""
+        for name in lost:
+            for record in self.ledger.in_state(*WITH_A_VEHICLE):
+                if record.vehicle == name:
+                    self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
+                    self._agenda.add(Item.CUT, now_ms)
+        for record in self.ledger.in_state(StripState.OFFERED):
+            if now_ms - record.since_ms >= ANSWER_WITHIN_MS:
+                self._fleet.vehicles[record.vehicle].note_silence()
+                self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
+                self._agenda.add(Item.ASSIGN, now_ms)
+        for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
+            vehicle, offer = self._of(record)
+            if now_ms >= offer.due_ms:
+                late = f"{record.vehicle} has not served it, which was expected by {offer.service.ends_s:.0f} s"
+                self.ask_back(record.strip, vehicle)
+                vehicle.note_failure(record.window)
+                self._move(record, StripState.OPEN, now_ms, late)
+                self._agenda.add(Item.CUT, now_ms)
+
+    def deadlines_ms(self) -> Iterator[int]:
+        """When an answer, or a service, is overdue."""
+        yield from (one.since_ms + ANSWER_WITHIN_MS for one in self.ledger.in_state(StripState.OFFERED))
+        at_work = self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY)
+        yield from (self._of(one)[1].due_ms for one in at_work)
+
+    @property
+    def unended(self) -> list[StripRecord]:
+        """The strips that are open or with a vehicle."""
+        return self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
+
+    def leave_all(self, now_ms: int) -> None:
+        """Leaves what has not ended open for good: the mission is over."""
+        for record in self.unended:
+            who = f"{record.vehicle} has not ended it" if record.vehicle else "nobody has served it"
+            self.ledger.leave(record, now_ms, f"left when the mission was over: {who}")
+            self._outbox.add_strip(record)
+
+    def _hear_at_work(self, number: int, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
+        """A vehicle says that it is at a strip.
+
+        Where the strip is not with it, because it counted as lost, it gets the strip back, as it was, if nobody else
+        has it. Else the vehicle is to give it back, so that no two are at one place: also where it was asked to before,
+        and where the strip is of a coordinator that is no more.
+        """
+        record, name = self.ledger.get(number), vehicle.entry.vehicle
+        if record is None:
+            if number > 0:
+                self._outbox.add_task(TaskAction.GIVE_BACK, name, Strip(number, (0.0, 0.0), 0.0, 0.0, 0.0))
+            return
+        offer = vehicle.offers.get(number)
+        if record.state is StripState.OPEN and offer is not None and vehicle.asked_back != number:
+            if record.strip != offer.strip:
+                self.ledger.revise(record, offer.strip, offer.cut)
+                self._outbox.add_strip(record)
+                self._agenda.add(Item.CUT, now_ms)
+            vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + LATE_MS))
+            self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
+        if record.vehicle == name and record.state in WITH_A_VEHICLE:
+            vehicle.unanswered = 0
+            if under_way:
+                self._move(record, StripState.UNDER_WAY, now_ms, "under way", name)
+            else:
+                self._move(record, StripState.ACCEPTED, now_ms, "accepted", name)
+        else:
+            self.ask_back(record.strip, vehicle)
+
+    def _hear_no_work(self, vehicle: KnownVehicle, header: Header, now_ms: int) -> None:
+        """A vehicle says once more that it has no work: its last word on a strip that it still has here was lost."""
+        name = vehicle.entry.vehicle
+        for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
+            if record.vehicle == name and vehicle.tells_news_of(record.strip.number, header):
+                if self._seen_share(record) >= COVERED_SHARE:
+                    vehicle.failures = 0
+                    self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)
+                else:
+                    vehicle.note_failure()
+                    self._move(record, StripState.OPEN, now_ms, f"{name} has no work, its word on it was lost")
+                self._agenda.add(Item.CUT, now_ms)
+
+    def _hear_done(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int) -> None:
+        """What is left of a strip that its vehicle says is done is cut anew."""
+        name, share = vehicle.entry.vehicle, self._seen_share(record)
+        if share >= COVERED_SHARE:
+            vehicle.failures = 0
+            if self._cutter is not None:
+                self._cutter.learn(record.window, name, vehicle.entry.p_detect)
+            self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
+        else:
+            vehicle.note_failure(record.window)
+            self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
+
+    def _seen_share(self, record: StripRecord) -> float:
+        """Share of a strip's cells that its vehicle has seen since it was offered the strip."""
+        cells = self._inside[record.window.cells]
+        if not cells.any():
+            return 1.0
+        levels, before = self._fleet.levels(record.vehicle, record.window), self._of(record)[1].levels_before
+        return float(((levels > before) | (levels == FULL_LEVEL))[cells].mean())
+
+    def _of(self, record: StripRecord) -> tuple[KnownVehicle, Offer]:
+        """The vehicle that has a strip, and as what it was offered it."""
+        vehicle = self._fleet.vehicles[record.vehicle]
+        return vehicle, vehicle.offers[record.strip.number]
+
+    def _strip_of(self, cut: Cut, number: int) -> Strip:
+        return strip_of(self._fleet.map.grid, cut.window, number, descending=cut.descending)
+
+    def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
+        if self.ledger.move(record, state, now_ms, reason, vehicle):
+            self._outbox.add_strip(record)

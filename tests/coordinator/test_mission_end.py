@@ -1,0 +1,159 @@
+"""The mission's end, by hand: when it is over, and to whom that is said again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from by_hand import FLEET, HELPER, PRIMARY, vehicle
+from coordinator_by_hand import (
+    DONE,
+    ELSEWHERE,
+    GRID,
+    OFFERED,
+    OPEN,
+    coordinator,
+    looked,
+    with_a_helper,
+)
+
+from comms.said.messages import (
+    MissionOver,
+    Mode,
+    Role,
+    StripStatus,
+    TaskState,
+)
+from coordinator.allocate.simple import GreedyAllocator, NoAllocator
+from coordinator.allocate.situation import Allocator
+
+
+class TestTheEnd:
+    def test_it_is_over_when_the_primary_has_finished_and_no_strip_is_left(self) -> None:
+        told = coordinator()
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        said = told.settle()
+        assert [one.message for one in said] == [MissionOver("every primary has finished and no strip is left")]
+        told.state(HELPER, Mode.FINISHED, at_ms=told.node.now_ms + 3)
+        told.state(PRIMARY, Mode.FINISHED)
+        told.hotspot()
+        assert told.node.wait(100) == []
+        assert told.node.wake_ms is None
+
+    def test_it_says_so_again_for_10_s_until_all_have_answered(self) -> None:
+        told = coordinator()
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        told.settle()
+        over_ms = told.node.now_ms
+        told.node.wait(60)
+        times_ms = [one.at_ms - over_ms for one in told.node.said if isinstance(one.message, MissionOver)]
+        assert times_ms == [0, *range(10, 100, 10), *range(1000, 10_000, 1000)]
+
+    def test_it_says_so_again_where_tiles_were_lost(self) -> None:
+        told = coordinator()
+        told.layer(PRIMARY, np.full(GRID.shape, 0.3))
+        told.version += 1  # one that does not arrive
+        told.layer(PRIMARY, np.full(GRID.shape, 0.3))
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        told.settle()
+        for name in (PRIMARY, HELPER):
+            told.state(name, Mode.FINISHED)
+        told.node.wait(60)
+        assert len(told.node.all(MissionOver)) == 19
+
+    def test_what_is_left_is_left_open_with_a_reason(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.hotspot(ELSEWHERE, number=2)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=20_000)
+        told.settle()
+        told.state(HELPER, Mode.REVISIT, 1)
+        told.node.wait(2)
+        over = next(one for one in told.node.said if isinstance(one.message, MissionOver))
+        last = [one for one in told.node.said if isinstance(one.message, StripStatus)][-2:]
+        assert [(one.number, one.at_ms) for one in last] == [(1, over.at_ms), (2, over.at_ms)]
+        assert told.states() == {1: OPEN, 2: OPEN}
+        assert told.strips()[1].reason == f"left when the mission was over: {HELPER} has not ended it"
+        assert told.strips()[2].reason == "left when the mission was over: nobody has served it"
+
+    def test_it_waits_for_what_is_being_served(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=20_000_000 // 1000)
+        told.settle()
+        assert told.node.all(MissionOver) == []
+        told.layer(HELPER, looked())
+        told.status(HELPER, 1, TaskState.DONE)
+        told.settle()
+        assert told.node.all(MissionOver)
+        assert told.states() == {1: DONE}
+
+    def test_it_waits_for_a_last_hotspot_that_comes_with_the_last_state(self) -> None:
+        told = coordinator()
+        told.keep_alive([PRIMARY, HELPER], 3000)
+        told.hotspot()
+        told.state(PRIMARY, Mode.FINISHED)
+        told.settle()
+        assert told.node.all(MissionOver) == []
+        assert told.states() == {1: OFFERED}
+
+    @pytest.mark.parametrize("allocator", [GreedyAllocator(), NoAllocator()])
+    def test_at_the_deadline_it_is_over_whatever_is_left(self, allocator: Allocator) -> None:
+        told = coordinator(allocator=allocator)
+        told.hotspot()
+        told.state(PRIMARY, Mode.SURVEY, 1)
+        for at_ms in range(20_000, 1_000_000, 20_000):
+            told.state(PRIMARY, Mode.SURVEY, 1, at_ms=at_ms)
+            told.state(HELPER, Mode.IDLE)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=1_000_000)
+        told.keep_alive([PRIMARY, HELPER], 49)
+        assert told.node.all(MissionOver) == []
+        told.node.wait_until(1_050_000)
+        over = [one for one in told.node.said if isinstance(one.message, MissionOver)]
+        assert [(one.at_ms, one.message.reason) for one in over if isinstance(one.message, MissionOver)] == [
+            (1_050_000, "1.05 times the last primary's end is reached, 1 strips are left")
+        ]
+        assert told.states()[1] in (OPEN, OFFERED)
+        assert bool(told.tasks()) is isinstance(allocator, GreedyAllocator)
+
+    def test_every_primary_counts(self) -> None:
+        told = coordinator((*FLEET, vehicle("other", Role.SURVEY)))
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        told.settle()
+        assert told.node.all(MissionOver) == []
+        told.state("other", Mode.FINISHED)
+        told.settle()
+        assert len(told.node.all(MissionOver)) == 1
+
+    def test_a_primary_that_is_silent_for_five_minutes_is_given_up(self) -> None:
+        told = coordinator(idle=())
+        told.hotspot()
+        told.node.wait_until(314_999)
+        assert told.node.all(MissionOver) == []
+        told.node.wait_until(315_001)
+        assert len(told.node.all(MissionOver)) == 1  # 1.05 times 300 s
+        assert told.states() == {1: OPEN}
+
+    def test_with_nothing_left_to_do_it_is_over_when_the_primary_is_given_up(self) -> None:
+        told = coordinator()
+        told.node.wait_until(299_999)
+        assert told.node.all(MissionOver) == []
+        told.node.wait_until(300_001)
+        assert len(told.node.all(MissionOver)) == 1
+
+    @pytest.mark.parametrize("silent_s", [40, 305])
+    def test_a_primary_that_is_heard_again_is_waited_for(self, silent_s: int) -> None:
+        told = coordinator()
+        told.hotspot()
+        told.node.wait_until(silent_s * 1000)
+        told.state(PRIMARY, Mode.SURVEY, 1)
+        told.state(HELPER, Mode.IDLE)
+        told.keep_alive([PRIMARY, HELPER], 500 - silent_s)
+        assert told.node.all(MissionOver) == []
+        told.state(PRIMARY, Mode.FINISHED)
+        told.keep_alive([PRIMARY, HELPER], 24)
+        assert told.node.all(MissionOver) == []  # 1.05 times 500 s
+        told.keep_alive([PRIMARY, HELPER], 2)
+        assert told.node.all(MissionOver)
+
+    def test_a_run_without_a_primary_is_over_at_once(self) -> None:
+        told = coordinator((vehicle(HELPER, Role.REVISIT),))
+        told.node.wait(1)
+        assert told.node.all(MissionOver)
