@@ -14,7 +14,7 @@ from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
 from planner.dubins import Pose
 from planner.risk import LevelArray
-from planner.sweep import Run, distance_over, run_over
+from planner.sweep import Pass, distance_over, pass_over
 from planner.types import Strip
 
 log = logging.getLogger("secondlook.coordinator")
@@ -33,20 +33,20 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
     at_ms, pose = heard_ms, Pose(state.x_m, state.y_m, state.heading_rad)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)
-        pose = run_of(ahead[0], entry.run_in_m).end
+        pose = pass_of(ahead[0], entry.run_in_m).end
         ahead = ahead[1:]
         at_ms += round(entry.run_in_m / entry.speed_mps * 1000) if ahead else 0
     if not ahead:
         return at_ms
-    runs = [run_of(track, entry.run_in_m) for track in ahead]
+    passes = [pass_of(track, entry.run_in_m) for track in ahead]
     # The last track's run-out comes after its end.
-    way_m = distance_over(pose, runs, entry.turn_radius_m) - entry.run_in_m
+    way_m = distance_over(pose, passes, entry.turn_radius_m) - entry.run_in_m
     return at_ms + round(way_m / entry.speed_mps * 1000)
 
 
-def run_of(track: PlannedTrack, run_in_m: float) -> Run:
+def pass_of(track: PlannedTrack, run_in_m: float) -> Pass:
     """A planned track with its run-in and run-out."""
-    return run_over((track.start_x_m, track.start_y_m), (track.end_x_m, track.end_y_m), run_in_m)
+    return pass_over((track.start_x_m, track.start_y_m), (track.end_x_m, track.end_y_m), run_in_m)
 
 
 Order = tuple[int, int]

@@ -15,7 +15,7 @@ from planner.types import Point, Strip, SweepFrame, Track
 LENGTH_TOLERANCE_M = 1e-6
 
 
-class Run(NamedTuple):
+class Pass(NamedTuple):
     """A leg with its run-in and run-out: where the one begins and the other ends."""
 
     begin: Pose
@@ -36,19 +36,19 @@ class Sweep:
     """
 
     legs: tuple[Track, ...]
-    runs: tuple[Run, ...]
+    passes: tuple[Pass, ...]
     length_m: float
     follows: bool
 
     @property
     def entry(self) -> Pose:
         """Where the first run-in begins."""
-        return self.runs[0].begin
+        return self.passes[0].begin
 
     @property
     def leave(self) -> Pose:
         """Where the last run-out ends."""
-        return self.runs[-1].end
+        return self.passes[-1].end
 
 
 def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list[Track]:
@@ -91,10 +91,10 @@ def sweeps_over(
     ways = [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
     found = []
     for way in ways:
-        runs = tuple(run_over(leg.start, leg.end, run_in_m) for leg in way)
+        passes = tuple(pass_over(leg.start, leg.end, run_in_m) for leg in way)
         numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
         follows = len(legs) == 1 and way is legs
-        found.append(Sweep(numbered, runs, length_over(runs, turn_radius_m), follows))
+        found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m), follows))
     return tuple(found)
 
 
@@ -111,24 +111,24 @@ def shortest_sweep(sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float) ->
     return best, best_m - best.length_m
 
 
-def run_over(start: Point, end: Point, run_in_m: float) -> Run:
-    """The run over a leg from `start` to `end`."""
+def pass_over(start: Point, end: Point, run_in_m: float) -> Pass:
+    """The pass over a leg from `start` to `end`."""
     heading_rad = math.atan2(end[0] - start[0], end[1] - start[1]) % (2 * math.pi)
-    return Run(shifted(start, heading_rad, -run_in_m), shifted(end, heading_rad, run_in_m))
+    return Pass(shifted(start, heading_rad, -run_in_m), shifted(end, heading_rad, run_in_m))
 
 
-def length_over(runs: Sequence[Run], turn_radius_m: float) -> float:
-    """How far it is, in metres, over runs in their order, with the turns between them. Raises ValueError where the turn
-    radius is not finite and above 0."""
-    turns_m = (shortest_path(one.end, other.begin, turn_radius_m).length_m for one, other in pairwise(runs))
-    return sum(run.length_m for run in runs) + sum(turns_m)
+def length_over(passes: Sequence[Pass], turn_radius_m: float) -> float:
+    """How far it is, in metres, over passes in their order, with the turns between them. Raises ValueError where the
+    turn radius is not finite and above 0."""
+    turns_m = (shortest_path(one.end, other.begin, turn_radius_m).length_m for one, other in pairwise(passes))
+    return sum(one.length_m for one in passes) + sum(turns_m)
 
 
-def distance_over(pose: Pose, runs: Sequence[Run], turn_radius_m: float) -> float:
-    """How far it is, in metres, from a pose over runs in their order to the last one's end; 0 without runs."""
-    if not runs:
+def distance_over(pose: Pose, passes: Sequence[Pass], turn_radius_m: float) -> float:
+    """How far it is, in metres, from a pose over passes in their order to the last one's end; 0 without passes."""
+    if not passes:
         return 0.0
-    return shortest_path(pose, runs[0].begin, turn_radius_m).length_m + length_over(runs, turn_radius_m)
+    return shortest_path(pose, passes[0].begin, turn_radius_m).length_m + length_over(passes, turn_radius_m)
 
 
 def shifted(point: Point, heading_rad: float, distance_m: float) -> Pose:

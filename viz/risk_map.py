@@ -137,7 +137,7 @@ class RiskMap:
         self._whole = {index for index, block in enumerate(self._blocks.all) if self._inside[block.window].all()}
         self._tally = RiskTally(len(self._blocks.all))
         self._pace = Pace(max(draw_every_ms, LARGE_EVERY_MS if self._blocks.are_large else 0))
-        self._lookers: defaultdict[int, set[str]] = defaultdict(set)  # who has told of a block
+        self._tellers: defaultdict[int, set[str]] = defaultdict(set)  # who has told of a block
         self._changed: set[int] = set()
         self._now_ms = 0
         self._statistics = {
@@ -161,7 +161,7 @@ class RiskMap:
             return
         if news:
             index = self._blocks.index_at(tile.first_row, tile.first_column)
-            self._lookers[index].add(received.vehicle)
+            self._tellers[index].add(received.vehicle)
             self._changed.add(index)
             self._pace.note(received.header.sent_ms)
 
@@ -185,7 +185,7 @@ class RiskMap:
 
     def _draw_block(self, time_ms: int, index: int) -> None:
         block = self._blocks.all[index]
-        levels, risk = self._map.levels_within(block.window, self._lookers[index])
+        levels, risk = self._map.levels_within(block.window, self._tellers[index])
         # The first row of an image is drawn at the far end of the along axis.
         image = np.rint(risk * 255).astype(np.uint8).take(levels)[::-1]
         self._canvas.put(time_ms, f"{paths.RISK}/{block.name}", rr.GridMap.from_fields(data=image.tobytes()))

@@ -78,49 +78,49 @@ class SecondLooks:
             strips=ring(hotspot.outline, HOTSPOT_Z_M),
             labels=f"hotspot {received.number}: {hotspot.cells} cells, mean risk {hotspot.mean_risk:.2f}",
         )
-        self._canvas.put(received.header.sent_ms, path, outline, _hotspot_look())
+        self._canvas.put(received.header.sent_ms, path, outline, _hotspot_style())
 
     def _draw_strip(self, received: Received, strip: StripStatus) -> None:
         number, time_ms = received.number, received.header.sent_ms
         path = f"{paths.STRIPS}/{number}"
-        drawn_look, drawn_place = self._drawn.pop(number, (None, None))
+        drawn_style, drawn_place = self._drawn.pop(number, (None, None))
         if strip.state is StripState.WITHDRAWN:
             self._canvas.put(time_ms, path, rr.Clear(recursive=True))
             self._labelled.discard(number)
             return
         wide = strip.width_m >= self._labelled_m
-        look = (strip.state, wide)
+        style = (strip.state, wide)
         place = strip.as_strip(number)
-        self._drawn[number] = (look, place)
+        self._drawn[number] = (style, place)
         # Often nothing but its worth has changed, or nothing but its place and its worth.
-        looks_new = look != drawn_look
-        lies_new = looks_new or place != drawn_place
+        restyled = style != drawn_style
+        moved = restyled or place != drawn_place
         outline = rr.LineStrips3D.from_fields(
-            strips=strip_ring(place, STRIP_Z_M) if lies_new else None,
+            strips=strip_ring(place, STRIP_Z_M) if moved else None,
             labels=f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_whose(strip)}",
         )
-        self._canvas.put(time_ms, path, outline, *([_strip_look(*look)] if looks_new else []))
+        self._canvas.put(time_ms, path, outline, *([_strip_style(*style)] if restyled else []))
         shows = wide or strip.state in IN_HAND
         if shows or number in self._labelled:
             self._labelled.add(number)
             told = wide and strip.state is not StripState.DONE
             label = rr.Points3D.from_fields(
-                positions=[label_place(place, STRIP_Z_M)] if lies_new else None,
+                positions=[label_place(place, STRIP_Z_M)] if moved else None,
                 labels=f"{number}: {strip.removable_m2:.0f} m²" if told else str(number),  # its colour tells its state
             )
-            self._canvas.put(time_ms, f"{path}/label", label, *([_label_look(shows, strip.state)] if looks_new else []))
+            self._canvas.put(time_ms, f"{path}/label", label, *([_label_style(shows, strip.state)] if restyled else []))
 
 
 # How things look is made once and put beside each outline: to make it anew takes longer than to draw it.
 
 
 @cache
-def _hotspot_look() -> rr.LineStrips3D:
+def _hotspot_style() -> rr.LineStrips3D:
     return rr.LineStrips3D.from_fields(colors=[palette.HOTSPOT], radii=rr.Radius.ui_points(0.7), show_labels=False)
 
 
 @cache
-def _strip_look(state: StripState, wide: bool) -> rr.LineStrips3D:
+def _strip_style(state: StripState, wide: bool) -> rr.LineStrips3D:
     done = state is StripState.DONE
     return rr.LineStrips3D.from_fields(
         colors=[palette.STRIP[state]],
@@ -130,7 +130,7 @@ def _strip_look(state: StripState, wide: bool) -> rr.LineStrips3D:
 
 
 @cache
-def _label_look(shows: bool, state: StripState) -> rr.Points3D:
+def _label_style(shows: bool, state: StripState) -> rr.Points3D:
     # Words in the colour of the state would not be legible on every part of the map.
     return rr.Points3D.from_fields(
         colors=[palette.STRIP[state] if state is StripState.DONE else palette.TEXT],

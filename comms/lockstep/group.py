@@ -17,7 +17,7 @@ from comms.said.routing import Route, Routing
 LOST = "lost by a fault"
 
 
-class NodeRunner:
+class LockstepNode:
     """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
 
     def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
@@ -78,7 +78,7 @@ class NodeGroup:
         self, nodes: Mapping[str, Node], routing: Routing, faults: Faults = NO_FAULTS, incarnation: int = 0
     ) -> None:
         self.intake = Intake(routing)
-        self.runners: dict[str, NodeRunner] = {}
+        self.runners: dict[str, LockstepNode] = {}
         self._routing = routing
         self._faults = faults
         self._departed: list[SenderDigest] = []
@@ -87,7 +87,7 @@ class NodeGroup:
 
     def join(self, node_id: str, node: Node, incarnation: int) -> None:
         """From now on the node is here."""
-        self.runners[node_id] = NodeRunner(node_id, node, self._routing, incarnation)
+        self.runners[node_id] = LockstepNode(node_id, node, self._routing, incarnation)
 
     def leave(self, node_id: str) -> None:
         """From now on the node is not here any more; what it has said counts."""
@@ -119,10 +119,10 @@ class NodeGroup:
         """Puts a message that is open already into the mailboxes of those here that read it, as far as faults let."""
         self._hand_out(received, self._readers(route))
 
-    def _readers(self, route: Route) -> list[NodeRunner]:
+    def _readers(self, route: Route) -> list[LockstepNode]:
         return [self.runners[name] for name in route.readers if name in self.runners]
 
-    def _hand_out(self, received: Received, readers: list[NodeRunner]) -> None:
+    def _hand_out(self, received: Received, readers: list[LockstepNode]) -> None:
         for runner in readers:
             if self._faults:
                 self._deliver_with_faults(runner, received)
@@ -154,10 +154,10 @@ class NodeGroup:
         return [*self._departed, *(runner.digest() for runner in self.runners.values())]
 
     def act(self, grant: Grant, now_ms: int) -> tuple[int | None, list[Outgoing]]:
-        """Lets one node act; see `NodeRunner.act`."""
+        """Lets one node act; see `LockstepNode.act`."""
         return self.runners[grant.node_id].act(now_ms, start=grant.start)
 
-    def _deliver_with_faults(self, runner: NodeRunner, received: Received) -> None:
+    def _deliver_with_faults(self, runner: LockstepNode, received: Received) -> None:
         deliveries = self._faults.deliveries(runner.node_id, received, self._routing)
         if not deliveries:
             self.intake.dropped[LOST] += 1

@@ -134,7 +134,7 @@ class WallHub:
             self._alive_at_s = now_s + SIGN_OF_LIFE_EVERY_S
             self._alive(self._now_ms(now_s))
             if self._strict:
-                self._look_for_silent(now_s)
+                self._find_silent(now_s)
         for notice in self._clock.notices:
             self._notice(notice)
         self._clock.notices.clear()
@@ -152,7 +152,7 @@ class WallHub:
             self._line.say(self._keys.to_host(host), words)
         self._clock.words.clear()
 
-    def _look_for_silent(self, now_s: float) -> None:
+    def _find_silent(self, now_s: float) -> None:
         silent = self._clock.silent(now_s, self._patience_s)
         if silent:
             at_s = self._now_ms(now_s) / 1000

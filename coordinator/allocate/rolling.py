@@ -25,7 +25,7 @@ TOLERANCE_M2 = 1e-6
 
 
 @dataclass(frozen=True)
-class Plan:
+class Schedule:
     """A helper's next strips, by their places; what they remove and the time they leave is worth; when it sets out."""
 
     strips: tuple[int, ...]
@@ -82,8 +82,8 @@ class RollingAllocator:
         helper: Helper,
         task: OpenStrip,
         not_for_it: set[int],
-        plan: Plan,
-    ) -> Plan | None:
+        plan: Schedule,
+    ) -> Schedule | None:
         """What a helper would do if it gave its task back at once; None where that is not better by the margin."""
         free = replace(helper, task=None, free_at=helper.pose, free_s=situation.now_s)
         search = _Search(self, situation, [*strips, task], free)
@@ -111,7 +111,7 @@ class _Search:
         self.first = self._table.served_from(self._pose, np.array([helper.free_s]))
         self.rates: FloatArray = self.first.removed_m2[0] / (self.first.free_s[0] - helper.free_s)
 
-    def plan(self, not_for_it: set[int]) -> Plan:
+    def plan(self, not_for_it: set[int]) -> Schedule:
         """The best sequence without these strips."""
         rates = self.rates.copy()
         rates[sorted(not_for_it)] = 0.0
@@ -119,11 +119,11 @@ class _Search:
         chosen = chosen[rates[chosen] > 0]
         later_m2ps = self._situation.later_m2ps
         free_s = self._helper.free_s
-        best = Plan((), later_m2ps * self._left_s(np.array(free_s)).item(), free_s)
+        best = Schedule((), later_m2ps * self._left_s(np.array(free_s)).item(), free_s)
         if not chosen.size:
             return best
         rank_m2ps = max(later_m2ps, LEAST_WORTH * float(rates[chosen[0]]))
-        # Where the plans of all helpers leave strips over, time left will be spent on them.
+        # Where the schedules of all helpers leave strips over, time left will be spent on them.
         left_over = chosen.size > self._allocator.depth * len(self._situation.helpers)
         end_m2ps = rank_m2ps if left_over else later_m2ps
         table = self._table.of(chosen)
@@ -142,7 +142,7 @@ class _Search:
             row, strip = divmod(place, chosen.size)
             if not depth or total_m2[row, strip] > best.value_m2 + TOLERANCE_M2:
                 first_s = leaves_s[row] if depth else float(found.leaves_s[row, strip])
-                best = Plan((*sequences[row], int(chosen[strip])), float(total_m2[row, strip]), first_s)
+                best = Schedule((*sequences[row], int(chosen[strip])), float(total_m2[row, strip]), first_s)
             ranks = np.where(possible, gained_m2 - rank_m2ps * found.free_s, -np.inf)
             order = np.argsort(-ranks, axis=None, kind="stable")[: self._allocator.beam]
             rows, picked = np.divmod(order[np.isfinite(ranks.flat[order])], chosen.size)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comms.said.messages import AgentState, Mode, Plan, RosterVehicle
-from coordinator.vehicles import run_of
+from coordinator.vehicles import pass_of
 from planner.dubins import DubinsPath, Pose, shortest_path
 from planner.sweep import Sweep, shifted
 from planner.types import FloatArray
@@ -76,18 +76,18 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
     ahead = [track for track in tracks if not track.flown] if state.mode is not Mode.FINISHED else []
     if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         # When the track ends is known more exactly than where the vehicle was last.
-        end = run_of(ahead.pop(0), entry.run_in_m).end
+        end = pass_of(ahead.pop(0), entry.run_in_m).end
         left_m = max(0.0, state.expected_end_ms / 1000 - heard_s) * entry.speed_mps + entry.run_in_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
         flown = [track for track in tracks if track.flown]
-        left_m = run_out_left_m(run_of(flown[-1], entry.run_in_m).end, pose, entry.run_in_m) if flown else 0.0
+        left_m = run_out_left_m(pass_of(flown[-1], entry.run_in_m).end, pose, entry.run_in_m) if flown else 0.0
         end = shifted(pose[:2], pose.heading_rad, left_m)
     paths, here, length_m = [straight(pose, left_m, radius_m)], end, left_m
     for track in ahead:
-        run = run_of(track, entry.run_in_m)
-        paths += [shortest_path(here, run.begin, radius_m), straight(run.begin, run.length_m, radius_m)]
-        here = run.end
+        one = pass_of(track, entry.run_in_m)
+        paths += [shortest_path(here, one.begin, radius_m), straight(one.begin, one.length_m, radius_m)]
+        here = one.end
         length_m += paths[-1].length_m + paths[-2].length_m
         if length_m > entry.speed_mps * AHEAD_S:
             break
@@ -100,7 +100,7 @@ def sweep_course(
     """The course over a strip's legs from a pose at a time; `entered`: the first leg's run-in lies behind it, the pose
     on the leg."""
     paths, here = [], pose
-    for place, (begin, end) in enumerate(sweep.runs):
+    for place, (begin, end) in enumerate(sweep.passes):
         if not (entered and place == 0):
             paths.append(shortest_path(here, begin, turn_radius_m))
             here = begin

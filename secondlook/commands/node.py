@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ import typer
 from comms.session import Certificates
 from secondlook.commands.run import check_factor
 from secondlook.errors import UserError
+from secondlook.fleet.nodes import COORDINATOR, WORLD
 from secondlook.launch.run_folder import run_folder
 from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
 from secondlook.scenario import Scenario, load_scenario
@@ -113,24 +115,30 @@ def router(
     raise typer.Exit(run_router(mission, link, factor=factor, record=not no_record))
 
 
-@node_app.command()
-def world(
-    scenario: ScenarioArgument,
-    connect: Connect,
-    listen: Listen = None,
-    run: Run = None,
-    seed: Seed = None,
-    set_: Set = None,
-    insecure: Insecure = False,
-    tls_ca: Authority = None,
-    tls_cert: Certificate = None,
-    tls_key: Key = None,
-    wait: Wait = 10.0,
-) -> None:
-    """The simulated sea, with all vehicles whose body is simulated."""
-    mission = load_scenario(scenario, set_ or (), seed)
-    link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
-    raise typer.Exit(run_node(mission, link, "world"))
+def _acting(node_id: str) -> Callable[..., None]:
+    """The command that runs an acting node which every fleet has."""
+
+    def command(
+        scenario: ScenarioArgument,
+        connect: Connect,
+        listen: Listen = None,
+        run: Run = None,
+        seed: Seed = None,
+        set_: Set = None,
+        insecure: Insecure = False,
+        tls_ca: Authority = None,
+        tls_cert: Certificate = None,
+        tls_key: Key = None,
+        wait: Wait = 10.0,
+    ) -> None:
+        mission = load_scenario(scenario, set_ or (), seed)
+        link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
+        raise typer.Exit(run_node(mission, link, node_id))
+
+    return command
+
+
+node_app.command("world", help="The simulated sea, with all vehicles whose body is simulated.")(_acting(WORLD))
 
 
 @node_app.command()
@@ -156,24 +164,7 @@ def agent(
     raise typer.Exit(run_node(mission, link, vehicle))
 
 
-@node_app.command()
-def coordinator(
-    scenario: ScenarioArgument,
-    connect: Connect,
-    listen: Listen = None,
-    run: Run = None,
-    seed: Seed = None,
-    set_: Set = None,
-    insecure: Insecure = False,
-    tls_ca: Authority = None,
-    tls_cert: Certificate = None,
-    tls_key: Key = None,
-    wait: Wait = 10.0,
-) -> None:
-    """The coordinator, which gives out the second looks."""
-    mission = load_scenario(scenario, set_ or (), seed)
-    link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
-    raise typer.Exit(run_node(mission, link, "coordinator"))
+node_app.command("coordinator", help="The coordinator, which gives out the second looks.")(_acting(COORDINATOR))
 
 
 @node_app.command()

@@ -15,7 +15,7 @@ from planner.area import SurveyArea
 from planner.dubins import Pose
 from planner.first_plan import FirstPlan
 from planner.seen import seen_cells
-from planner.sweep import distance_over, run_over
+from planner.sweep import distance_over, pass_over
 from planner.types import Point, Track
 from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
 from secondlook.recorded import GeographicOrigin
@@ -71,9 +71,9 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     inside = region.inside(grid)
     missed = inside & ~seen_cells(grid, tracks, vehicle.nadir_gap_m, vehicle.told_range_m)
     start = Pose(vehicle.start.x_m, vehicle.start.y_m, math.radians(vehicle.start.heading_deg))
-    runs = [run_over(track.start, track.end, vehicle.run_in_m) for track in tracks]
+    passes = [pass_over(track.start, track.end, vehicle.run_in_m) for track in tracks]
     # The last track's run-out comes after its end.
-    way_m = distance_over(start, runs, vehicle.turn_radius_m) - vehicle.run_in_m
+    way_m = distance_over(start, passes, vehicle.turn_radius_m) - vehicle.run_in_m
     return PlannedSurvey(
         name, vehicle, heading_rad, plan, float(missed.sum() / max(1, inside.sum())), way_m / vehicle.speed_mps
     )

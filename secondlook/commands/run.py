@@ -74,53 +74,61 @@ class BusName(StrEnum):
     local = "local"
 
 
+Out = Annotated[
+    Path | None, typer.Option(help="Folder for the files of the run, new or empty; runs/SCENARIO-TIME if left out.")
+]
+Processes = Annotated[
+    int | None, typer.Option(min=1, help="Over how many processes the nodes are spread; one each if left out.")
+]
+RealTime = Annotated[
+    float | None,
+    typer.Option(
+        REAL_TIME,
+        metavar="[FACTOR]",
+        help="By the wall clock, FACTOR times as fast, 1 if left out; not repeatable, so without a digest.",
+    ),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override a key of the scenario, e.g. vehicles.primary.spacing=fixed; may be repeated.",
+    ),
+]
+Cell = Annotated[
+    float | None,
+    typer.Option(
+        "--cell", metavar="M", help="Another cell of the map than the scenario's, in metres; at most 20 million cells."
+    ),
+]
+NoRecord = Annotated[
+    bool,
+    typer.Option(
+        "--no-record", help="Without the recording and messages.mpk, and so without the report; not with --live."
+    ),
+]
+Live = Annotated[
+    bool, typer.Option("--live", help="Show the mission in Rerun while it runs; the window stays open afterwards.")
+]
+Web = Annotated[
+    bool, typer.Option("--web", help="With --live: in a browser on this machine; prints the page's address.")
+]
+
+
 def run(
     scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")] = "tellaro",
-    out: Annotated[
-        Path | None, typer.Option(help="Folder for the files of the run, new or empty; runs/SCENARIO-TIME if left out.")
-    ] = None,
+    out: Out = None,
     seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Another seed than the scenario's.")] = None,
     bus: Annotated[BusName, typer.Option(help="Real processes over Zenoh, or all in this process.")] = BusName.zenoh,
-    processes: Annotated[
-        int | None, typer.Option(min=1, help="Over how many processes the nodes are spread; one each if left out.")
-    ] = None,
-    real_time: Annotated[
-        float | None,
-        typer.Option(
-            REAL_TIME,
-            metavar="[FACTOR]",
-            help="By the wall clock, FACTOR times as fast, 1 if left out; not repeatable, so without a digest.",
-        ),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUE",
-            help="Override a key of the scenario, e.g. vehicles.primary.spacing=fixed; may be repeated.",
-        ),
-    ] = None,
-    cell: Annotated[
-        float | None,
-        typer.Option(
-            "--cell",
-            metavar="M",
-            help="Another cell of the map than the scenario's, in metres; at most 20 million cells.",
-        ),
-    ] = None,
-    no_record: Annotated[
-        bool,
-        typer.Option(
-            "--no-record", help="Without the recording and messages.mpk, and so without the report; not with --live."
-        ),
-    ] = False,
+    processes: Processes = None,
+    real_time: RealTime = None,
+    set_: Set = None,
+    cell: Cell = None,
+    no_record: NoRecord = False,
     no_report: Annotated[bool, typer.Option("--no-report", help="Without report.html.")] = False,
-    live: Annotated[
-        bool, typer.Option("--live", help="Show the mission in Rerun while it runs; the window stays open afterwards.")
-    ] = False,
-    web: Annotated[
-        bool, typer.Option("--web", help="With --live: in a browser on this machine; prints the page's address.")
-    ] = False,
+    live: Live = False,
+    web: Web = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
 ) -> None:
     """Fly a mission, and write what happened."""

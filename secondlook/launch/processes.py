@@ -22,7 +22,7 @@ from secondlook.launch.listening_thread import ListeningThread
 from secondlook.launch.verdict import Verdict
 from secondlook.recorded.observer import RunStopped
 
-LOOK_EVERY_S = 0.1
+POLL_EVERY_S = 0.1
 GRACE_S = 3.0  # to end by themselves, once their pipe is closed
 HUB_PATIENCE = 1.5  # times the hub's own patience with its hosts, whose words come first that way
 
@@ -144,7 +144,7 @@ class Processes:
 
     def _hear(self) -> Iterable[tuple[ChildProcess, dict[str, Any]]]:
         """What the children say, waited for a little."""
-        for key, _ in self._selector.select(LOOK_EVERY_S):
+        for key, _ in self._selector.select(POLL_EVERY_S):
             child: ChildProcess = key.data
             words = child.status.read()
             if words is None:

@@ -39,7 +39,7 @@ class Watchdog:
         self._calls = 0
         self._overdue = 0
         self._done = threading.Event()
-        self._thread = threading.Thread(target=self._look, name="watchdog", daemon=True)
+        self._thread = threading.Thread(target=self._check, name="watchdog", daemon=True)
         self._main = threading.get_ident()
         self._before: signal._HANDLER = None
 
@@ -64,7 +64,7 @@ class Watchdog:
         """The call has come back."""
         self._what = None
 
-    def _look(self) -> None:
+    def _check(self) -> None:
         seen, since_s = 0, time.monotonic()
         while not self._done.wait(self._patience_s / _LOOKS):
             what, now_s = self._what, time.monotonic()

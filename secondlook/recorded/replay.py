@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from comms.lockstep.clock import WRAP_UP_MS
-from comms.lockstep.group import NodeRunner
+from comms.lockstep.group import LockstepNode
 from comms.node import Node, Received
 from comms.runner import Intake, Outgoing
 from comms.said.codec import decode
@@ -56,7 +56,7 @@ def replay_node(
     intake = Intake(routing)
     messages = [received for key, payload in recording if (received := intake.open(key, payload)) is not None]
     expected = [one for one in messages if one.header.sender == node_id]
-    runner = NodeRunner(node_id, node, routing)
+    runner = LockstepNode(node_id, node, routing)
     last_ms = 0
     due_times: set[int] = set()
     for one in messages:

@@ -34,14 +34,7 @@ def summarise(
     told = observer.metrics.summary()
     closest = told.pop("closest")
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
-    dropped = {} if result is None else dict(result.dropped)
-    if observer.metrics.misfits:
-        dropped["does not fit the map"] = observer.metrics.misfits
     messages = observer.messages if result is None else result.messages
-    lost = Counter(messages)
-    lost.subtract(observer.messages)
-    if +lost:
-        dropped["lost on the way to the observer"] = (+lost).total()
     return {
         "scenario": scenario.name,
         "seed": scenario.seed,
@@ -69,8 +62,20 @@ def summarise(
         },
         "rounds": None if result is None else result.rounds,
         "messages": dict(sorted(messages.items())),
-        "dropped": dropped,
+        "dropped": _dropped(observer, result),
     }
+
+
+def _dropped(observer: Observer, result: BusResult | None) -> dict[str, int]:
+    """How many messages were dropped for each reason, as far as is known."""
+    dropped = {} if result is None else dict(result.dropped)
+    if observer.metrics.misfits:
+        dropped["does not fit the map"] = observer.metrics.misfits
+    lost = Counter({} if result is None else result.messages)
+    lost.subtract(observer.messages)
+    if +lost:
+        dropped["lost on the way to the observer"] = (+lost).total()
+    return dropped
 
 
 def _percentiles(milliseconds: list[float]) -> dict[str, float | None]:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.dubins import Pose, shortest_path
-from planner.sweep import Sweep, distance_over, legs_over_strip, run_over, shortest_sweep, sweeps_over
+from planner.sweep import Sweep, distance_over, legs_over_strip, pass_over, shortest_sweep, sweeps_over
 from planner.types import Strip, Track
 
 NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
@@ -87,7 +87,7 @@ class TestLegsOverStrip:
 def cheapest(strip: Strip, pose: Pose, turn_radius_m: float, run_in_m: float, swath_m: float) -> tuple[Sweep, float]:
     """The shortest sweep, and the distance to its last run-out's end."""
     sweep, way_m = shortest_sweep(sweeps_over(strip, swath_m, turn_radius_m, run_in_m), pose, turn_radius_m)
-    assert way_m + sweep.length_m == pytest.approx(distance_over(pose, sweep.runs, turn_radius_m))
+    assert way_m + sweep.length_m == pytest.approx(distance_over(pose, sweep.passes, turn_radius_m))
     return sweep, way_m + sweep.length_m
 
 
@@ -169,7 +169,7 @@ class TestShortestSweep:
 
     def test_nothing_is_flown_over_nothing(self) -> None:
         assert distance_over(Pose(0, 0, 0), [], 10) == 0
-        assert distance_over(Pose(0, -50, NORTH), [run_over((0, 0), (0, 100), 30)], 10) == pytest.approx(180)
+        assert distance_over(Pose(0, -50, NORTH), [pass_over((0, 0), (0, 100), 30)], 10) == pytest.approx(180)
 
     def test_refuses_no_sweeps_and_lengths_out_of_range(self) -> None:
         with pytest.raises(ValueError, match="no sweep"):

@@ -10,7 +10,7 @@ from typing import Any
 from hypothesis import strategies as st
 
 from comms.errors import NodeError
-from comms.lockstep.group import NodeRunner
+from comms.lockstep.group import LockstepNode
 from comms.runner import Intake, Outgoing
 from comms.said.codec import CLOCK, Header, encode
 from comms.said.messages import Maneuver, Message
@@ -115,7 +115,7 @@ class _Told:
         self._commanded: Maneuver | None = None
         self._said: list[Outgoing] = []
         node = checked.make(config=fleet.specs[node_id].config)
-        self._runner = NodeRunner(node_id, WatchedNode(checked.name, node, checked.watchdog), self._routing)
+        self._runner = LockstepNode(node_id, WatchedNode(checked.name, node, checked.watchdog), self._routing)
         self._wake_ms = self._act(start=True)
 
     def all(self, letters: Sequence[Letter]) -> list[Outgoing]:
