@@ -29,9 +29,8 @@ from viz.blueprint import mission_blueprint
 from viz.canvas import Canvas
 from viz.curves import Curves
 from viz.fleet import Fleet
-from viz.priorities import put_priorities
 from viz.recorder_config import LogLine, RecorderConfig
-from viz.risk_map import RiskMap
+from viz.risk_map import RiskMap, put_priorities
 from viz.second_looks import SecondLooks
 from viz.shapes import extent_of
 from viz.task_table import TaskTable

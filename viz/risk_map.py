@@ -1,9 +1,11 @@
-"""The fleet's residual risk from above, drawn as it changes in blocks of whole tiles, and its statistics over time."""
+"""The area from above: residual risk, drawn as it changes in blocks of whole tiles, its statistics over time, and
+ground that counts for more or less."""
 
 from __future__ import annotations
 
 import sys
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +13,14 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from comms.node import Received
-from comms.said.messages import CoverageTile, RunInfo
+from comms.said.messages import CoverageTile, RunInfo, Vertex
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.risk import RiskStatistics
 from planner.tiles import TILE_CELLS
-from planner.types import BoolArray, FloatArray, GridSpec
+from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from viz import palette, paths
-from viz.canvas import Canvas
-from viz.pace import Pace
+from viz.canvas import Canvas, Pace
 from viz.shapes import OUTLINE_Z_M, UNSEEN_Z_M, Extent, ring
 
 SMALLEST_CELLS = 2 * TILE_CELLS  # every drawing costs some 2 kB beside its cells
@@ -288,3 +289,18 @@ def _image_format(columns: int, rows: int, model: rr.ColorModel) -> rr.encodings
     return rr.encodings.ImageFormat(
         width=columns, height=rows, color_model=model, channel_datatype=rr.ChannelDatatype.U8
     )
+
+
+def put_priorities(canvas: Canvas, priorities: Sequence[PriorityGround]) -> None:
+    """Draws each under its own entity, with what it counts."""
+    for number, one in enumerate(priorities, start=1):
+        canvas.put_static(
+            f"{paths.PRIORITIES}/{number}",
+            rr.LineStrips3D(
+                [ring([Vertex(*corner) for corner in outline], OUTLINE_Z_M) for outline in one.outlines_m],
+                colors=[palette.PRIORITY],
+                radii=rr.Radius.ui_points(1.5),
+                labels=f"risk counts {one.weight:g} times here",
+                show_labels=True,
+            ),
+        )

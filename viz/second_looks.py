@@ -10,8 +10,7 @@ import rerun as rr
 from comms.node import Received
 from comms.said.messages import Hotspot, HotspotState, StripState, StripStatus
 from viz import palette, paths
-from viz.canvas import Canvas
-from viz.pace import Pace
+from viz.canvas import Canvas, Pace
 from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_ring
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each

@@ -11,8 +11,7 @@ import rerun as rr
 from comms.node import Received
 from comms.said.messages import RunInfo, StripState, StripStatus, TaskState, TaskStatus
 from viz import paths
-from viz.canvas import Canvas
-from viz.pace import Pace
+from viz.canvas import Canvas, Pace
 
 MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
 IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)

@@ -13,8 +13,7 @@ from typing import Annotated
 import typer
 
 from secondlook.errors import UserError
-from viz.recording_file import is_empty, is_recording, is_whole, repair
-from viz.recording_viewer import RecordingViewer
+from viz.recording_viewer import RecordingViewer, is_empty, is_recording, is_whole, repair
 from viz.viewer_program import ViewerError, check_display
 
 

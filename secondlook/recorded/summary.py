@@ -34,7 +34,6 @@ def summarise(
     told = observer.metrics.summary()
     closest = told.pop("closest")
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
-    messages = observer.messages if result is None else result.messages
     return {
         "scenario": scenario.name,
         "seed": scenario.seed,
@@ -61,7 +60,7 @@ def summarise(
             "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
         },
         "rounds": None if result is None else result.rounds,
-        "messages": dict(sorted(messages.items())),
+        "messages": dict(sorted((observer.messages if result is None else result.messages).items())),
         "dropped": _dropped(observer, result),
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viz.pace import Pace
+from viz.canvas import Pace
 
 
 def test_it_is_due_once_in_a_while_and_not_before_all_of_one_time_is_in() -> None:

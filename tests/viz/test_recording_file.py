@@ -11,7 +11,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from tests.viz.recordings import entities, rows, timelines, verify
-from viz.recording_file import is_empty, is_recording, is_whole, repair
+from viz.recording_viewer import is_empty, is_recording, is_whole, repair
 from viz.viewer_program import ViewerError
 
 SHOWN = (

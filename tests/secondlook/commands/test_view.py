@@ -20,7 +20,7 @@ from flights import LONG, flight, until
 from secondlook import cli
 from tests.viz.recordings import verify
 from tests.viz.test_recording_file import counted, ends_of_messages
-from viz.recording_file import is_empty
+from viz.recording_viewer import is_empty
 
 PAGE = re.compile(r"The mission is shown at (http://127\.0\.0\.1:\d+/\S+); Ctrl-C ends it\n")
 ROOT = Path(__file__).parents[3]
