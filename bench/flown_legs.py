@@ -36,7 +36,7 @@ class FlownLegs:
 
 def _leg(grid: GridSpec, helper: LegHelper, looks: Sequence[tuple[float, Look]]) -> Leg:
     first_s, first = looks[0]
-    end_m = max(look.first_along_m + look.p_detect.shape[1] * look.along_bin_m for _, look in looks)
+    end_m = max(look.first_along_m + look.geometry.along_bins * look.along_bin_m for _, look in looks)
     across_m, along_m = map(float, grid.frame.to_sweep(first.origin_x_m, first.origin_y_m))
     up = math.cos(first.heading_rad - grid.frame.heading_rad) > 0
     way = 1 if up else -1
@@ -48,5 +48,5 @@ def _leg(grid: GridSpec, helper: LegHelper, looks: Sequence[tuple[float, Look]])
         end=min(max(end, 1), grid.rows),
         up=up,
         waits=False,
-        from_s=first_s - first.p_detect.shape[1] * first.along_bin_m / helper.speed_mps,
+        from_s=first_s - first.geometry.along_bins * first.along_bin_m / helper.speed_mps,
     )

@@ -11,7 +11,7 @@ from bench.swath import Swath
 from comms.node import Received
 from comms.said.messages import CoverageTile, Look
 from planner.dubins import Pose
-from planner.footprint import look_on_grid
+from planner.footprints.cells import look_on_grid
 from planner.types import BoolArray, FloatArray, GridSpec
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
@@ -20,7 +20,6 @@ from secondlook.scenario import Scenario
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.seabed import make_seabed
 from sim_world.sonar import CurveSonar
-from vehicle_agent.coverage import geometry
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +107,7 @@ class Clairvoyance:
         # A primary's second looks come after its survey and do not count as its last.
         surveying = self.metrics.vehicles[received.vehicle].finished_ms is None
         if isinstance(message, Look) and message.valid and surveying:
-            rows, columns, p_detect = look_on_grid(self.metrics.map.grid, geometry(message), message.p_detect)
+            rows, columns, p_detect = look_on_grid(self.metrics.map.grid, message.geometry, message.p_detect)
             self._looked_s[rows, columns][p_detect > 0] = now_s
         elif isinstance(message, CoverageTile):
             window = np.s_[

@@ -15,6 +15,7 @@ from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
+from planner.footprints import footprint_of
 
 SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on the way
 
@@ -122,7 +123,7 @@ class Briefing:
             speed_mps=entry.speed_mps,
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
-            swath_m=entry.strip_width_m,
+            swath_m=footprint_of(entry.sonar).reach.strip_width_m,
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,

@@ -16,6 +16,7 @@ from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from coordinator.strip_life import StripLife
 from planner.fleet_map import FleetMap
+from planner.footprints import footprint_of
 from planner.types import BoolArray
 
 SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newly cut strip is an open one revised
@@ -27,12 +28,13 @@ def cutter_for(run: RunInfo, config: CoordinatorConfig, fleet_map: FleetMap, ins
     helpers = [entry for entry in run.vehicles if entry.role.revisits]
     if not helpers:
         return None
-    narrowest = min(helpers, key=lambda entry: entry.strip_width_m)
+    reaches = {entry: footprint_of(entry.sonar).reach for entry in helpers}
+    narrowest, reach = min(reaches.items(), key=lambda item: item[1].strip_width_m)
     rules = CuttingRules(
-        swath_m=narrowest.strip_width_m,
+        swath_m=reach.strip_width_m,
         p_detect=narrowest.p_detect,
         worth_risk=config.worth_risk,
-        overhead_m=math.pi * narrowest.turn_radius_m + 2 * narrowest.swath_m + 2 * narrowest.run_in_m,
+        overhead_m=math.pi * narrowest.turn_radius_m + 2 * reach.far_m + 2 * narrowest.run_in_m,
         min_strip_m=config.min_strip_m,
         max_strip_m=config.max_strip_m,
     )

@@ -13,6 +13,7 @@ from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
 from planner.dubins import Pose
+from planner.footprints import footprint_of
 from planner.risk import LevelArray
 from planner.sweep import Pass, distance_over, pass_over
 from planner.types import Strip
@@ -196,7 +197,8 @@ class KnownVehicle:
         track = next((one for one in self.plan.tracks if one.number == self.state.works_on and not one.flown), None)
         if track is None or self.state.expected_end_ms == 0:
             return None
-        return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps, self.entry.swath_m)
+        reach_m = footprint_of(self.entry.sonar).reach.far_m
+        return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps, reach_m)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

@@ -1,4 +1,4 @@
-"""Shapes that planning and messages share: the sweep frame, the grid, tracks, strips, detection curves.
+"""Shapes that planning and messages share: the sweep frame, the grid, tracks, strips, sonars, looks, detection curves.
 
 Frozen, without algorithms. The mission frame is ENU metres (x east, y north). The sweep frame of an area has its
 origin at the area's corner; `along` (v) points along the tracks, `across` (u) to the right of that, the direction in
@@ -157,3 +157,36 @@ class DetectionCurve:
     def at(self, range_m: FloatArray | float) -> FloatArray:
         """P_d at the given ranges; 0 outside the curve."""
         return np.asarray(np.interp(range_m, self.range_m, self.p_detect, left=0.0, right=0.0))
+
+
+@dataclass(frozen=True)
+class SonarShape:
+    """What ground a sonar sees at a time, as its footprint is made of it (`planner.footprints.footprint_of`).
+
+    `footprint`: the kind of that, by name. `near_m`, `far_m`: from which range to which it sees, 0 <= near < far.
+    `half_angle_rad`: how far to either side of where it looks, 0 to pi/2; 0 for a sonar that looks along a line.
+    `look_m`: the length of track that one look stands for, > 0.
+    """
+
+    footprint: str
+    near_m: float
+    far_m: float
+    half_angle_rad: float = 0.0
+    look_m: float = 20.0
+
+
+@dataclass(frozen=True)
+class LookGeometry:
+    """A look's frame and bins.
+
+    `origin` (mission frame) and `heading_rad` (compass) are the track's; along bin i covers
+    `first_along_m + [i, i + 1) * along_bin_m` from the origin; range bin k is centred at `k * range_bin_m` to a side.
+    """
+
+    origin: Point
+    heading_rad: float
+    first_along_m: float
+    along_bin_m: float
+    range_bin_m: float
+    along_bins: int
+    range_bins: int

@@ -21,7 +21,9 @@ from comms.said.messages import (
     Task,
 )
 from comms.said.topics import CONTACT, MANEUVER, STATE
+from planner.footprints.footprint import Footprint
 from planner.region import Region
+from planner.sweep import shifted
 from planner.types import Point, Strip, SweepFrame, Track
 from vehicle_agent.coverage import CoverageLayer
 
@@ -40,8 +42,9 @@ class Agent:
     manoeuvre's end and each task.
     """
 
-    def __init__(self, vehicle: str, endurance_ms: int) -> None:
+    def __init__(self, vehicle: str, footprint: Footprint, endurance_ms: int) -> None:
         self.vehicle = vehicle
+        self.footprint = footprint
         self.mode = Mode.IDLE
         self.works_on = 0
         self.expected_end_ms = 0
@@ -132,8 +135,10 @@ class Agent:
         self._outbox.append(Publication(key, message))  # type: ignore[arg-type]
 
     def follow(self, track: Track, run_in_m: float) -> None:
-        """Commands the vehicle to fly a track with the sonar on."""
-        self._command(ManeuverKind.FOLLOW, track.start, track.end, run_in_m)
+        """Commands the vehicle to fly a track with the sonar on, so that what lies beside the track is seen."""
+        lead_m = self.footprint.lead_m
+        start, end = (shifted(place, track.heading_rad, -lead_m)[:2] for place in (track.start, track.end))
+        self._command(ManeuverKind.FOLLOW, start, end, run_in_m)
 
     def go_to(self, place: Point) -> None:
         """Commands the vehicle to a place, to wait there."""

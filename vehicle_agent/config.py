@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from planner.footprints.footprint import Footprint
 from planner.spacing_planners import SpacingPlanner
 from planner.types import DetectionCurve
 
@@ -12,14 +13,15 @@ WHOLE = (0.0, 1.0)
 
 @dataclass(frozen=True)
 class SurveyConfig:
-    """A survey agent. `nadir_gap_m`, `range_m`: r_min and the told r_max of planning. `threshold`: P_d from which data
-    is admissible. `hotspot_risk`: residual risk from which a settled cell is a hotspot. `run_in_m`: straight run before
-    and after each track. `endurance_ms`: mission time on one battery. `prior`: P(y) of earlier missions, which holds
-    until the first track is flown (paper, section III-B). `share`: from which to which share of the area's
-    width it surveys, see `planner.region.Region.share`."""
+    """A survey agent. `footprint`: its sonar's. `nadir_gap_m`, `range_m`: r_min and the told r_max of planning.
+    `threshold`: P_d from which data is admissible. `hotspot_risk`: residual risk from which a settled cell is a
+    hotspot. `run_in_m`: straight run before and after each track. `endurance_ms`: mission time on one battery. `prior`:
+    P(y) of earlier missions, which holds until the first track is flown (paper, section III-B). `share`: from which to
+    which share of the area's width it surveys, see `planner.region.Region.share`."""
 
     vehicle: str
     spacing: SpacingPlanner
+    footprint: Footprint
     nadir_gap_m: float
     range_m: float
     threshold: float
@@ -32,16 +34,14 @@ class SurveyConfig:
 
 @dataclass(frozen=True)
 class RevisitConfig:
-    """A revisit agent. `swath_m`: the full width one pass covers; `beside_m`: how far to the side of the track the
-    middle of that lies, 0 for a sensor without a nadir gap. Speeds and turns are those of its vehicle."""
+    """A revisit agent. `footprint`: its sonar's. Speeds and turns are those of its vehicle."""
 
     vehicle: str
-    swath_m: float
+    footprint: Footprint
     speed_mps: float
     turn_radius_m: float
     run_in_m: float
     endurance_ms: int
-    beside_m: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from comms.node import Publication
 from comms.said.messages import CoverageTile, Look
 from comms.said.topics import COVERAGE
-from planner.footprint import LookGeometry, look_on_grid
+from planner.footprints.cells import look_on_grid
 from planner.risk import RiskLayer
 from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within
 from planner.types import BoolArray, GridSpec, Strip
@@ -36,7 +36,7 @@ class CoverageLayer:
 
     def add(self, look: Look) -> None:
         """Adds a valid look."""
-        rows, columns, p_detect = look_on_grid(self.grid, geometry(look), look.p_detect)
+        rows, columns, p_detect = look_on_grid(self.grid, look.geometry, look.p_detect)
         self.layer.add_look(rows, columns, p_detect)
         self._looked_at.update(tiles_within(self.grid, self._tiles, rows, columns))
 
@@ -94,17 +94,3 @@ class CoverageLayer:
             settled=self._published_settled[window].copy(),
         )
         return Publication(COVERAGE.key(vehicle=self._vehicle, tile=tile.name), message)
-
-
-def geometry(look: Look) -> LookGeometry:
-    """Where a look's bins lie."""
-    _, along_bins, range_bins = look.p_detect.shape
-    return LookGeometry(
-        origin=(look.origin_x_m, look.origin_y_m),
-        heading_rad=look.heading_rad,
-        first_along_m=look.first_along_m,
-        along_bin_m=look.along_bin_m,
-        range_bin_m=look.range_bin_m,
-        along_bins=along_bins,
-        range_bins=range_bins,
-    )

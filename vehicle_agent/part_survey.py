@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from planner.area import SurveyArea
-from planner.settle import Reach
+from planner.footprints.footprint import Reach
 from planner.spacing import NARROWEST_M
 from planner.spacing_planners import (
     FlownTrack,

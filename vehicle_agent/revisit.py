@@ -69,7 +69,7 @@ class SecondLooks:
     def on_look(self, look: Look) -> None:
         """Counts what has been swept of the present leg."""
         if self._agent.maneuver is not None and look.maneuver == self._agent.maneuver.number:
-            self._swept_m += look.p_detect.shape[1] * look.along_bin_m
+            self._swept_m += self._agent.footprint.track_length_m(look.geometry)
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Goes from leg to leg."""
@@ -101,7 +101,7 @@ class SecondLooks:
             self._tell(self.strip.number, TaskState.UNDER_WAY, self._agent.expected_end_ms)
 
     def _consider(self, strip: Strip, now_ms: int) -> None:
-        agent, config = self._agent, self.config
+        agent, config, reach = self._agent, self.config, self._agent.footprint.reach
         if self.strip is not None:
             self._tell(strip.number, TaskState.REFUSED, 0, f"at work on strip {self.strip.number}")
             return
@@ -114,17 +114,17 @@ class SecondLooks:
         if not agent.region.meets(strip):
             self._tell(strip.number, TaskState.REFUSED, 0, "it lies outside the area")
             return
-        least_ms = round((strip.length_m + strip.width_m - config.swath_m) / config.speed_mps * 1000)
+        least_ms = round((strip.length_m + strip.width_m - reach.strip_width_m) / config.speed_mps * 1000)
         if agent.battery(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         pose = Pose(agent.nav.x_m, agent.nav.y_m, agent.nav.heading_rad)
         # A sensor that looks to the side can pass on either.
-        sides_m = (config.beside_m, -config.beside_m) if config.beside_m else (0.0,)
+        sides_m = (reach.beside_m, -reach.beside_m) if reach.beside_m else (0.0,)
         ways = [
             sweep
             for side_m in sides_m
-            for sweep in sweeps_over(strip, config.swath_m, config.turn_radius_m, config.run_in_m, side_m)
+            for sweep in sweeps_over(strip, reach.strip_width_m, config.turn_radius_m, config.run_in_m, side_m)
         ]
         sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
         ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
@@ -187,7 +187,7 @@ class RevisitAgent(Agent):
     """A helper: see the module."""
 
     def __init__(self, config: RevisitConfig) -> None:
-        super().__init__(config.vehicle, config.endurance_ms)
+        super().__init__(config.vehicle, config.footprint, config.endurance_ms)
         self.config = config
         self._looks = SecondLooks(self, config, rest=Mode.IDLE)
 

@@ -24,9 +24,10 @@ from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower
 from planner.curve import RangeTally, effective_range_m
 from planner.first_plan import parts_in_order
+from planner.footprints.cells import Ahead, cells_within, settled_cells
+from planner.footprints.footprint import Reach
 from planner.hotspots import HotspotMap, update_hotspots
 from planner.risk import HIGHEST_P_DETECT, residual_risk
-from planner.settle import Ahead, Reach, cells_within, settled_cells
 from planner.spacing_planners import SpacingDecision
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
@@ -41,7 +42,7 @@ class SurveyAgent(Agent):
     """A primary: see the module. Its node id is its vehicle's."""
 
     def __init__(self, config: SurveyConfig) -> None:
-        super().__init__(config.vehicle, config.endurance_ms)
+        super().__init__(config.vehicle, config.footprint, config.endurance_ms)
         self.config = config
         self.flown: list[Track] = []
         self.ahead: list[Track] = []  # in the present part; the first one is under way
@@ -83,19 +84,17 @@ class SurveyAgent(Agent):
         """Notes how far the sonar sees; of a look at the present track also its P_d and how far the track is looked."""
         self._new_looks = True
         self._along_bin_m = max(self._along_bin_m, look.along_bin_m)
-        seen = look.p_detect.max(axis=(0, 1)).nonzero()[0]
-        if seen.size:
-            near_m, far_m = float(seen[0] * look.range_bin_m), float(seen[-1] * look.range_bin_m)
-            reach = self._reach or Reach(near_m, far_m)
-            self._reach = Reach(min(near_m, reach.near_m), max(far_m, reach.far_m))
+        reach = Reach.of_look(look.geometry, look.p_detect)
+        if reach is not None:
+            self._reach = reach if self._reach is None else self._reach.joined(reach)
         if not self.ahead or self.maneuver is None or look.maneuver != self.maneuver.number:
             return
         if self._tally is None:
             self._tally = RangeTally(look.range_bin_m)
             self._range_bin_m = look.range_bin_m
         if look.range_bin_m == self._range_bin_m:
-            self._tally.add(look.p_detect)
-        self._looked_to_m = self._end_along_m(look)
+            self._tally.add(self.footprint.pass_profile(look.geometry, look.p_detect))
+        self._looked_to_m = self._passed_along_m(look)
 
     def on_maneuver(self, status: ManeuverStatus, now_ms: int) -> None:
         """Reacts to a track's start and end."""
@@ -252,9 +251,9 @@ class SurveyAgent(Agent):
         """A track's offset in the grid's frame; its own is in that of its part."""
         return float(self._grid.frame.to_sweep(*track.start)[0])
 
-    def _end_along_m(self, look: Look) -> float:
-        """Where a look ends, along the grid."""
-        end_m = look.first_along_m + look.p_detect.shape[1] * look.along_bin_m
+    def _passed_along_m(self, look: Look) -> float:
+        """Where the stretch of track ends that a look stands for, along the grid."""
+        end_m = look.first_along_m + self.footprint.track_length_m(look.geometry)
         x_m = look.origin_x_m + end_m * math.sin(look.heading_rad)
         y_m = look.origin_y_m + end_m * math.cos(look.heading_rad)
         return float(self._grid.frame.to_sweep(x_m, y_m)[1])
@@ -280,16 +279,19 @@ class SurveyAgent(Agent):
         self.coverage.settled = settled
 
     def _still_ahead(self, track: Track) -> Ahead:
-        """What is not yet looked at of a track; its last bin may reach beyond its end."""
+        """What may yet be seen along a track: from where the vehicle is, or is to begin, to as far as it sees from
+        where it ends; the last bin may reach beyond that."""
         from_m, to_m = (float(self._grid.frame.to_sweep(*end)[1]) for end in (track.start, track.end))
-        end_m = to_m + math.copysign(self._along_bin_m, to_m - from_m)
+        way, lead_m = math.copysign(1.0, to_m - from_m), self.footprint.lead_m
+        end_m = to_m + way * (self._along_bin_m + self.footprint.ahead_m - lead_m)
+        from_m -= way * lead_m
         if self._looked_to_m is not None and track is self.ahead[0]:
             from_m = self._looked_to_m
         return Ahead(self._across_m(track), min(from_m, end_m), max(from_m, end_m))
 
     def _cells_within(self, part: PartSurvey, from_across_m: float, beyond_m: float) -> BoolArray:
         """Cells that tracks over a part, from an offset on, may see."""
-        margin_m = self._grid.cell_m + self._along_bin_m
+        margin_m = self._grid.cell_m + self._along_bin_m + self.footprint.ahead_m
         across_m = (from_across_m, part.area.width_m + beyond_m)
         return cells_within(self._grid, part.area.frame, across_m, (-margin_m, part.area.length_m + margin_m))
 

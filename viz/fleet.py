@@ -10,9 +10,10 @@ import rerun as rr
 
 from comms.node import Received
 from comms.said.messages import AgentState, Contact, Mode, Nav, Plan, RosterVehicle, RunInfo, TaskState, TaskStatus
+from planner.footprints import footprint_of
 from viz import palette, paths
 from viz.canvas import Canvas, Column
-from viz.shapes import FLOWN_Z_M, PLAN_Z_M, POINT_Z_M, VEHICLE_Z_M, Extent, body_quaternions, glyph, swath
+from viz.shapes import FLOWN_Z_M, PLAN_Z_M, POINT_Z_M, VEHICLE_Z_M, Extent, body_quaternions, glyph
 
 GLYPH_SHARE = 0.022  # of the area's longer side
 TRAIL_STEP_MS = 5_000
@@ -159,7 +160,8 @@ def _segments(rows: Sequence[Sequence[tuple[float, float, float]]]) -> rr.Compon
 @cache
 def _beam(vehicle: RosterVehicle | None) -> rr.LineStrips3D:
     """What a vehicle sees at once; made once, which takes longer than to draw it. None while its sonar is off."""
-    return rr.LineStrips3D.from_fields(strips=swath(vehicle.nadir_gap_m, vehicle.swath_m) if vehicle else [])
+    outline = footprint_of(vehicle.sonar).outline if vehicle else ()
+    return rr.LineStrips3D.from_fields(strips=[[(*point, 0.0) for point in line] for line in outline])
 
 
 def _changes(states: Sequence[str]) -> rr.ComponentColumnList:

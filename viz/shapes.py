@@ -83,11 +83,6 @@ def glyph(size_m: float) -> tuple[FloatArray, list[tuple[int, int, int]]]:
     return corners * size_m, [(0, 1, 2), (0, 2, 3)]
 
 
-def swath(nadir_gap_m: float, swath_m: float) -> list[list[tuple[float, float, float]]]:
-    """What a side-looking sonar sees to either side, in the body frame: one line per side."""
-    return [[(side * nadir_gap_m, 0.0, 0.0), (side * swath_m, 0.0, 0.0)] for side in (-1, 1)]
-
-
 def body_quaternions(heading_rad: FloatArray) -> FloatArray:
     """Compass headings as rotations of a body frame (y forward) into the mission frame, shape (n, 4), xyzw."""
     half = -heading_rad / 2

@@ -29,7 +29,7 @@ from comms.said.wire import (
     Text,
     YesNo,
 )
-from planner.types import GridSpec, Point, Strip, SweepFrame
+from planner.types import GridSpec, LookGeometry, Point, SonarShape, Strip, SweepFrame
 
 
 class Role(enum.Enum):
@@ -72,8 +72,8 @@ class ClockMode(enum.Enum):
 class RosterVehicle:
     """One vehicle of the fleet, as everyone is told at the start.
 
-    `swath_m`: how far the sonar sees to each side; `p_detect`: its mean P_d from the nadir gap up to there. Both say
-    what a second look by this vehicle is expected to be worth.
+    `near_m` to `look_m`: what its sonar sees, see `planner.types.SonarShape`. `p_detect`: the mean P_d of a pass, over
+    the lateral ranges that it reaches. Both say what a second look by this vehicle is expected to be worth.
     """
 
     vehicle: Identifier
@@ -81,15 +81,18 @@ class RosterVehicle:
     speed_mps: MetresPerSecond
     turn_radius_m: Metres
     run_in_m: Metres
-    nadir_gap_m: Metres
-    swath_m: Metres
+    near_m: Metres
+    far_m: Metres
     p_detect: Probability
     endurance_ms: Milliseconds
+    footprint: Identifier = "side"
+    half_angle_rad: Radians = 0.0
+    look_m: Metres = 20.0
 
     @property
-    def strip_width_m(self) -> float:
-        """The widest strip that one pass covers: with both sides, or with one where there is a nadir gap between."""
-        return self.swath_m - self.nadir_gap_m if self.nadir_gap_m > 0 else 2 * self.swath_m
+    def sonar(self) -> SonarShape:
+        """Its sonar as planning knows it."""
+        return SonarShape(self.footprint, self.near_m, self.far_m, self.half_angle_rad, self.look_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,9 +184,9 @@ class Look:
     """What the sonar saw on a stretch of track.
 
     The look's frame has its origin at the track's start, `along` pointing down the track. The look covers
-    `[first_along_m, first_along_m + bins * along_bin_m)`. `p_detect` has shape (2, along bins, range bins): side 0 is
-    port, side 1 starboard; range bin k is centred at `k * range_bin_m`; 0 where nothing was seen. `valid` is false in
-    turns and run-in.
+    `[first_along_m, first_along_m + bins * along_bin_m)`, which for a sonar that sees ahead is more than the stretch of
+    track that it stands for. `p_detect` has shape (2, along bins, range bins): side 0 is port, side 1 starboard; range
+    bin k is centred at `k * range_bin_m`; 0 where nothing was seen. `valid` is false in turns and run-in.
     """
 
     number: Count
@@ -199,6 +202,20 @@ class Look:
     position_sigma_m: Metres
     valid: YesNo
     contacts: Annotated[tuple[LookContact, ...], AtMost(200)]
+
+    @property
+    def geometry(self) -> LookGeometry:
+        """Where its bins lie."""
+        _, along_bins, range_bins = self.p_detect.shape
+        return LookGeometry(
+            origin=(self.origin_x_m, self.origin_y_m),
+            heading_rad=self.heading_rad,
+            first_along_m=self.first_along_m,
+            along_bin_m=self.along_bin_m,
+            range_bin_m=self.range_bin_m,
+            along_bins=along_bins,
+            range_bins=range_bins,
+        )
 
 
 class ManeuverKind(enum.Enum):

@@ -17,6 +17,7 @@ from coordinator.keep_apart.courses import (
 )
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose, shortest_path
+from planner.footprints import footprint_of
 from planner.sweep import Sweep, shortest_sweep, sweeps_over
 from planner.types import Point, Strip
 
@@ -149,5 +150,5 @@ def _arrival(pose: Pose, place: Point) -> Pose:
 def _sweep_from(pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
     """How a helper sweeps a strip that it sets out to from a pose."""
     entry = vehicle.entry
-    sweeps = sweeps_over(strip, entry.strip_width_m, entry.turn_radius_m, entry.run_in_m)
+    sweeps = sweeps_over(strip, footprint_of(entry.sonar).reach.strip_width_m, entry.turn_radius_m, entry.run_in_m)
     return shortest_sweep(sweeps, pose, entry.turn_radius_m)[0]

@@ -14,7 +14,8 @@ from shapely.geometry.base import BaseGeometry
 from planner.area import SurveyArea
 from planner.dubins import Pose
 from planner.first_plan import FirstPlan
-from planner.seen import seen_cells
+from planner.footprints import footprint_of
+from planner.footprints.cells import seen_cells
 from planner.sweep import distance_over, pass_over
 from planner.types import Point, Track
 from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
@@ -69,7 +70,7 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     region = region_for(scenario, vehicle, heading_rad)
     grid = region.about(heading_rad).grid(scenario.area.cell_m)
     inside = region.inside(grid)
-    missed = inside & ~seen_cells(grid, tracks, vehicle.nadir_gap_m, vehicle.told_range_m)
+    missed = inside & ~seen_cells(grid, tracks, footprint_of(vehicle.sonar).told(vehicle.told_range_m).reach)
     start = Pose(vehicle.start.x_m, vehicle.start.y_m, math.radians(vehicle.start.heading_deg))
     passes = [pass_over(track.start, track.end, vehicle.run_in_m) for track in tracks]
     # The last track's run-out comes after its end.

@@ -13,8 +13,9 @@ from comms.said.codec import SCHEMA_VERSION, Header, encode
 from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.routing import RosterNode
 from coordinator.config import CoordinatorConfig
+from planner.footprints import footprint_of
 from planner.region import Region
-from planner.types import DetectionCurve, Point, PriorityGround
+from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
@@ -126,22 +127,28 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
 
 
 def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
-    curve = vehicle.sensor.detection_curve(vehicle.nadir_gap_m)
+    sonar = vehicle.sonar
     return RosterVehicle(
         vehicle=name,
         role=_role_of(vehicle),
         speed_mps=vehicle.speed_mps,
         turn_radius_m=vehicle.turn_radius_m,
         run_in_m=vehicle.run_in_m,
-        nadir_gap_m=vehicle.nadir_gap_m,
-        swath_m=vehicle.sensor.reach_m,
-        p_detect=_mean_p_detect(curve, vehicle.nadir_gap_m, vehicle.sensor.reach_m),
+        near_m=sonar.near_m,
+        far_m=sonar.far_m,
+        p_detect=_mean_p_detect(vehicle),
         endurance_ms=_endurance_ms(vehicle),
+        footprint=sonar.footprint,
+        half_angle_rad=sonar.half_angle_rad,
+        look_m=sonar.look_m,
     )
 
 
-def _mean_p_detect(curve: DetectionCurve, near_m: float, far_m: float) -> float:
-    """The mean of P(y) from one range to another."""
+def _mean_p_detect(vehicle: SurveyVehicle | RevisitVehicle) -> float:
+    """The mean of P(y) of a pass, over the lateral ranges that it reaches."""
+    footprint = footprint_of(vehicle.sonar)
+    curve = footprint.pass_curve(vehicle.detection_curve)
+    near_m, far_m = footprint.reach.near_m, footprint.reach.far_m
     within = curve.range_m[(curve.range_m > near_m) & (curve.range_m < far_m)]
     range_m = np.concatenate([[near_m], within, [far_m]])
     return float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
@@ -152,27 +159,27 @@ def _endurance_ms(vehicle: SurveyVehicle | RevisitVehicle) -> int:
 
 
 def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
-    roster = _roster_vehicle(name, vehicle)
+    footprint, endurance_ms = footprint_of(vehicle.sonar), _endurance_ms(vehicle)
     revisit = RevisitConfig(
         vehicle=name,
-        swath_m=roster.strip_width_m,
-        beside_m=(roster.nadir_gap_m + roster.swath_m) / 2 if roster.nadir_gap_m > 0 else 0.0,
+        footprint=footprint,
         speed_mps=vehicle.speed_mps,
         turn_radius_m=vehicle.turn_radius_m,
         run_in_m=vehicle.run_in_m,
-        endurance_ms=roster.endurance_ms,
+        endurance_ms=endurance_ms,
     )
     if isinstance(vehicle, RevisitVehicle):
         return node_spec(Role.REVISIT, revisit, vehicle.agent)
     survey = SurveyConfig(
         vehicle=name,
         spacing=made(SPACING, vehicle.spacing, nadir_gap_m=vehicle.nadir_gap_m, told_range_m=vehicle.told_range_m),
+        footprint=footprint,
         nadir_gap_m=vehicle.nadir_gap_m,
         range_m=vehicle.told_range_m,
         threshold=vehicle.threshold,
         hotspot_risk=vehicle.hotspot_risk,
         run_in_m=vehicle.run_in_m,
-        endurance_ms=roster.endurance_ms,
+        endurance_ms=endurance_ms,
         prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
         share=vehicle.share,
     )
@@ -212,7 +219,7 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
         position_error_m=vehicle.position_error_m,
         position_drift_mps=vehicle.position_drift_m_per_h / 3600,
         sensor=SensorConfig(
-            curve=sensor.detection_curve(vehicle.nadir_gap_m),
+            curve=vehicle.detection_curve,
             along_bin_m=sensor.along_bin_m,
             range_bin_m=sensor.range_bin_m,
             look_m=sensor.look_m,

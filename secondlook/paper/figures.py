@@ -74,7 +74,7 @@ def draw_curve(missions: Sequence[MeasuredMission]) -> Figure:
     mission = next(one for one in missions if one.published.name == CURVE_MISSION)
     scenario = scenario_of(mission.published, mission.survey.seed)
     (vehicle,) = scenario.survey_vehicles.values()
-    truth, estimate = vehicle.sensor.detection_curve(vehicle.nadir_gap_m), mission.survey.curve
+    truth, estimate = vehicle.detection_curve, mission.survey.curve
     r_eff_m = mission.survey.r_eff_m[0]
     figure, (panel,) = _figure(6, 3.6)
     fine_m = np.linspace(0, 150, 1501)

@@ -26,6 +26,8 @@ from comms.said.messages import (
     TruthTargets,
 )
 from planner.fleet_map import FleetMap, VehicleLayer
+from planner.footprints import footprint_of
+from planner.footprints.footprint import Footprint
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
@@ -42,6 +44,7 @@ class VehicleFigures:
     it had surveyed all, if it goes on to take strips."""
 
     role: Role
+    footprint: Footprint
     path_m: float = 0.0
     ended_ms: int = 0
     looked_m: float = 0.0
@@ -93,7 +96,7 @@ class Metrics:
         elif isinstance(message, TruthPose) and vehicle is not None:
             self.approaches.take(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
-            vehicle.looked_m += message.p_detect.shape[1] * message.along_bin_m
+            vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
         elif isinstance(message, CoverageTile):
             self._take_tile(received, message)
         elif isinstance(message, Plan) and vehicle is not None:
@@ -194,7 +197,7 @@ class Metrics:
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
         self.inside = Region(run.outline, run.hole_outlines).inside(spec)
-        self.vehicles = {entry.vehicle: VehicleFigures(entry.role) for entry in run.vehicles}
+        self.vehicles = {entry.vehicle: VehicleFigures(entry.role, footprint_of(entry.sonar)) for entry in run.vehicles}
         self.approaches = ClosestApproaches({entry.vehicle: entry.speed_mps for entry in run.vehicles})
 
     def _pass_time(self, sent_ms: int) -> None:

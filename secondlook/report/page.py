@@ -17,6 +17,7 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
+from planner.footprints import footprint_of
 from secondlook.errors import UserError
 from secondlook.recorded import RecordedMission, RiskMap, load_run
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
@@ -136,6 +137,7 @@ def _template() -> jinja2.Template:
     )
     environment.filters["seconds"] = lambda t_s: "–" if t_s is None else f"{t_s:.0f} s"
     environment.filters["minutes"] = lambda t_s: f"{t_s / 60:.0f} minutes"
+    environment.filters["footprint"] = footprint_of
     environment.filters["share"] = lambda share: f"{100 * share:.0f} %"
     environment.filters["risk"] = lambda risk: "–" if risk != risk else f"{risk:.2f}"  # noqa: PLR0124 - NaN
     return environment.from_string(_text("template.html"))

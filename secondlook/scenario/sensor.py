@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
 
-from planner.types import DetectionCurve
+from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario import bundled
 from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
 from secondlook.scenario.text import Value
@@ -140,8 +140,17 @@ class Sensor(Mapping):
         """The range up to which it detects anything."""
         return self.curve.range_m[-1] if self.curve is not None else self.range_m or 0.0
 
-    def detection_curve(self, nadir_gap_m: float) -> DetectionCurve:
-        """P(y): the curve as given, or the flat one from the nadir gap to `range_m`."""
+    def check_nadir_gap(self, nadir_gap_m: float) -> None:
+        """Refuses a nadir gap that leaves nothing to be seen."""
+        if self.reach_m <= nadir_gap_m:
+            raise refused(f"must see beyond nadir_gap_m, {nadir_gap_m:g}")
+
+    def shape(self, nadir_gap_m: float) -> SonarShape:
+        """What ground it sees, from the nadir gap on."""
+        return SonarShape("side", nadir_gap_m, self.reach_m, look_m=self.look_m)
+
+    def detection_curve(self, shape: SonarShape) -> DetectionCurve:
+        """P_d over the range: the curve as given, or the flat one as far as it sees."""
         if self.curve is not None:
             return self.curve.detection_curve
-        return DetectionCurve(np.array([nadir_gap_m, self.range_m]), np.array([self.p_detect, self.p_detect]))
+        return DetectionCurve(np.array([shape.near_m, self.range_m]), np.array([self.p_detect, self.p_detect]))

@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from comms.said.messages import Role
 from planner.curve import effective_range_m
+from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario.plug_ins import NODE, SPACING
 from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
 from secondlook.scenario.values import (
@@ -89,9 +90,19 @@ class VehicleBase(Mapping):
     @field_validator("sensor")
     @classmethod
     def _check_reach(cls, sensor: Sensor, info: ValidationInfo) -> Sensor:
-        if "nadir_gap_m" in info.data and sensor.reach_m <= info.data["nadir_gap_m"]:
-            raise refused(f"must see beyond nadir_gap_m, {info.data['nadir_gap_m']:g}")
+        if "nadir_gap_m" in info.data:
+            sensor.check_nadir_gap(info.data["nadir_gap_m"])
         return sensor
+
+    @property
+    def sonar(self) -> SonarShape:
+        """What ground its sonar sees."""
+        return self.sensor.shape(self.nadir_gap_m)
+
+    @property
+    def detection_curve(self) -> DetectionCurve:
+        """P_d of a look over the range: the sensor's curve, or the flat one from the nearest to the farthest range."""
+        return self.sensor.detection_curve(self.sonar)
 
 
 class SurveyVehicle(VehicleBase):

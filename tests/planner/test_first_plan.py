@@ -15,12 +15,12 @@ from regions import regions
 from planner import convex_parts as cutting
 from planner.convex_parts import SHALLOW_M, convex_parts
 from planner.first_plan import best_heading, first_plan, in_order, parts_in_order
-from planner.footprint import LookGeometry, look_on_grid
+from planner.footprints.cells import look_on_grid, seen_cells
+from planner.footprints.footprint import Reach
 from planner.region import Region
-from planner.seen import seen_cells
 from planner.spacing import adapt_range, track_count, track_offsets
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
-from planner.types import BoolArray, GridSpec, Point, Track
+from planner.types import BoolArray, GridSpec, LookGeometry, Point, Track
 
 headings = st.floats(0, 2 * math.pi)
 sonars = st.tuples(st.integers(0, 40), st.integers(0, 60)).map(lambda one: (one[0], max(20, 3 * one[0] + one[1])))
@@ -71,7 +71,7 @@ class TestCoverage:
         plan = first_plan(region, heading_rad, *sonar)
         tracks = [track for part in plan.tracks for track in part][::2]  # half of them: much is not seen
         grid = region.about(heading_rad).grid(40)
-        told = seen_cells(grid, tracks, *sonar)
+        told = seen_cells(grid, tracks, Reach(*sonar))
         for row, along_m in enumerate(grid.along_m.tolist()):
             for column, across_m in enumerate(grid.across_m.tolist()):
                 x_m, y_m = grid.frame.to_mission(across_m, along_m)
@@ -90,7 +90,7 @@ class TestLooks:
             region, heading_rad, *sonar, (FixedSpacing if fixed else AdaptiveSpacing)(*sonar)
         ).all_tracks
         grid = region.about(heading_rad).grid(17)
-        told = seen_cells(grid, tracks, *sonar)
+        told = seen_cells(grid, tracks, Reach(*sonar))
         assert (told | ~region.inside(grid)).all()
         assert not (told & ~looked_at(grid, tracks, *sonar)).any()
 
@@ -213,7 +213,7 @@ class TestCoastOfManyCorners:
         plan = first_plan(self.COAST, 0.3, 40, 130)
         grid = self.COAST.about(0.3).grid(5)
         tracks = [track for part in plan.tracks for track in part]
-        assert (seen_cells(grid, tracks, 40, 130) | ~self.COAST.inside(grid)).all()
+        assert (seen_cells(grid, tracks, Reach(40, 130)) | ~self.COAST.inside(grid)).all()
 
 
 class TestOrder:

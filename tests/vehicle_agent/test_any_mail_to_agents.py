@@ -10,7 +10,9 @@ from one_node import OneNode
 
 from comms.said.messages import AgentState, CoverageTile, Mode, Role, TaskState, TaskStatus
 from comms.said.topics import LOOK, MANEUVER_STATUS, MISSION_OVER, NAV, TASK
+from planner.footprints.side import SideLooking
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
+from planner.types import SonarShape
 from secondlook.testing.checks.any_mail import Letter, letters
 from vehicle_agent.config import RevisitConfig, SurveyConfig
 from vehicle_agent.revisit import RevisitAgent
@@ -19,6 +21,7 @@ from vehicle_agent.survey import SurveyAgent
 SURVEY_MAIL = [(topic, [PRIMARY]) for topic in (LOOK, LOOK, LOOK, MANEUVER_STATUS, MANEUVER_STATUS, NAV)]
 REVISIT_MAIL = [(topic, [HELPER]) for topic in (LOOK, LOOK, MANEUVER_STATUS, MANEUVER_STATUS, NAV, TASK, TASK, TASK)]
 OVER = [(MISSION_OVER, [""])]
+SEES = SideLooking(SonarShape("side", 0, 25))
 RUNS = [run_info(300, 200, cell_m=10), run_info(77, 55, cell_m=3, heading_rad=2.0, rho=0.5)]
 
 
@@ -47,7 +50,7 @@ def test_the_survey_agent(
     mail: list[Letter],
     after: list[Letter],
 ) -> None:
-    config = SurveyConfig(PRIMARY, spacing, spacing.nadir_gap_m, spacing.told_range_m, 0.05, 0.6, 20, 36_000_000)
+    config = SurveyConfig(PRIMARY, spacing, SEES, spacing.nadir_gap_m, spacing.told_range_m, 0.05, 0.6, 20, 36_000_000)
     node = OneNode(SurveyAgent(config), Role.SURVEY)
     deliver(node, before)
     assert node.said == []
@@ -58,7 +61,7 @@ def test_the_survey_agent(
 @settings(max_examples=40, deadline=None)
 @given(run=st.sampled_from(RUNS), mail=letters(REVISIT_MAIL, 25), after=letters([*REVISIT_MAIL, *OVER], 5))
 def test_the_revisit_agent(run: object, mail: list[Letter], after: list[Letter]) -> None:
-    config = RevisitConfig(HELPER, swath_m=50, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
+    config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
     node = OneNode(RevisitAgent(config), Role.REVISIT)
     deliver(node, [Letter("run", run, 1, None, 0), Letter(f"veh/{HELPER}/nav", nav(), 0, None, 0), *mail, *after])
     said_soundly(node)

@@ -23,17 +23,20 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from planner.footprints.side import SideLooking
+from planner.types import SonarShape
 from vehicle_agent.config import RevisitConfig
 from vehicle_agent.revisit import RevisitAgent
 
 RUN = run_info(400, 400)
 SEES_25_M = flat(0.7, 0, 25)
+SEES = SideLooking(SonarShape("side", 0, 25))
 STRIP = Task(TaskAction.TAKE, 3, 100, 50, 0, 200, 50)
 
 
 def revisit(endurance_ms: int = 14_400_000, *, at_m: tuple[float, float] | None = (100, 0)) -> OneNode:
     """A helper of 2 m/s with a swath of 50 m, told of the run and of where it is."""
-    config = RevisitConfig(HELPER, swath_m=50, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=endurance_ms)
+    config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=endurance_ms)
     agent = OneNode(RevisitAgent(config), Role.REVISIT)
     agent.hear("run", RUN, at_ms=1)
     if at_m is not None:
@@ -152,7 +155,7 @@ class TestAWordRepeated:
         assert len(agent.all(Maneuver)) == 1
 
     def test_a_task_from_before_its_start_was_for_who_was_there_before(self) -> None:
-        config = RevisitConfig(HELPER, swath_m=50, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
+        config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
         agent = OneNode(RevisitAgent(config), Role.REVISIT, now_ms=5000)
         agent.hear("run", RUN, at_ms=5001, sent_ms=0)
         agent.hear(f"veh/{HELPER}/nav", nav(100, 0), sent_ms=4000)

@@ -43,8 +43,9 @@ from comms.said.messages import (
     RunInfo,
 )
 from planner.fleet_map import FleetMap
+from planner.footprints.side import SideLooking
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
-from planner.types import BoolArray, DetectionCurve, GridSpec
+from planner.types import BoolArray, DetectionCurve, GridSpec, SonarShape
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
@@ -63,6 +64,7 @@ def survey(
     config = SurveyConfig(
         vehicle=PRIMARY,
         spacing=spacing or AdaptiveSpacing(nadir_gap_m, range_m),
+        footprint=SideLooking(SonarShape("side", nadir_gap_m, range_m)),
         nadir_gap_m=nadir_gap_m,
         range_m=range_m,
         threshold=0.05,

@@ -28,8 +28,10 @@ from comms.said.messages import (
     RunInfo,
     Vertex,
 )
+from planner.footprints.side import SideLooking
 from planner.region import Region
 from planner.spacing_planners import AdaptiveSpacing
+from planner.types import SonarShape
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
@@ -55,6 +57,7 @@ def surveyor(run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145) -> 
     config = SurveyConfig(
         vehicle=PRIMARY,
         spacing=AdaptiveSpacing(nadir_gap_m, range_m),
+        footprint=SideLooking(SonarShape("side", nadir_gap_m, range_m)),
         nadir_gap_m=nadir_gap_m,
         range_m=range_m,
         threshold=0.05,

@@ -18,7 +18,9 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from planner.footprints.side import SideLooking
 from planner.spacing_planners import AdaptiveSpacing
+from planner.types import SonarShape
 from vehicle_agent.config import RevisitConfig, SurveyConfig, SurveyRevisitConfig
 from vehicle_agent.survey_revisit import SurveyRevisitAgent
 
@@ -29,8 +31,9 @@ STRIP = Task(TaskAction.TAKE, 3, 200, 50, 0, 100, 90)
 
 def primary(endurance_ms: int = 36_000_000) -> OneNode:
     """It sees from 40 to 130 m to each side, and has been told of the run."""
-    survey = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), 40, 145, 0.05, 0.6, 20, endurance_ms)
-    revisit = RevisitConfig(PRIMARY, 90, 1.5, 20, 20, endurance_ms, beside_m=85)
+    sonar = SideLooking(SonarShape("side", 40, 130))
+    survey = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, endurance_ms)
+    revisit = RevisitConfig(PRIMARY, sonar, 1.5, 20, 20, endurance_ms)
     agent = OneNode(SurveyRevisitAgent(SurveyRevisitConfig(survey, revisit)), Role.SURVEY_REVISIT)
     agent.hear("run", RUN, at_ms=1)
     agent.hear(f"veh/{PRIMARY}/nav", nav())

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from comms.said.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from planner.types import Strip
 from viz.blueprint import FIELD_OF_VIEW_RAD, MARGIN, mission_blueprint
-from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring, swath
+from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring
 
 PRIMARY = RosterVehicle("primary", Role.SURVEY, 1.5, 20, 20, 40, 145, 0.4, 36_000_000)
 RUN = RunInfo(1, "x", "0" * 64, 1, ClockMode.WALL, (), Grid(0, 0, 0, 10, 4, 2), 0.0, (PRIMARY,))
@@ -46,10 +46,6 @@ def test_labels_hang_on_the_centre_line_apart_from_their_neighbours(number: int,
 def test_a_ring_is_closed() -> None:
     assert ring([Vertex(1, 2), Vertex(3, 4)], 5.0).tolist() == [[1, 2, 5], [3, 4, 5], [1, 2, 5]]
     assert ring([], 5.0).shape == (0, 3)
-
-
-def test_the_swath_leaves_out_the_nadir_gap() -> None:
-    assert swath(40.0, 130.0) == [[(-40, 0, 0), (-130, 0, 0)], [(40, 0, 0), (130, 0, 0)]]
 
 
 def test_a_heading_east_turns_the_body_a_quarter_clockwise() -> None:

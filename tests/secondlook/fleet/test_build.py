@@ -42,7 +42,7 @@ class TestTheAnnouncement:
             ("primary", Role.SURVEY),
             ("helper", Role.REVISIT),
         ]
-        assert (helper(run).swath_m, helper(run).p_detect, helper(run).endurance_ms) == (25, 0.7, 14_400_000)
+        assert (helper(run).far_m, helper(run).p_detect, helper(run).endurance_ms) == (25, 0.7, 14_400_000)
 
     @pytest.mark.parametrize("heading_deg", [1, 37, 90, 200.5])
     def test_corners_along_straight_sides_do_no_harm_when_they_are_rounded(self, heading_deg: float) -> None:
@@ -69,7 +69,7 @@ class TestTheAnnouncement:
         run = announced(
             "vehicles.helper.sensor={curve: {range_m: [0, 20, 40], p_detect: [0.2, 0.8, 0.2]}}",
         )
-        assert (helper(run).swath_m, helper(run).p_detect) == (40, 0.5)
+        assert (helper(run).far_m, helper(run).p_detect) == (40, 0.5)
 
     def test_an_endurance_below_a_millisecond_is_one(self) -> None:
         assert helper(announced("vehicles.helper.endurance_s=0.0001")).endurance_ms == 1

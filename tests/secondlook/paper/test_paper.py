@@ -67,7 +67,7 @@ class TestPublished:
 
     def test_the_bundled_scenario_has_the_papers_sonar(self) -> None:
         (vehicle,) = load_scenario("paper").survey_vehicles.values()
-        sonar, curve = published_sonar(), vehicle.sensor.detection_curve(vehicle.nadir_gap_m)
+        sonar, curve = published_sonar(), vehicle.detection_curve
         assert (vehicle.nadir_gap_m, vehicle.threshold) == (sonar.r_min_m, sonar.threshold)
         assert curve.range_m[np.argmax(curve.p_detect)] == sonar.peak_range_m
         assert sonar.r_max_true_m <= curve.range_m[-1] < sonar.r_max_true_m + 1

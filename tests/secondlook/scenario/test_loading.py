@@ -76,7 +76,7 @@ def test_tellaro_is_the_published_mission() -> None:
     assert scenario.area.extent_m == (1212, 400)
     (primary,) = scenario.survey_vehicles.values()
     assert (primary.nadir_gap_m, primary.range_m, primary.threshold) == (40, 145, 0.05)
-    seen = primary.sensor.detection_curve(primary.nadir_gap_m)
+    seen = primary.detection_curve
     assert seen.at(np.array([24.9, 131])).tolist() == [0, 0]
     assert seen.range_m[np.argmax(seen.p_detect)] == 70
     steps = np.diff(seen.p_detect)
@@ -85,7 +85,7 @@ def test_tellaro_is_the_published_mission() -> None:
     # Where data ends it is well above the threshold, so that no track's own error moves r_eff.
     assert seen.at(130) > 0.06
     (helper,) = scenario.revisit_vehicles.values()
-    flat = helper.sensor.detection_curve(helper.nadir_gap_m)
+    flat = helper.detection_curve
     assert flat.at(np.array([0, 12, 25, 25.1])) == pytest.approx([0.7, 0.7, 0.7, 0])
 
 

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planner.footprint import EDGE_TOLERANCE_M, LookGeometry, look_on_grid
-from planner.types import FloatArray, GridSpec, SweepFrame
+from planner.footprints.cells import EDGE_TOLERANCE_M, look_on_grid
+from planner.types import FloatArray, GridSpec, LookGeometry, SweepFrame
 
 NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
 AXIS_HEADINGS = st.sampled_from([NORTH, EAST, SOUTH, WEST])

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.area import SurveyArea, lawnmower
-from planner.footprint import LookGeometry, look_on_grid
-from planner.settle import Ahead, Reach, cells_within, settled_cells
+from planner.footprints.cells import Ahead, cells_within, look_on_grid, settled_cells
+from planner.footprints.footprint import Reach
 from planner.spacing import track_offsets
-from planner.types import BoolArray, GridSpec, SweepFrame, Track
+from planner.types import BoolArray, GridSpec, LookGeometry, SweepFrame, Track
 
 LENGTH_M = 100
 REACH = Reach(25, 130)

@@ -1,0 +1,122 @@
+"""Which cells of the grid a look falls on, which ones tracks see, and which ones tracks to come may still improve."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from planner.footprints.footprint import Reach
+from planner.types import BoolArray, FloatArray, GridSpec, LookGeometry, SweepFrame, Track
+
+EDGE_TOLERANCE_M = 1e-3
+"""A cell centre this close before a bin's edge counts as on it: positions travel in centimetres, headings in
+microradians."""
+
+
+def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> tuple[slice, slice, FloatArray]:
+    """The window of the grid that a look may touch, and the P_d that each of its cells gets, 0 where it is not seen.
+
+    `p_detect`: shape (2, along_bins, range_bins), port first. A cell is seen if its centre is (paper, section V). A
+    centre on the edge between two bins belongs to the one that begins there, which of two range bins is the outer; one
+    right under the track belongs to starboard. Of consecutive looks of one track exactly one sees a cell.
+    """
+    # Rounded, so that one look's end is the next one's begin to the last bit, however each was computed.
+    begin_m = round(geometry.first_along_m, 6)
+    end_m = round(geometry.first_along_m + geometry.along_bins * geometry.along_bin_m, 6)
+    reach_m = (geometry.range_bins - 0.5) * geometry.range_bin_m
+    turn_rad = geometry.heading_rad - grid.frame.heading_rad
+    sin, cos = math.sin(turn_rad), math.cos(turn_rad)
+    origin_across, origin_along = map(float, grid.frame.to_sweep(*geometry.origin))
+    corners = [(lateral_m, along_m) for lateral_m in (-reach_m, reach_m) for along_m in (begin_m, end_m)]
+    columns = _window([origin_across + u_m * cos + v_m * sin for u_m, v_m in corners], grid.across_m)
+    rows = _window([origin_along - u_m * sin + v_m * cos for u_m, v_m in corners], grid.along_m)
+    du = (grid.across_m[columns] - origin_across)[np.newaxis, :]
+    dv = (grid.along_m[rows] - origin_along)[:, np.newaxis]
+    lateral_m = du * cos - dv * sin
+    along_m = du * sin + dv * cos + EDGE_TOLERANCE_M
+    along_bin = np.floor((along_m - begin_m) / geometry.along_bin_m).astype(np.intp)
+    range_bin = np.floor((np.abs(lateral_m) + EDGE_TOLERANCE_M) / geometry.range_bin_m + 0.5).astype(np.intp)
+    side = (lateral_m >= -EDGE_TOLERANCE_M).astype(np.intp)
+    seen = (along_m >= begin_m) & (along_m < end_m) & (range_bin < geometry.range_bins)
+    along_bin = np.minimum(np.maximum(along_bin, 0), geometry.along_bins - 1)  # clip takes longer with whole numbers
+    range_bin = np.minimum(range_bin, geometry.range_bins - 1)
+    return rows, columns, np.where(seen, p_detect[side, along_bin, range_bin], 0.0)
+
+
+def _window(corners_m: list[float], centres_m: FloatArray) -> slice:
+    """The cells along one axis of the grid with their centres between a look's corners, all in the sweep frame."""
+    margin_m = 2 * EDGE_TOLERANCE_M  # one that a bin may begin early, one for rounding
+    ends_m = min(corners_m) - margin_m, max(corners_m) + margin_m
+    first, behind_last = centres_m.searchsorted(ends_m).tolist()
+    return slice(first, behind_last)
+
+
+ON_EDGE_M = 1e-3
+"""A cell whose centre is as near to the edge of what is seen as this is seen."""
+
+
+def seen_cells(grid: GridSpec, tracks: Iterable[Track], reach: Reach) -> BoolArray:
+    """Cells whose centre lies beside one of the tracks, within the reach of the sonar; shape grid.shape."""
+    seen = np.zeros(grid.shape, dtype=np.bool_)
+    for track in tracks:
+        frame = SweepFrame(*track.start, track.heading_rad)
+        reach_m, ends_m = reach.far_m + ON_EDGE_M, (-ON_EDGE_M, track.length_m + ON_EDGE_M)
+        corners_m = grid.frame.to_sweep(*frame.to_mission(np.array([-reach_m, reach_m] * 2), np.repeat(ends_m, 2)))
+        columns, rows = (_between(*axis) for axis in zip((grid.across_m, grid.along_m), corners_m, strict=True))
+        centres_m = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
+        across_m, along_m = frame.to_sweep(*centres_m)
+        lateral_m = np.abs(across_m)
+        seen[rows, columns] |= (
+            (lateral_m >= reach.near_m - ON_EDGE_M)
+            & (lateral_m <= reach_m)
+            & (along_m >= ends_m[0])
+            & (along_m <= ends_m[1])
+        )
+    return seen
+
+
+def _between(centres_m: FloatArray, corners_m: FloatArray) -> slice:
+    """Those along one axis that lie among the corners, and one more on either side."""
+    first, behind_last = np.searchsorted(centres_m, (corners_m.min(), corners_m.max())).tolist()
+    return slice(max(first - 1, 0), behind_last + 1)
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """What is still to be looked at of a track: its offset and from where to where along, in the grid's sweep frame."""
+
+    across_m: float
+    from_m: float
+    to_m: float
+
+
+def settled_cells(grid: GridSpec, ahead: Iterable[Ahead], reach: Reach) -> BoolArray:
+    """Cells that none of these can see, shape grid.shape. One cell of margin is kept about what they see."""
+    settled = np.ones(grid.shape, dtype=np.bool_)
+    for one in ahead:
+        distance_m = np.abs(grid.across_m - one.across_m)
+        columns = (distance_m >= reach.near_m - grid.cell_m) & (distance_m <= reach.far_m + grid.cell_m)
+        first = np.searchsorted(grid.along_m, one.from_m - grid.cell_m, side="right")
+        behind_last = np.searchsorted(grid.along_m, one.to_m + grid.cell_m)
+        settled[first:behind_last, columns] = False
+    return settled
+
+
+def cells_within(
+    grid: GridSpec, frame: SweepFrame, across_m: tuple[float, float], along_m: tuple[float, float]
+) -> BoolArray:
+    """Cells with their centre in a rectangle of another sweep frame, without its sides; shape grid.shape."""
+    u_m, v_m = _centres_in(frame, grid)
+    within: BoolArray = (u_m > across_m[0]) & (u_m < across_m[1]) & (v_m > along_m[0]) & (v_m < along_m[1])
+    return within
+
+
+@lru_cache(maxsize=16)
+def _centres_in(frame: SweepFrame, grid: GridSpec) -> tuple[FloatArray, FloatArray]:
+    """The cells' centres in another sweep frame, each of shape grid.shape."""
+    x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
+    return frame.to_sweep(x_m, y_m)
