@@ -9,13 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from comms.said.wire import IDENTIFIER
-from planner.types import DetectionCurve, Point
-from sim_world.sonar_model import SonarModel
+from planner.types import DetectionCurve, Point, SonarShape
+from sim_world.footprints import FOOTPRINTS
+
+if TYPE_CHECKING:  # it imports the seabed, which is made of a configuration from here
+    from sim_world.sonar import SonarModel
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
@@ -53,10 +56,12 @@ class SeabedConfig:
 
 @dataclass(frozen=True)
 class SensorConfig:
-    """A side-looking sonar, one to each side.
+    """A sonar.
 
-    `curve`: true P_d over lateral range on a seabed that weakens nothing. A look covers `look_m` of track, a whole
-    number of bins `along_bin_m`; its range bins are centred at whole multiples of `range_bin_m`. `noise_cell` and
+    `curve`: true P_d over range on a seabed that weakens nothing; nothing is seen beyond its last range. `footprint`,
+    `near_m`, `half_angle_rad`: what ground it sees besides, see `planner.types.SonarShape`. A look stands for `look_m`
+    of track, a whole number of bins `along_bin_m`; its lateral bins are centred at whole multiples of `range_bin_m`.
+    `noise_cell` and
     `noise_track`: standard deviations, on the logit scale, of the error of the P_d that the vehicle estimates, drawn
     once a cell and once a track, 0 to 2. `sonar` makes the true model, called with the
     keywords `curve` and `seabed`; None stands for `sim_world.sonar.CurveSonar`.
@@ -69,6 +74,9 @@ class SensorConfig:
     noise_cell: float = 0.0
     noise_track: float = 0.0
     sonar: Callable[..., SonarModel] | None = None
+    footprint: str = "side"
+    near_m: float = 0.0
+    half_angle_rad: float = 0.0
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect
@@ -89,20 +97,27 @@ class SensorConfig:
             round(per_look) >= 1 and math.isclose(per_look, round(per_look), rel_tol=1e-9),
             "look_m", self.look_m, f"a whole multiple of along_bin_m, {self.along_bin_m}",
         )  # fmt: skip
-        cells = 2 * self.bins_per_look * self.range_bins
+        _require(self.footprint in FOOTPRINTS, "footprint", self.footprint, " or ".join(FOOTPRINTS))
+        cells = 2 * math.prod(self.look_bins)
         _require(cells <= LARGEST_LOOK_CELLS, "look_m", f"{cells} cells a look", f"at most {LARGEST_LOOK_CELLS}")
         for name in ("noise_cell", "noise_track"):
             _require(0.0 <= getattr(self, name) <= LARGEST_NOISE, name, getattr(self, name), "0 to 2")
 
     @property
     def bins_per_look(self) -> int:
-        """Along-track bins of a whole look."""
+        """Along-track bins of the stretch of track that a whole look stands for."""
         return round(self.look_m / self.along_bin_m)
 
     @property
-    def range_bins(self) -> int:
-        """Range bins a side: bin 0 is at range 0, the last at or just beyond the curve's last range."""
-        return math.ceil(float(self.curve.range_m[-1]) / self.range_bin_m) + 1
+    def look_bins(self) -> tuple[int, int]:
+        """Along-track bins of a whole look, and range bins of each of its sides."""
+        bins_m = self.along_bin_m, self.range_bin_m
+        return FOOTPRINTS[self.footprint].bins_of(self.shape, self.bins_per_look, bins_m)
+
+    @property
+    def shape(self) -> SonarShape:
+        """What ground it sees."""
+        return SonarShape(self.footprint, self.near_m, float(self.curve.range_m[-1]), self.half_angle_rad, self.look_m)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ from comms.node import random_stream
 from comms.said.messages import Look, LookContact, TruthLook
 from planner.types import FloatArray, Point
 from sim_world.config import VehicleConfig
-from sim_world.sonar_model import SonarModel
-from sim_world.swath import SIDES, Swath
+from sim_world.footprints import FOOTPRINTS
+from sim_world.footprints.swath import Swath
+from sim_world.sonar import SonarModel
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import Stretch
 
@@ -108,17 +109,16 @@ class Looks:
             self._tracks += 1
             self._track_error = self._estimate.track_error(self._stream("track_noise", self._tracks))
         config, sensor, maneuver = self._config, self._config.sensor, stretch.maneuver
-        swath = Swath(
-            origin_x_m=maneuver.start_x_m + offset_m[0],
-            origin_y_m=maneuver.start_y_m + offset_m[1],
-            heading_rad=stretch.heading_rad,
-            first_along_m=stretch.first_along_m,
-            along_bin_m=sensor.along_bin_m,
-            bins=stretch.bins,
-            range_bin_m=sensor.range_bin_m,
-            range_bins=sensor.range_bins,
+        swath = FOOTPRINTS[sensor.footprint].over(
+            sensor.shape,
+            (maneuver.start_x_m + offset_m[0], maneuver.start_y_m + offset_m[1]),
+            stretch.heading_rad,
+            stretch.first_along_m,
+            stretch.bins,
+            (sensor.along_bin_m, sensor.range_bin_m),
         )
-        truly = self._p_detect(swath, swath.ranges_m, SIDES, swath.cell_centres(), time_s)
+        p_detect = self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), time_s)
+        truly = np.where(swath.sees(swath.along_m, swath.lateral_m), p_detect, 0.0)
         contacts, truth = self._targets_passed(swath, time_s)
         if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
             contacts += self._recogniser.false_alarms(swath, self._stream("false_alarms", self._looks))
@@ -144,7 +144,7 @@ class Looks:
         passed = self._targets.passed(swath)
         if not passed.numbers.size:
             return [], None
-        p_detect = self._p_detect(swath, np.abs(passed.lateral_m), passed.lateral_m, (passed.x_m, passed.y_m), time_s)
+        p_detect = self._p_detect(swath, passed.along_m, passed.lateral_m, (passed.x_m, passed.y_m), time_s)
         seen = p_detect > 0.0
         if not seen.any():
             return [], None
@@ -161,12 +161,12 @@ class Looks:
     def _p_detect(
         self,
         swath: Swath,
-        range_m: FloatArray,
-        lateral: FloatArray,
+        along_m: FloatArray,
+        lateral_m: FloatArray,
         position_m: tuple[FloatArray, FloatArray],
         time_s: float,
     ) -> FloatArray:
-        bearing_rad = swath.bearings_rad(lateral)
+        range_m, bearing_rad = swath.range_m(along_m, lateral_m), swath.bearing_rad(along_m, lateral_m)
         return self._sonar.p_detect(range_m, bearing_rad, self._config.altitude_m, position_m, time_s)
 
     def _stream(self, name: str, number: int) -> np.random.Generator:

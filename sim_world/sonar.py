@@ -1,16 +1,36 @@
-"""A sonar whose true P_d follows a curve over lateral range, weakened by the seabed."""
+"""How well a sonar truly sees: what is asked of any, and the one whose P_d follows a curve over range."""
 
 from __future__ import annotations
+
+from typing import Protocol
 
 import numpy as np
 
 from planner.types import DetectionCurve, FloatArray
 from sim_world.seabed import Seabed
-from sim_world.sonar_model import Position
+
+Position = tuple[FloatArray, FloatArray]
+"""x and y, mission frame."""
+
+
+class SonarModel(Protocol):
+    """A sonar's true P_d."""
+
+    def p_detect(
+        self,
+        range_m: FloatArray,
+        look_bearing_rad: FloatArray | float,
+        altitude_m: float,
+        position_m: Position,
+        time_s: float,
+    ) -> FloatArray:
+        """P_d in [0, 1) of what lies at `position_m` (mission frame, true), seen at the range `range_m` >= 0 over the
+        ground along the compass bearing `look_bearing_rad` from `altitude_m` above the seabed at `time_s`. The
+        arguments broadcast."""
 
 
 class CurveSonar:
-    """A sonar whose P_d is one curve over lateral range, weakened by the seabed (paper, section III-B).
+    """A sonar whose P_d is one curve over range, weakened by the seabed (paper, section III-B).
 
     The curve holds for the altitude that the vehicle keeps and for the whole mission: altitude and time change nothing.
     """

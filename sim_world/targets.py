@@ -11,12 +11,12 @@ from comms.node import random_stream
 from comms.said.messages import LookContact, TruthTarget, TruthTargets
 from planner.types import BoolArray, DetectionCurve, FloatArray, Point
 from sim_world.area import uniform_points
-from sim_world.swath import Swath
+from sim_world.footprints.swath import Swath
 
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """Targets beside a stretch of track: their numbers, ascending, and where they lie in the track's own frame.
+    """Targets where a look sees: their numbers, ascending, and where they lie in the track's own frame.
 
     All arrays have shape (n,); `lateral_m` is negative to port.
     """
@@ -43,10 +43,9 @@ class Targets:
         return TruthTargets(tuple(TruthTarget(x_m, y_m) for x_m, y_m in pairs))
 
     def passed(self, swath: Swath) -> Passed:
-        """The targets within the stretch of track that a swath covers, as far to the sides as it reaches."""
+        """The targets that lie where a look sees."""
         along_m, lateral_m = swath.to_track(self._x_m, self._y_m)
-        within = (along_m >= swath.first_along_m) & (along_m < swath.end_along_m) & (np.abs(lateral_m) <= swath.reach_m)
-        numbers = within.nonzero()[0]
+        numbers = swath.sees(along_m, lateral_m).nonzero()[0]
         return Passed(numbers, along_m[numbers], lateral_m[numbers], self._x_m[numbers], self._y_m[numbers])
 
 
@@ -78,12 +77,9 @@ class Recogniser:
 
     def false_alarms(self, swath: Swath, generator: np.random.Generator) -> list[LookContact]:
         """Contacts of nothing, Poisson in number and uniform over the swath."""
-        width_m = 2.0 * (self._farthest_m - self._nearest_m)
-        length_m = swath.end_along_m - swath.first_along_m
-        count = generator.poisson(self._false_alarms_per_m2 * width_m * length_m)
-        along_m = generator.uniform(swath.first_along_m, swath.end_along_m, count)
-        sides = generator.choice(np.array([-1.0, 1.0]), count)
-        lateral_m = sides * generator.uniform(self._nearest_m, self._farthest_m, count)
+        ranges_m = self._nearest_m, self._farthest_m
+        count = generator.poisson(self._false_alarms_per_m2 * swath.area_m2(*ranges_m))
+        along_m, lateral_m = swath.scattered(count, *ranges_m, generator)
         return _contacts(along_m, lateral_m, 0.75 * generator.beta(2.0, 3.0, count))
 
 

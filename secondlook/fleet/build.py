@@ -220,6 +220,9 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
         position_drift_mps=vehicle.position_drift_m_per_h / 3600,
         sensor=SensorConfig(
             curve=vehicle.detection_curve,
+            footprint=vehicle.sonar.footprint,
+            near_m=vehicle.sonar.near_m,
+            half_angle_rad=vehicle.sonar.half_angle_rad,
             along_bin_m=sensor.along_bin_m,
             range_bin_m=sensor.range_bin_m,
             look_m=sensor.look_m,

@@ -7,13 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.types import DetectionCurve
+from planner.types import DetectionCurve, SonarShape
 from sim_world.area import uniform_points
-from sim_world.swath import Swath
+from sim_world.footprints.side import SideSwath
 from sim_world.targets import Passed, Recogniser, Targets
 
 AREA = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0))
 CURVE = DetectionCurve(np.array([0.0, 20.0, 30.0, 70.0, 130.0, 140.0]), np.array([0.0, 0.0, 0.2, 0.5, 0.1, 0.0]))
+
+
+SHAPE = SonarShape("side", 0.0, 135.0)
 
 
 def passed(count: int) -> Passed:
@@ -63,7 +66,10 @@ def test_each_target_beside_a_track_is_passed_by_exactly_one_of_its_looks(
     seed: int, heading_rad: float, look_m: float
 ) -> None:
     targets = Targets(AREA, 300, seed)
-    looks = [Swath(500.0, 200.0, heading_rad, n * look_m, look_m, 1, 5.0, 28) for n in range(round(420 / look_m))]
+    looks = [
+        SideSwath.over(SHAPE, (500.0, 200.0), heading_rad, n * look_m, 1, (look_m, 5.0))
+        for n in range(round(420 / look_m))
+    ]
     seen = [number for look in looks for number in targets.passed(look).numbers.tolist()]
     assert len(seen) == len(set(seen))
     for number, target in enumerate(targets.truth().targets):
@@ -76,7 +82,7 @@ def test_each_target_beside_a_track_is_passed_by_exactly_one_of_its_looks(
 def test_port_is_negative() -> None:
     targets = Targets(AREA, 1, 1)
     (target,) = targets.truth().targets
-    beside = targets.passed(Swath(target.x_m + 30.0, target.y_m - 12.0, 0.0, 0.0, 20.0, 1, 5.0, 28))
+    beside = targets.passed(SideSwath.over(SHAPE, (target.x_m + 30.0, target.y_m - 12.0), 0.0, 0.0, 1, (20.0, 5.0)))
     assert (beside.along_m.tolist(), beside.lateral_m.tolist()) == ([pytest.approx(12.0)], [pytest.approx(-30.0)])
 
 
@@ -96,7 +102,7 @@ def test_the_recogniser_detects_as_often_as_p_detect_says_and_scores_above_one_h
 def test_false_alarms_are_as_many_as_asked_for_within_the_swath_and_score_lower() -> None:
     recogniser, generator = Recogniser(CURVE, false_alarms_per_km2=1000.0), np.random.default_rng(3)
     assert recogniser.raises_false_alarms
-    look = Swath(0.0, 0.0, 0.5, 40.0, 5.0, 4, 5.0, 29)
+    look = SideSwath.over(SHAPE, (0.0, 0.0), 0.5, 40.0, 4, (5.0, 5.0))
     looks = [recogniser.false_alarms(look, generator) for _ in range(2000)]
     # The swath is 20 m long and 2 * (140 - 20) m wide: 4.8 a look.
     counts = np.array([len(contacts) for contacts in looks])
@@ -115,5 +121,5 @@ def test_no_false_alarms_unless_asked_for() -> None:
 
 def test_a_sonar_that_sees_nothing_raises_no_false_alarms() -> None:
     blind = Recogniser(DetectionCurve(np.array([0.0, 100.0]), np.zeros(2)), false_alarms_per_km2=1e6)
-    look = Swath(0.0, 0.0, 0.0, 0.0, 5.0, 4, 5.0, 29)
+    look = SideSwath.over(SHAPE, (0.0, 0.0), 0.0, 0.0, 4, (5.0, 5.0))
     assert blind.false_alarms(look, np.random.default_rng(1)) == []

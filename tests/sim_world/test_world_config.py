@@ -18,9 +18,9 @@ def curve(ranges: list[float], values: list[float]) -> DetectionCurve:
 
 
 def test_bins_follow_from_the_lengths() -> None:
-    assert (SENSOR.bins_per_look, SENSOR.range_bins) == (4, 28)
+    assert (SENSOR.bins_per_look, SENSOR.look_bins) == (4, (4, 28))
     assert replace(SENSOR, along_bin_m=0.1, look_m=0.3, range_bin_m=130.9).bins_per_look == 3
-    assert replace(SENSOR, range_bin_m=130.9).range_bins == 2
+    assert replace(SENSOR, range_bin_m=130.9).look_bins == (4, 2)
 
 
 @pytest.mark.parametrize(

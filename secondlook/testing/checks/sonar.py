@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from planner.types import DetectionCurve
+from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario.plug_ins import CURVE, SONAR
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked
 from sim_world.config import HIGHEST_P_DETECT, SeabedConfig, SensorConfig
+from sim_world.footprints import FOOTPRINTS
 from sim_world.seabed import make_seabed
-from sim_world.swath import SIDES, Swath
 
 
 def check_detection_curve(curve: Any, *, patience_s: float = PATIENCE_S) -> None:
@@ -114,12 +114,17 @@ def _answer(checked: Checked, plug_in: Any, question: tuple[Any, ...]) -> Any:
 def _looks() -> st.SearchStrategy[tuple[Any, ...]]:
     """What the world asks for the cells of a look."""
 
-    def question(x_m: float, heading_rad: float, bins: int, range_bins: int, altitude_m: float, time_s: float) -> Any:
-        swath = Swath(x_m, 50.0, heading_rad, 20.0, 5.0, bins, 5.0, range_bins)
-        return swath.ranges_m, swath.bearings_rad(SIDES), altitude_m, swath.cell_centres(), time_s
+    def question(
+        kind: str, x_m: float, heading_rad: float, bins: int, range_bins: int, altitude_m: float, time_s: float
+    ) -> Any:
+        shape = SonarShape(kind, 0.0, 5.0 * (range_bins - 1), math.pi / 4)
+        swath = FOOTPRINTS[kind].over(shape, (x_m, 50.0), heading_rad, 20.0, bins, (5.0, 5.0))
+        seen = swath.along_m, swath.lateral_m
+        return swath.range_m(*seen), swath.bearing_rad(*seen), altitude_m, swath.cell_centres(), time_s
 
     return st.builds(
         question,
+        st.sampled_from(list(FOOTPRINTS)),
         st.sampled_from([-100.0, 0.0, 200.0]),
         st.sampled_from([0.0, 1.0, math.pi, 6.2]),
         st.integers(1, 4),

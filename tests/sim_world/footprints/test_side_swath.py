@@ -7,11 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim_world.swath import SIDES, Swath
+from planner.types import SonarShape
+from sim_world.footprints.side import SideSwath
+from sim_world.footprints.swath import SIDES
 
 
-def swath(heading_rad: float, *, first_along_m: float = 20.0) -> Swath:
-    return Swath(10.0, 20.0, heading_rad, first_along_m, along_bin_m=5.0, bins=2, range_bin_m=10.0, range_bins=4)
+def swath(heading_rad: float) -> SideSwath:
+    return SideSwath.over(SonarShape("side", 0.0, 30.0), (10.0, 20.0), heading_rad, 20.0, 2, (5.0, 10.0))
 
 
 def test_heading_north_port_is_west() -> None:
@@ -21,7 +23,9 @@ def test_heading_north_port_is_west() -> None:
     assert x_m[1, 1] == pytest.approx(np.array([10.0, 20.0, 30.0, 40.0]))
     assert y_m[:, 0] == pytest.approx(np.full((2, 4), 42.5))
     assert y_m[:, 1] == pytest.approx(np.full((2, 4), 47.5))
-    assert swath(0.0).bearings_rad(SIDES).ravel() == pytest.approx(np.array([-math.pi / 2, math.pi / 2]))
+    assert swath(0.0).bearing_rad(swath(0.0).along_m, SIDES).ravel() == pytest.approx(
+        np.array([-math.pi / 2, math.pi / 2])
+    )
 
 
 def test_heading_east_port_is_north() -> None:
@@ -34,7 +38,7 @@ def test_heading_east_port_is_north() -> None:
 def test_it_ends_after_its_bins_and_reaches_its_last_range() -> None:
     assert swath(1.0).end_along_m == 30.0
     assert swath(1.0).reach_m == 30.0
-    assert swath(1.0).ranges_m.tolist() == [0.0, 10.0, 20.0, 30.0]
+    assert swath(1.0).lateral_m.tolist() == [[[-0.0, -10.0, -20.0, -30.0]], [[0.0, 10.0, 20.0, 30.0]]]
 
 
 @given(st.floats(0.0, 6.28))
@@ -42,4 +46,4 @@ def test_the_cells_lie_in_the_tracks_frame_where_the_look_says(heading_rad: floa
     cells = swath(heading_rad)
     along_m, lateral_m = cells.to_track(*cells.cell_centres())
     assert along_m == pytest.approx(np.broadcast_to(np.array([22.5, 27.5])[None, :, None], (2, 2, 4)))
-    assert lateral_m == pytest.approx(np.broadcast_to(SIDES * cells.ranges_m, (2, 2, 4)), abs=1e-9)
+    assert lateral_m == pytest.approx(np.broadcast_to(cells.lateral_m, (2, 2, 4)), abs=1e-9)
