@@ -29,13 +29,13 @@ from secondlook.scenario import (
     PatchySeabed,
     RevisitVehicle,
     Scenario,
-    Sensor,
     Start,
     SurveyVehicle,
     Targets,
     UniformSeabed,
 )
 from secondlook.scenario.area import Priority
+from secondlook.scenario.sensor import SENSORS, SensorBase
 from secondlook.scenario.vehicle import VehicleBase
 
 ROOT = Path(__file__).parents[1]
@@ -62,7 +62,7 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("Every vehicle", "`vehicles.ID`", (SurveyVehicle, RevisitVehicle)),
     ("Vehicles that survey", "`vehicles.ID`", (SurveyVehicle,)),
     ("Start", "`vehicles.ID.start`", (Start,)),
-    ("Sensor", "`vehicles.ID.sensor`", (Sensor,)),
+    ("Sensor", "`vehicles.ID.sensor`", tuple(SENSORS.values())),
     ("Detection curve", "`vehicles.ID.sensor.curve` and `vehicles.ID.prior_curve`", (Curve,)),
     ("Coordinator", "`coordinator`", (Coordinator,)),
 )
@@ -71,6 +71,7 @@ SAID = {
     + "of a revisit vehicle.",
     "Seabed": "What lowers every vehicle's P_d: nothing, or, on a `patchy` seabed, fields of sand ripples and patches "
     + "of vegetation.",
+    "Sensor": " ".join((SensorBase.__doc__ or "").split()),
 }
 
 
@@ -92,7 +93,7 @@ def scenario_page() -> str:
             anchors.setdefault(model.__name__, title.lower().replace(" ", "-"))
     for title, where, models in SECTIONS:
         said = SAID.get(title) or " ".join((models[0].__doc__ or "").split())
-        keys = list(models[-1].model_fields)
+        keys = list(dict.fromkeys(key for model in models for key in model.model_fields))
         if VehicleBase in models[0].__bases__:
             keys = [key for key in models[0].model_fields if (key in VehicleBase.model_fields) == (len(models) > 1)]
         lines += ["", f"## {title}", "", f"{said} Keys of {where}:" if where else said, ""]

@@ -11,11 +11,12 @@ from pydantic_core import ErrorDetails
 
 from secondlook.scenario.errors import KeyPath, Place, Problem, dotted, shown
 from secondlook.scenario.model import PatchySeabed, UniformSeabed
+from secondlook.scenario.sensor import SENSORS
 from secondlook.scenario.text import Value
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle
 
 # Pydantic puts the chosen member of a union into the location of an error, and this where a key itself is wrong.
-_TAGS = frozenset({"survey", "revisit", "uniform", "patchy", "degrees", "auto"})
+_TAGS = frozenset({"survey", "revisit", "uniform", "patchy", "degrees", "auto", *SENSORS})
 _KEY_MARK = "[key]"
 
 # A default that is made from other fields was not, as one of these has an error of its own.
@@ -90,7 +91,7 @@ def _problem(
     path, holder, value = _locate(error["loc"], data)
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
         # The error lies with the key that tells the members of the union apart.
-        tag = context["discriminator"].strip("'")
+        tag = context["discriminator"].strip("'()")
         path, holder = (*path, tag), value
         value = value.get(tag) if isinstance(value, dict) else None
     if kind in {"missing", "union_tag_not_found"}:
@@ -140,5 +141,8 @@ def _unknown_key(key: str, taken_for: type[BaseModel] | None) -> str:
     other, whose = _FULLER.get(taken_for, (None, ""))
     if other and key in other.model_fields:
         return f"only {whose} has this key"
+    kinds = [kind for kind, sensor in SENSORS.items() if key in sensor.model_fields]
+    if kinds and taken_for in SENSORS.values():
+        return f"only a sensor of footprint {' or '.join(kinds)} has this key"
     near = nearest(key, known)
     return f"no such key, did you mean {near}?" if near else f"no such key here, there are {', '.join(known)}"

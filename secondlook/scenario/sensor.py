@@ -88,9 +88,12 @@ def _noise(name: Literal["noise_cell", "noise_track"]) -> Any:
     return Field(default_factory=default)
 
 
-class Sensor(Mapping):
-    """A side-looking sonar. What it detects is either a `curve`, or, flat, `p_detect` up to `range_m`."""
+class SensorBase(Mapping):
+    """What every sonar has, whatever the kind of its footprint. What it detects is either a `curve`, or, flat,
+    `p_detect` up to `range_m`."""
 
+    footprint: str
+    """What ground it sees: `side`, what lies beside its track."""
     curve: OptionalCurve = None
     """Detection curve P(y): a bundled one's name (`muscle`), a mapping as below, or `package.module:Class` of what
     makes one."""
@@ -140,6 +143,18 @@ class Sensor(Mapping):
         """The range up to which it detects anything."""
         return self.curve.range_m[-1] if self.curve is not None else self.range_m or 0.0
 
+    def detection_curve(self, shape: SonarShape) -> DetectionCurve:
+        """P_d over the range: the curve as given, or the flat one as far as it sees."""
+        if self.curve is not None:
+            return self.curve.detection_curve
+        return DetectionCurve(np.array([shape.near_m, self.range_m]), np.array([self.p_detect, self.p_detect]))
+
+
+class SideSensor(SensorBase):
+    """A side-looking sonar: it sees what lies beside the vehicle, beyond the vehicle's nadir gap."""
+
+    footprint: Literal["side"] = "side"
+
     def check_nadir_gap(self, nadir_gap_m: float) -> None:
         """Refuses a nadir gap that leaves nothing to be seen."""
         if self.reach_m <= nadir_gap_m:
@@ -147,10 +162,9 @@ class Sensor(Mapping):
 
     def shape(self, nadir_gap_m: float) -> SonarShape:
         """What ground it sees, from the nadir gap on."""
-        return SonarShape("side", nadir_gap_m, self.reach_m, look_m=self.look_m)
+        return SonarShape(self.footprint, nadir_gap_m, self.reach_m, look_m=self.look_m)
 
-    def detection_curve(self, shape: SonarShape) -> DetectionCurve:
-        """P_d over the range: the curve as given, or the flat one as far as it sees."""
-        if self.curve is not None:
-            return self.curve.detection_curve
-        return DetectionCurve(np.array([shape.near_m, self.range_m]), np.array([self.p_detect, self.p_detect]))
+
+SENSORS: dict[str, type[SensorBase]] = {"side": SideSensor}
+
+Sensor = SideSensor
