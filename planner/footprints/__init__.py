@@ -7,9 +7,10 @@ from functools import lru_cache
 
 from planner.footprints.footprint import Footprint
 from planner.footprints.side import SideLooking
+from planner.footprints.wedge import ForwardLooking
 from planner.types import SonarShape
 
-FOOTPRINTS: dict[str, Callable[[SonarShape], Footprint]] = {"side": SideLooking}
+FOOTPRINTS: dict[str, Callable[[SonarShape], Footprint]] = {"side": SideLooking, "wedge": ForwardLooking}
 
 
 @lru_cache(maxsize=256)

@@ -16,7 +16,7 @@ from secondlook.scenario.model import (
     UniformSeabed,
     scenario_hash,
 )
-from secondlook.scenario.sensor import Curve, Sensor
+from secondlook.scenario.sensor import Curve
 from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle, body_of
 
 __all__ = [
@@ -31,7 +31,6 @@ __all__ = [
     "RevisitVehicle",
     "Scenario",
     "ScenarioError",
-    "Sensor",
     "Start",
     "SurveyVehicle",
     "Targets",

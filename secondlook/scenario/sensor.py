@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario import bundled
@@ -93,7 +94,7 @@ class SensorBase(Mapping):
     `p_detect` up to `range_m`."""
 
     footprint: str
-    """What ground it sees: `side`, what lies beside its track."""
+    """What ground it sees: `side`, what lies beside its track; `wedge`, a sector ahead."""
     curve: OptionalCurve = None
     """Detection curve P(y): a bundled one's name (`muscle`), a mapping as below, or `package.module:Class` of what
     makes one."""
@@ -165,6 +166,39 @@ class SideSensor(SensorBase):
         return SonarShape(self.footprint, nadir_gap_m, self.reach_m, look_m=self.look_m)
 
 
-SENSORS: dict[str, type[SensorBase]] = {"side": SideSensor}
+class WedgeSensor(SensorBase):
+    """A forward-looking sonar: from `near_m` on it sees what lies within `half_angle_deg` of the bow, to either side.
+    Its `curve` is over the distance from the vehicle; it makes a look at the beginning of each `look_m`."""
 
-Sensor = SideSensor
+    footprint: Literal["wedge"]
+    half_angle_deg: Annotated[float, Field(gt=0, le=90)]
+    """Of a wedge: how far it sees to either side of the bow."""
+    near_m: LengthOrZero = 0.0
+    """Of a wedge: from which distance on it sees; the farthest is `range_m`, or its curve's last."""
+
+    @model_validator(mode="after")
+    def _check_depth(self) -> Self:
+        if self.reach_m <= self.near_m + self.look_m:
+            raise refused(f"must see farther than near_m and look_m together, {self.near_m + self.look_m:g}")
+        return self
+
+    def check_nadir_gap(self, nadir_gap_m: float) -> None:
+        """Refuses any: it sees the ground that its vehicle will pass over."""
+        if nadir_gap_m > 0:
+            raise refused(f"must be of another footprint than {self.footprint}, or nadir_gap_m 0")
+
+    def shape(self, nadir_gap_m: float) -> SonarShape:
+        """What ground it sees."""
+        return SonarShape(self.footprint, self.near_m, self.reach_m, math.radians(self.half_angle_deg), self.look_m)
+
+
+SENSORS: dict[str, type[SensorBase]] = {"side": SideSensor, "wedge": WedgeSensor}
+
+
+def footprint(sensor: object) -> object:
+    """The kind that a sensor names, side where it names none."""
+    named = sensor.get("footprint", "side") if isinstance(sensor, dict) else getattr(sensor, "footprint", "side")
+    return named if isinstance(named, str) else repr(named)
+
+
+Sensor = Annotated[Annotated[SideSensor, Tag("side")] | Annotated[WedgeSensor, Tag("wedge")], Discriminator(footprint)]

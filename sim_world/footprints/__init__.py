@@ -4,5 +4,6 @@ from __future__ import annotations
 
 from sim_world.footprints.side import SideSwath
 from sim_world.footprints.swath import Swath
+from sim_world.footprints.wedge import WedgeSwath
 
-FOOTPRINTS: dict[str, type[Swath]] = {"side": SideSwath}
+FOOTPRINTS: dict[str, type[Swath]] = {"side": SideSwath, "wedge": WedgeSwath}

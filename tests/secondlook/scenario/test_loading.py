@@ -47,7 +47,16 @@ def load_text(folder: Path, text: str) -> Scenario:
 
 
 def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
-    assert BUNDLED == ["five-helpers", "headland", "paper", "patchy", "tellaro", "two-helpers", "wide"]
+    assert BUNDLED == [
+        "five-helpers",
+        "forward-looking",
+        "headland",
+        "paper",
+        "patchy",
+        "tellaro",
+        "two-helpers",
+        "wide",
+    ]
     for name, description in bundled_scenarios():
         assert load_scenario(name).name == name
         assert description

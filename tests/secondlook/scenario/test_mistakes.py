@@ -392,6 +392,50 @@ MISTAKES = {
             "must see beyond nadir_gap_m, 25"
         ],
     ),
+    "a footprint of no kind": (
+        "p_detect: 0.7,",
+        "footprint: round, p_detect: 0.7,",
+        ['bad.yaml:20: vehicles.helper.sensor.footprint: "round" is not allowed; must be side or wedge'],
+    ),
+    "a footprint that is a list": (
+        "p_detect: 0.7,",
+        "footprint: [wedge], p_detect: 0.7,",
+        ['bad.yaml:20: vehicles.helper.sensor.footprint: ["wedge"] is not allowed; must be side or wedge'],
+    ),
+    "a side-looking sonar with a wedge's keys": (
+        "p_detect: 0.7,",
+        "half_angle_deg: 45, p_detect: 0.7, near_m: 3,",
+        [
+            f"bad.yaml:20: vehicles.helper.sensor.{key} is not allowed; only a sensor of footprint wedge has this key"
+            for key in ("half_angle_deg: 45", "near_m: 3")
+        ],
+    ),
+    "a wedge of no angle": (
+        "p_detect: 0.7,",
+        "footprint: wedge, p_detect: 0.7,",
+        ["bad.yaml:20: vehicles.helper.sensor.half_angle_deg: missing; must be given"],
+    ),
+    "a wedge that looks behind": (
+        "p_detect: 0.7,",
+        "footprint: wedge, half_angle_deg: 91, p_detect: 0.7,",
+        ["bad.yaml:20: vehicles.helper.sensor.half_angle_deg: 91 is not allowed; must be at most 90"],
+    ),
+    "a wedge that ends before the next look": (
+        "    sensor: {p_detect: 0.7, range_m: 25}",
+        "    sensor:\n      {footprint: wedge, half_angle_deg: 45, near_m: 5, p_detect: 0.7, range_m: 25}",
+        [
+            'bad.yaml:20: vehicles.helper.sensor: {"footprint": "wedge", "half_angle_deg": 45, "near_m": 5,... '
+            "is not allowed; must see farther than near_m and look_m together, 25"
+        ],
+    ),
+    "a wedge with a nadir gap": (
+        "    sensor: {p_detect: 0.7, range_m: 25}",
+        "    nadir_gap_m: 2\n    sensor: {footprint: wedge, half_angle_deg: 45, p_detect: 0.7, range_m: 25}",
+        [
+            'bad.yaml:21: vehicles.helper.sensor: {"footprint": "wedge", "half_angle_deg": 45, "p_detect": ... '
+            "is not allowed; must be of another footprint than wedge, or nadir_gap_m 0"
+        ],
+    ),
     "bins of other than whole centimetres": (
         "curve: muscle",
         "curve: muscle, along_bin_m: 2.505, range_bin_m: 0.001",
@@ -549,7 +593,7 @@ def test_a_file_that_is_no_scenario_is_told(write: Write, content: bytes, expect
 
 
 def test_a_name_that_is_not_bundled_is_told_with_those_that_are() -> None:
-    there_are = "there are five-helpers, headland, paper, patchy, tellaro, two-helpers, wide"
+    there_are = "there are five-helpers, forward-looking, headland, paper, patchy, tellaro, two-helpers, wide"
     assert lines_of("telaro") == [f"telaro: no such scenario, did you mean tellaro? ({there_are})"]
     assert lines_of("xyz") == [f"xyz: no such scenario ({there_are})"]
 
