@@ -16,7 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from comms.node import Received
-from comms.said.messages import Look, Nav, Role, RunInfo, TruthPose
+from comms.said.announcement import Role, RunInfo
+from comms.said.messages import Look, Nav, TruthPose
 from planner.region import Region
 from planner.risk import residual_risk, risk_statistics
 from planner.types import GridSpec, Point

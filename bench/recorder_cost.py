@@ -41,7 +41,7 @@ import secondlook
 from bench.replayed import ReplayedConfig
 from comms.lockstep.drive import Lockstep
 from comms.node import Received
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import RECORDER, NodeSpec, node_spec
 from secondlook.launch.mission import recorder_config

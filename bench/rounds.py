@@ -21,7 +21,8 @@ from comms.lockstep.access import access_rules
 from comms.lockstep.host import NodeHost
 from comms.lockstep.hub import Hub
 from comms.node import Node, Publication, Received, Step
-from comms.said.messages import AgentState, ClockMode, Grid, Mode, Role, RunInfo
+from comms.said.announcement import ClockMode, Grid, Role, RunInfo
+from comms.said.messages import AgentState, Mode
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import STATE
 from comms.session import open_client, open_hub, put, subscribe

@@ -14,7 +14,7 @@ import zenoh
 from comms.keys import HostSpec, RunKeys
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.said.messages import ClockMode, RunInfo
+from comms.said.announcement import ClockMode, RunInfo
 from comms.said.routing import RosterNode, Routing
 from comms.session import PATIENCE_S
 

@@ -7,8 +7,9 @@ import logging
 from itertools import chain
 
 from comms.node import Received, Step
+from comms.said.announcement import RunInfo
 from comms.said.codec import Header
-from comms.said.messages import AgentState, CoverageTile, Hotspot, Plan, RunInfo, TaskStatus
+from comms.said.messages import AgentState, CoverageTile, Hotspot, Plan, TaskStatus
 from coordinator.agenda import Agenda, Item
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig

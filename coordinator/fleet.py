@@ -8,7 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from comms.node import Received
-from comms.said.messages import CoverageTile, RunInfo
+from comms.said.announcement import RunInfo
+from comms.said.messages import CoverageTile
 from coordinator.cut.window import Window
 from coordinator.vehicles import KnownVehicle
 from planner.fleet_map import FleetMap

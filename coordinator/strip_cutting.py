@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 
 from comms.node import Received
-from comms.said.messages import Hotspot, RunInfo, StripState
+from comms.said.announcement import RunInfo
+from comms.said.messages import Hotspot, StripState
 from coordinator.agenda import Agenda, Item
 from coordinator.allocate.service import expected_service
 from coordinator.briefing import Briefing

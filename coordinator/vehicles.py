@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, field
 
+from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
-from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role, RosterVehicle
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import Service
 from coordinator.cut.ground import TrackUnderWay
 from coordinator.cut.strips import Cut

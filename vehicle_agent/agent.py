@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 
 from comms.node import Publication, Received, Step
+from comms.said.announcement import RunInfo
 from comms.said.codec import Header
 from comms.said.messages import (
     AgentState,
@@ -17,7 +18,6 @@ from comms.said.messages import (
     MissionOver,
     Mode,
     Nav,
-    RunInfo,
     Task,
 )
 from comms.said.topics import CONTACT, MANEUVER, STATE

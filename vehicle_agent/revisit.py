@@ -5,17 +5,8 @@ from __future__ import annotations
 
 import math
 
-from comms.said.messages import (
-    Look,
-    ManeuverState,
-    ManeuverStatus,
-    Mode,
-    RunInfo,
-    Task,
-    TaskAction,
-    TaskState,
-    TaskStatus,
-)
+from comms.said.announcement import RunInfo
+from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
 from comms.said.topics import TASK_STATUS
 from planner.dubins import Pose
 from planner.region import share_within

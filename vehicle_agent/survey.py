@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 
+from comms.said.announcement import RunInfo, Vertex
 from comms.said.messages import (
     Curve,
     Hotspot,
@@ -17,8 +18,6 @@ from comms.said.messages import (
     Mode,
     Plan,
     PlannedTrack,
-    RunInfo,
-    Vertex,
 )
 from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower

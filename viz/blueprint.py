@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import rerun.blueprint as rrb
 
-from comms.said.messages import RunInfo
+from comms.said.announcement import RunInfo
 from viz import palette, paths
 from viz.shapes import Extent
 

@@ -8,7 +8,8 @@ import numpy as np
 import rerun as rr
 
 from comms.node import Received
-from comms.said.messages import Curve, Plan, RunInfo
+from comms.said.announcement import RunInfo
+from comms.said.messages import Curve, Plan
 from viz import palette, paths
 from viz.canvas import Canvas
 

@@ -9,7 +9,8 @@ import numpy as np
 import rerun as rr
 
 from comms.node import Received
-from comms.said.messages import AgentState, Contact, Mode, Nav, Plan, RosterVehicle, RunInfo, TaskState, TaskStatus
+from comms.said.announcement import RosterVehicle, RunInfo
+from comms.said.messages import AgentState, Contact, Mode, Nav, Plan, TaskState, TaskStatus
 from planner.footprints import footprint_of
 from viz import palette, paths
 from viz.canvas import Canvas, Column

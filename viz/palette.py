@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from comms.said.messages import Mode, Role, RosterVehicle, StripState, TaskState
+from comms.said.announcement import Role, RosterVehicle
+from comms.said.messages import Mode, StripState, TaskState
 
 Colour = tuple[int, int, int]
 

@@ -8,6 +8,7 @@ from typing import Any
 import rerun as rr
 
 from comms.node import Received
+from comms.said.announcement import RunInfo
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -17,7 +18,6 @@ from comms.said.messages import (
     Message,
     Nav,
     Plan,
-    RunInfo,
     StripStatus,
     TaskStatus,
     TruthLook,

@@ -13,7 +13,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from comms.node import Received
-from comms.said.messages import CoverageTile, RunInfo, Vertex
+from comms.said.announcement import RunInfo, Vertex
+from comms.said.messages import CoverageTile
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.risk import RiskStatistics

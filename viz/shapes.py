@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from comms.said.messages import RunInfo, Vertex
+from comms.said.announcement import RunInfo, Vertex
 from planner.types import FloatArray, Strip
 
 # Heights in metres, far enough apart for the depth buffer, too little to shift anything seen from above.

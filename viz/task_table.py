@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import rerun as rr
 
 from comms.node import Received
-from comms.said.messages import RunInfo, StripState, StripStatus, TaskState, TaskStatus
+from comms.said.announcement import RunInfo
+from comms.said.messages import StripState, StripStatus, TaskState, TaskStatus
 from viz import paths
 from viz.canvas import Canvas, Pace
 

@@ -19,7 +19,7 @@ from comms.lockstep.hub import Hub
 from comms.lockstep.local_bus import run_local
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.said.messages import ClockMode
+from comms.said.announcement import ClockMode
 from comms.said.routing import Routing
 
 

@@ -9,7 +9,7 @@ import enum
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import Routing
 
 JOINER_DELAY_MS = 1  # from joining to the delivery of what was kept

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from comms.node import Received
+from comms.said.announcement import Role
 from comms.said.key_expressions import KeyExpression, key_expression
-from comms.said.messages import Role
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import TOPICS
 

@@ -22,7 +22,7 @@ from comms.lockstep.words import pack_answers, unpack_grants
 from comms.node import Listener, Node, Received
 from comms.result import STRIP_TO_TASK, LastWord, StripLatency
 from comms.runner import GuardedListener, Intake, Outgoing, close_all
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.said.wire import WireError
 from comms.session import Mailbox, put, subscribe

@@ -23,8 +23,8 @@ from comms.lockstep.words import pack_grants, unpack_answers
 from comms.node import Node
 from comms.result import BusResult, LastWord
 from comms.runner import Stamp
+from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
-from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import RUN
 from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S, put, subscribe

@@ -11,8 +11,9 @@ from comms.lockstep.group import JoinerMail, NodeGroup
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending, LastWord, summed_up
 from comms.runner import GuardedListener, Outgoing, Stamp, close_all, fleet_digest
+from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
-from comms.said.messages import Message, RunInfo
+from comms.said.messages import Message
 from comms.said.routing import Routing
 from comms.said.topics import RUN
 

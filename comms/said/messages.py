@@ -10,11 +10,11 @@ import enum
 from dataclasses import dataclass
 from typing import Annotated
 
+from comms.said.announcement import RunInfo, Vertex
 from comms.said.wire import (
     AtMost,
     CellMask,
     Count,
-    Digest,
     Identifier,
     Levels,
     Metres,
@@ -29,133 +29,7 @@ from comms.said.wire import (
     Text,
     YesNo,
 )
-from planner.types import GridSpec, LookGeometry, Point, SonarShape, Strip, SweepFrame
-
-
-class Role(enum.Enum):
-    """What a node is in the fleet."""
-
-    CLOCK = "clock"
-    WORLD = "world"
-    BODY = "body"
-    SURVEY = "survey"
-    REVISIT = "revisit"
-    COORDINATOR = "coordinator"
-    RECORDER = "recorder"
-    OBSERVER = "observer"
-    SURVEY_REVISIT = "survey_revisit"
-
-    @property
-    def is_single(self) -> bool:
-        """Whether a fleet has one such node at most, whose id is the role's word."""
-        return self in (Role.CLOCK, Role.WORLD, Role.COORDINATOR, Role.RECORDER, Role.OBSERVER)
-
-    @property
-    def surveys(self) -> bool:
-        """Whether it is the agent of a primary."""
-        return self in (Role.SURVEY, Role.SURVEY_REVISIT)
-
-    @property
-    def revisits(self) -> bool:
-        """Whether it takes strips: a helper's agent, or a primary's once it has surveyed all."""
-        return self in (Role.REVISIT, Role.SURVEY_REVISIT)
-
-
-class ClockMode(enum.Enum):
-    """Whether simulated time advances in lockstep or with the wall clock."""
-
-    LOCKSTEP = "lockstep"
-    WALL = "wall"
-
-
-@dataclass(frozen=True, slots=True)
-class RosterVehicle:
-    """One vehicle of the fleet, as everyone is told at the start.
-
-    `near_m` to `look_m`: what its sonar sees, see `planner.types.SonarShape`. `p_detect`: the mean P_d of a pass, over
-    the lateral ranges that it reaches. Both say what a second look by this vehicle is expected to be worth.
-    """
-
-    vehicle: Identifier
-    role: Role
-    speed_mps: MetresPerSecond
-    turn_radius_m: Metres
-    run_in_m: Metres
-    near_m: Metres
-    far_m: Metres
-    p_detect: Probability
-    endurance_ms: Milliseconds
-    footprint: Identifier = "side"
-    half_angle_rad: Radians = 0.0
-    look_m: Metres = 20.0
-
-    @property
-    def sonar(self) -> SonarShape:
-        """Its sonar as planning knows it."""
-        return SonarShape(self.footprint, self.near_m, self.far_m, self.half_angle_rad, self.look_m)
-
-
-@dataclass(frozen=True, slots=True)
-class Vertex:
-    """A corner of an outline."""
-
-    x_m: Metres
-    y_m: Metres
-
-
-@dataclass(frozen=True, slots=True)
-class Grid:
-    """The residual-risk map's grid (`planner.types.GridSpec`): the sweep frame's origin and heading, cells."""
-
-    origin_x_m: Metres
-    origin_y_m: Metres
-    heading_rad: Radians
-    cell_m: Metres
-    columns: Count
-    rows: Count
-
-    @property
-    def spec(self) -> GridSpec:
-        """The grid as planning uses it."""
-        frame = SweepFrame(self.origin_x_m, self.origin_y_m, self.heading_rad)
-        return GridSpec(frame, self.cell_m, self.columns, self.rows)
-
-
-@dataclass(frozen=True, slots=True)
-class Hole:
-    """What is left out of an area: a hole's outline."""
-
-    outline: Annotated[tuple[Vertex, ...], AtMost(50)]
-
-
-@dataclass(frozen=True, slots=True)
-class RunInfo:
-    """What is run: published once by the clock before anything else. Everyone takes area, grid and roster from here.
-
-    `area`: the survey area's outline. `rho`: correlation of looks at one cell in the residual risk, 0 for none.
-    `holes`: what is not to be surveyed within the area.
-    """
-
-    schema: Count
-    scenario: Identifier
-    scenario_sha256: Digest
-    seed: Count
-    mode: ClockMode
-    area: Annotated[tuple[Vertex, ...], AtMost(500)]
-    grid: Grid
-    rho: Probability
-    vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(100)]
-    holes: Annotated[tuple[Hole, ...], AtMost(20)] = ()
-
-    @property
-    def outline(self) -> tuple[Point, ...]:
-        """The survey area's corners, mission frame."""
-        return tuple((corner.x_m, corner.y_m) for corner in self.area)
-
-    @property
-    def hole_outlines(self) -> tuple[tuple[Point, ...], ...]:
-        """The corners of each hole, mission frame."""
-        return tuple(tuple((corner.x_m, corner.y_m) for corner in hole.outline) for hole in self.holes)
+from planner.types import LookGeometry, Strip
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.topics import TOPICS, Reach, Topic, topic_of
 from comms.said.wire import IDENTIFIER
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from comms.said.announcement import Role, RunInfo
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -24,8 +25,6 @@ from comms.said.messages import (
     MissionOver,
     Nav,
     Plan,
-    Role,
-    RunInfo,
     StripStatus,
     Task,
     TaskStatus,

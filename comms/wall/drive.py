@@ -12,7 +12,7 @@ from comms.drive import Host, Setup
 from comms.keys import HostSpec
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.said.messages import ClockMode
+from comms.said.announcement import ClockMode
 from comms.said.routing import Routing
 from comms.wall.access import access_rules
 from comms.wall.host import WallHost

@@ -13,8 +13,8 @@ from comms.keys import HostSpec, RunKeys
 from comms.node import Received
 from comms.result import BusResult, LastWord
 from comms.runner import Stamp
+from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
-from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN
 from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S

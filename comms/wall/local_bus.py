@@ -9,8 +9,8 @@ from collections.abc import Callable, Mapping
 from comms.node import Listener, Node
 from comms.result import BusResult, Ending, LastWord
 from comms.runner import Intake, Outgoing, Stamp
+from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
-from comms.said.messages import RunInfo
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN
 from comms.wall.clock import MissionTime, result_of

@@ -16,7 +16,7 @@ from typing import Protocol
 from comms.node import Listener, Node, Received
 from comms.result import STRIP_TO_TASK, LastWord, StripLatency
 from comms.runner import GuardedListener, GuardedNode, Outgoing, close_all
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.said.topics import RUN
 from comms.wall.journal import Journal

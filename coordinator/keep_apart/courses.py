@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.said.messages import AgentState, Mode, Plan, RosterVehicle
+from comms.said.announcement import RosterVehicle
+from comms.said.messages import AgentState, Mode, Plan
 from coordinator.vehicles import pass_of
 from planner.dubins import DubinsPath, Pose, shortest_path
 from planner.sweep import Sweep, shifted

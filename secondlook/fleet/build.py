@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
+from comms.said.announcement import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.codec import SCHEMA_VERSION, Header, encode
-from comms.said.messages import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.routing import RosterNode
 from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of

@@ -15,7 +15,7 @@ from typing import Any
 
 from comms.keys import HostSpec
 from comms.runner import failure_of
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import RosterNode
 
 CLOCK, WORLD, COORDINATOR, RECORDER, OBSERVER = (

@@ -16,7 +16,7 @@ from comms.drive import Drive, Setup
 from comms.errors import NodeError, RunawayError
 from comms.lockstep.drive import Lockstep
 from comms.result import BusResult, Ending
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError

@@ -13,7 +13,7 @@ from pathlib import Path
 from comms.errors import ConnectionFailedError, Interrupted, NodeError, RefusedError
 from comms.keys import RunKeys
 from comms.result import BusResult, Ending
-from comms.said.messages import ClockMode, Role
+from comms.said.announcement import ClockMode, Role
 from comms.said.routing import Routing
 from comms.session import Certificates, open_guest, open_router
 from comms.wall.access import access_rules

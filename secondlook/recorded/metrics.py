@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from comms.node import Received
+from comms.said.announcement import Role, RunInfo
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -17,8 +18,6 @@ from comms.said.messages import (
     Mode,
     Nav,
     Plan,
-    Role,
-    RunInfo,
     StripState,
     StripStatus,
     TruthLook,

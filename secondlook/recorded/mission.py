@@ -14,6 +14,7 @@ import shapely
 import yaml
 
 from comms.node import Received
+from comms.said.announcement import RunInfo
 from comms.said.codec import decode, header_of
 from comms.said.key_expressions import KeyExpression, key_expression
 from comms.said.messages import (
@@ -23,7 +24,6 @@ from comms.said.messages import (
     Message,
     Nav,
     Plan,
-    RunInfo,
     StripStatus,
     TruthLook,
     TruthTargets,

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from comms.node import Received
+from comms.said.announcement import RunInfo
 from comms.said.messages import (
     Curve,
     Hotspot,
@@ -15,7 +16,6 @@ from comms.said.messages import (
     ManeuverStatus,
     MissionOver,
     Plan,
-    RunInfo,
     StripState,
     StripStatus,
     Task,

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.said.messages import CoverageTile, Mode, RunInfo
+from comms.said.announcement import RunInfo
+from comms.said.messages import CoverageTile, Mode
 from planner.types import FloatArray
 from secondlook.recorded import Activity, RecordedMission, RiskMap
 from secondlook.recorded.metrics import Metrics

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import AfterValidator, Field, ValidationInfo, field_validator, model_validator
 
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from planner.curve import effective_range_m
 from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario.plug_ins import NODE, SPACING

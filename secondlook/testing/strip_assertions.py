@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 from comms.lockstep.events import Kill
 from comms.node import Received
+from comms.said.announcement import Role
 from comms.said.messages import (
     AgentState,
     MissionOver,
     Mode,
-    Role,
     StripState,
     StripStatus,
     Task,

@@ -9,7 +9,7 @@ from comms.errors import NodeError, RunawayError
 from comms.lockstep import clock
 from comms.node import Step
 from comms.result import Ending
-from comms.said.messages import RunInfo
+from comms.said.announcement import RunInfo
 from comms.said.topics import TRUTH_TARGETS
 
 

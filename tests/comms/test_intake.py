@@ -12,8 +12,8 @@ from same_message import assert_same
 
 from comms.node import Received
 from comms.runner import Intake, Stamp
+from comms.said.announcement import Role
 from comms.said.codec import Header, encode
-from comms.said.messages import Role
 from comms.said.routing import Routing
 from comms.said.topics import NAV, STATE, TOPICS, Topic
 from comms.said.wire import LARGEST_MS

@@ -11,18 +11,17 @@ from hypothesis import strategies as st
 from one_node import OneNode, received
 
 from comms.node import Received
+from comms.said.announcement import Role, Vertex
 from comms.said.messages import (
     AgentState,
     Hotspot,
     HotspotState,
     MissionOver,
     Mode,
-    Role,
     StripState,
     StripStatus,
     Task,
     TaskAction,
-    Vertex,
 )
 from comms.said.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TASK_STATUS
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator

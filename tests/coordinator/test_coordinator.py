@@ -22,13 +22,13 @@ from coordinator_by_hand import (
 )
 from one_node import OneNode, received
 
+from comms.said.announcement import Role
 from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,
     HotspotState,
     Mode,
-    Role,
     StripStatus,
     Task,
     TaskAction,

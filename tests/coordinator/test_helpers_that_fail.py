@@ -19,7 +19,8 @@ from coordinator_by_hand import (
 )
 from one_node import OneNode
 
-from comms.said.messages import Mode, Plan, Role, StripState, TaskAction, TaskState
+from comms.said.announcement import Role
+from comms.said.messages import Mode, Plan, StripState, TaskAction, TaskState
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator

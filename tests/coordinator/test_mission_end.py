@@ -16,13 +16,8 @@ from coordinator_by_hand import (
     with_a_helper,
 )
 
-from comms.said.messages import (
-    MissionOver,
-    Mode,
-    Role,
-    StripStatus,
-    TaskState,
-)
+from comms.said.announcement import Role
+from comms.said.messages import MissionOver, Mode, StripStatus, TaskState
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator
 

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from comms.node import Node, Publication, Received, Step
+from comms.said.announcement import Role
 from comms.said.codec import Header, encode
 from comms.said.messages import (
     Look,
@@ -20,7 +21,6 @@ from comms.said.messages import (
     Message,
     MissionOver,
     Nav,
-    Role,
     TruthLook,
     TruthPose,
     TruthTargets,

@@ -9,20 +9,8 @@ from itertools import pairwise
 import numpy as np
 from one_node import OneNode
 
-from comms.said.messages import (
-    ClockMode,
-    Grid,
-    Look,
-    Maneuver,
-    ManeuverKind,
-    ManeuverState,
-    ManeuverStatus,
-    Nav,
-    Role,
-    RosterVehicle,
-    RunInfo,
-    Vertex,
-)
+from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
+from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav
 from planner.area import SurveyArea
 from planner.types import FloatArray
 

@@ -14,7 +14,7 @@ from comms.errors import NodeError
 from comms.keys import HostSpec, RunKeys
 from comms.node import Listener, Node
 from comms.result import BusResult
-from comms.said.messages import ClockMode, Role
+from comms.said.announcement import ClockMode, Role
 from comms.said.routing import Routing
 from comms.session import open_client, open_hub
 from comms.wall.access import access_rules

@@ -9,21 +9,19 @@ import numpy as np
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
 from one_node import OneNode, Said
 
+from comms.said.announcement import Role, RosterVehicle, Vertex
 from comms.said.messages import (
     AgentState,
     CoverageTile,
     Hotspot,
     HotspotState,
     Mode,
-    Role,
-    RosterVehicle,
     StripState,
     StripStatus,
     Task,
     TaskAction,
     TaskState,
     TaskStatus,
-    Vertex,
 )
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Allocator

@@ -19,18 +19,8 @@ from comms.lockstep.hub import Hub
 from comms.lockstep.local_bus import run_local
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.result import BusResult
-from comms.said.messages import (
-    AgentState,
-    ClockMode,
-    Grid,
-    ManeuverState,
-    ManeuverStatus,
-    MissionOver,
-    Mode,
-    Nav,
-    Role,
-    RunInfo,
-)
+from comms.said.announcement import ClockMode, Grid, Role, RunInfo
+from comms.said.messages import AgentState, ManeuverState, ManeuverStatus, MissionOver, Mode, Nav
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import MANEUVER_STATUS, MISSION_OVER, NAV, STATE
 from comms.session import open_client, open_hub, put

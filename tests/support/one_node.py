@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from comms.node import Node, Received, Step
+from comms.said.announcement import Role
 from comms.said.codec import Header, decode, encode
-from comms.said.messages import Message, Role
+from comms.said.messages import Message
 from comms.said.topics import number_of, topic_of
 
 M = TypeVar("M")

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode
 
-from comms.said.messages import AgentState, CoverageTile, Mode, Role, TaskState, TaskStatus
+from comms.said.announcement import Role
+from comms.said.messages import AgentState, CoverageTile, Mode, TaskState, TaskStatus
 from comms.said.topics import LOOK, MANEUVER_STATUS, MISSION_OVER, NAV, TASK
 from planner.footprints.side import SideLooking
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing

@@ -9,6 +9,7 @@ import pytest
 from by_hand import HELPER, flat, fly, look, nav, run_info, tell_status, to_follow
 from one_node import OneNode, Said
 
+from comms.said.announcement import Role
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -17,7 +18,6 @@ from comms.said.messages import (
     ManeuverState,
     MissionOver,
     Mode,
-    Role,
     Task,
     TaskAction,
     TaskState,

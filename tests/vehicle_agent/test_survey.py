@@ -24,6 +24,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode, Said
 
+from comms.said.announcement import Role, RunInfo
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -39,8 +40,6 @@ from comms.said.messages import (
     MissionOver,
     Mode,
     Plan,
-    Role,
-    RunInfo,
 )
 from planner.fleet_map import FleetMap
 from planner.footprints.side import SideLooking

@@ -15,19 +15,8 @@ from hypothesis import strategies as st
 from one_node import OneNode
 from regions import regions
 
-from comms.said.messages import (
-    AgentState,
-    Grid,
-    Hole,
-    Hotspot,
-    HotspotState,
-    ManeuverState,
-    Mode,
-    Plan,
-    Role,
-    RunInfo,
-    Vertex,
-)
+from comms.said.announcement import Grid, Hole, Role, RunInfo, Vertex
+from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState, Mode, Plan
 from planner.footprints.side import SideLooking
 from planner.region import Region
 from planner.spacing_planners import AdaptiveSpacing

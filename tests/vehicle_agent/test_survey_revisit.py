@@ -5,6 +5,7 @@ from __future__ import annotations
 from by_hand import PRIMARY, flat, fly, nav, run_info, tell_status, to_follow
 from one_node import OneNode
 
+from comms.said.announcement import Role
 from comms.said.messages import (
     AgentState,
     Maneuver,
@@ -12,7 +13,6 @@ from comms.said.messages import (
     ManeuverState,
     MissionOver,
     Mode,
-    Role,
     Task,
     TaskAction,
     TaskState,

@@ -12,14 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from comms.node import Received
+from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.codec import Header, decode, encode
 from comms.said.messages import (
     AgentState,
-    ClockMode,
     Contact,
     CoverageTile,
     Curve,
-    Grid,
     Hotspot,
     HotspotState,
     Maneuver,
@@ -32,9 +31,6 @@ from comms.said.messages import (
     Nav,
     Plan,
     PlannedTrack,
-    Role,
-    RosterVehicle,
-    RunInfo,
     StripState,
     StripStatus,
     Task,
@@ -45,7 +41,6 @@ from comms.said.messages import (
     TruthPose,
     TruthTarget,
     TruthTargets,
-    Vertex,
 )
 from comms.said.topics import (
     CONTACT,

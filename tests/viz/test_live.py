@@ -22,7 +22,8 @@ import rerun as rr
 from rerun.experimental import ViewerClient
 
 from comms.node import Received
-from comms.said.messages import Hotspot, Nav, RunInfo
+from comms.said.announcement import RunInfo
+from comms.said.messages import Hotspot, Nav
 from secondlook.recorded.story import Story
 from tests.viz.mission_stream import PRIMARY
 from tests.viz.recordings import entities, rows, rows_so_far, verify

@@ -22,25 +22,23 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from comms.node import Received
+from comms.said.announcement import Hole, RunInfo, Vertex
 from comms.said.messages import (
     AgentState,
     CoverageTile,
     Curve,
-    Hole,
     Hotspot,
     Look,
     Message,
     MissionOver,
     Nav,
     Plan,
-    RunInfo,
     StripState,
     StripStatus,
     TaskStatus,
     TruthLook,
     TruthPose,
     TruthTargets,
-    Vertex,
 )
 from comms.said.topics import TOPICS
 from planner.region import Region

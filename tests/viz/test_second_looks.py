@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 
 from comms.node import Received
 from comms.said import topics
+from comms.said.announcement import RunInfo, Vertex
 from comms.said.codec import Header
-from comms.said.messages import Hotspot, HotspotState, MissionOver, RunInfo, StripState, StripStatus, Vertex
+from comms.said.messages import Hotspot, HotspotState, MissionOver, StripState, StripStatus
 from tests.viz.mission_stream import mission
 from tests.viz.recordings import rows
 from viz import palette

@@ -10,7 +10,7 @@ import rerun.blueprint as rrb
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.said.messages import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
+from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from planner.types import Strip
 from viz.blueprint import FIELD_OF_VIEW_RAD, MARGIN, mission_blueprint
 from viz.shapes import Extent, body_quaternions, extent_of, label_place, ring, strip_ring

@@ -11,6 +11,7 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 import numpy as np
 from hypothesis import strategies as st
 
+from comms.said.announcement import Vertex
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -27,7 +28,6 @@ from comms.said.messages import (
     TaskAction,
     TaskState,
     TaskStatus,
-    Vertex,
 )
 from comms.said.topics import Topic
 from comms.said.wire import AtMost, Flag, Mask, Packed, Scaled, Whole, Words

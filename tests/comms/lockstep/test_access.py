@@ -18,8 +18,9 @@ from comms.errors import ConnectionFailedError, FleetError
 from comms.keys import HostSpec, RunKeys
 from comms.lockstep.access import access_rules
 from comms.node import Step
+from comms.said.announcement import Role
 from comms.said.codec import Header, encode
-from comms.said.messages import Maneuver, ManeuverKind, Role, Task, TaskAction, TruthPose
+from comms.said.messages import Maneuver, ManeuverKind, Task, TaskAction, TruthPose
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import TOPICS
 from comms.session import open_client, open_hub, put, subscribe

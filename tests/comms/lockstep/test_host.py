@@ -21,7 +21,8 @@ from comms.lockstep.host import ListenerHost, NodeHost
 from comms.lockstep.parcels import publish
 from comms.lockstep.words import pack_grants, unpack_answers
 from comms.runner import Outgoing, Stamp
-from comms.said.messages import Look, Message, Role, TruthPose
+from comms.said.announcement import Role
+from comms.said.messages import Look, Message, TruthPose
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import LOOK, NAV, STATE, TRUTH_POSE
 from comms.session import Mailbox, open_client, open_hub, put, subscribe

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 import zenoh
 
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import TOPICS, Topic, topic_of
 

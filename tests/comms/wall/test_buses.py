@@ -12,8 +12,8 @@ from fleets import Notes, Scripted, fleet_that_talks, password, say_nav, say_ove
 from comms.errors import FleetError, NodeError
 from comms.node import Received, Step
 from comms.result import BusResult, Ending
+from comms.said.announcement import ClockMode, RunInfo
 from comms.said.codec import Header, encode
-from comms.said.messages import ClockMode, RunInfo
 from comms.session import open_client, put
 
 LATER_MS = 5_000  # of mission time: 50 ms

@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from situations import helper, strip
 
-from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
+from comms.said.announcement import Role
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import expected_service, sweeps
 from coordinator.allocate.situation import OpenStrip
 from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close

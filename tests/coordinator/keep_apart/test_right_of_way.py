@@ -9,7 +9,8 @@ import pytest
 from by_hand import vehicle
 from situations import helper, open_strip, situation, strip
 
-from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, Role
+from comms.said.announcement import Role
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.allocators import ASKED_LATER_S, offers_let_through
 from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip

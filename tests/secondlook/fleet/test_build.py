@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import pytest
 from one_node import received
 
-from comms.said.messages import Role, RosterVehicle, RunInfo
+from comms.said.announcement import Role, RosterVehicle, RunInfo
 from planner.area import SurveyArea
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet

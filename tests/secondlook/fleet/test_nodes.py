@@ -8,7 +8,7 @@ from flights import BRIEF
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.said.messages import Role
+from comms.said.announcement import Role
 from comms.said.routing import RosterNode
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import LONGEST_HOST, NodeSpec, hosts_of_run

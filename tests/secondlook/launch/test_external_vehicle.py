@@ -14,18 +14,9 @@ from typing import Any
 import pytest
 from spread import PATIENT, loopback_endpoint, lost_of_what_is_kept, spread_fleet
 
+from comms.said.announcement import ClockMode, Role
 from comms.said.codec import Header, decode, encode
-from comms.said.messages import (
-    ClockMode,
-    Look,
-    Maneuver,
-    ManeuverKind,
-    ManeuverState,
-    ManeuverStatus,
-    Message,
-    Nav,
-    Role,
-)
+from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav
 from comms.said.topics import topic_of
 from secondlook import cli
 from secondlook.fleet.build import build_fleet

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 from flights import BRIEF, Flight, events, flight, has_ended, until
 
+from comms.said.announcement import ClockMode, RunInfo
 from comms.said.codec import decode
-from comms.said.messages import ClockMode, RunInfo
 from comms.said.topics import topic_of
 from secondlook.cli import main, with_number
 from secondlook.recorded.mission_files import read_messages

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
+from comms.said.announcement import RunInfo
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -21,7 +22,6 @@ from comms.said.messages import (
     Mode,
     Plan,
     PlannedTrack,
-    RunInfo,
     StripState,
     StripStatus,
     TruthLook,

@@ -23,8 +23,9 @@ from hypothesis.extra.numpy import arrays
 
 import secondlook
 from comms.node import Received
+from comms.said.announcement import RunInfo
 from comms.said.codec import Header
-from comms.said.messages import AgentState, Message, Mode, Plan, PlannedTrack, RunInfo, StripState, StripStatus
+from comms.said.messages import AgentState, Message, Mode, Plan, PlannedTrack, StripState, StripStatus
 from comms.said.topics import PLAN, STATE, STRIP, Topic
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame

@@ -10,13 +10,11 @@ import numpy as np
 import pytest
 
 from comms.node import Received
+from comms.said.announcement import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.codec import Header
 from comms.said.messages import (
     AgentState,
-    ClockMode,
     Curve,
-    Grid,
-    Hole,
     Hotspot,
     HotspotState,
     ManeuverState,
@@ -26,16 +24,12 @@ from comms.said.messages import (
     Mode,
     Plan,
     PlannedTrack,
-    Role,
-    RosterVehicle,
-    RunInfo,
     StripState,
     StripStatus,
     Task,
     TaskAction,
     TaskState,
     TaskStatus,
-    Vertex,
 )
 from comms.said.topics import (
     CURVE,
