@@ -116,14 +116,14 @@ def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seco
 def one_seed(scenario: Scenario, allocators: list[str], seconds: float) -> Row:
     """Flies the seed with each allocator, and solves it. The survey is the same with all of them."""
     clairvoyance = Clairvoyance(contenders(scenario, ["none"])[0].scenario)
-    survey = fly(clairvoyance.scenario, clairvoyance.take)
+    survey = fly(clairvoyance.scenario, clairvoyance.hear)
     if isinstance(survey, Failure):
         raise ValueError(f"seed {scenario.seed}: {survey.failure}")
     mission = clairvoyance.removable()
     flown: dict[str, Flown | None] = {}
     for contender in contenders(scenario, allocators):
         legs = FlownLegs()
-        result = fly(contender.scenario, legs.take)
+        result = fly(contender.scenario, legs.hear)
         flown[contender.name] = (
             None
             if isinstance(result, Failure)
@@ -137,8 +137,8 @@ def one_run(folder: Path, seconds: float) -> Row:
     scenario = load_scenario(str(folder / "scenario.yaml"))
     clairvoyance, legs = Clairvoyance(scenario), FlownLegs()
     for received in secondlook.load(folder).received():
-        clairvoyance.take(received)
-        legs.take(received)
+        clairvoyance.hear(received)
+        legs.hear(received)
     alone, fleet = clairvoyance.metrics.risk_primary_alone(), clairvoyance.metrics.risk()
     if alone is None or fleet is None:
         raise UserError(f"{folder}: the run ended before the mission began")

@@ -19,7 +19,7 @@ class FlownLegs:
 
     _looks: dict[str, dict[int, list[tuple[float, Look]]]] = field(default_factory=dict)
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Takes one message, in the order of sending."""
         look = received.message
         if isinstance(look, Look) and look.valid:

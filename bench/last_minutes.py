@@ -107,7 +107,7 @@ def one_mission(scenario: Scenario, order: str) -> Row:
     """Flies a mission and looks at it afterwards."""
     clairvoyance = Clairvoyance(scenario)
     with tempfile.TemporaryDirectory(prefix="secondlook-minutes-") as folder:
-        told = run_mission(scenario, RunOptions(Path(folder), "local", record=False, watch=clairvoyance.take))
+        told = run_mission(scenario, RunOptions(Path(folder), "local", record=False, watch=clairvoyance.hear))
     mission = clairvoyance.removable()
     area_m2 = told["risk"]["cells"] * mission.grid.cell_area_m2
     late = [_late(mission, mission.primary_s - last_s) for last_s in LAST_S]

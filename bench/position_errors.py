@@ -39,7 +39,7 @@ class TrueMap:
     believed: dict[str, Nav] = field(default_factory=dict)
     off_m: dict[str, Point] = field(default_factory=dict)
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Takes a message, in the order of sending."""
         message, name = received.message, received.vehicle
         if isinstance(message, RunInfo):
@@ -83,7 +83,7 @@ def fly(scenario: str, seed: int, error: str, size: int) -> tuple[float, float, 
     settings = [f"vehicles.{name}.{error}={size}" for name in helpers]
     truth = TrueMap()
     with tempfile.TemporaryDirectory() as folder:
-        options = RunOptions(Path(folder), "local", None, record=False, watch=truth.take)
+        options = RunOptions(Path(folder), "local", None, record=False, watch=truth.hear)
         told = run_mission(load_scenario(scenario, settings, seed), options)
     return told["risk"]["mean"], truth.mean_risk(Role.SURVEY, Role.REVISIT), truth.mean_risk(Role.SURVEY)
 

@@ -35,7 +35,7 @@ class _Watcher:
         self.metrics = Metrics()
 
     def on_message(self, received: Received) -> None:
-        self.metrics.take(received)
+        self.metrics.hear(received)
 
     def close(self) -> None:
         self.metrics.close()

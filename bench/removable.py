@@ -95,9 +95,9 @@ class Clairvoyance:
         if self.scenario.area.priorities:
             raise UserError("area.priorities: not allowed here; must be [], all ground counts alike")
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Takes one message, in the order of sending."""
-        self.metrics.take(received)
+        self.metrics.hear(received)
         message, now_s = received.message, received.header.sent_ms / 1000
         if self.metrics.map is None or received.vehicle not in self.scenario.survey_vehicles:
             return

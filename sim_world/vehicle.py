@@ -103,10 +103,10 @@ class SimulatedVehicle:
 
     @property
     def next_event_ms(self) -> int | None:
-        """When `take_event` has something next, None for never."""
+        """When `pop_event` has something next, None for never."""
         return None if self._next is None else self._next[0]
 
-    def take_event(self) -> Event:
+    def pop_event(self) -> Event:
         """The next event, once its time has come.
 
         Raises:

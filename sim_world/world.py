@@ -60,7 +60,7 @@ class Body:
 
     def next_event(self, time_ms: int) -> list[Publication]:
         """What it has to say at that time."""
-        event = self._vehicle.take_event()
+        event = self._vehicle.pop_event()
         if isinstance(event, ManeuverStatus):
             if self._told is not None and event.number == self._told[0].number:
                 self._said = event

@@ -76,7 +76,7 @@ class Agent:
         message = received.message
         self._now_ms = now_ms
         if isinstance(message, Nav):
-            self._take_nav(message, now_ms)
+            self._hear_nav(message, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
             self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
             self.region = Region(message.outline, message.hole_outlines)
@@ -84,7 +84,7 @@ class Agent:
             self.on_run(message, now_ms)
         elif self.coverage is not None and not self._over:
             if isinstance(message, Look):
-                self._take_look(message, received.header.incarnation, now_ms)
+                self._hear_look(message, received.header.incarnation, now_ms)
             elif isinstance(message, ManeuverStatus):
                 if self.maneuver is not None and message.number == self.maneuver.number:
                     self._word_due_ms = _next_word_due_ms(message)
@@ -180,7 +180,7 @@ class Agent:
         """Share of the endurance that is left."""
         return max(0.0, 1.0 - now_ms / self._endurance_ms)
 
-    def _take_nav(self, nav: Nav, now_ms: int) -> None:
+    def _hear_nav(self, nav: Nav, now_ms: int) -> None:
         first = self.nav is None
         self.nav = nav
         if first and self.coverage is not None and not self._over:
@@ -203,7 +203,7 @@ class Agent:
         self._word_due_ms = self._now_ms + REPORT_EVERY_MS
         self.publish(MANEUVER.key(vehicle=self.vehicle), self.maneuver)
 
-    def _take_look(self, look: Look, incarnation: int, now_ms: int) -> None:
+    def _hear_look(self, look: Look, incarnation: int, now_ms: int) -> None:
         if (incarnation, look.number) in self._looks_taken:  # a look that comes twice was one look
             return
         self._looks_taken.add((incarnation, look.number))

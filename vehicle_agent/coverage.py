@@ -42,7 +42,7 @@ class CoverageLayer:
 
     def changed_tiles(self) -> list[Publication]:
         """The tiles that differ from what was last published."""
-        changed = {tile for tile in self._looked_at if self._take_levels(tile)}
+        changed = {tile for tile in self._looked_at if self._copy_levels(tile)}
         self._looked_at.clear()
         if self.settled is not self._published_settled:
             changed.update(tiles_holding(self.grid, self._tiles, self.settled != self._published_settled))
@@ -54,8 +54,8 @@ class CoverageLayer:
             published.append(self._say(tile))
         return published
 
-    def _take_levels(self, tile: Tile) -> bool:
-        """Takes a tile's levels to be published; returns whether they are others than before."""
+    def _copy_levels(self, tile: Tile) -> bool:
+        """Copies a tile's levels to be published; returns whether they are others than before."""
         window, changed = tile.window, False
         for now, published in (
             (self.layer.sum_levels[window], self._published_sum[window]),

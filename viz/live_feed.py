@@ -63,9 +63,9 @@ class LiveFeed:
 
     def _run(self) -> None:
         while not self._closing.wait(PIECE_EVERY_S):
-            self._take()
+            self._collect()
             self._write()
-        self._take()
+        self._collect()
         deadline = time.monotonic() + REST_WITHIN_S
         while self._write() and self._pipe is not None and time.monotonic() < deadline:
             select.select([], [self._pipe], [], PIECE_EVERY_S)
@@ -74,8 +74,8 @@ class LiveFeed:
             log.warning("the live view lacks %d pieces of the recording; the file has them", left_out)
         self._hang_up()
 
-    def _take(self) -> None:
-        """Takes what has been drawn since; read also where it leads nowhere, or it would pile up."""
+    def _collect(self) -> None:
+        """Collects what has been drawn since; read also where it leads nowhere, or it would pile up."""
         piece = self._bytes.read()
         if not piece or self._pipe is None:
             return

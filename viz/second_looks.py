@@ -37,11 +37,11 @@ class SecondLooks:
 
     def on_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         """Draws the outline, with its number and its mean risk."""
-        self._take(received, hotspot.state, partial(self._draw_hotspot, received, hotspot))
+        self._note(received, hotspot.state, partial(self._draw_hotspot, received, hotspot))
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
-        self._take(received, strip.state, partial(self._draw_strip, received, strip))
+        self._note(received, strip.state, partial(self._draw_strip, received, strip))
 
     def advance(self, time_ms: int) -> None:
         """Draws what was held back if its minute is over."""
@@ -54,7 +54,7 @@ class SecondLooks:
             draw()
         self._held.clear()
 
-    def _take(self, received: Received, state: HotspotState | StripState, draw: Callable[[], None]) -> None:
+    def _note(self, received: Received, state: HotspotState | StripState, draw: Callable[[], None]) -> None:
         """Draws what a message says, or holds it back if it tells no new state and what it is of changes often."""
         key, time_ms = received.key, received.header.sent_ms
         before = self._states.get(key)

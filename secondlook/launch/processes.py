@@ -94,7 +94,7 @@ class Processes:
             for child, words in self._hear():
                 if "result" in words:
                     return self._end(words["result"])
-                self._take(child, words)
+                self._act_on(child, words)
             if self._listening.stopped:
                 raise RunStopped
             now_s = time.monotonic()
@@ -155,7 +155,7 @@ class Processes:
             for one in words:
                 yield child, one
 
-    def _take(self, child: ChildProcess, words: dict[str, Any]) -> None:
+    def _act_on(self, child: ChildProcess, words: dict[str, Any]) -> None:
         match words:
             case {"endpoint": endpoint}:
                 self._endpoint = endpoint

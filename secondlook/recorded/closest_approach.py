@@ -50,7 +50,7 @@ class ClosestApproaches:
         self._closest: dict[tuple[str, str], Closest] = {}
         self._due_s: dict[tuple[str, str], float] = {}
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Folds one message in."""
         message, name = received.message, received.vehicle
         if isinstance(message, TruthPose):

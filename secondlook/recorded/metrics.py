@@ -64,8 +64,8 @@ class StripFigures:
 
 @dataclass
 class Metrics:
-    """Take the messages in order; ask at any time. `coordinators`: the newest incarnation that has told of strips; what
-    those before have left counts as withdrawn."""
+    """Hears the messages in order; may be asked at any time. `coordinators`: the newest incarnation that has told of
+    strips; what those before have left counts as withdrawn."""
 
     now_ms: int = 0
     run: RunInfo | None = None
@@ -80,7 +80,7 @@ class Metrics:
     misfits: int = 0
     coordinators: int = 0
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Folds one message in. What contradicts the run's announcement is counted in `misfits`."""
         message = received.message
         if received.header.sent_ms > self.now_ms:
@@ -88,16 +88,16 @@ class Metrics:
         vehicle = self.vehicles.get(received.vehicle)
         if isinstance(message, Nav):  # most are
             if vehicle is not None:
-                self._take_nav(vehicle, message)
-                self.approaches.take(received)
+                self._hear_nav(vehicle, message)
+                self.approaches.hear(received)
         elif isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
         elif isinstance(message, TruthPose) and vehicle is not None:
-            self.approaches.take(received)
+            self.approaches.hear(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
             vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
         elif isinstance(message, CoverageTile):
-            self._take_tile(received, message)
+            self._hear_tile(received, message)
         elif isinstance(message, Plan) and vehicle is not None:
             vehicle.plan = message
         elif isinstance(message, AgentState) and vehicle is not None:
@@ -107,7 +107,7 @@ class Metrics:
                 if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
                     vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))
         elif isinstance(message, StripStatus):
-            self._take_strip(received, message)
+            self._hear_strip(received, message)
         elif isinstance(message, TruthTargets):
             self.targets = message
         elif isinstance(message, TruthLook):
@@ -215,12 +215,12 @@ class Metrics:
         if risk is not None:
             self.risk_at.append({"t_s": at_ms / 1000, "mean": risk.mean, "worst30_mean": risk.worst30_mean})
 
-    def _take_nav(self, vehicle: VehicleFigures, nav: Nav) -> None:
+    def _hear_nav(self, vehicle: VehicleFigures, nav: Nav) -> None:
         if vehicle.last_nav is not None:
             vehicle.path_m += math.hypot(nav.x_m - vehicle.last_nav.x_m, nav.y_m - vehicle.last_nav.y_m)
         vehicle.last_nav = nav
 
-    def _take_tile(self, received: Received, tile: CoverageTile) -> None:
+    def _hear_tile(self, received: Received, tile: CoverageTile) -> None:
         if self.map is None:
             return
         try:
@@ -228,7 +228,7 @@ class Metrics:
         except ValueError:
             self.misfits += 1
 
-    def _take_strip(self, received: Received, status: StripStatus) -> None:
+    def _hear_strip(self, received: Received, status: StripStatus) -> None:
         if received.header.incarnation > self.coordinators:  # it was started anew, and cuts strips of its own
             self.coordinators = received.header.incarnation
             for left in self.strips.values():

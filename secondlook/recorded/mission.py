@@ -116,7 +116,7 @@ class Mission(ABC):
         for one in self.received(RunInfo, CoverageTile):
             tile = isinstance(one.message, CoverageTile)
             if not tile or (one.header.sent_ms <= until_ms and (vehicles is None or one.vehicle in vehicles)):
-                metrics.take(one)
+                metrics.hear(one)
         return RiskMap.of(until_ms / 1000, metrics)
 
     @property
@@ -136,7 +136,7 @@ class Mission(ABC):
     def _figures(self) -> Metrics:
         figures = Metrics()
         for one in self.received():
-            figures.take(one)
+            figures.hear(one)
         return figures
 
     @cached_property

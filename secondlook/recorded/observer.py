@@ -44,7 +44,7 @@ class Observer:
         """Takes one message."""
         self.messages[received.topic.name] += 1
         self._files.write(received)
-        self.metrics.take(received)
+        self.metrics.hear(received)
         if self._progress is not None and self.metrics.now_ms >= self._progress_due_ms:
             self._progress_due_ms = self.metrics.now_ms + PROGRESS_EVERY_MS
             self._progress(self.metrics)

@@ -49,7 +49,7 @@ def risk_series(mission: RecordedMission) -> RiskSeries:
     for received in mission.received(RunInfo, CoverageTile):
         while received.header.sent_ms / 1000 > times_s[len(samples)]:
             samples.append(_sample(metrics, times_s[len(samples)]))
-        metrics.take(received)
+        metrics.hear(received)
     samples += [_sample(metrics, t_s) for t_s in times_s[len(samples) :]]
     before, after = (RiskMap.of(mission.end_s, metrics, vehicles) for vehicles in (mission.primaries, None))
     return RiskSeries(samples, before, after)

@@ -49,7 +49,7 @@ class Curve(Mapping):
         return DetectionCurve(np.array(self.range_m), np.array(self.p_detect))
 
 
-def _take_bundled(value: object) -> object:
+def _bundled(value: object) -> object:
     if not isinstance(value, str):
         return value
     names = bundled.curve_names()
@@ -71,7 +71,7 @@ def _take_bundled(value: object) -> object:
     return {"range_m": np.asarray(made.range_m).tolist(), "p_detect": np.asarray(made.p_detect).tolist()}
 
 
-OptionalCurve = Annotated[Curve | None, BeforeValidator(_take_bundled, json_schema_input_type=Curve | str | None)]
+OptionalCurve = Annotated[Curve | None, BeforeValidator(_bundled, json_schema_input_type=Curve | str | None)]
 """A curve inline, a bundled one's name, or `package.module:Class` of what makes one."""
 
 CALIBRATED = "muscle"

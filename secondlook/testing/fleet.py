@@ -36,7 +36,7 @@ def scenario_from(source: ScenarioSource, overrides: Overrides = (), seed: int |
         overrides: `{"vehicles.primary.speed_mps": 2}`, or `["vehicles.primary.speed_mps=2"]` as at the command line.
         seed: in place of the scenario's own.
 
-    Where a scenario names a part as `package.module:Class`, the class itself may stand in data and overrides.
+    Where a scenario names a plug-in as `package.module:Class`, the class itself may stand in data and overrides.
     Raises UserError for what cannot be used.
     """
     settings = overrides if isinstance(overrides, Sequence) else [f"{k}={_written(v)}" for k, v in overrides.items()]
@@ -55,15 +55,17 @@ def _written(value: Any) -> str:
     return json.dumps(value, default=_named)
 
 
-def _named(part: Any) -> str:
-    if not inspect.isclass(part) and not inspect.isfunction(part):
-        raise UserError(f"{part!r} is not allowed in a scenario; must be plain data, or a part's class or function")
-    name = part.__qualname__
+def _named(plug_in: Any) -> str:
+    if not inspect.isclass(plug_in) and not inspect.isfunction(plug_in):
+        raise UserError(
+            f"{plug_in!r} is not allowed in a scenario; must be plain data, or a plug-in's class or function"
+        )
+    name = plug_in.__qualname__
     if "." in name:
         raise UserError(
-            f"{name} is not allowed as a part; must be defined in a module itself, so that it can be imported"
+            f"{name} is not allowed as a plug-in; must be defined in a module itself, so that it can be imported"
         )
-    return f"{part.__module__}:{name}"
+    return f"{plug_in.__module__}:{name}"
 
 
 Condition = Callable[[Heard], bool]
@@ -181,7 +183,7 @@ class Fleet(Trouble):
             self._processes,
             record=self._record,
             drive=Lockstep(faults, events),
-            watch=watch.take,
+            watch=watch.hear,
             patience_s=self._patience_s,
         )
         summary = run_mission(self.scenario, options)
@@ -209,25 +211,25 @@ class _Watch:
         self._condition = condition
         self._until_ms = until_s * 1000
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Takes one message; raises RunStopped."""
         try:
-            self._take(received)
+            self._hear(received)
         except Exception as error:  # of the condition, say: told to the test, not as a failure of the observer's
             self.error = error
             raise RunStopped from error
 
-    def _take(self, received: Received) -> None:
+    def _hear(self, received: Received) -> None:
         place = len(self.heard)
         if place < len(self._until_now):
             before = self._until_now[place]
             if (before.key, before.payload) != (received.key, received.payload):
                 raise NotRepeatedError(_difference(place, before, received))
-            self.heard.take(received)
+            self.heard.hear(received)
         elif received.header.sent_ms > self._until_ms:
             raise RunStopped
         else:
-            self.heard.take(received)
+            self.heard.hear(received)
             if self._condition is not None and self._condition(self.heard):
                 self.holds = True
                 raise RunStopped

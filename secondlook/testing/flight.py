@@ -31,9 +31,9 @@ class Heard(Sequence[Received]):
         self._all: list[Received] = []
         self._found: dict[str, tuple[list[Received], int]] = {}
         for one in messages:
-            self.take(one)
+            self.hear(one)
 
-    def take(self, received: Received) -> None:
+    def hear(self, received: Received) -> None:
         """Takes one more message."""
         self._all.append(received)
 

@@ -293,8 +293,8 @@ class TestAFlownMission:
         clairvoyance, flown = Clairvoyance(scenario), FlownLegs()
 
         def watch(received: Received) -> None:
-            clairvoyance.take(received)
-            flown.take(received)
+            clairvoyance.hear(received)
+            flown.hear(received)
 
         summary = run_mission(scenario, RunOptions(tmp_path, "local", record=False, watch=watch))
         made = clairvoyance.removable()
@@ -316,8 +316,8 @@ class TestAFlownMission:
         clairvoyance, flown = Clairvoyance(load_scenario("patchy", (), 4)), FlownLegs()
 
         def watch(received: Received) -> None:
-            clairvoyance.take(received)
-            flown.take(received)
+            clairvoyance.hear(received)
+            flown.hear(received)
 
         options = RunOptions(tmp_path, "local", record=False, watch=watch)
         summary = run_mission(clairvoyance.scenario, options)
@@ -350,7 +350,7 @@ class TestFlownLegs:
         flown, strips = FlownLegs(), []
 
         def watch(received: Received) -> None:
-            flown.take(received)
+            flown.hear(received)
             if isinstance(received.message, StripStatus) and received.message.state is StripState.DONE:
                 strips.append(received.message)
 

@@ -30,7 +30,7 @@ class Watcher:
 
     def on_message(self, received: Received) -> None:
         self.heard.append(received)
-        self.metrics.take(received)
+        self.metrics.hear(received)
 
     def close(self) -> None:
         self.metrics.close()

@@ -52,7 +52,7 @@ class TestTheFigure:
     def test_between_two_positions(self) -> None:
         figure = ClosestApproaches({"a": 20, "b": 20})
         for one in [nav("a", 0, -10, 3), nav("b", 0, 10, 0), nav("a", 1, 10, 3), nav("b", 1, -10, 0)]:
-            figure.take(one)  # type: ignore[arg-type]
+            figure.hear(one)  # type: ignore[arg-type]
         (found,) = figure.found()
         assert found.vehicles == ("a", "b")
         assert found.closest_m == pytest.approx(3)
@@ -61,15 +61,15 @@ class TestTheFigure:
     def test_a_vehicle_counts_once_it_is_under_way(self) -> None:
         figure = ClosestApproaches({"a": 2, "b": 2})
         for one in [nav("a", 0, 0, 0), nav("b", 0, 1, 0, 0), nav("a", 1, 2, 0), nav("b", 1, 1, 0, 0)]:
-            figure.take(one)  # type: ignore[arg-type]
+            figure.hear(one)  # type: ignore[arg-type]
         assert figure.found() == []
 
     def test_true_positions_count(self) -> None:
         figure = ClosestApproaches({"a": 2, "b": 2})
         for t_s in (0, 1):
-            figure.take(nav("a", t_s, 0, 0))  # type: ignore[arg-type]
-            figure.take(received("world/truth/pose/a", TruthPose(7, 0, 0), sender="world", sent_ms=t_s * 1000))
-            figure.take(nav("b", t_s, 0, 0))  # type: ignore[arg-type]
+            figure.hear(nav("a", t_s, 0, 0))  # type: ignore[arg-type]
+            figure.hear(received("world/truth/pose/a", TruthPose(7, 0, 0), sender="world", sent_ms=t_s * 1000))
+            figure.hear(nav("b", t_s, 0, 0))  # type: ignore[arg-type]
         assert figure.found()[0].closest_m == pytest.approx(7)
 
     @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 4), min_size=20, max_size=60))
@@ -80,8 +80,8 @@ class TestTheFigure:
         ways = np.round(np.cumsum(np.array(turns), axis=0) + np.array([0, 0, 15, 15]), 2)
         figure = ClosestApproaches({"a": 1.43, "b": 1.43})
         for t_s, (ax, ay, bx, by) in enumerate(ways.tolist()):
-            figure.take(nav("a", t_s, ax, ay))  # type: ignore[arg-type]
-            figure.take(nav("b", t_s, bx, by))  # type: ignore[arg-type]
+            figure.hear(nav("a", t_s, ax, ay))  # type: ignore[arg-type]
+            figure.hear(nav("b", t_s, bx, by))  # type: ignore[arg-type]
         apart = ways[:, :2] - ways[:, 2:]
         share = np.linspace(0, 1, 101)[:, np.newaxis, np.newaxis]
         apart_m = np.hypot(*np.moveaxis(apart[:-1] * (1 - share) + apart[1:] * share, -1, 0))

@@ -44,7 +44,7 @@ class Stream:
 
     def say(self, at_s: float, key: str, message: Message, *, incarnation: int = 0) -> None:
         self.sequence += 1
-        self.metrics.take(
+        self.metrics.hear(
             received(key, message, sent_ms=round(at_s * 1000), sequence=self.sequence, incarnation=incarnation)
         )
 

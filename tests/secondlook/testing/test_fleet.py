@@ -183,7 +183,7 @@ class TestSources:
             ("tellaro", {"mission.rho": 2}, "mission.rho: 2 is not allowed; must be at most 1"),
             ("tellaro", {"coordinator.allocator": object()}, "is not allowed in a scenario; must be plain data"),
             ("tellaro", {"coordinator.allocator": Fruitless}, "an allocator must have assign(situation)"),
-            ("tellaro", {"coordinator.allocator": Heard.take}, "Heard.take is not allowed as a part"),
+            ("tellaro", {"coordinator.allocator": Heard.hear}, "Heard.hear is not allowed as a plug-in"),
         ],
     )
     def test_what_cannot_be_used_is_refused(self, source: Any, overrides: Any, sentence: str) -> None:
