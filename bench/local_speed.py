@@ -61,7 +61,7 @@ PARTS: tuple[tuple[Any, str, str], ...] = (
     (LockstepClock, "next_round", "clock"),
     (LockstepClock, "answer", "clock"),
     (MissionFiles, "write", "observer, files"),
-    (Metrics, "take", "observer, figures"),
+    (Metrics, "hear", "observer, figures"),
     (comms.lockstep.drive, "run_local", "local bus"),
 )  # fmt: skip
 

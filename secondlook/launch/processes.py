@@ -91,6 +91,8 @@ class Processes:
         self._start_all()
         self._hub_heard_s = time.monotonic()
         while True:
+            # Before they are heard: what a process said before it ended is not to come after the news of its end.
+            fates = {host: child.fate() for host, child in self._children.items() if host not in self._killed}
             for child, words in self._hear():
                 if "result" in words:
                     return self._end(words["result"])
@@ -98,10 +100,9 @@ class Processes:
             if self._listening.stopped:
                 raise RunStopped
             now_s = time.monotonic()
-            for child in self._children.values():
-                fate = None if child.host in self._killed else child.fate()
-                if fate is not None:
-                    self._verdict.ends(child.host, fate, now_s)
+            for host, fate in fates.items():
+                if fate is not None and host not in self._killed:
+                    self._verdict.ends(host, fate, now_s)
             if self._listening.error is not None:
                 self._verdict.says(str(self._listening.error))
             if now_s - self._hub_heard_s >= HUB_PATIENCE * self._patience_s:
