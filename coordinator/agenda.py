@@ -40,4 +40,7 @@ class Agenda:
 
     def next_wake_ms(self, now_ms: int, others_ms: Iterable[int]) -> int | None:
         """The earliest deadline, of the agenda and of these others, in the future; None where there is none."""
-        return min((max(one, now_ms + 1) for one in (*self._deadlines_ms.values(), *others_ms)), default=None)
+        first_ms = min(self._deadlines_ms.values(), default=None)
+        if first_ms is None or first_ms > now_ms + 1:  # else the others need not be asked
+            first_ms = min(others_ms if first_ms is None else (first_ms, *others_ms), default=None)
+        return None if first_ms is None else max(first_ms, now_ms + 1)

@@ -117,8 +117,7 @@ class Looks:
             stretch.bins,
             (sensor.along_bin_m, sensor.range_bin_m),
         )
-        p_detect = self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), time_s)
-        truly = np.where(swath.sees(swath.along_m, swath.lateral_m), p_detect, 0.0)
+        truly = swath.seen(self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), time_s))
         contacts, truth = self._targets_passed(swath, time_s)
         if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
             contacts += self._recogniser.false_alarms(swath, self._stream("false_alarms", self._looks))

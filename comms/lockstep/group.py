@@ -49,9 +49,10 @@ class LockstepNode:
 
         Returns when to act next and what the node publishes. Raises NodeError.
         """
-        outgoing = self._node.act(now_ms, () if start else self._due_mail(now_ms), start=start, wake=not start)
-        self._node.check_wake(now_ms)
-        next_ms = self._node.wake_ms
+        node = self._node
+        outgoing = node.act(now_ms, () if start else self._due_mail(now_ms), start=start, wake=not start)
+        node.check_wake(now_ms)
+        next_ms = node.wake_ms
         if self._late_ms:
             del self._late_ms[: bisect.bisect_right(self._late_ms, now_ms)]
             next_ms = min((ms for ms in (next_ms, *self._late_ms[:1]) if ms is not None), default=None)
@@ -62,8 +63,9 @@ class LockstepNode:
         return self._node.stamp.digest()
 
     def _due_mail(self, now_ms: int) -> list[Received]:
+        times = [due for due in self._mail if due <= now_ms]
         found: list[Received] = []
-        for due in sorted([due for due in self._mail if due <= now_ms]):
+        for due in times if len(times) < 2 else sorted(times):
             mail = self._mail.pop(due)
             if len(mail) > 1:
                 mail.sort(key=lambda one: one.header.order)

@@ -22,6 +22,10 @@ class SideSwath(Swath):
         """All beside the stretch, as far to the sides as its cells reach."""
         return (along_m >= self.first_along_m) & (along_m < self.end_along_m) & (np.abs(lateral_m) <= self.reach_m)
 
+    def seen(self, p_detect: FloatArray) -> FloatArray:
+        """All cells are."""
+        return p_detect
+
     def range_m(self, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
         """The lateral range."""
         return np.abs(lateral_m)

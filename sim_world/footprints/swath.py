@@ -60,6 +60,10 @@ class Swath(ABC):
     def sees(self, along_m: FloatArray, lateral_m: FloatArray) -> BoolArray:
         """Which places are seen."""
 
+    def seen(self, p_detect: FloatArray) -> FloatArray:
+        """P_d of the cells, 0 where they are not seen."""
+        return np.where(self.sees(self.along_m, self.lateral_m), p_detect, 0.0)
+
     @abstractmethod
     def range_m(self, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
         """From how far they are seen."""
