@@ -146,12 +146,12 @@ class Scenario(Mapping):
     @field_validator("vehicles")
     @classmethod
     def _check_parts(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
-        parts = {one.part_of for one in vehicles.values() if isinstance(one, SurveyVehicle)}
-        counts = {count for _, count in parts}
+        shares = {one.share_of for one in vehicles.values() if isinstance(one, SurveyVehicle)}
+        counts = {count for _, count in shares}
         if len(counts) > 1:
             raise refused("must all survey the whole area, or each a part of as many")
         missing = [
-            f"{part} of {count}" for count in counts for part in range(1, count + 1) if (part, count) not in parts
+            f"{share} of {count}" for count in counts for share in range(1, count + 1) if (share, count) not in shares
         ]
         if missing:
             raise refused(f"must survey the whole area together, but nobody has part {', '.join(missing)}")

@@ -171,16 +171,16 @@ class SurveyVehicle(VehicleBase):
         return part
 
     @property
-    def part_of(self) -> tuple[int, int]:
-        """Which part of how many is its own, from 1; the whole is 1 of 1."""
+    def share_of(self) -> tuple[int, int]:
+        """Which share of how many is its own, from 1; the whole is 1 of 1."""
         match = None if self.part is None else _SHARE.fullmatch(self.part)
         return (1, 1) if match is None else (int(match[1]), int(match[2]))
 
     @property
     def share(self) -> tuple[float, float]:
-        """From which to which share of the area's width its part is."""
-        part, parts = self.part_of
-        return (part - 1) / parts, part / parts
+        """From where to where its share of the area's width runs."""
+        share, shares = self.share_of
+        return (share - 1) / shares, share / shares
 
 
 class RevisitVehicle(VehicleBase):
