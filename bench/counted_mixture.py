@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.types import FloatArray
-from secondlook.paper.fit import MOST_STEPS, TOLERANCE, different_starts
-from secondlook.paper.measured import Mixture
+from secondlook.paper.fit import MOST_STEPS, TOLERANCE, Mixture, different_starts
 
 REGULARISATION = 1e-6
 """What scikit-learn adds to each variance."""

@@ -9,16 +9,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
 from comms.said.wire import IDENTIFIER
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.footprints import FOOTPRINTS
-
-if TYPE_CHECKING:  # it imports the seabed, which is made of a configuration from here
-    from sim_world.sonar import SonarModel
+from sim_world.sonar import SonarModel
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -16,18 +15,12 @@ from comms.node import random_stream
 from planner.types import FloatArray, Point
 from sim_world.area import uniform_points
 from sim_world.config import SeabedConfig
+from sim_world.sonar import Seabed
 
 HALF_WEIGHT = math.sqrt(1.0 - math.sqrt(0.5))
 """Share of a half axis at which the weight is one half."""
 RIPPLE_SLENDERNESS = (0.25, 0.5)
 VEGETATION_SLENDERNESS = (0.7, 1.0)
-
-
-class Seabed(Protocol):
-    """The share of P_d that the seabed leaves."""
-
-    def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
-        """Factor in (0, 1] at mission-frame positions seen along a compass bearing; the arguments broadcast."""
 
 
 class UniformSeabed:

@@ -1,4 +1,5 @@
-"""How well a sonar truly sees: what is asked of any, and the one whose P_d follows a curve over range."""
+"""How well a sonar truly sees: what is asked of any, what it asks of the seabed, and the sonar whose P_d follows a
+curve over range."""
 
 from __future__ import annotations
 
@@ -7,10 +8,16 @@ from typing import Protocol
 import numpy as np
 
 from planner.types import DetectionCurve, FloatArray
-from sim_world.seabed import Seabed
 
 Position = tuple[FloatArray, FloatArray]
 """x and y, mission frame."""
+
+
+class Seabed(Protocol):
+    """The share of P_d that the seabed leaves."""
+
+    def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
+        """Factor in (0, 1] at mission-frame positions seen along a compass bearing; the arguments broadcast."""
 
 
 class SonarModel(Protocol):

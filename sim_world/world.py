@@ -9,8 +9,8 @@ from comms.said.messages import Maneuver, ManeuverStatus, MissionOver
 from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE, TRUTH_TARGETS
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
-from sim_world.seabed import Seabed, make_seabed
-from sim_world.sonar import CurveSonar
+from sim_world.seabed import make_seabed
+from sim_world.sonar import CurveSonar, Seabed
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import SimulatedVehicle
 

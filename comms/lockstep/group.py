@@ -155,10 +155,6 @@ class NodeGroup:
         """What the group's nodes have said so far, those that have left included."""
         return [*self._departed, *(runner.digest() for runner in self.runners.values())]
 
-    def act(self, grant: Grant, now_ms: int) -> tuple[int | None, list[Outgoing]]:
-        """Lets one node act; see `LockstepNode.act`."""
-        return self.runners[grant.node_id].act(now_ms, start=grant.start)
-
     def _deliver_with_faults(self, runner: LockstepNode, received: Received) -> None:
         deliveries = self._faults.deliveries(runner.node_id, received, self._routing)
         if not deliveries:

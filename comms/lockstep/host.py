@@ -119,7 +119,7 @@ class ServedNodes:
     def act(self, grants: Iterable[Grant], now_ms: int) -> Iterator[tuple[str, int | None, list[Outgoing]]]:
         """Lets each granted node act and sends what it publishes: of each its wake-up and that. Raises NodeError."""
         for grant in grants:
-            wake_ms, outgoing = self.group.act(grant, now_ms)
+            wake_ms, outgoing = self.group.runners[grant.node_id].act(now_ms, start=grant.start)
             if grant.node_id in self._coordinators:
                 self._latency.sending(outgoing, time.perf_counter())
             publish(self._session, self._keys, grant.node_id, outgoing)

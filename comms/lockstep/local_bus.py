@@ -63,7 +63,7 @@ class _Local:
                 self._happen(happening)
             sent: list[Outgoing] = []
             for grant in turn.grants:
-                wake_ms, outgoing = self.group.act(grant, turn.now_ms)
+                wake_ms, outgoing = self.group.runners[grant.node_id].act(turn.now_ms, start=grant.start)
                 self.clock.answer(grant.node_id, wake_ms, outgoing)
                 sent.extend(outgoing)
             if len(turn.grants) > 1:

@@ -6,6 +6,7 @@ import json
 import sys
 from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
@@ -16,13 +17,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.signals import signals_interrupt
-from secondlook.paper.extra import require_extra
 from secondlook.paper.measured import MeasuredMission, measure_all
 from secondlook.paper.published import PublishedMission, published_missions
 from secondlook.paper.report import as_json as entries_of
 from secondlook.paper.report import conclusions, differing_decisions, tables
 
 FAILED = 1
+NEEDED = {"sklearn": "scikit-learn", "matplotlib": "matplotlib"}
+"""What is imported, and what it is called where packages are installed from."""
 
 
 def paper(
@@ -31,7 +33,7 @@ def paper(
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="Runs of the six missions, to tell the spread.")] = 1,
 ) -> None:
     """Fly the paper's three experiments. Prints its tables beside what came of them; needs secondlook[paper]."""
-    require_extra()
+    _require_extra()
     if out is not None:
         _make(out)
     runs = _measure(seeds, shown=sys.stderr.isatty() and not as_json)
@@ -87,3 +89,13 @@ def _make(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+
+
+def _require_extra() -> None:
+    """Raises UserError, in one sentence, where a package of the extra `paper` is not installed."""
+    missing = [name for module, name in NEEDED.items() if find_spec(module) is None]
+    if missing:
+        names = " and ".join(missing)
+        raise UserError(
+            f"secondlook paper needs {names}, not installed here; the extra secondlook[paper] has all of it"
+        )

@@ -13,7 +13,8 @@ from matplotlib.patches import Rectangle
 from planner.risk import NATS_PER_LEVEL
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner
 from planner.types import FloatArray
-from secondlook.paper.measured import MeasuredMission, Mixture, scenario_of
+from secondlook.paper.fit import Mixture
+from secondlook.paper.measured import MeasuredMission, scenario_of
 from secondlook.paper.published import published_sonar
 
 CONTROL, ADAPTIVE = "tab:blue", "tab:orange"

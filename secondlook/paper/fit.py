@@ -1,15 +1,17 @@
-"""Fits Gaussian mixtures to residual risk, as in the paper's Table 2 and histograms. Needs scikit-learn."""
+"""Gaussian mixtures of residual risk, and how they are fitted, as in the paper's Table 2 and histograms.
+
+Fitting needs scikit-learn, of the extra `paper`, which is imported where it is used.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.cluster import KMeans
-from sklearn.mixture import GaussianMixture
-from threadpoolctl import threadpool_limits
 
 from planner.types import FloatArray
-from secondlook.paper.measured import Mixture
 
 TOLERANCE = 1e-6
 """Of the log-likelihood a cell. scikit-learn's own, 1e-3, stops the fit of experiment 1 before it has settled."""
@@ -19,6 +21,22 @@ RANDOM_STATE = 0
 
 Labels = NDArray[np.intp]
 """Which cluster each cell is in, from 0."""
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """A Gaussian mixture, components by ascending mean: `weights` (they add up to 1), `means`, `stds`, and the number
+    of `cells` that it was fitted to."""
+
+    weights: tuple[float, ...]
+    means: tuple[float, ...]
+    stds: tuple[float, ...]
+    cells: int
+
+    @property
+    def rightmost_cells(self) -> float:
+        """The cells that the rightmost component stands for: its weight of them all."""
+        return self.weights[-1] * self.cells
 
 
 def fit_mixture(risk: FloatArray, components: int) -> Mixture:
@@ -31,6 +49,8 @@ def fit_mixture(risk: FloatArray, components: int) -> Mixture:
         risk: residual risk of the cells with a look, shape (n,), n >= `components`.
         components: number of Gaussians, 1 or more.
     """
+    from threadpoolctl import threadpool_limits  # noqa: PLC0415 - an extra, as what follows
+
     samples = risk[:, np.newaxis]
     with threadpool_limits(limits=1):
         fits = [_fit_from(samples, labels, components) for labels in different_starts(samples, components)]
@@ -46,6 +66,8 @@ def fit_mixture(risk: FloatArray, components: int) -> Mixture:
 
 def different_starts(samples: FloatArray, components: int) -> list[Labels]:
     """The clusterings that GaussianMixture begins with, drawn as it draws them: labels by ascending centre."""
+    from sklearn.cluster import KMeans  # noqa: PLC0415
+
     generator = np.random.RandomState(RANDOM_STATE)  # the kind that random_state stands for
     starts: dict[bytes, Labels] = {}
     for _ in range(STARTS):
@@ -55,7 +77,9 @@ def different_starts(samples: FloatArray, components: int) -> list[Labels]:
     return list(starts.values())
 
 
-def _fit_from(samples: FloatArray, labels: Labels, components: int) -> GaussianMixture:
+def _fit_from(samples: FloatArray, labels: Labels, components: int) -> Any:
+    from sklearn.mixture import GaussianMixture  # noqa: PLC0415
+
     clusters = [samples[labels == label, 0] for label in range(components)]
     mixture = GaussianMixture(components, tol=TOLERANCE, max_iter=MOST_STEPS)
     variances = np.array([cluster.var() for cluster in clusters]) + mixture.reg_covar

@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ import numpy as np
 from planner.risk import LevelArray, residual_risk
 from planner.types import DetectionCurve, FloatArray
 from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.paper.fit import Mixture, fit_mixture
 from secondlook.paper.published import PublishedMission
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.worker_pool import worker_pool
@@ -108,22 +108,6 @@ def _said(events: Path) -> tuple[dict[str, list[dict[str, float]]], DetectionCur
     return plan, DetectionCurve(np.arange(p_detect.size) * curve["range_bin_m"], p_detect)
 
 
-@dataclass(frozen=True)
-class Mixture:
-    """A Gaussian mixture, components by ascending mean: `weights` (they add up to 1), `means`, `stds`, and the number
-    of `cells` that it was fitted to."""
-
-    weights: tuple[float, ...]
-    means: tuple[float, ...]
-    stds: tuple[float, ...]
-    cells: int
-
-    @property
-    def rightmost_cells(self) -> float:
-        """The cells that the rightmost component stands for: its weight of them all."""
-        return self.weights[-1] * self.cells
-
-
 @dataclass(frozen=True, eq=False)
 class MeasuredMission:
     """One flown mission beside the published one."""
@@ -184,7 +168,6 @@ def measure(published: PublishedMission, seed: int, scratch: Path) -> MeasuredMi
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         survey = fly(scenario_of(published, seed), Path(folder))
     # Only who measures needs scikit-learn, not who reads the result in another process.
-    fit_mixture = import_module("secondlook.paper.fit").fit_mixture
     return MeasuredMission(published, survey, fit_mixture(survey.risk_seen, published.components))
 
 

@@ -21,8 +21,8 @@ from secondlook import cli
 from secondlook.commands.paper import seed_of
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.figures import draw_all
-from secondlook.paper.fit import fit_mixture
-from secondlook.paper.measured import MeasuredMission, Mixture, Survey, measure_all
+from secondlook.paper.fit import Mixture, fit_mixture
+from secondlook.paper.measured import MeasuredMission, Survey, measure_all
 from secondlook.paper.published import published_missions, published_sonar
 from secondlook.paper.report import as_json, conclusions, differing_decisions, mean_difference, rc_mean_drop, tables
 from secondlook.scenario import load_scenario
@@ -274,7 +274,9 @@ class TestCommand:
         self, command: Command, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         find = importlib.util.find_spec
-        monkeypatch.setattr("secondlook.paper.extra.find_spec", lambda name: None if name == "sklearn" else find(name))
+        monkeypatch.setattr(
+            "secondlook.commands.paper.find_spec", lambda name: None if name == "sklearn" else find(name)
+        )
         code, out, err = command()
         assert (code, out) == (2, "")
         assert err == (
