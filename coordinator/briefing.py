@@ -114,6 +114,7 @@ class Briefing:
                 ends_ms = state.expected_end_ms
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
         open_strips = self._ledger.in_state(StripState.OPEN)
+        sees = footprint_of(entry.sonar)
         return Helper(
             vehicle=entry.vehicle,
             pose=pose,
@@ -123,7 +124,8 @@ class Briefing:
             speed_mps=entry.speed_mps,
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
-            swath_m=footprint_of(entry.sonar).reach.strip_width_m,
+            swath_m=sees.reach.strip_width_m,
+            lead_m=sees.lead_m,
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,

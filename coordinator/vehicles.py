@@ -35,20 +35,21 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
     at_ms, pose = heard_ms, Pose(state.x_m, state.y_m, state.heading_rad)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)
-        pose = pass_of(ahead[0], entry.run_in_m).end
+        pose = pass_of(ahead[0], entry).end
         ahead = ahead[1:]
         at_ms += round(entry.run_in_m / entry.speed_mps * 1000) if ahead else 0
     if not ahead:
         return at_ms
-    passes = [pass_of(track, entry.run_in_m) for track in ahead]
+    passes = [pass_of(track, entry) for track in ahead]
     # The last track's run-out comes after its end.
     way_m = distance_over(pose, passes, entry.turn_radius_m) - entry.run_in_m
     return at_ms + round(way_m / entry.speed_mps * 1000)
 
 
-def pass_of(track: PlannedTrack, run_in_m: float) -> Pass:
-    """A planned track with its run-in and run-out."""
-    return pass_over((track.start_x_m, track.start_y_m), (track.end_x_m, track.end_y_m), run_in_m)
+def pass_of(track: PlannedTrack, entry: RosterVehicle) -> Pass:
+    """A planned track with its run-in and run-out, as a vehicle flies it."""
+    start, end = (track.start_x_m, track.start_y_m), (track.end_x_m, track.end_y_m)
+    return pass_over(start, end, entry.run_in_m, footprint_of(entry.sonar).lead_m)
 
 
 Order = tuple[int, int]
@@ -198,8 +199,8 @@ class KnownVehicle:
         track = next((one for one in self.plan.tracks if one.number == self.state.works_on and not one.flown), None)
         if track is None or self.state.expected_end_ms == 0:
             return None
-        reach_m = footprint_of(self.entry.sonar).reach.far_m
-        return TrackUnderWay(track, self.state.expected_end_ms / 1000, self.entry.speed_mps, reach_m)
+        sees, ends_s = footprint_of(self.entry.sonar), self.state.expected_end_ms / 1000
+        return TrackUnderWay(track, ends_s, self.entry.speed_mps, sees.reach.far_m, sees.lead_m)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

@@ -76,13 +76,13 @@ def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list
 
 @lru_cache(maxsize=10_000)
 def sweeps_over(
-    strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float, beside_m: float = 0.0
+    strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float, beside_m: float = 0.0, lead_m: float = 0.0
 ) -> tuple[Sweep, ...]:
     """The ways to fly the legs over a strip (see `legs_over_strip`): in sequence from the first or from the last, in
     their directions or all turned round.
 
-    Each leg is entered and left straight for `run_in_m` >= 0. Raises ValueError where the run-in, or the turn
-    radius where there are turns, is not finite or out of its range.
+    Each leg is entered and left straight for `run_in_m` >= 0, and flown `lead_m` earlier, see `pass_over`. Raises
+    ValueError where the run-in, or the turn radius where there are turns, is not finite or out of its range.
     """
     if not (math.isfinite(run_in_m) and run_in_m >= 0):
         raise ValueError(f"the run-in must be finite and 0 or more, not {run_in_m} m")
@@ -91,7 +91,7 @@ def sweeps_over(
     ways = [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
     found = []
     for way in ways:
-        passes = tuple(pass_over(leg.start, leg.end, run_in_m) for leg in way)
+        passes = tuple(pass_over(leg.start, leg.end, run_in_m, lead_m) for leg in way)
         numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
         follows = len(legs) == 1 and way is legs
         found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m), follows))
@@ -111,10 +111,10 @@ def shortest_sweep(sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float) ->
     return best, best_m - best.length_m
 
 
-def pass_over(start: Point, end: Point, run_in_m: float) -> Pass:
-    """The pass over a leg from `start` to `end`."""
+def pass_over(start: Point, end: Point, run_in_m: float, lead_m: float = 0.0) -> Pass:
+    """The pass over a leg from `start` to `end`, flown `lead_m` earlier (`planner.footprints.footprint.Footprint`)."""
     heading_rad = math.atan2(end[0] - start[0], end[1] - start[1]) % (2 * math.pi)
-    return Pass(shifted(start, heading_rad, -run_in_m), shifted(end, heading_rad, run_in_m))
+    return Pass(shifted(start, heading_rad, -run_in_m - lead_m), shifted(end, heading_rad, run_in_m - lead_m))
 
 
 def length_over(passes: Sequence[Pass], turn_radius_m: float) -> float:

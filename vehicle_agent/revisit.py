@@ -92,7 +92,8 @@ class SecondLooks:
             self._tell(self.strip.number, TaskState.UNDER_WAY, self._agent.expected_end_ms)
 
     def _consider(self, strip: Strip, now_ms: int) -> None:
-        agent, config, reach = self._agent, self.config, self._agent.footprint.reach
+        agent, config = self._agent, self.config
+        reach, lead_m = agent.footprint.reach, agent.footprint.lead_m
         if self.strip is not None:
             self._tell(strip.number, TaskState.REFUSED, 0, f"at work on strip {self.strip.number}")
             return
@@ -115,7 +116,7 @@ class SecondLooks:
         ways = [
             sweep
             for side_m in sides_m
-            for sweep in sweeps_over(strip, reach.strip_width_m, config.turn_radius_m, config.run_in_m, side_m)
+            for sweep in sweeps_over(strip, reach.strip_width_m, config.turn_radius_m, config.run_in_m, side_m, lead_m)
         ]
         sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
         ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)

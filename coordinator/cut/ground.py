@@ -162,12 +162,14 @@ REPORTED_WITHIN_S = 10.0
 
 @dataclass(frozen=True)
 class TrackUnderWay:
-    """The track that a primary flies, when it ends, how fast the primary is, and how far it sees to each side."""
+    """The track that a primary flies, when it ends, how fast the primary is, how far it sees to each side, and how much
+    earlier than over the ground that it sees it flies the track."""
 
     track: PlannedTrack
     ends_s: float
     speed_mps: float
     range_m: float
+    lead_m: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -202,7 +204,8 @@ class Growth:
         columns = (count >= SETTLED_ROWS) & still_open.any(axis=0) & (last_settled < still_open.argmax(axis=0))
         expected = np.where(settled, risk[beside], 0.0).sum(axis=0) / np.maximum(count, 1)
         ahead = still_open & columns & (expected > 0)
-        to_end_m = np.maximum(0.0, (float(end_m) - grid.along_m[beside[0]]) * (-1 if descending else 1))
+        to_end_m = (float(end_m) - grid.along_m[beside[0]]) * (-1 if descending else 1) - under_way.lead_m
+        to_end_m = np.maximum(0.0, to_end_m)
         settles_s = under_way.ends_s + REPORTED_WITHIN_S - to_end_m / under_way.speed_mps
         self.risk[beside][ahead] = np.broadcast_to(expected, ahead.shape)[ahead]
         self.settles_s[beside][ahead] = np.broadcast_to(settles_s[:, np.newaxis], ahead.shape)[ahead]

@@ -77,16 +77,16 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
     ahead = [track for track in tracks if not track.flown] if state.mode is not Mode.FINISHED else []
     if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         # When the track ends is known more exactly than where the vehicle was last.
-        end = pass_of(ahead.pop(0), entry.run_in_m).end
+        end = pass_of(ahead.pop(0), entry).end
         left_m = max(0.0, state.expected_end_ms / 1000 - heard_s) * entry.speed_mps + entry.run_in_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
         flown = [track for track in tracks if track.flown]
-        left_m = run_out_left_m(pass_of(flown[-1], entry.run_in_m).end, pose, entry.run_in_m) if flown else 0.0
+        left_m = run_out_left_m(pass_of(flown[-1], entry).end, pose, entry.run_in_m) if flown else 0.0
         end = shifted(pose[:2], pose.heading_rad, left_m)
     paths, here, length_m = [straight(pose, left_m, radius_m)], end, left_m
     for track in ahead:
-        one = pass_of(track, entry.run_in_m)
+        one = pass_of(track, entry)
         paths += [shortest_path(here, one.begin, radius_m), straight(one.begin, one.length_m, radius_m)]
         here = one.end
         length_m += paths[-1].length_m + paths[-2].length_m

@@ -150,5 +150,7 @@ def _arrival(pose: Pose, place: Point) -> Pose:
 def _sweep_from(pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
     """How a helper sweeps a strip that it sets out to from a pose."""
     entry = vehicle.entry
-    sweeps = sweeps_over(strip, footprint_of(entry.sonar).reach.strip_width_m, entry.turn_radius_m, entry.run_in_m)
+    sees = footprint_of(entry.sonar)
+    width_m = sees.reach.strip_width_m
+    sweeps = sweeps_over(strip, width_m, entry.turn_radius_m, entry.run_in_m, lead_m=sees.lead_m)
     return shortest_sweep(sweeps, pose, entry.turn_radius_m)[0]

@@ -72,7 +72,8 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     inside = region.inside(grid)
     missed = inside & ~seen_cells(grid, tracks, footprint_of(vehicle.sonar).told(vehicle.told_range_m).reach)
     start = Pose(vehicle.start.x_m, vehicle.start.y_m, math.radians(vehicle.start.heading_deg))
-    passes = [pass_over(track.start, track.end, vehicle.run_in_m) for track in tracks]
+    lead_m = footprint_of(vehicle.sonar).lead_m
+    passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
     way_m = distance_over(start, passes, vehicle.turn_radius_m) - vehicle.run_in_m
     return PlannedSurvey(

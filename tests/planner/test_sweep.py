@@ -171,6 +171,14 @@ class TestShortestSweep:
         assert distance_over(Pose(0, 0, 0), [], 10) == 0
         assert distance_over(Pose(0, -50, NORTH), [pass_over((0, 0), (0, 100), 30)], 10) == pytest.approx(180)
 
+    def test_a_sonar_that_looks_ahead_flies_its_pass_earlier(self) -> None:
+        begun, ended = pass_over((0, 0), (0, 100), 10, lead_m=30)
+        assert (begun[:2], ended[:2]) == (pytest.approx((0, -40)), pytest.approx((0, 80)))
+        first, *_ = sweeps_over(self.STRIP, 20, 10, 5, lead_m=30)
+        for leg, one in zip(first.legs, first.passes, strict=True):
+            assert math.dist(one.begin[:2], leg.start) == pytest.approx(35)
+            assert math.dist(one.end[:2], leg.end) == pytest.approx(25)
+
     def test_refuses_no_sweeps_and_lengths_out_of_range(self) -> None:
         with pytest.raises(ValueError, match="no sweep"):
             shortest_sweep([], Pose(0, 0, 0), 10)

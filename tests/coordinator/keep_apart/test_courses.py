@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -57,6 +58,15 @@ class TestCourses:
         on_second = laid.poses[np.abs(laid.poses[:, 2] - SOUTH) < 1e-6]
         assert on_second[:, 0] == pytest.approx(100)
         assert on_second[:, 1].min() < 10
+
+    def test_a_primary_that_looks_ahead_is_where_its_track_is_flown_earlier(self) -> None:
+        # Its swath begins 30 m ahead of it, see tests/planner/footprints/test_wedge.py.
+        shape = {"footprint": "wedge", "near_m": 3.0, "far_m": 50.0, "half_angle_rad": math.pi / 4, "look_m": 10.0}
+        entry = replace(vehicle("primary", Role.SURVEY), **shape)  # type: ignore[arg-type]
+        track = PlannedTrack(1, 0, 0, 0, 0, 400, False)
+        state = AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0)
+        laid = survey_course(entry, state, Plan(1, (track,), (), (), ""), 0)
+        assert laid.at(100)[0][:2] == pytest.approx((0, 370))
 
     def test_a_run_out_is_sailed_to_its_end(self) -> None:
         entry = vehicle("primary", Role.SURVEY)
