@@ -14,7 +14,7 @@ TOLERANCE_M = 1e-6
 """Lengths that differ by no more are taken as equal."""
 NARROWEST_M = 1e-3
 """No track is laid for what is narrower: headings travel in microradians, which makes a turned area wider by as much,
-and a cell whose centre is as near to a swath is seen (`planner.footprint`)."""
+and a cell whose centre is as near to a swath is seen (`planner.footprints`)."""
 
 
 @dataclass(frozen=True)

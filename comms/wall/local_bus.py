@@ -60,7 +60,8 @@ class _WallLocal:
                 return self._result(Ending.TIME_LIMIT, time_limit_ms)
             self._carry(self._acting.act(now_ms))
             self._watching.act(now_ms)
-            next_ms = min(time_limit_ms + 1, *(ms for ms in (self._acting.next_ms, self._watching.next_ms) if ms))
+            due_ms = [ms for ms in (self._acting.next_ms, self._watching.next_ms) if ms is not None]
+            next_ms = min([time_limit_ms + 1, *due_ms])
             time.sleep(max(0.0, self._time.local_s(next_ms) - time.monotonic()))
         return self._result(Ending.OVER, self._over_ms)
 

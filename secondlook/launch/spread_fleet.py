@@ -82,7 +82,7 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
             strict=False,
             notice=_say_as(ROUTER),
         )
-        _say(ROUTER, f"listens on {endpoint}, and waits for {', '.join(plan.host for plan in hosts)}")
+        _say(ROUTER, f"listens on {endpoint}, and waits for {', '.join(spec.host for spec in hosts)}")
         try:
             with signals_ask(hub.interrupt):
                 result = hub.run()

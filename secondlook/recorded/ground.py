@@ -72,7 +72,8 @@ class RiskMap:
         return np.where(on_grid, self.risk[np.where(on_grid, rows, 0), np.where(on_grid, columns, 0)], np.nan)
 
     def mean_within(self, geometry: BaseGeometry) -> float:
-        """Mean risk of the cells inside the area whose centres lie in a geometry (mission frame); NaN if none does."""
+        """Mean risk of the cells inside the area whose centres lie within a geometry (mission frame) and not on its
+        border; NaN if none does."""
         return self.mean_of(self.cells_within(geometry))
 
     def mean_of(self, cells: Cells) -> float:
@@ -80,7 +81,8 @@ class RiskMap:
         return float(self.risk[cells].mean()) if cells[0].size else float("nan")
 
     def cells_within(self, geometry: BaseGeometry) -> Cells:
-        """Rows and columns of the cells inside the area whose centres lie in a geometry (mission frame)."""
+        """Rows and columns of the cells inside the area whose centres lie within a geometry (mission frame) and not on
+        its border."""
         near_rows, near_columns = self._around(geometry)
         rows, columns = np.nonzero(self.inside[near_rows, near_columns])
         rows, columns = rows + near_rows.start, columns + near_columns.start

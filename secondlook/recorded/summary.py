@@ -61,18 +61,18 @@ def summarise(
         },
         "rounds": None if result is None else result.rounds,
         "messages": dict(sorted((observer.messages if result is None else result.messages).items())),
-        "dropped": _dropped(observer, result),
+        "dropped": _dropped(observer, result, factor),
     }
 
 
-def _dropped(observer: Observer, result: BusResult | None) -> dict[str, int]:
-    """How many messages were dropped for each reason, as far as is known."""
+def _dropped(observer: Observer, result: BusResult | None, factor: float | None) -> dict[str, int]:
+    """How many messages were dropped for each reason, as far as is known; none is lost to an observer in lockstep."""
     dropped = {} if result is None else dict(result.dropped)
     if observer.metrics.misfits:
         dropped["does not fit the map"] = observer.metrics.misfits
     lost = Counter({} if result is None else result.messages)
     lost.subtract(observer.messages)
-    if +lost:
+    if factor is not None and +lost:
         dropped["lost on the way to the observer"] = (+lost).total()
     return dropped
 
