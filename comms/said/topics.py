@@ -78,7 +78,7 @@ class Topic:
         return self.pattern.format(vehicle=vehicle, number=number, tile=tile)
 
     def due_ms(self, sent_ms: int) -> int:
-        """When a message that was sent at a time is due in lockstep. A link's own delay belongs here."""
+        """When a message that was sent at a time is due in lockstep, whoever reads it."""
         return sent_ms + self.delay_ms
 
     @cached_property

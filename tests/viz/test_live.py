@@ -25,7 +25,7 @@ from comms.node import Received
 from comms.said.announcement import RunInfo
 from comms.said.messages import Hotspot, Nav
 from secondlook.recorded.story import Story
-from tests.viz.mission_stream import PRIMARY
+from tests.viz.mission_stream import PRIMARY, VIEWS
 from tests.viz.recordings import entities, rows, rows_so_far, verify
 from viz import canvas, live_server, viewer_program
 from viz.live_feed import LiveFeed
@@ -120,7 +120,7 @@ def test_a_viewer_shows_what_is_recorded_so_far(
             server.pipe, tmp_path, messages, lambda: wait_until(lambda: shown_until_ms(client) >= half_ms - 61_000)
         )
         wait_until(lambda: shown_until_ms(client) == messages[-1].header.sent_ms)
-        wait_until(lambda: len(client.get_state().views) == 7)
+        wait_until(lambda: len(client.get_state().views) == VIEWS)
         state = client.get_state()
     assert [one.store_id for one in state.recordings] == [f"Recording:secondlook:{RUN}"]
     assert [report for view in state.views for report in view.reports] == []

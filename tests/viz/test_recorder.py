@@ -86,8 +86,9 @@ def drawn_maps(recording: Path, kind: str, depth: int) -> list[tuple[int, np.nda
     paths = [path for path in entities(recording) if re.fullmatch(f"/area/{kind}/.*", path)]
     corners = {path: static(recording, path, "Transform3D:translation")[0] for path in paths}
     widths = {path: static(recording, path, "GridMap:format")[0]["width"] for path in paths}
-    news = sorted(
-        (time_ms, path, bytes(data[0])) for path in paths for time_ms, data in rows(recording, path, "GridMap:data")
+    news = sorted(  # stable: of one time as written
+        ((time_ms, path, bytes(data[0])) for path in paths for time_ms, data in rows(recording, path, "GridMap:data")),
+        key=lambda one: one[:2],
     )
     whole = np.full((ROWS, COLUMNS, depth), 255, dtype=np.uint8)
     found = []

@@ -14,6 +14,7 @@ import pytest
 from rerun.experimental import ViewerClient
 
 from comms.node import Received
+from tests.viz.mission_stream import VIEWS
 from viz import recording_viewer
 from viz.recording_viewer import RecordingViewer
 from viz.viewer_program import LISTENING, ViewerError
@@ -45,7 +46,7 @@ def test_the_window_shows_the_recording(
             return max((line.end or 0 for line in lines), default=0) // 1_000_000
 
         wait_until(lambda: shown_until_ms() == end_ms)
-        wait_until(lambda: len(client.get_state().views) == 7)
+        wait_until(lambda: len(client.get_state().views) == VIEWS)
         assert [report for view in client.get_state().views for report in view.reports] == []
     assert viewer.process.poll() is not None
     assert not viewer.log.parent.exists()
