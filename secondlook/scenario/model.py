@@ -149,12 +149,12 @@ class Scenario(Mapping):
         shares = {one.share_of for one in vehicles.values() if isinstance(one, SurveyVehicle)}
         counts = {count for _, count in shares}
         if len(counts) > 1:
-            raise refused("must all survey the whole area, or each a part of as many")
+            raise refused("must all survey the whole area, or each a share of as many")
         missing = [
             f"{share} of {count}" for count in counts for share in range(1, count + 1) if (share, count) not in shares
         ]
         if missing:
-            raise refused(f"must survey the whole area together, but nobody has part {', '.join(missing)}")
+            raise refused(f"must survey the whole area together, but nobody has share {', '.join(missing)}")
         return vehicles
 
     @property

@@ -167,7 +167,7 @@ class SurveyVehicle(VehicleBase):
     def _check_part(cls, part: str | None) -> str | None:
         match = None if part is None else _SHARE.fullmatch(part)
         if part is not None and (match is None or not 1 <= int(match[1]) <= int(match[2])):
-            raise refused("must be such as 1 of 3: which part, and of how many, at most 99")
+            raise refused("must be such as 1 of 3: which share, and of how many, at most 99")
         return part
 
     @property

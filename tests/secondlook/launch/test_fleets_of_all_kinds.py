@@ -1,4 +1,4 @@
-"""Missions of other fleets than a primary with a helper: a primary that revisits, primaries on parts, many helpers."""
+"""Missions of other fleets than a primary with a helper: a primary that revisits, primaries on shares, many helpers."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ MISTAKES = {
         "range_m: 145\n    part: first",
         [
             'bad.yaml:13: vehicles.primary.part: "first" is not allowed; '
-            "must be such as 1 of 3: which part, and of how many, at most 99"
+            "must be such as 1 of 3: which share, and of how many, at most 99"
         ],
     ),
     "a part beyond the last": (
@@ -69,7 +69,7 @@ MISTAKES = {
         "range_m: 145\n    part: 4 of 3",
         [
             'bad.yaml:13: vehicles.primary.part: "4 of 3" is not allowed; '
-            "must be such as 1 of 3: which part, and of how many, at most 99"
+            "must be such as 1 of 3: which share, and of how many, at most 99"
         ],
     ),
     "a helper that has a part": (
@@ -553,7 +553,7 @@ def test_a_mistake_is_told_by_line(write: Write, valid_text: str, old: str, new:
 
 def test_parts_that_nobody_has_are_told(write: Write, valid_text: str) -> None:
     (line,) = lines_of(write(valid_text.replace("range_m: 145", "range_m: 145\n    part: 2 of 4")))
-    assert line.endswith("must survey the whole area together, but nobody has part 1 of 4, 3 of 4, 4 of 4")
+    assert line.endswith("must survey the whole area together, but nobody has share 1 of 4, 3 of 4, 4 of 4")
     assert line.startswith("bad.yaml:4: vehicles: ")
 
 
@@ -562,7 +562,7 @@ def test_parts_of_different_counts_are_told(write: Write, valid_text: str) -> No
     second = primary.replace("primary", "second").replace("range_m: 145", "range_m: 145\n    part: 1 of 1")
     third = primary.replace("primary", "third").replace("range_m: 145", "range_m: 145\n    part: 1 of 2")
     (line,) = lines_of(write(valid_text + second + third))
-    assert line.endswith("must all survey the whole area, or each a part of as many")
+    assert line.endswith("must all survey the whole area, or each a share of as many")
 
 
 FILES = {
