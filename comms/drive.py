@@ -46,8 +46,12 @@ class Host(Protocol):
     def run(self) -> object:
         """Runs to the run's end; raises NodeError after telling the hub."""
 
+
+class ListeningHost(Host, Protocol):
+    """One that holds a listener, which may be told to keep what it has."""
+
     def interrupt(self) -> None:
-        """From another thread: ends the run here early; listeners keep what they have."""
+        """From another thread: ends the run here early; the listener keeps what it has."""
 
 
 class Drive(Protocol):
@@ -100,5 +104,7 @@ class Drive(Protocol):
     def acting(self, session: zenoh.Session, setup: Setup, spec: HostSpec, nodes: Mapping[str, Node]) -> Host:
         """A process that holds nodes that act."""
 
-    def listening(self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener) -> Host:
+    def listening(
+        self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener
+    ) -> ListeningHost:
         """A process that holds a listener; its `run` raises what the listener raises, too."""

@@ -17,6 +17,8 @@ from typing import NamedTuple, Protocol
 
 from comms.errors import RunawayError
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent, absent_at_start, timeline
+from comms.result import BusResult, Ending, LastWord, summed_up
+from comms.runner import fleet_digest
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
 
@@ -264,3 +266,18 @@ class LockstepClock:
         in_second = self.messages - Counter(self._messages_before)
         topics = ", ".join(f"{name} {number}" for name, number in in_second.most_common(5))
         return RunawayError(f"more than {most} within simulated second {self._second}; messages in it: {topics}")
+
+
+def result_of(clock: LockstepClock, last_words: Iterable[LastWord]) -> BusResult:
+    """The result of a run whose clock has no next round, from the last words of its processes."""
+    last = summed_up(last_words)
+    ended = Ending.TIME_LIMIT if clock.timed_out else Ending.IDLE
+    return BusResult(
+        ending=ended if clock.over_ms is None else Ending.OVER,
+        mission_ms=clock.now_ms if clock.over_ms is None else clock.over_ms,
+        digest=fleet_digest(last.digests),
+        rounds=clock.rounds,
+        messages=dict(clock.messages),
+        dropped=last.dropped,
+        latencies_ms=last.latencies_ms,
+    )

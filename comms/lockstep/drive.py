@@ -9,7 +9,7 @@ from typing import Any
 
 import zenoh
 
-from comms.drive import Host, Setup
+from comms.drive import Host, ListeningHost, Setup
 from comms.keys import HostSpec
 from comms.lockstep.access import access_rules
 from comms.lockstep.events import Change, NodeEvent, timeline
@@ -95,6 +95,8 @@ class Lockstep:
         """See `comms.drive.Drive`."""
         return NodeHost(session, setup.keys, spec, nodes, setup.routing(), self.faults)
 
-    def listening(self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener) -> Host:
+    def listening(
+        self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener
+    ) -> ListeningHost:
         """See `comms.drive.Drive`."""
         return ListenerHost(session, setup.keys, host, node_id, listener, setup.routing())

@@ -17,6 +17,11 @@ from comms.said.routing import Route, Routing
 LOST = "lost by a fault"
 
 
+def has_all(arrived: Counter[str], expected: Mapping[str, int]) -> bool:
+    """Whether as many messages of each sender have arrived as are expected."""
+    return all(arrived[sender] >= count for sender, count in expected.items())
+
+
 class LockstepNode:
     """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
 
@@ -39,10 +44,6 @@ class LockstepNode:
         self.deliver(received, due_ms)
         if received.topic.wakes:
             bisect.insort(self._late_ms, due_ms)
-
-    def has_all(self, expected: dict[str, int]) -> bool:
-        """Whether as many messages of each sender have arrived as the clock expects."""
-        return all(self.arrived[sender] >= count for sender, count in expected.items())
 
     def act(self, now_ms: int, *, start: bool) -> tuple[int | None, list[Outgoing]]:
         """Starts the node, or handles its due mail in order and then its wake-up if that is due.
@@ -140,7 +141,7 @@ class NodeGroup:
 
     def has_all(self, grants: list[Grant]) -> bool:
         """Whether all the mail that the clock expects for these grants has arrived."""
-        return all(self.runners[grant.node_id].has_all(grant.expected) for grant in grants)
+        return all(has_all(self.runners[grant.node_id].arrived, grant.expected) for grant in grants)
 
     def missing(self, grants: list[Grant]) -> str:
         """In words, what has not arrived."""
@@ -186,10 +187,6 @@ class JoinerMail:
         if route is not None and self._node_id in route.readers:
             self.arrived[route.writer] += 1
             self._kept.add(route.topic, key, payload)
-
-    def has_all(self, said: Counter[str]) -> bool:
-        """Whether as much has arrived of each sender as was said."""
-        return all(self.arrived[sender] >= count for sender, count in said.items())
 
     def messages(self) -> list[tuple[str, bytes]]:
         """Key and payload of each kept message."""

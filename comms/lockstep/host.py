@@ -16,7 +16,7 @@ from comms.errors import Interrupted, NodeError
 from comms.keys import HostSpec, RunKeys
 from comms.lockstep.clock import Grant, Sent
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.group import NodeGroup
+from comms.lockstep.group import NodeGroup, has_all
 from comms.lockstep.parcels import publish, unpacked
 from comms.lockstep.words import pack_answers, unpack_grants
 from comms.node import Listener, Node, Received
@@ -111,8 +111,8 @@ class ServedNodes:
         self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
 
     def receive(self, key: str, payload: bytes) -> None:
-        """A message has come, under its full key."""
-        received = self.group.receive(key.removeprefix(self._keys.root), payload)
+        """A message has come, under its key below the run id."""
+        received = self.group.receive(key, payload)
         if received is not None and self.group.holds(self._coordinators):
             self._latency.arrived(received, time.perf_counter())
 
@@ -134,7 +134,7 @@ class ServedNodes:
 class NodeHost:
     """Lets the nodes of a host act as the clock grants, until the run is finished.
 
-    `run` tells the hub of a node that fails, and raises NodeError; after `interrupt` it raises Interrupted.
+    `run` tells the hub of a node that fails, and raises NodeError.
     """
 
     def __init__(
@@ -148,11 +148,8 @@ class NodeHost:
     ) -> None:
         self._nodes = ServedNodes(session, keys, nodes, routing, faults, spec.incarnation)
         expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
+        self._root = keys.root
         self._line = _Line(session, keys, spec.host, expressions)
-
-    def interrupt(self) -> None:
-        """Ends the run early."""
-        self._line.interrupt()
 
     def run(self) -> None:
         """Serves to the end of the run."""
@@ -162,7 +159,7 @@ class NodeHost:
         while True:
             words = line.words(TAKE_EVERY_S if granted is None else MAIL_EVERY_S)
             for key, payload in line.mail():
-                self._nodes.receive(key, payload)
+                self._nodes.receive(key.removeprefix(self._root), payload)
             if words[:1] == ["grant"]:
                 granted = unpack_grants(words)
             elif words[:1] == ["kept"]:
@@ -245,7 +242,7 @@ class ListenerHost:
             self._open_mail()
             if words[:1] in (["mark"], ["finish"]):
                 mark = words
-            if mark is None or not self._has_all(mark[3]):
+            if mark is None or not has_all(self._arrived, mark[3]):
                 continue
             self._release(up_to_ms=mark[2])
             if mark[0] == "finish":
@@ -271,9 +268,6 @@ class ListenerHost:
                 received = self._intake.open(below, payload)
                 if received is not None:
                     self._held.append(received)
-
-    def _has_all(self, expected: dict[str, int]) -> bool:
-        return all(self._arrived[sender] >= count for sender, count in expected.items())
 
     def _release(self, *, up_to_ms: int | None) -> None:
         self._held.sort(key=lambda one: one.header.order)

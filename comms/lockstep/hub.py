@@ -11,12 +11,11 @@ import zenoh
 
 from comms.errors import FleetError, HostLostError, WordsError
 from comms.keys import HostSpec, RunKeys
-from comms.lockstep.clock import Grant, LockstepClock, Round
+from comms.lockstep.clock import Grant, LockstepClock, Round, result_of
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.group import JoinerMail
+from comms.lockstep.group import JoinerMail, has_all
 from comms.lockstep.host import ServedNodes
-from comms.lockstep.local_bus import result_of
 from comms.lockstep.pacing import MOST_BEHIND_BYTES, Pacing
 from comms.lockstep.parcels import publish
 from comms.lockstep.words import pack_grants, unpack_answers
@@ -150,7 +149,7 @@ class Hub:
         self._change(Change.JOIN, host)
         self._wait(lambda: host in self._ready, lambda: _no("start", {host}))
         kept, said = self._kept[node_id], self._clock.said_to_joiners[node_id]
-        self._wait(lambda: kept.has_all(said), lambda: f"mail is missing that was kept for {node_id}")
+        self._wait(lambda: has_all(kept.arrived, said), lambda: f"mail is missing that was kept for {node_id}")
         self._say(host, pack("kept", node_id, kept.messages(), self._clock.now_ms + JOINER_DELAY_MS))
 
     def _say(self, host: str, words: bytes) -> None:
@@ -202,9 +201,10 @@ class Hub:
 
     def _handle(self, kind: str, key: str, payload: bytes) -> None:
         if kind == "mail":
+            below = key.removeprefix(self._keys.root)
             for kept in self._kept.values():
-                kept.add(key.removeprefix(self._keys.root), payload)
-            self._nodes.receive(key, payload)
+                kept.add(below, payload)
+            self._nodes.receive(below, payload)
             return
         host = key.rsplit("/", 1)[1]
         if host not in self._hosts:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 
-from comms.lockstep.clock import LockstepClock
+from comms.lockstep.clock import LockstepClock, result_of
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import JoinerMail, NodeGroup
 from comms.node import Listener, Node
-from comms.result import BusResult, Ending, LastWord, summed_up
-from comms.runner import GuardedListener, Outgoing, Stamp, close_all, fleet_digest
+from comms.result import BusResult, LastWord
+from comms.runner import GuardedListener, Outgoing, Stamp, close_all
 from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
 from comms.said.messages import Message
@@ -97,18 +97,3 @@ class _Local:
                 listener = self.listeners.get(name)
                 if listener is not None:
                     listener.on_message(received)
-
-
-def result_of(clock: LockstepClock, last_words: Iterable[LastWord]) -> BusResult:
-    """The result of a run whose clock has no next round, from the last words of its processes."""
-    last = summed_up(last_words)
-    ended = Ending.TIME_LIMIT if clock.timed_out else Ending.IDLE
-    return BusResult(
-        ending=ended if clock.over_ms is None else Ending.OVER,
-        mission_ms=clock.now_ms if clock.over_ms is None else clock.over_ms,
-        digest=fleet_digest(last.digests),
-        rounds=clock.rounds,
-        messages=dict(clock.messages),
-        dropped=last.dropped,
-        latencies_ms=last.latencies_ms,
-    )

@@ -8,7 +8,7 @@ from typing import Any
 
 import zenoh
 
-from comms.drive import Host, Setup
+from comms.drive import Host, ListeningHost, Setup
 from comms.keys import HostSpec
 from comms.node import Listener, Node
 from comms.result import BusResult
@@ -72,12 +72,16 @@ class ByWallClock:
 
     def acting(self, session: zenoh.Session, setup: Setup, spec: HostSpec, nodes: Mapping[str, Node]) -> Host:
         """See `comms.drive.Drive`."""
-        return self._host(session, setup, spec.host, NodeSeat(nodes, setup.routing()))
+        routing = setup.routing()
+        return _host(session, setup, spec.host, NodeSeat(nodes, routing), routing)
 
-    def listening(self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener) -> Host:
+    def listening(
+        self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener
+    ) -> ListeningHost:
         """See `comms.drive.Drive`."""
-        return self._host(session, setup, host, ListenerSeat({node_id: listener}, setup.routing()))
+        routing = setup.routing()
+        return _host(session, setup, host, ListenerSeat({node_id: listener}, routing), routing)
 
-    def _host(self, session: zenoh.Session, setup: Setup, host: str, seat: Seat) -> Host:
-        sha256 = setup.run_info.scenario_sha256
-        return WallHost(session, setup.keys, host, seat, setup.routing(), sha256, setup.time_limit_ms)
+
+def _host(session: zenoh.Session, setup: Setup, host: str, seat: Seat, routing: Routing) -> WallHost:
+    return WallHost(session, setup.keys, host, seat, routing, setup.run_info.scenario_sha256, setup.time_limit_ms)

@@ -91,37 +91,6 @@ class WallNode:
         return published
 
 
-class WallNodes:
-    """All nodes of a process, keyed by node id. `said` counts their messages by topic."""
-
-    def __init__(self, nodes: Mapping[str, Node], routing: Routing, incarnation: int = 0) -> None:
-        self.incarnation = incarnation
-        self.said: Counter[str] = Counter()
-        self.nodes = {node_id: WallNode(node_id, node, routing, incarnation) for node_id, node in nodes.items()}
-        self._routing = routing
-
-    def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
-        """Gives a message to those here that read it; returns what they publish. Raises NodeError."""
-        route = self._routing.route(received.key)
-        readers = () if route is None else route.readers
-        return self._count(
-            [one for name in readers if name in self.nodes for one in self.nodes[name].hear(received, now_ms)]
-        )
-
-    def wake(self, now_ms: int) -> list[Outgoing]:
-        """Wakes those for whom it is time; returns what they publish. Raises NodeError."""
-        return self._count([one for node in self.nodes.values() for one in node.wake(now_ms)])
-
-    @property
-    def wake_ms(self) -> int | None:
-        """When the next wake-up is due."""
-        return min((node.wake_ms for node in self.nodes.values() if node.wake_ms is not None), default=None)
-
-    def _count(self, published: list[Outgoing]) -> list[Outgoing]:
-        self.said.update(one.route.topic.name for one in published)
-        return published
-
-
 WINDOW_S = 0.5  # of wall time, within which listeners get messages in the order of their sending
 
 
@@ -164,35 +133,39 @@ class NodeSeat:
     def __init__(self, nodes: Mapping[str, Node], routing: Routing) -> None:
         self.reads = tuple(one for node_id in nodes for one in routing.subscriptions(node_id))
         self.keeps = tuple(one for node_id in nodes for one in routing.publications(node_id))
+        self.kept: dict[str, Journal] = {}
         self._raw = nodes
         self._routing = routing
-        self._nodes = WallNodes({}, routing)
+        self._nodes: dict[str, WallNode] = {}
+        self._said: Counter[str] = Counter()
         self._latency = StripLatency()
         self._is_coordinators = any(routing.nodes[node_id].role is Role.COORDINATOR for node_id in nodes)
 
     def begin(self, incarnation: int, factor: float) -> None:
         """Seats the nodes; they are started when the run is announced to them."""
-        self._nodes = WallNodes(self._raw, self._routing, incarnation)
+        self._nodes = {
+            node_id: WallNode(node_id, node, self._routing, incarnation) for node_id, node in self._raw.items()
+        }
+        self.kept = {node_id: node.kept for node_id, node in self._nodes.items()}
 
     def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
-        """Lets the nodes handle a message."""
+        """Lets those nodes handle a message that read it."""
         if self._is_coordinators:
             self._latency.arrived(received, time.perf_counter())
-        return self._time(self._nodes.hear(received, now_ms))
+        route = self._routing.route(received.key)
+        readers = () if route is None else route.readers
+        return self._noted(
+            [one for name in readers if name in self._nodes for one in self._nodes[name].hear(received, now_ms)]
+        )
 
     def act(self, now_ms: int) -> list[Outgoing]:
         """Wakes the nodes for whom it is time."""
-        return self._time(self._nodes.wake(now_ms))
+        return self._noted([one for node in self._nodes.values() for one in node.wake(now_ms)])
 
     @property
     def next_ms(self) -> int | None:
         """When the next wake-up is due."""
-        return self._nodes.wake_ms
-
-    @property
-    def kept(self) -> Mapping[str, Journal]:
-        """What the nodes keep."""
-        return {node_id: node.kept for node_id, node in self._nodes.nodes.items()}
+        return min((node.wake_ms for node in self._nodes.values() if node.wake_ms is not None), default=None)
 
     def close(self) -> None:
         """Nodes have nothing to close."""
@@ -200,9 +173,10 @@ class NodeSeat:
     def last_word(self, dropped: Mapping[str, int]) -> LastWord:
         """What the nodes have said, and the latencies measured here."""
         latencies = {STRIP_TO_TASK: self._latency.milliseconds}
-        return LastWord(messages=dict(self._nodes.said), dropped=dict(dropped), latencies_ms=latencies)
+        return LastWord(messages=dict(self._said), dropped=dict(dropped), latencies_ms=latencies)
 
-    def _time(self, outgoing: list[Outgoing]) -> list[Outgoing]:
+    def _noted(self, outgoing: list[Outgoing]) -> list[Outgoing]:
+        self._said.update(one.route.topic.name for one in outgoing)
         if self._is_coordinators:
             self._latency.sending(outgoing, time.perf_counter())
         return outgoing

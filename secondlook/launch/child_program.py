@@ -123,11 +123,11 @@ def _be_host(child: ChildSetup) -> None:
     with open_client(endpoint, child.host, child.password, patience_s=setup.patience_s) as session:
         if child.listens_only:
             ((node_id, listener),) = nodes.items()
-            host = child.drive.listening(session, setup, child.host, node_id, listener)
-            watch.act = host.interrupt  # it keeps what it has
+            listening = child.drive.listening(session, setup, child.host, node_id, listener)
+            watch.act = listening.interrupt  # it keeps what it has
+            listening.run()
         else:
-            host = child.drive.acting(session, setup, child.spec, nodes)
-        host.run()
+            child.drive.acting(session, setup, child.spec, nodes).run()
 
 
 if __name__ == "__main__":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from comms.drive import Drive, Host, Setup
+from comms.drive import Drive, ListeningHost, Setup
 from comms.node import Listener
 from comms.session import open_client
 from secondlook.recorded.observer import RunStopped
@@ -25,7 +25,7 @@ class ListeningThread:
         self._setup = setup
         self._drive = drive
         self._password = password
-        self._host: Host | None = None
+        self._host: ListeningHost | None = None
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._listen, name=node_id, daemon=True)
         self._endpoint = ""
