@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -111,13 +112,13 @@ class Mission(ABC):
         `vehicles`: of these alone, such as `primaries`.
         """
         self.run  # noqa: B018 - raises where there is none
-        until_ms = round((self.end_s if at_s is None else at_s) * 1000)
+        until_ms = math.inf if at_s is None else round(at_s * 1000)
         metrics = Metrics()
         for one in self.received(RunInfo, CoverageTile):
             tile = isinstance(one.message, CoverageTile)
             if not tile or (one.header.sent_ms <= until_ms and (vehicles is None or one.vehicle in vehicles)):
                 metrics.hear(one)
-        return RiskMap.of(until_ms / 1000, metrics)
+        return RiskMap.of(self.end_s if at_s is None else until_ms / 1000, metrics)
 
     @property
     def risk_map(self) -> FleetMap:

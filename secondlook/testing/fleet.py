@@ -162,8 +162,7 @@ class Fleet(Trouble):
         until_s = self.now_s + timeout_s
         flight, holds = self._fly(_Watch(self._new_heard(), self._until_now, condition, until_s), self.bus)
         if not holds:
-            over_s = flight.summary["time"]["mission_s"]
-            when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {over_s:g} s"
+            when = f"by {until_s:g} s" if flight.digest is None else f"until the mission's end at {flight.end_s:g} s"
             raise AssertionError(f"the condition did not come to hold {when}; heard last:\n{_last_words(flight.heard)}")
         self._until_now = list(flight.heard)
         self._from_ms = flight.heard.now_ms + 1

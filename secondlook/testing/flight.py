@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
@@ -94,6 +95,12 @@ class Flight(Mission):
     routing: Routing
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
+
+    @cached_property
+    def end_s(self) -> float:
+        """Simulated time of the mission's end, or of the last message so far."""
+        end_s: float = self.summary["time"]["mission_s"]
+        return end_s
 
     def messages(self, keys: str = "**") -> list[Received]:
         """The messages whose keys are like `keys`; see `Heard.messages`."""

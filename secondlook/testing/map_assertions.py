@@ -55,7 +55,7 @@ def assert_risk_at_most(
     limits = {"mean": mean, "worst30_mean": worst30_mean, "uncovered_share": uncovered_share}
     fail_if(
         [
-            f"{name} is {risk[name]:.4f} at {flight.summary['time']['mission_s']:g} s, and not at most {limit:g}"
+            f"{name} is {risk[name]:.4f} at {flight.end_s:g} s, and not at most {limit:g}"
             for name, limit in limits.items()
             if limit is not None and not risk[name] <= limit
         ],

@@ -55,7 +55,7 @@ class TestRun:
         plain = run_mission(load_scenario(BRIEF), RunOptions(tmp_path / "plain", bus="local", record=False))
         flight = brief(bus=bus).run()
         assert flight.digest == plain["digest"]
-        assert flight.summary["time"]["mission_s"] == plain["time"]["mission_s"]
+        assert flight.end_s == plain["time"]["mission_s"]
         assert len(flight.heard) == sum(plain["messages"].values())
         times = [one.header.order for one in flight.heard]
         assert times == sorted(times)
@@ -72,7 +72,7 @@ class TestRun:
         assert all(isinstance(one.message, Hotspot) and one.header.sender == "primary" for one in hotspots)
         assert fleet.messages("agent/primary/hotspot/1")[0] == hotspots[0]
         assert fleet.messages() == list(flight.heard)
-        assert flight.messages("coord/mission_over")[-1].header.sent_ms == flight.summary["time"]["mission_s"] * 1000
+        assert flight.messages("coord/mission_over")[-1].header.sent_ms == flight.end_s * 1000
 
     def test_a_second_run_is_the_same_mission_anew(self, brief: MakeFleet) -> None:
         fleet = brief()
