@@ -116,7 +116,7 @@ def router(
 
 
 def _acting(node_id: str) -> Callable[..., None]:
-    """The command that runs an acting node which every fleet has."""
+    """The command that runs a node which is there once, or not at all."""
 
     def command(
         scenario: ScenarioArgument,

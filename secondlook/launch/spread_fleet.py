@@ -99,6 +99,10 @@ def run_node(scenario: Scenario, link: Link, node_id: str) -> int:
     """Runs an acting node of the fleet; returns the exit code. Raises UserError where it cannot take part."""
     _log_to_stderr()
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
+    if node_id not in fleet.specs:
+        raise UserError(
+            f"{node_id}: is no node of scenario {scenario.name} that acts here; must be {' or '.join(fleet.specs)}"
+        )
     try:
         nodes = make_nodes({node_id: fleet.specs[node_id]})
         outcome = _run_as_guest(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))

@@ -111,6 +111,7 @@ def test_an_endpoint_where_nobody_listens_is_told_in_one_sentence(fleet: SpreadF
     assert world.said == f"no connection to {fleet.endpoint} within 0.3 s: nobody listens there\n"
 
 
+ALL_EXTERNAL = ("--set", "vehicles.primary.body=external", "--set", "vehicles.helper.body=external")
 TLS = ("--tls-ca", "ca.pem", "--tls-cert", "cert.pem", "--tls-key", "key.pem")
 
 
@@ -150,6 +151,10 @@ TLS = ("--tls-ca", "ca.pem", "--tls-cert", "cert.pem", "--tls-key", "key.pem")
         (
             ("agent", "brief.yaml", "third", "--connect", "tcp/127.0.0.1:7447"),
             "third: is no vehicle of scenario brief; must be primary or helper",
+        ),
+        (
+            ("world", "brief.yaml", "--connect", "tcp/127.0.0.1:7447", *ALL_EXTERNAL),
+            "world: is no node of scenario brief that acts here; must be primary or helper or coordinator",
         ),
         (
             ("world", "brief.yaml", "--connect", "tcp/127.0.0.1:7447", "--run", "a/b"),
