@@ -200,7 +200,7 @@ class KnownVehicle:
         if track is None or self.state.expected_end_ms == 0:
             return None
         sees, ends_s = footprint_of(self.entry.sonar), self.state.expected_end_ms / 1000
-        return TrackUnderWay(track, ends_s, self.entry.speed_mps, sees.reach.far_m, sees.lead_m)
+        return TrackUnderWay(track, ends_s, self.entry.speed_mps, sees.widest_m, sees.lead_m)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

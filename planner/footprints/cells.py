@@ -13,8 +13,8 @@ from planner.footprints.footprint import Reach
 from planner.types import BoolArray, FloatArray, GridSpec, LookGeometry, SweepFrame, Track
 
 EDGE_TOLERANCE_M = 1e-3
-"""A cell centre this close before a bin's edge counts as on it: positions travel in centimetres, headings in
-microradians."""
+"""A cell centre this close before a bin's edge, or to the edge of what is seen, counts as on it: positions travel in
+centimetres, headings in microradians."""
 
 
 def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> tuple[slice, slice, FloatArray]:
@@ -55,23 +55,19 @@ def _window(corners_m: list[float], centres_m: FloatArray) -> slice:
     return slice(first, behind_last)
 
 
-ON_EDGE_M = 1e-3
-"""A cell whose centre is as near to the edge of what is seen as this is seen."""
-
-
 def seen_cells(grid: GridSpec, tracks: Iterable[Track], reach: Reach) -> BoolArray:
     """Cells whose centre lies beside one of the tracks, within the reach of the sonar; shape grid.shape."""
     seen = np.zeros(grid.shape, dtype=np.bool_)
     for track in tracks:
         frame = SweepFrame(*track.start, track.heading_rad)
-        reach_m, ends_m = reach.far_m + ON_EDGE_M, (-ON_EDGE_M, track.length_m + ON_EDGE_M)
+        reach_m, ends_m = reach.far_m + EDGE_TOLERANCE_M, (-EDGE_TOLERANCE_M, track.length_m + EDGE_TOLERANCE_M)
         corners_m = grid.frame.to_sweep(*frame.to_mission(np.array([-reach_m, reach_m] * 2), np.repeat(ends_m, 2)))
         columns, rows = (_between(*axis) for axis in zip((grid.across_m, grid.along_m), corners_m, strict=True))
         centres_m = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
         across_m, along_m = frame.to_sweep(*centres_m)
         lateral_m = np.abs(across_m)
         seen[rows, columns] |= (
-            (lateral_m >= reach.near_m - ON_EDGE_M)
+            (lateral_m >= reach.near_m - EDGE_TOLERANCE_M)
             & (lateral_m <= reach_m)
             & (along_m >= ends_m[0])
             & (along_m <= ends_m[1])

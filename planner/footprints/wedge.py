@@ -38,6 +38,11 @@ class ForwardLooking:
         return Reach(0.0, min(to_edges_m, math.sqrt(shape.far_m**2 - (shape.near_m + shape.look_m) ** 2)))
 
     @property
+    def widest_m(self) -> float:
+        """Where the edges of the sector meet the far arc."""
+        return self.shape.far_m * math.sin(self.shape.half_angle_rad)
+
+    @property
     def ahead_m(self) -> float:
         """The farthest range."""
         return self.shape.far_m
@@ -85,8 +90,7 @@ class ForwardLooking:
 
     def pass_curve(self, curve: DetectionCurve) -> DetectionCurve:
         """Of the looks that a place gets one stretch after the other, the mean over where in a stretch it lies."""
-        widest_m = self.shape.far_m * math.sin(self.shape.half_angle_rad)
-        lateral_m = np.linspace(0.0, widest_m, PASS_RANGES)[:, np.newaxis, np.newaxis]
+        lateral_m = np.linspace(0.0, self.widest_m, PASS_RANGES)[:, np.newaxis, np.newaxis]
         places_m = (np.arange(PASS_PLACES)[:, np.newaxis] + 0.5) / PASS_PLACES * self.shape.look_m
         ahead_m = places_m + np.arange(math.ceil(self.shape.far_m / self.shape.look_m)) * self.shape.look_m
         p_detect = curve.at(np.hypot(ahead_m, lateral_m)) * self.sees(ahead_m, lateral_m)

@@ -189,7 +189,9 @@ class WedgeSensor(SensorBase):
 
     def shape(self, nadir_gap_m: float) -> SonarShape:
         """What ground it sees."""
-        return SonarShape(self.footprint, self.near_m, self.reach_m, math.radians(self.half_angle_deg), self.look_m)
+        # As it travels: with another last digit the coordinator would take its swath for a cell narrower.
+        half_angle_rad = round(math.radians(self.half_angle_deg), 6)
+        return SonarShape(self.footprint, self.near_m, self.reach_m, half_angle_rad, self.look_m)
 
 
 SENSORS: dict[str, type[SensorBase]] = {"side": SideSensor, "wedge": WedgeSensor}

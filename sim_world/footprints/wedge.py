@@ -18,8 +18,8 @@ class WedgeSwath(Swath):
     @staticmethod
     def bins_of(shape: SonarShape, stretch_bins: int, bins_m: tuple[float, float]) -> tuple[int, int]:
         """As far as the sector reaches, were it made at the stretch's end; to the sides as far as it is wide."""
-        widest_m = shape.far_m * math.sin(shape.half_angle_rad)
-        return stretch_bins + ForwardLooking(shape).bins_ahead(bins_m[0]), math.ceil(widest_m / bins_m[1]) + 1
+        sees = ForwardLooking(shape)
+        return stretch_bins + sees.bins_ahead(bins_m[0]), math.ceil(sees.widest_m / bins_m[1]) + 1
 
     def sees(self, along_m: FloatArray, lateral_m: FloatArray) -> BoolArray:
         """What lies in the sector."""

@@ -39,6 +39,7 @@ class TestASwath:
         found = sonar(3, 50, QUARTER, 10)
         assert (found.reach.near_m, found.reach.far_m) == pytest.approx((0, 30))
         assert (found.lead_m, found.ahead_m) == pytest.approx((30, 50))
+        assert found.widest_m == pytest.approx(50 / math.sqrt(2))
         assert (found.reach.strip_width_m, found.reach.beside_m) == pytest.approx((60, 0))
 
     def test_or_as_far_ahead_as_the_near_arc(self) -> None:

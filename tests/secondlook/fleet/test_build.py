@@ -71,6 +71,14 @@ class TestTheAnnouncement:
         )
         assert (helper(run).far_m, helper(run).p_detect) == (40, 0.5)
 
+    @pytest.mark.parametrize("half_angle_deg", [45, 60, 33.3, 71.7])
+    def test_of_a_wedge_the_fleet_hears_the_very_sonar_that_its_agent_has(self, half_angle_deg: float) -> None:
+        # At 45 degrees its swath is 60 m, twelve cells; a millionth less would be eleven.
+        sensor = f"{{footprint: wedge, half_angle_deg: {half_angle_deg}, range_m: 50, look_m: 10, p_detect: 0.4}}"
+        overrides = [f"vehicles.helper.sensor={sensor}"]
+        own = load_scenario("tellaro", overrides).vehicles["helper"].sonar
+        assert helper(announced(*overrides)).sonar == own
+
     def test_an_endurance_below_a_millisecond_is_one(self) -> None:
         assert helper(announced("vehicles.helper.endurance_s=0.0001")).endurance_ms == 1
 
