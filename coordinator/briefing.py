@@ -10,7 +10,7 @@ from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.cutter import Cutter
-from coordinator.cut.strips import Cut, strip_of
+from coordinator.cut.strips import Cut
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
@@ -63,7 +63,7 @@ class Briefing:
 
     def coming_strip(self, cut: Cut) -> OpenStrip:
         """What will be a strip, as an allocator sees it."""
-        strip = strip_of(self._grid, cut.window, 0, descending=cut.descending)
+        strip = cut.strip(self._grid, 0)
         return OpenStrip(strip, self._risk_m2(cut), cut.settles_s)
 
     def open_strip(self, record: StripRecord) -> OpenStrip:

@@ -14,11 +14,12 @@ from comms.said.messages import AgentState, Mode, StripState, TaskAction, TaskSt
 from coordinator.agenda import Agenda, Item
 from coordinator.allocate.service import Service
 from coordinator.cut.cutter import Cutter
-from coordinator.cut.strips import Cut, strip_of
+from coordinator.cut.strips import Cut
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.outbox import Outbox
 from coordinator.vehicles import KnownVehicle, Offer
+from planner.risk import MOST_LEVELS
 from planner.types import BoolArray, Strip
 
 WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is published again
@@ -26,7 +27,6 @@ ANSWER_WITHIN_MS = 10_000
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen anew for the map to agree that it is done
 LATE_SHARE = 0.5  # of the time that a service was expected to take, that it may take longer
 LATE_MS = 60_000  # and so much more
-FULL_LEVEL = 255  # a cell that has it cannot show another look
 
 
 class StripLife:
@@ -54,7 +54,7 @@ class StripLife:
 
     def open(self, cut: Cut, now_ms: int) -> None:
         """Opens a new strip where it is cut."""
-        strip = self._strip_of(cut, self.ledger.next_number)
+        strip = cut.strip(self._fleet.map.grid, self.ledger.next_number)
         self._outbox.add_strip(self.ledger.open(strip, cut, now_ms, "badly seen"))
 
     def revise(self, record: StripRecord, cut: Cut) -> None:
@@ -62,7 +62,7 @@ class StripLife:
         change_m2 = abs(cut.counts_m2 - record.cut.counts_m2)
         if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
             return
-        self.ledger.revise(record, self._strip_of(cut, record.strip.number), cut)
+        self.ledger.revise(record, cut.strip(self._fleet.map.grid, record.strip.number), cut)
         for vehicle in self._fleet.vehicles.values():
             vehicle.refused.discard(record.strip.number)
         self._outbox.add_strip(record)
@@ -229,15 +229,12 @@ class StripLife:
         if not cells.any():
             return 1.0
         levels, before = self._fleet.levels(record.vehicle, record.window), self._of(record)[1].levels_before
-        return float(((levels > before) | (levels == FULL_LEVEL))[cells].mean())
+        return float(((levels > before) | (levels == MOST_LEVELS))[cells].mean())
 
     def _of(self, record: StripRecord) -> tuple[KnownVehicle, Offer]:
         """The vehicle that has a strip, and as what it was offered it."""
         vehicle = self._fleet.vehicles[record.vehicle]
         return vehicle, vehicle.offers[record.strip.number]
-
-    def _strip_of(self, cut: Cut, number: int) -> Strip:
-        return strip_of(self._fleet.map.grid, cut.window, number, descending=cut.descending)
 
     def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
         if self.ledger.move(record, state, now_ms, reason, vehicle):

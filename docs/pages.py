@@ -19,6 +19,7 @@ from typing import Any
 import typer
 from pydantic import BaseModel
 
+from secondlook import installed_command
 from secondlook.cli import app
 from secondlook.scenario import (
     Area,
@@ -224,7 +225,7 @@ def _option(shown: str, told: str) -> tuple[str, str, str]:
 
 # The map
 
-ROOMS = ("comms", "coordinator", "planner", "secondlook", "sim_world", "vehicle_agent", "viz")
+ROOMS = tuple(sorted((*installed_command.ROOMS, "secondlook")))
 BESIDE = {
     "bench": "Programs that measure, each by itself: `python -m bench.NAME`.",
     "docs": "These pages; the files are what makes some of them, and the site.",

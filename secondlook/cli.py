@@ -21,6 +21,7 @@ from secondlook.commands.run import REAL_TIME, run
 from secondlook.commands.scenarios import scenarios
 from secondlook.commands.view import view
 from secondlook.errors import UserError
+from secondlook.installed_command import WRONG_USE
 
 
 def with_number(arguments: Sequence[str], option: str, left_out: str) -> list[str]:
@@ -42,9 +43,6 @@ def _is_number(text: str) -> bool:
         return False
     return True
 
-
-WRONG_USE = 2
-"""Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""
 
 # Plain messages: no boxes for a user's mistake, and Python's own traceback for ours.
 app = typer.Typer(

@@ -29,6 +29,7 @@ def check_rooms() -> None:
 
 
 WRONG_USE = 2
+"""Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""
 
 
 def main() -> None:

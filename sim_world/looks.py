@@ -8,7 +8,7 @@ import numpy as np
 from comms.node import random_stream
 from comms.said.messages import Look, LookContact, TruthLook
 from planner.types import FloatArray, Point
-from sim_world.config import VehicleConfig
+from sim_world.config import HIGHEST_P_DETECT, VehicleConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
 from sim_world.sonar import SonarModel
@@ -17,8 +17,6 @@ from sim_world.vehicle import Stretch
 
 LOWEST_SEEN = 1e-4
 """The wire's step: an estimate of what was seen does not fall below it, for 0 says that nothing was seen."""
-HIGHEST = 0.999
-"""The wire refuses P_d above this."""
 QUADRATURE_POINTS = 32
 TABLE_LOGITS = np.linspace(-14.0, 14.0, 1401)
 
@@ -56,7 +54,7 @@ class PDetectEstimate:
         logits = _logit(np.where(seen, p_detect, 0.5))
         logits += np.interp(logits, self._truth_logits, self._shifts) + track_error
         logits += errors
-        return np.where(seen, np.minimum(np.maximum(_sigmoid(logits), LOWEST_SEEN), HIGHEST), 0.0)
+        return np.where(seen, np.minimum(np.maximum(_sigmoid(logits), LOWEST_SEEN), HIGHEST_P_DETECT), 0.0)
 
 
 def _logit(p: FloatArray) -> FloatArray:

@@ -23,7 +23,7 @@ from comms.said.messages import (
 from comms.said.topics import CONTACT, MANEUVER, STATE
 from planner.footprints.footprint import Footprint
 from planner.region import Region
-from planner.sweep import shifted
+from planner.sweep import pass_over
 from planner.types import Point, Strip, SweepFrame, Track
 from vehicle_agent.coverage import CoverageLayer
 
@@ -136,9 +136,8 @@ class Agent:
 
     def follow(self, track: Track, run_in_m: float) -> None:
         """Commands the vehicle to fly a track with the sonar on, so that what lies beside the track is seen."""
-        lead_m = self.footprint.lead_m
-        start, end = (shifted(place, track.heading_rad, -lead_m)[:2] for place in (track.start, track.end))
-        self._command(ManeuverKind.FOLLOW, start, end, run_in_m)
+        begin, end = pass_over(track.start, track.end, 0.0, self.footprint.lead_m)
+        self._command(ManeuverKind.FOLLOW, begin[:2], end[:2], run_in_m)
 
     def go_to(self, place: Point) -> None:
         """Commands the vehicle to a place, to wait there."""

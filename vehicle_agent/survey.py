@@ -28,6 +28,7 @@ from planner.footprints.footprint import Reach
 from planner.hotspots import HotspotMap, update_hotspots
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
+from planner.sweep import shifted
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import WHOLE, SurveyConfig
@@ -253,9 +254,8 @@ class SurveyAgent(Agent):
     def _passed_along_m(self, look: Look) -> float:
         """Where the stretch of track ends that a look stands for, along the grid."""
         end_m = look.first_along_m + self.footprint.track_length_m(look.geometry)
-        x_m = look.origin_x_m + end_m * math.sin(look.heading_rad)
-        y_m = look.origin_y_m + end_m * math.cos(look.heading_rad)
-        return float(self._grid.frame.to_sweep(x_m, y_m)[1])
+        end = shifted((look.origin_x_m, look.origin_y_m), look.heading_rad, end_m)
+        return float(self._grid.frame.to_sweep(*end[:2])[1])
 
     def _settle(self) -> None:
         """Marks the cells that no remaining track of the plan can improve; before the first look that is not known."""

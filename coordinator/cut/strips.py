@@ -55,6 +55,10 @@ class Cut:
     settles_s: float = 0.0
     descending: bool = False
 
+    def strip(self, grid: GridSpec, number: int) -> Strip:
+        """The strip that it becomes under a number."""
+        return strip_of(grid, self.window, number, descending=self.descending)
+
 
 def cut_strips(
     grid: GridSpec,

@@ -167,7 +167,6 @@ def measure(published: PublishedMission, seed: int, scratch: Path) -> MeasuredMi
     """Flies one mission and fits its mixture; its files lie in `scratch` for so long. Raises RunFailedError."""
     with tempfile.TemporaryDirectory(dir=scratch) as folder:
         survey = fly(scenario_of(published, seed), Path(folder))
-    # Only who measures needs scikit-learn, not who reads the result in another process.
     return MeasuredMission(published, survey, fit_mixture(survey.risk_seen, published.components))
 
 

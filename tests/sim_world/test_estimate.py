@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_world.looks import HIGHEST, LOWEST_SEEN, PDetectEstimate
+from sim_world.config import HIGHEST_P_DETECT
+from sim_world.looks import LOWEST_SEEN, PDetectEstimate
 
 TRUTHS = (0.05, 0.3, 0.49, 0.7, 0.9)
 
@@ -59,7 +60,7 @@ def test_unseen_stays_unseen_seen_stays_seen_and_nothing_is_certain() -> None:
     for seed in range(50):
         estimates = noise.estimate(cells, 0.0, np.random.default_rng(seed))
         assert estimates[0, 0, 0] == 0.0
-        assert np.all((estimates[0, 0, 1:] >= LOWEST_SEEN) & (estimates[0, 0, 1:] <= HIGHEST))
+        assert np.all((estimates[0, 0, 1:] >= LOWEST_SEEN) & (estimates[0, 0, 1:] <= HIGHEST_P_DETECT))
 
 
 def test_the_draws_do_not_depend_on_what_was_seen() -> None:
