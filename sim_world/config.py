@@ -16,7 +16,7 @@ import numpy as np
 from comms.said.wire import IDENTIFIER
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.footprints import FOOTPRINTS
-from sim_world.sonar import SonarModel
+from sim_world.sonar import CurveSonar, Seabed, SonarModel, SufferedSeabed
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
@@ -26,6 +26,8 @@ HIGHEST_P_DETECT = 0.999
 LARGEST_LOOK_CELLS = 65_536
 LARGEST_LOOK_TARGETS = 1_000
 LARGEST_NOISE = 2.0
+ROUNDING_RAD = 1e-9
+"""Half a turn told in degrees may be as much more."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,8 @@ class SeabedConfig:
 
     `scale_m`: smallest and largest length of a patch, measured where its effect has fallen to one half, > 0.
     `strength`: smallest and largest share of P_d that a patch takes away at its centre, within [0, 1).
+    `ripple_crests_rad`: from which to which compass heading the crests of ripples run, [0, 2 pi), at most half a turn
+    apart; None stands for any.
     """
 
     kind: Literal["uniform", "patchy"] = "uniform"
@@ -41,6 +45,7 @@ class SeabedConfig:
     vegetation_patches: int = 0
     scale_m: tuple[float, float] = (40.0, 200.0)
     strength: tuple[float, float] = (0.3, 0.8)
+    ripple_crests_rad: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         _require(self.kind in ("uniform", "patchy"), "kind", self.kind, "uniform or patchy")
@@ -50,6 +55,9 @@ class SeabedConfig:
         _require(0.1 <= low <= high <= FARTHEST_M, "scale_m", self.scale_m, f"ascending, 0.1 to {FARTHEST_M:.0f} m")
         low, high = self.strength
         _require(0.0 <= low <= high < 1.0, "strength", self.strength, "ascending, within [0, 1)")
+        low, high = self.ripple_crests_rad or (0.0, 0.0)
+        apart = 0.0 <= low <= high < 2 * math.pi and high - low <= math.pi + ROUNDING_RAD
+        _require(apart, "ripple_crests_rad", self.ripple_crests_rad, "ascending, 0 to 2 pi, at most pi apart")
 
 
 @dataclass(frozen=True)
@@ -59,10 +67,11 @@ class SensorConfig:
     `curve`: true P_d over range on a seabed that weakens nothing; nothing is seen beyond its last range. `footprint`,
     `near_m`, `half_angle_rad`: what ground it sees besides, see `planner.types.SonarShape`. A look stands for `look_m`
     of track, a whole number of bins `along_bin_m`; its lateral bins are centred at whole multiples of `range_bin_m`.
-    `noise_cell` and
-    `noise_track`: standard deviations, on the logit scale, of the error of the P_d that the vehicle estimates, drawn
-    once a cell and once a track, 0 to 2. `sonar` makes the true model, called with the
-    keywords `curve` and `seabed`; None stands for `sim_world.sonar.CurveSonar`.
+    `noise_cell` and `noise_track`: standard deviations, on the logit scale, of the error of the P_d that the vehicle
+    estimates, drawn once a cell and once a track, 0 to 2. `sonar` makes the true model, called with the keywords
+    `curve` and `seabed`; None stands for `sim_world.sonar.CurveSonar`. `seabed_share`: of what the seabed takes away
+    the share that this sonar loses, [0, 1]. `half_at_crab_rad`: the crab angle at which half of P_d is lost, up to
+    pi / 2; None for a sonar that does not mind, see `sim_world.steadiness`.
     """
 
     curve: DetectionCurve
@@ -75,6 +84,8 @@ class SensorConfig:
     footprint: str = "side"
     near_m: float = 0.0
     half_angle_rad: float = 0.0
+    seabed_share: float = 1.0
+    half_at_crab_rad: float | None = None
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect
@@ -100,6 +111,14 @@ class SensorConfig:
         _require(cells <= LARGEST_LOOK_CELLS, "look_m", f"{cells} cells a look", f"at most {LARGEST_LOOK_CELLS}")
         for name in ("noise_cell", "noise_track"):
             _require(0.0 <= getattr(self, name) <= LARGEST_NOISE, name, getattr(self, name), "0 to 2")
+        _require(0.0 <= self.seabed_share <= 1.0, "seabed_share", self.seabed_share, "0 to 1")
+        half_rad = self.half_at_crab_rad
+        _require(half_rad is None or 1e-3 <= half_rad <= math.pi / 2, "half_at_crab_rad", half_rad, "0.001 to pi / 2")
+
+    def sonar_over(self, seabed: Seabed) -> SonarModel:
+        """The true model over a seabed, of which it loses its share."""
+        suffered = seabed if self.seabed_share == 1.0 else SufferedSeabed(seabed, self.seabed_share)
+        return (self.sonar or CurveSonar)(curve=self.curve, seabed=suffered)
 
     @property
     def bins_per_look(self) -> int:
@@ -119,12 +138,40 @@ class SensorConfig:
 
 
 @dataclass(frozen=True)
+class SettlingConfig:
+    """How a vehicle settles after a turn: it loses `share` of P_d, [0, 1), at the turn's end, and evenly less down to
+    nothing once it has gone straight for `length_m` > 0."""
+
+    share: float
+    length_m: float
+
+    def __post_init__(self) -> None:
+        _require(0.0 <= self.share < 1.0, "share", self.share, "0 to below 1")
+        _require(0.01 <= self.length_m <= 1e4, "length_m", self.length_m, "0.01 to 10000 m")
+
+
+@dataclass(frozen=True)
+class CurrentConfig:
+    """A current towards the compass heading `toward_rad`. With `period_s` it flows to and fro, `speed_mps` at most."""
+
+    speed_mps: float
+    toward_rad: float
+    period_s: float | None = None
+
+    def __post_init__(self) -> None:
+        _require(0.0 <= self.speed_mps <= 100.0, "speed_mps", self.speed_mps, "0 to 100")
+        _require(-7.0 <= self.toward_rad <= 7.0, "toward_rad", self.toward_rad, "-7 to 7")
+        _require(self.period_s is None or 1.0 <= self.period_s <= 1e7, "period_s", self.period_s, "1 to 1e7 s")
+
+
+@dataclass(frozen=True)
 class VehicleConfig:
     """A simulated vehicle and where it waits for its first manoeuvre.
 
     `position_error_m`: the constant distance, in a random direction, between where the vehicle is and where it
     believes it is. `position_drift_mps`: what comes to that, growing with the mission's time, in a random direction of
-    its own. The start pose is the believed one.
+    its own. The start pose is the believed one. `settling`: how it settles after a turn; None for one that is steady at
+    once.
     """
 
     vehicle: str
@@ -137,6 +184,7 @@ class VehicleConfig:
     sensor: SensorConfig
     position_error_m: float = 0.0
     position_drift_mps: float = 0.0
+    settling: SettlingConfig | None = None
 
     def __post_init__(self) -> None:
         _require(bool(IDENTIFIER.fullmatch(self.vehicle)), "vehicle", self.vehicle, f"a match of {IDENTIFIER.pattern}")
@@ -168,7 +216,7 @@ class TargetsConfig:
 @dataclass(frozen=True)
 class WorldConfig:
     """The whole sea. `area`, `holes`: outlines of the survey area and of what is left out of it, at least three corners
-    each. `vehicles`: those simulated here."""
+    each. `vehicles`: those simulated here, all of them faster than the current."""
 
     seed: int
     area: tuple[Point, ...]
@@ -176,6 +224,7 @@ class WorldConfig:
     seabed: SeabedConfig = field(default_factory=SeabedConfig)
     targets: TargetsConfig = field(default_factory=TargetsConfig)
     holes: tuple[tuple[Point, ...], ...] = ()
+    current: CurrentConfig | None = None
 
     def __post_init__(self) -> None:
         _require(self.seed >= 0, "seed", self.seed, "0 or more")
@@ -187,6 +236,9 @@ class WorldConfig:
             )  # fmt: skip
         names = [vehicle.vehicle for vehicle in self.vehicles]
         _require(len(set(names)) == len(names), "vehicles", ", ".join(names), "different names")
+        slowest_mps = min((vehicle.speed_mps for vehicle in self.vehicles), default=math.inf)
+        holds = self.current is None or self.current.speed_mps < slowest_mps
+        _require(holds, "current", self.current, f"slower than every vehicle, {slowest_mps:g} m/s")
 
 
 def _require(holds: bool, name: str, value: object, allowed: str) -> None:

@@ -12,6 +12,7 @@ from sim_world.config import HIGHEST_P_DETECT, VehicleConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
 from sim_world.sonar import SonarModel
+from sim_world.steadiness import STILL_WATER, Current, Steadiness
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import Stretch
 
@@ -85,9 +86,11 @@ class Looks:
         targets: Targets,
         recogniser: Recogniser,
         seed: int,
+        current: Current = STILL_WATER,
     ) -> None:
         self._config = config
         self._sonar = sonar
+        self._steadiness = Steadiness(config, current)
         self._targets = targets
         self._recogniser = recogniser
         self._seed = seed
@@ -115,8 +118,9 @@ class Looks:
             stretch.bins,
             (sensor.along_bin_m, sensor.range_bin_m),
         )
-        truly = swath.seen(self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), time_s))
-        contacts, truth = self._targets_passed(swath, time_s)
+        run_in_m = maneuver.run_in_m
+        truly = self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), run_in_m, time_s)
+        contacts, truth = self._targets_passed(swath, run_in_m, time_s)
         if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
             contacts += self._recogniser.false_alarms(swath, self._stream("false_alarms", self._looks))
         contacts = sorted(contacts, key=lambda contact: contact.score, reverse=True)[:MOST_CONTACTS]
@@ -129,7 +133,7 @@ class Looks:
             first_along_m=stretch.first_along_m,
             along_bin_m=sensor.along_bin_m,
             range_bin_m=sensor.range_bin_m,
-            p_detect=self._estimate.estimate(truly, self._track_error, self._stream("noise", self._looks)),
+            p_detect=self._estimate.estimate(swath.seen(truly), self._track_error, self._stream("noise", self._looks)),
             altitude_m=config.altitude_m,
             position_sigma_m=sigma_m,
             valid=True,
@@ -137,11 +141,13 @@ class Looks:
         )
         return look, truth
 
-    def _targets_passed(self, swath: Swath, time_s: float) -> tuple[list[LookContact], TruthLook | None]:
+    def _targets_passed(
+        self, swath: Swath, run_in_m: float, time_s: float
+    ) -> tuple[list[LookContact], TruthLook | None]:
         passed = self._targets.passed(swath)
         if not passed.numbers.size:
             return [], None
-        p_detect = self._p_detect(swath, passed.along_m, passed.lateral_m, (passed.x_m, passed.y_m), time_s)
+        p_detect = self._p_detect(swath, passed.along_m, passed.lateral_m, (passed.x_m, passed.y_m), run_in_m, time_s)
         seen = p_detect > 0.0
         if not seen.any():
             return [], None
@@ -161,10 +167,13 @@ class Looks:
         along_m: FloatArray,
         lateral_m: FloatArray,
         position_m: tuple[FloatArray, FloatArray],
+        run_in_m: float,
         time_s: float,
     ) -> FloatArray:
         range_m, bearing_rad = swath.range_m(along_m, lateral_m), swath.bearing_rad(along_m, lateral_m)
-        return self._sonar.p_detect(range_m, bearing_rad, self._config.altitude_m, position_m, time_s)
+        p_detect = self._sonar.p_detect(range_m, bearing_rad, self._config.altitude_m, position_m, time_s)
+        left = self._steadiness.factor(run_in_m + swath.seen_from_m(along_m), swath.heading_rad, time_s)
+        return p_detect * left
 
     def _stream(self, name: str, number: int) -> np.random.Generator:
         return random_stream(self._seed, "world", self._config.vehicle, name, str(number))

@@ -82,14 +82,17 @@ class PatchySeabed:
 
 def make_seabed(config: SeabedConfig, area: tuple[Point, ...], seed: int) -> Seabed:
     """The seabed of a world: patch centres lie uniformly in the area, everything else is drawn from the config's
-    ranges. Each kind of patch has its own random stream."""
+    ranges. Each kind of patch has its own random stream, and so has the direction of crests, which with a given range
+    run as the sea made them, else in any direction."""
     if config.kind == "uniform":
         return UniformSeabed()
     ripples = _draw(config, config.ripple_fields, area, random_stream(seed, "world", "ripples"), RIPPLE_SLENDERNESS)
     vegetation = _draw(
         config, config.vegetation_patches, area, random_stream(seed, "world", "vegetation"), VEGETATION_SLENDERNESS
     )
-    normals = random_stream(seed, "world", "ripple_normals").uniform(0.0, math.pi, len(ripples)).tolist()
+    crests = config.ripple_crests_rad
+    least_rad, largest_rad = (0.0, math.pi) if crests is None else (crests[0] + math.pi / 2, crests[1] + math.pi / 2)
+    normals = random_stream(seed, "world", "ripple_normals").uniform(least_rad, largest_rad, len(ripples)).tolist()
     rippled = tuple(replace(patch, ripple_normal_rad=one) for patch, one in zip(ripples, normals, strict=True))
     return PatchySeabed(rippled + vegetation)
 

@@ -20,6 +20,18 @@ class Seabed(Protocol):
         """Factor in (0, 1] at mission-frame positions seen along a compass bearing; the arguments broadcast."""
 
 
+class SufferedSeabed:
+    """A seabed as a sonar sees it that loses but a `share`, [0, 1], of what the seabed takes away."""
+
+    def __init__(self, seabed: Seabed, share: float) -> None:
+        self._seabed = seabed
+        self._share = share
+
+    def factor(self, x_m: FloatArray, y_m: FloatArray, bearing_rad: FloatArray | float) -> FloatArray:
+        """1 less that share of what is taken away, in the arguments' common shape."""
+        return 1.0 - self._share * (1.0 - self._seabed.factor(x_m, y_m, bearing_rad))
+
+
 class SonarModel(Protocol):
     """A sonar's true P_d."""
 

@@ -10,7 +10,8 @@ from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
-from sim_world.sonar import CurveSonar, Seabed
+from sim_world.sonar import Seabed
+from sim_world.steadiness import Current, make_current
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import SimulatedVehicle
 
@@ -18,15 +19,18 @@ from sim_world.vehicle import SimulatedVehicle
 class Body:
     """A vehicle of a world, with the keys under which it speaks."""
 
-    def __init__(self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, targets: Targets) -> None:
+    def __init__(
+        self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, current: Current, targets: Targets
+    ) -> None:
         self._vehicle = SimulatedVehicle(config, world.seed)
-        curve = config.sensor.curve
+        sensor = config.sensor
         self._looks = Looks(
             config,
-            sonar=(config.sensor.sonar or CurveSonar)(curve=curve, seabed=seabed),
+            sonar=sensor.sonar_over(seabed),
             targets=targets,
-            recogniser=Recogniser(curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
+            recogniser=Recogniser(sensor.curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
             seed=world.seed,
+            current=current,
         )
         self._told: tuple[Maneuver, int] | None = None
         self._said: ManeuverStatus | None = None
@@ -86,8 +90,9 @@ class World:
     def __init__(self, config: WorldConfig) -> None:
         self._targets = Targets(config.area, config.targets.count, config.seed, config.holes)
         seabed = make_seabed(config.seabed, config.area, config.seed)
+        current = make_current(config.current, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)
-        self._bodies = {one.vehicle: Body(one, config, seabed, self._targets) for one in by_id}
+        self._bodies = {one.vehicle: Body(one, config, seabed, current, self._targets) for one in by_id}
         self._next_nav_ms = 0
         self._over = False
 

@@ -24,11 +24,20 @@ from secondlook.scenario import (
     RevisitVehicle,
     Scenario,
     SurveyVehicle,
+    UniformSeabed,
     body_of,
     scenario_hash,
 )
 from secondlook.scenario.plug_ins import ALLOCATOR, SONAR, SPACING, made
-from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
+from sim_world.config import (
+    CurrentConfig,
+    SeabedConfig,
+    SensorConfig,
+    SettlingConfig,
+    TargetsConfig,
+    VehicleConfig,
+    WorldConfig,
+)
 from vehicle_agent.config import RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
 AS_CONVEX = 1e-6
@@ -189,7 +198,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
 
 
 def _world_config(scenario: Scenario) -> WorldConfig:
-    seabed = scenario.seabed
+    current = scenario.current
     return WorldConfig(
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
@@ -197,17 +206,30 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         vehicles=tuple(
             _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),
-        seabed=(
-            SeabedConfig("patchy", seabed.ripple_fields, seabed.vegetation_patches, seabed.scale_m, seabed.strength)
-            if isinstance(seabed, PatchySeabed)
-            else SeabedConfig()
-        ),
+        seabed=_seabed(scenario.seabed),
         targets=TargetsConfig(scenario.targets.count),
+        current=None
+        if current is None
+        else CurrentConfig(current.speed_mps, math.radians(current.toward_deg), current.period_s),
+    )
+
+
+def _seabed(seabed: UniformSeabed | PatchySeabed) -> SeabedConfig:
+    if isinstance(seabed, UniformSeabed):
+        return SeabedConfig()
+    crests = seabed.ripple_crests_deg
+    return SeabedConfig(
+        kind="patchy",
+        ripple_fields=seabed.ripple_fields,
+        vegetation_patches=seabed.vegetation_patches,
+        scale_m=seabed.scale_m,
+        strength=seabed.strength,
+        ripple_crests_rad=None if crests is None else (math.radians(crests[0]), math.radians(crests[1])),
     )
 
 
 def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
-    sensor = vehicle.sensor
+    sensor, settling = vehicle.sensor, vehicle.settling
     return VehicleConfig(
         vehicle=name,
         start_x_m=vehicle.start.x_m,
@@ -218,6 +240,7 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
         altitude_m=vehicle.altitude_m,
         position_error_m=vehicle.position_error_m,
         position_drift_mps=vehicle.position_drift_m_per_h / 3600,
+        settling=None if settling is None else SettlingConfig(settling.share, settling.length_m),
         sensor=SensorConfig(
             curve=vehicle.detection_curve,
             footprint=vehicle.sonar.footprint,
@@ -229,6 +252,8 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
             noise_cell=sensor.noise_cell,
             noise_track=sensor.noise_track,
             sonar=None if sensor.sonar is None else SONAR.maker(sensor.sonar),
+            seabed_share=1.0 if sensor.seabed_share is None else sensor.seabed_share,
+            half_at_crab_rad=None if sensor.half_at_crab_deg is None else math.radians(sensor.half_at_crab_deg),
         ),
     )
 

@@ -8,6 +8,7 @@ from secondlook.scenario.errors import Place, Problem, ScenarioError
 from secondlook.scenario.load import bundled_scenarios, load_scenario, make_scenario
 from secondlook.scenario.model import (
     Coordinator,
+    Current,
     Mission,
     Origin,
     PatchySeabed,
@@ -17,11 +18,12 @@ from secondlook.scenario.model import (
     scenario_hash,
 )
 from secondlook.scenario.sensor import Curve
-from secondlook.scenario.vehicle import RevisitVehicle, Start, SurveyVehicle, body_of
+from secondlook.scenario.vehicle import RevisitVehicle, Settling, Start, SurveyVehicle, body_of
 
 __all__ = [
     "Area",
     "Coordinator",
+    "Current",
     "Curve",
     "Mission",
     "Origin",
@@ -31,6 +33,7 @@ __all__ = [
     "RevisitVehicle",
     "Scenario",
     "ScenarioError",
+    "Settling",
     "Start",
     "SurveyVehicle",
     "Targets",

@@ -11,12 +11,24 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 from secondlook.scenario.area import Area
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
-from secondlook.scenario.values import Duration, Length, Mapping, OpenShare, Share, check_pair, plug_in, refused
+from secondlook.scenario.values import (
+    Duration,
+    Heading,
+    Length,
+    Mapping,
+    OpenShare,
+    Share,
+    Speed,
+    check_pair,
+    plug_in,
+    refused,
+)
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
 # Beyond, a metre of easting is more degrees than a map can show.
 Latitude = Annotated[float, Field(ge=-89, le=89)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
+Headings = Annotated[tuple[Heading, Heading], BeforeValidator(check_pair), Field(strict=False)]
 
 
 class Origin(Mapping):
@@ -60,13 +72,37 @@ class PatchySeabed(Mapping):
     """Least and largest extent of one."""
     strength: Annotated[tuple[Share, Share], BeforeValidator(check_pair), Field(strict=False)] = (0.3, 0.8)
     """Least and largest share of P_d that one takes."""
+    ripple_crests_deg: Headings | None = None
+    """From which to which heading the crests of the ripples run, at most 180 degrees apart, as swell from one side
+    makes them; left out, in any direction. A sonar that looks across crests sees least, along them as on flat
+    ground."""
 
-    @field_validator("scale_m", "strength")
+    @field_validator("scale_m", "strength", "ripple_crests_deg")
     @classmethod
-    def _check_order(cls, pair: tuple[float, float]) -> tuple[float, float]:
-        if pair[0] > pair[1]:
+    def _check_order(cls, pair: tuple[float, float] | None) -> tuple[float, float] | None:
+        if pair is not None and pair[0] > pair[1]:
             raise refused("must be the least, then the largest")
         return pair
+
+    @field_validator("ripple_crests_deg")
+    @classmethod
+    def _check_crests(cls, pair: tuple[float, float] | None) -> tuple[float, float] | None:
+        if pair is not None and pair[1] - pair[0] > 180:
+            raise refused("must be at most 180 degrees apart")
+        return pair
+
+
+class Current(Mapping):
+    """A current, everywhere alike. Every simulated vehicle is faster: it keeps its track and its speed over the ground,
+    and crabs. What that does to its sonar, `sensor.half_at_crab_deg` tells."""
+
+    speed_mps: Speed
+    """How fast the water flows, at most."""
+    toward_deg: Heading
+    """Compass heading towards which it flows."""
+    period_s: Annotated[float, Field(ge=1, le=1e7)] | None = None
+    """With a period it flows to and fro, as in a seiche or a tide, and when it is slack is drawn from the seed. Left
+    out, it is steady."""
 
 
 class Targets(Mapping):
@@ -121,6 +157,8 @@ class Scenario(Mapping):
     """When the mission ends, and how its risk is computed."""
     seabed: Annotated[UniformSeabed | PatchySeabed, Field(discriminator="kind")] = UniformSeabed()
     """What lowers P_d, and where."""
+    current: Current | None = None
+    """How the water flows; left out, not at all."""
     targets: Targets = Targets()
     """What there is to find."""
     vehicles: Annotated[dict[VehicleId, Vehicle], Field(max_length=64)]
@@ -141,6 +179,16 @@ class Scenario(Mapping):
         for key, vehicle in vehicles.items():
             if vehicle.body == "external" and body_of(key) in vehicles:
                 raise refused(f"must have no {body_of(key)}, as the external body of {key} is called")
+        return vehicles
+
+    @field_validator("vehicles")
+    @classmethod
+    def _check_speeds(cls, vehicles: dict[str, Vehicle], info: ValidationInfo) -> dict[str, Vehicle]:
+        current = info.data.get("current")
+        if current is not None:
+            for key, vehicle in vehicles.items():
+                if vehicle.body == "simulated" and vehicle.speed_mps <= current.speed_mps:
+                    raise refused(f"must be faster than the current, {current.speed_mps:g} m/s, but {key} is not")
         return vehicles
 
     @field_validator("vehicles")

@@ -13,7 +13,18 @@ from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario import bundled
 from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
 from secondlook.scenario.text import Value
-from secondlook.scenario.values import TOLERANCE, Bin, Length, LengthOrZero, Mapping, Noise, PDetect, plug_in, refused
+from secondlook.scenario.values import (
+    TOLERANCE,
+    Bin,
+    Length,
+    LengthOrZero,
+    Mapping,
+    Noise,
+    PDetect,
+    Share,
+    plug_in,
+    refused,
+)
 
 
 class Curve(Mapping):
@@ -104,6 +115,12 @@ class SensorBase(Mapping):
     """Instead of a curve: the same P_d at every range up to `range_m`."""
     range_m: Length | None = None
     """How far that P_d holds."""
+    seabed_share: Share | None = None
+    """Of what the seabed takes from P_d, the share that this sonar loses: less than 1 for one that looks from near and
+    steeply down. Left out, all of it."""
+    half_at_crab_deg: Annotated[float, Field(ge=1, le=90)] | None = None
+    """The crab angle, in a current, at which half of P_d is lost; at half that angle a 17th is, at twice it all but a
+    17th. Left out, crabbing does not matter."""
     noise_cell: Noise = _noise("noise_cell")
     """Standard deviation of P_d per cell, in logits; left out, the curve's own, or else that of `muscle`."""
     noise_track: Noise = _noise("noise_track")

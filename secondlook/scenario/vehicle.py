@@ -57,6 +57,15 @@ class Start(Mapping):
     """Compass heading."""
 
 
+class Settling(Mapping):
+    """How a vehicle settles after a turn, until when its sonar sees less."""
+
+    share: OpenShare
+    """Share of P_d that is lost at the end of the turn; from there on less, evenly down to nothing."""
+    length_m: Length
+    """Straight run after which it is steady. `run_in_m` is the first part of it."""
+
+
 class VehicleBase(Mapping):
     """What every vehicle has, whatever its role."""
 
@@ -84,6 +93,8 @@ class VehicleBase(Mapping):
     """How far it truly is from where it believes it is, in a random direction."""
     position_drift_m_per_h: LengthOrZero = 0.0
     """By how much it drifts from there, in another."""
+    settling: Settling | None = None
+    """How it settles after a turn; left out, it is steady at once."""
     agent: Annotated[str, plug_in(NODE)] | None = None
     """`package.module:Class` of a node of your own in its back seat."""
 

@@ -26,6 +26,10 @@ class SideSwath(Swath):
         """All cells are."""
         return p_detect
 
+    def seen_from_m(self, along_m: FloatArray) -> FloatArray:
+        """Abeam of each."""
+        return along_m
+
     def range_m(self, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
         """The lateral range."""
         return np.abs(lateral_m)

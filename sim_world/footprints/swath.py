@@ -65,6 +65,10 @@ class Swath(ABC):
         return np.where(self.sees(self.along_m, self.lateral_m), p_detect, 0.0)
 
     @abstractmethod
+    def seen_from_m(self, along_m: FloatArray) -> FloatArray:
+        """How far down the track the vehicle is as it sees places that lie so far along it."""
+
+    @abstractmethod
     def range_m(self, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
         """From how far they are seen."""
 

@@ -25,6 +25,10 @@ class WedgeSwath(Swath):
         """What lies in the sector."""
         return ForwardLooking(self.shape).sees(along_m - self.first_along_m, lateral_m)
 
+    def seen_from_m(self, along_m: FloatArray) -> FloatArray:
+        """Where the stretch begins."""
+        return np.full_like(along_m, self.first_along_m)
+
     def range_m(self, along_m: FloatArray, lateral_m: FloatArray) -> FloatArray:
         """The distance over the ground."""
         range_m: FloatArray = np.hypot(along_m - self.first_along_m, lateral_m)

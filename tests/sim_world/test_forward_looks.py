@@ -8,7 +8,7 @@ import pytest
 from comms.said.messages import Look, Maneuver, ManeuverKind, TruthLook
 from planner.footprints.wedge import ForwardLooking
 from planner.types import DetectionCurve, FloatArray
-from sim_world.config import SensorConfig, VehicleConfig
+from sim_world.config import SensorConfig, SettlingConfig, VehicleConfig
 from sim_world.looks import Looks
 from sim_world.seabed import UniformSeabed
 from sim_world.sonar import CurveSonar, Position, SonarModel
@@ -36,9 +36,11 @@ class BearingSonar:
         return p_detect
 
 
-def looks_of_a_pass(sonar: SonarModel, targets: int = 0) -> list[tuple[Look, TruthLook | None]]:
+def looks_of_a_pass(
+    sonar: SonarModel, targets: int = 0, settling: SettlingConfig | None = None
+) -> list[tuple[Look, TruthLook | None]]:
     """What is told on 100 m northward, from (200, 50), a look every 10 m."""
-    config = VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, SENSOR)
+    config = VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, SENSOR, settling=settling)
     maker = Looks(
         config,
         sonar=sonar,
@@ -65,6 +67,13 @@ def test_the_sonar_is_told_the_bearing_off_the_bow() -> None:
     look, _ = looks_of_a_pass(BearingSonar())[0]
     assert not look.p_detect[0].any()  # port looks west
     assert look.p_detect[1, 3, 2] == pytest.approx(0.9 * 10.0 / math.hypot(17.5, 10.0))
+
+
+def test_a_look_is_as_steady_as_the_vehicle_is_where_it_makes_it() -> None:
+    # 5 m of run-in, and 20 m of track until the third look: half of 0.8 is lost, wherever the place lies ahead.
+    sonar = CurveSonar(CURVE, UniformSeabed())
+    steady, unsteady = (looks_of_a_pass(sonar, settling=one)[2][0] for one in (None, SettlingConfig(0.8, 50.0)))
+    assert unsteady.p_detect == pytest.approx(0.6 * steady.p_detect)
 
 
 def test_targets_are_found_by_their_own_place_in_every_look_that_sees_them() -> None:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from sim_world.config import SeabedConfig
 from sim_world.seabed import HALF_WEIGHT, Patch, PatchySeabed, UniformSeabed, make_seabed
+from sim_world.sonar import SufferedSeabed
 
 AREA = ((0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (0.0, 400.0))
 PATCHY = SeabedConfig("patchy", ripple_fields=7, vegetation_patches=7)
@@ -44,6 +45,36 @@ def test_ripples_weaken_most_across_their_crests_and_nothing_along_them() -> Non
     x_m, y_m = np.zeros(5), np.zeros(5)
     bearings = 0.3 + np.array([0.0, math.pi, math.pi / 2, -math.pi / 2, math.pi / 4])
     assert seabed.factor(x_m, y_m, bearings) == pytest.approx(np.array([0.2, 0.2, 1.0, 1.0, 0.6]))
+
+
+@pytest.mark.parametrize(
+    ("crests_deg", "least_deg", "largest_deg"),
+    [((0.0, 20.0), 90.0, 110.0), ((160.0, 160.0), 250.0, 250.0), (None, 0.0, 180.0)],
+)
+def test_crests_run_as_the_config_says_else_in_any_direction(
+    crests_deg: tuple[float, float] | None, least_deg: float, largest_deg: float
+) -> None:
+    crests_rad = None if crests_deg is None else (math.radians(crests_deg[0]), math.radians(crests_deg[1]))
+    patches = patchy(3, SeabedConfig("patchy", 300, ripple_crests_rad=crests_rad)).patches
+    normals_deg = [math.degrees(patch.ripple_normal_rad or 0.0) for patch in patches]
+    assert (min(normals_deg), max(normals_deg)) == pytest.approx((least_deg, largest_deg), abs=3.0)
+    assert least_deg - 1e-9 <= min(normals_deg) <= max(normals_deg) <= largest_deg + 1e-9
+
+
+@pytest.mark.parametrize("heading_rad", [0.0, math.pi])
+def test_along_crests_a_side_looking_sonar_is_blind_and_across_them_it_sees(heading_rad: float) -> None:
+    config = SeabedConfig("patchy", 1, strength=(0.9, 0.9), ripple_crests_rad=(math.pi, math.pi))
+    seabed = patchy(1, config)
+    centre = np.array([seabed.patches[0].x_m]), np.array([seabed.patches[0].y_m])
+    assert seabed.factor(*centre, heading_rad + math.pi / 2) == pytest.approx(0.1)
+    assert seabed.factor(*centre, heading_rad) == pytest.approx(1.0)
+
+
+def test_a_sonar_that_suffers_a_share_of_the_seabed_loses_that_share_of_what_is_taken_away() -> None:
+    seabed = PatchySeabed((Patch(0.0, 0.0, 0.0, 60.0, 20.0, 0.8),))
+    places = np.array([0.0, 0.0]), np.array([0.0, 60.0])
+    for share, expected in ((0.0, 1.0), (0.5, 0.6), (1.0, 0.2)):
+        assert SufferedSeabed(seabed, share).factor(*places, 0.3) == pytest.approx(np.array([expected, 1.0]))
 
 
 def test_overlapping_patches_multiply() -> None:
@@ -115,6 +146,11 @@ def test_a_look_asks_quickly() -> None:
         {"scale_m": (0.0, 40.0)},
         {"strength": (0.3, 1.0)},
         {"strength": (float("nan"), 0.5)},
+        {"ripple_crests_rad": (0.2, 0.1)},
+        {"ripple_crests_rad": (0.0, 3.2)},
+        {"ripple_crests_rad": (-0.1, 0.0)},
+        {"ripple_crests_rad": (6.0, 6.3)},
+        {"ripple_crests_rad": (float("nan"), 1.0)},
     ],
 )
 def test_a_seabed_that_cannot_be_is_refused(wrong: dict[str, object]) -> None:

@@ -28,7 +28,15 @@ from comms.said.messages import (
 from comms.said.routing import RosterNode, Routing
 from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, MISSION_OVER, TRUTH_LOOK, TRUTH_POSE, Topic
 from planner.types import DetectionCurve
-from sim_world.config import SeabedConfig, SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
+from sim_world.config import (
+    CurrentConfig,
+    SeabedConfig,
+    SensorConfig,
+    SettlingConfig,
+    TargetsConfig,
+    VehicleConfig,
+    WorldConfig,
+)
 from sim_world.world import World
 
 AREA = ((0.0, 0.0), (1212.0, 0.0), (1212.0, 400.0), (0.0, 400.0))
@@ -316,6 +324,46 @@ def test_the_seabed_weakens_a_look() -> None:
     pairs = [(one.p_detect, other.p_detect) for one, other in zip(bare, patchy, strict=True)]
     assert all(np.all(other <= one) for one, other in pairs)
     assert sum(float(other.sum()) for _, other in pairs) < 0.98 * sum(float(one.sum()) for one, _ in pairs)
+
+
+def test_the_first_metres_of_a_track_are_seen_worse_and_the_targets_there_too() -> None:
+    # 50 m of run-in are behind it: of the 90 % that a turn costs (1 - 50/200) are left, and less further on.
+    vehicle = replace(A, settling=SettlingConfig(share=0.9, length_m=200.0))
+    config = replace(QUIET, vehicles=(vehicle,), targets=TargetsConfig(1000))
+    sea, steady = (Sea(one).order("a", NORTH_400).until(300_000) for one in (config, replace(config, vehicles=(A,))))
+
+    def left(along_m: float) -> float:
+        return 1.0 - 0.9 * max(0.0, 1.0 - (50.0 + along_m) / 200.0)
+
+    assert left(0.0) == pytest.approx(0.325)
+    assert left(150.0) == 1.0
+    for look, other in zip(sea.looks(), steady.looks(), strict=True):
+        for number, centre_m in enumerate((2.5, 7.5, 12.5, 17.5)):
+            expected = other.p_detect[:, number] * left(look.first_along_m + centre_m)
+            assert look.p_detect[:, number] == pytest.approx(expected)
+    targets = sea.published[0][1].message
+    assert isinstance(targets, TruthTargets)
+    truths = [message for _, message in sea.said(TruthLook) if isinstance(message, TruthLook)]
+    seen = [pair for truth in truths for pair in zip(truth.targets, truth.p_detect, strict=True)]
+    assert len(seen) > 40
+    for number, p_detect in seen:
+        target = targets.targets[number]
+        assert p_detect == pytest.approx(float(CURVE.at(target.x_m)) * left(target.y_m))
+
+
+def test_in_a_current_it_crabs_more_with_the_stream_than_against_it() -> None:
+    # 0.8 m/s to the east and 1 m/s to the north, at 2 m/s over the ground: arctan 0.8 / 1 northward, 0.8 / 3 southward.
+    current = CurrentConfig(math.hypot(0.8, 1.0), math.atan2(0.8, 1.0))
+    half_rad = math.atan2(0.8, 1.0)
+    config = replace(QUIET, vehicles=(replace(A, sensor=replace(SENSOR, half_at_crab_rad=half_rad)),))
+    orders = NORTH_400, follow(8, (0.0, 400.0), (0.0, 0.0))
+    for order, left in zip(orders, (0.5, 1 / (1 + (math.atan2(0.8, 3.0) / half_rad) ** 4)), strict=True):
+        still, flowing = (
+            Sea(one).order("a", order).until(900_000).looks() for one in (config, replace(config, current=current))
+        )
+        assert len(still) == 20
+        for one, other in zip(still, flowing, strict=True):
+            assert other.p_detect == pytest.approx(left * one.p_detect)
 
 
 def check_places(look: Look, places: list[tuple[float, float]]) -> None:

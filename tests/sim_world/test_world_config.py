@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from planner.types import DetectionCurve
-from sim_world.config import SensorConfig, TargetsConfig, VehicleConfig, WorldConfig
+from sim_world.config import CurrentConfig, SensorConfig, SettlingConfig, TargetsConfig, VehicleConfig, WorldConfig
 
 SENSOR = SensorConfig(DetectionCurve(np.array([0.0, 130.9]), np.array([0.5, 0.1])))
 VEHICLE = VehicleConfig("a", 0.0, 0.0, 0.0, speed_mps=2.0, turn_radius_m=20.0, altitude_m=10.0, sensor=SENSOR)
@@ -40,6 +40,9 @@ def test_bins_follow_from_the_lengths() -> None:
         (SENSOR, "range_bin_m", float("nan")),
         (SENSOR, "noise_cell", -0.1),
         (SENSOR, "noise_track", 3.0),
+        (SENSOR, "seabed_share", 1.1),
+        (SENSOR, "half_at_crab_rad", 0.0),
+        (SENSOR, "half_at_crab_rad", float("nan")),
         (VEHICLE, "vehicle", "Not An Id"),
         (VEHICLE, "speed_mps", 0.0),
         (VEHICLE, "turn_radius_m", 0.0),
@@ -52,12 +55,20 @@ def test_bins_follow_from_the_lengths() -> None:
         (WORLD, "holes", (((0.1, 0.1), (0.2, 0.2)),)),
         (WORLD, "holes", (((0.1, 0.1), (0.2, 0.2), (2e6, 0.1)),)),
         (WORLD, "vehicles", (VEHICLE, VEHICLE)),
+        (WORLD, "current", CurrentConfig(2.0, 0.0)),  # as fast as the vehicle
+        (SettlingConfig(0.5, 100.0), "share", 1.0),
+        (SettlingConfig(0.5, 100.0), "length_m", 0.0),
+        (CurrentConfig(1.0, 0.0), "speed_mps", -0.1),
+        (CurrentConfig(1.0, 0.0), "toward_rad", 90.0),
+        (CurrentConfig(1.0, 0.0), "period_s", 0.0),
         (TargetsConfig(), "count", 1001),
         (TargetsConfig(), "false_alarms_per_km2", -1.0),
     ],
 )
 def test_a_value_out_of_range_is_refused_by_name(
-    config: SensorConfig | VehicleConfig | WorldConfig | TargetsConfig, name: str, value: object
+    config: SensorConfig | VehicleConfig | WorldConfig | TargetsConfig | SettlingConfig | CurrentConfig,
+    name: str,
+    value: object,
 ) -> None:
     with pytest.raises(ValueError, match=name):
         replace(config, **{name: value})  # type: ignore[arg-type]

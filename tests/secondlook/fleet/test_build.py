@@ -13,6 +13,7 @@ from planner.area import SurveyArea
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.scenario import load_scenario
+from sim_world.config import CurrentConfig, SettlingConfig
 
 
 def announced(*overrides: str) -> RunInfo:
@@ -95,3 +96,28 @@ class TestTheAnnouncement:
         scenario = load_scenario("tellaro", [askew(circle, 0)])
         with pytest.raises(UserError, match=r"^scenario tellaro: RunInfo\.area: \d+ entries are more than 500$"):
             build_fleet(scenario, record=False)
+
+
+class TestTheWorld:
+    def test_what_lowers_p_detect_comes_to_it_in_radians(self) -> None:
+        overrides = (
+            "seabed.ripple_crests_deg=[90, 180]",
+            "current={speed_mps: 0.5, toward_deg: 180, period_s: 3000}",
+            "vehicles.primary.settling={share: 0.9, length_m: 150}",
+            "vehicles.primary.sensor.half_at_crab_deg=45",
+            "vehicles.helper.sensor.seabed_share=0.5",
+        )
+        world = build_fleet(load_scenario("patchy", overrides), record=False).specs["world"].config
+        assert world.seabed.ripple_crests_rad == (math.pi / 2, math.pi)
+        assert world.current == CurrentConfig(0.5, math.pi, 3000)
+        primary, helper = world.vehicles
+        assert (primary.settling, helper.settling) == (SettlingConfig(0.9, 150), None)
+        assert (primary.sensor.half_at_crab_rad, helper.sensor.half_at_crab_rad) == (math.pi / 4, None)
+        assert (primary.sensor.seabed_share, helper.sensor.seabed_share) == (1, 0.5)
+
+    def test_what_is_left_out_lowers_nothing(self) -> None:
+        world = build_fleet(load_scenario("patchy"), record=False).specs["world"].config
+        assert (world.seabed.ripple_crests_rad, world.current) == (None, None)
+        for vehicle in world.vehicles:
+            sensor = vehicle.sensor
+            assert (vehicle.settling, sensor.half_at_crab_rad, sensor.seabed_share) == (None, None, 1)

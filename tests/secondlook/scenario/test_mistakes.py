@@ -16,7 +16,7 @@ def lines_of(source: str, overrides: tuple[str, ...] = (), seed: int | None = No
     return str(caught.value).splitlines()
 
 
-TOP_KEYS = "name, description, seed, area, origin, mission, seabed, targets, vehicles, coordinator"
+TOP_KEYS = "name, description, seed, area, origin, mission, seabed, current, targets, vehicles, coordinator"
 POLYGON = "[[0, 0], [500, 0], [500, 400], [0, 400]]"
 
 # What of the valid text is replaced, by what, and the lines that come of it.
@@ -470,6 +470,34 @@ MISTAKES = {
         "name: trial",
         "name: trial\nseabed: {kind: patchy, strength: [0.8, 0.3]}",
         ["bad.yaml:2: seabed.strength: [0.8, 0.3] is not allowed; must be the least, then the largest"],
+    ),
+    "crests the wrong way round": (
+        "name: trial",
+        "name: trial\nseabed: {kind: patchy, ripple_crests_deg: [350, 10]}",
+        ["bad.yaml:2: seabed.ripple_crests_deg: [350, 10] is not allowed; must be the least, then the largest"],
+    ),
+    "crests more than half a turn apart": (
+        "name: trial",
+        "name: trial\nseabed: {kind: patchy, ripple_crests_deg: [10, 200]}",
+        ["bad.yaml:2: seabed.ripple_crests_deg: [10, 200] is not allowed; must be at most 180 degrees apart"],
+    ),
+    "a current that no vehicle can hold against": (
+        "name: trial",
+        "name: trial\ncurrent: {speed_mps: 1.5, toward_deg: 90}",
+        [
+            'bad.yaml:5: vehicles: {"primary": {"role": "survey", "start": {"x_m": 0, "y_m":... is not allowed; '
+            "must be faster than the current, 1.5 m/s, but primary is not",
+        ],
+    ),
+    "a current towards nowhere": (
+        "name: trial",
+        "name: trial\ncurrent: {speed_mps: 1}",
+        ["bad.yaml:2: current.toward_deg: missing; must be given"],
+    ),
+    "a turn that leaves nothing": (
+        "range_m: 145",
+        "range_m: 145\n    settling: {share: 1, length_m: 100}",
+        ["bad.yaml:13: vehicles.primary.settling.share: 1 is not allowed; must be less than 1"],
     ),
     "strips longer at least than at most": (
         "name: trial",
