@@ -33,7 +33,7 @@ class SufferedSeabed:
 
 
 class SonarModel(Protocol):
-    """A sonar's true P_d."""
+    """A sonar's true P_d, carried steadily: what turns and a current leave of it, `sim_world.steadiness` tells."""
 
     def p_detect(
         self,

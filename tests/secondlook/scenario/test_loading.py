@@ -48,12 +48,15 @@ def load_text(folder: Path, text: str) -> Scenario:
 
 def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
     assert BUNDLED == [
+        "clear",
         "five-helpers",
         "forward-looking",
         "headland",
         "paper",
         "patchy",
+        "ripples",
         "tellaro",
+        "turns",
         "two-helpers",
         "wide",
     ]
