@@ -10,6 +10,7 @@ from types import MappingProxyType
 from typing import Protocol
 
 from coordinator.allocate.auction import AuctionAllocator
+from coordinator.allocate.cbba import CbbaAllocator
 from coordinator.allocate.rolling import RollingAllocator
 from coordinator.allocate.simple import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
@@ -18,6 +19,7 @@ ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
     {
         "plan": RollingAllocator,
         "auction": AuctionAllocator,
+        "cbba": CbbaAllocator,
         "greedy": GreedyAllocator,
         "nearest": NearestAllocator,
         "first_come": FirstComeAllocator,

@@ -116,8 +116,8 @@ class Coordinator(Mapping):
     """How strips are cut and given out."""
 
     allocator: Annotated[str, plug_in(ALLOCATOR)] = "plan"
-    """Who is offered which strip: `plan`, `auction`, `greedy`, `nearest`, `first_come`, `none` (strips are cut, but
-    given to nobody), or `package.module:Class` of your own."""
+    """Who is offered which strip: `plan`, `auction`, `cbba`, `greedy`, `nearest`, `first_come`, `none` (strips are cut,
+    but given to nobody), or `package.module:Class` of your own."""
     node: Annotated[str, plug_in(NODE)] | None = None
     """`package.module:Class` of a whole coordinator of your own."""
     lost_after_s: Duration = 30.0

@@ -1,0 +1,225 @@
+"""The consensus-based bundle algorithm: bids and bundles by hand, and what all agree on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from situations import at_work, helper, open_strip, situation, situations, strip
+
+from bench.planning_time import milliseconds
+from bench.planning_time import situation as large_situation
+from coordinator.allocate.cbba import BUNDLE, HALF_LIFE_S, NOBODY, Bidder, CbbaAllocator, Claims, agreed
+from coordinator.allocate.service import expected_service, removed_m2
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
+
+CBBA = CbbaAllocator()
+
+
+def score(reward_m2: float, ends_s: float) -> float:
+    """A reward at the end of its sweep, seconds from now."""
+    return reward_m2 * 2 ** (-ends_s / HALF_LIFE_S)
+
+
+def alone(told: Situation, one: OpenStrip, free: Helper) -> float:
+    """What a strip is worth to a helper that goes straight there."""
+    served = expected_service(one, free)
+    if one.strip.number in free.refused:
+        return 0.0
+    return score(removed_m2(one, free, served, told.deadline_s), served.ends_s - told.now_s)
+
+
+def path_score(told: Situation, path: list[OpenStrip]) -> float:
+    """What a path is worth to the first helper."""
+    free, total = told.helpers[0], 0.0
+    for one in path:
+        served = expected_service(one, free)
+        total += alone(told, one, free)
+        free = replace(free, free_at=served.free_at, free_s=served.free_s)
+    return total
+
+
+def by_number(told: Situation) -> list[OpenStrip]:
+    return sorted(told.strips, key=lambda one: one.strip.number)
+
+
+class TestBids:
+    """The helper is 100 m from a strip of 200 m, and goes 2 m/s: its sweep begins after 50 s and ends after 150."""
+
+    @pytest.mark.parametrize(("deadline_s", "share"), [(3600, 1), (150, 1), (100, 0.5), (60, 0.1)])
+    def test_what_is_swept_by_the_deadline_counts_discounted(self, deadline_s: float, share: float) -> None:
+        told = situation([open_strip(strip(1))], [helper()], deadline_s)
+        (alpha,) = agreed(told, told.strips)
+        assert alpha.claims.bids == pytest.approx([score(700 * share, 150)])
+        assert alpha.claims.winners.tolist() == [0]
+
+    def test_what_lies_on_the_way_is_put_in_before(self) -> None:
+        # 2 is worth more and claimed first; it begins where the run-out of 1 ends, so that 1 delays nothing.
+        told = situation([open_strip(strip(1)), open_strip(strip(2, y_m=310), 3000)], [helper()])
+        (alpha,) = agreed(told, told.strips)
+        assert (alpha.bundle, alpha.path) == ([1, 0], [0, 1])
+        assert alpha.claims.bids == pytest.approx([score(700, 150), score(2100, 255)])
+        assert CBBA.assign(told) == {"alpha": 1}
+
+    def test_a_bid_is_less_what_the_strips_behind_it_lose(self) -> None:
+        # Side by side, 12 m apart: 1 is left at y = 305 m after 152.5 s, half a circle of 6 m leads onto 2, on which it
+        # is 5 m of run-in later. So 2 ends 9.42 + 2.5 + 100 s later than 1 is left.
+        told = situation([open_strip(strip(1), 2000), open_strip(strip(2, x_m=12))], [helper()])
+        (alpha,) = agreed(told, told.strips)
+        assert alpha.path == [0, 1]
+        assert alpha.claims.bids == pytest.approx([score(1400, 150), score(700, 255 + np.pi * 3)])
+
+    def test_what_would_cost_more_than_it_brings_is_left(self) -> None:
+        # There is time for one of them: 1 is worth more, and 2 before it would take all of that.
+        told = situation([open_strip(strip(1, y_m=300), 3000), open_strip(strip(2, y_m=-300))], [helper()], 260)
+        (alpha,) = agreed(told, told.strips)
+        assert alpha.path == [0]
+
+    def test_no_bid_is_above_those_before(self) -> None:
+        # 3, claimed second, costs so much of 1 that 2, on the same way, costs little more: behind 3 it adds 555.
+        jobs = [
+            open_strip(strip(1, 300, -200, 200), 4000),
+            open_strip(strip(2, 300, 100, 100), 2000),
+            open_strip(strip(3, 200, 100, 100), 1000),
+        ]
+        told = situation(jobs, [helper()], 400)
+        (alpha,) = agreed(told, jobs)
+        added = [path_score(told, [jobs[place] for place in path]) for path in ([0], [2, 0], [2, 1, 0])]
+        assert added[2] - added[1] > added[1] - added[0] + 100
+        assert (alpha.bundle, alpha.path) == ([0, 2, 1], [2, 1, 0])
+        assert alpha.claims.bids == pytest.approx([added[0], *[added[1] - added[0]] * 2])
+
+    def test_a_bundle_has_its_most(self) -> None:
+        told = situation([open_strip(strip(number, x_m=60 * number)) for number in range(1, 9)], [helper()])
+        (alpha,) = agreed(told, told.strips)
+        assert len(alpha.bundle) == len(alpha.path) == BUNDLE
+
+
+class TestConflicts:
+    def test_the_nearer_gets_it_and_the_other_what_is_left(self) -> None:
+        # Both claim 1 and then 2. beta is 25 s nearer to 1; alpha gives up both, then bids more for 2 than before, and
+        # than beta, which would come there from 1.
+        jobs = [open_strip(strip(1), 2000), open_strip(strip(2, x_m=500))]
+        told = situation(jobs, [helper(), helper("beta", y_m=50)])
+        alpha, beta = agreed(told, jobs)
+        assert (alpha.path, beta.path) == ([1], [0])
+        assert alpha.claims.bids == pytest.approx([score(1400, 125), alone(told, jobs[1], alpha.helper)])
+        assert CBBA.assign(told) == {"alpha": 2, "beta": 1}
+
+    def test_what_is_lost_frees_what_was_bid_for_behind_it(self) -> None:
+        jobs = [open_strip(strip(1), 2000), open_strip(strip(2, y_m=310))]
+        alpha = Bidder(0, helper(), situation(jobs, [helper(), helper("beta")]), jobs)
+        assert alpha.claim()
+        assert alpha.bundle == [0, 1]
+        mine = alpha.claims.copy()
+        assert alpha.hear([mine, Claims(np.array([9999.0, 0.0]), np.array([1, NOBODY]))])
+        assert (alpha.bundle, alpha.path) == ([], [])
+        assert alpha.claims.winners.tolist() == [1, NOBODY]
+        assert alpha.claims.bids.tolist() == [9999, 0]
+        # A claim that its owner has given up is nobody's; one that it has lowered counts as it is now.
+        assert alpha.hear([mine, Claims(np.array([0.0, 3.0]), np.array([NOBODY, 1]))])
+        assert alpha.claims.winners.tolist() == [NOBODY, 1]
+        assert alpha.hear([mine, Claims(np.array([0.0, 2.0]), np.array([NOBODY, 1]))])
+        assert alpha.claims.bids.tolist() == [0, 2]
+
+    def test_a_third_ones_claim_is_not_taken_from_hearsay(self) -> None:
+        jobs = [open_strip(strip(1))]
+        alpha = Bidder(0, helper(), situation(jobs, [helper(), helper("beta"), helper("gamma")]), jobs)
+        nothing = Claims(np.zeros(1), np.array([NOBODY]))
+        assert not alpha.hear([nothing, Claims(np.array([5.0]), np.array([2])), nothing])
+
+    def test_who_loses_its_best_ones_has_others_to_turn_to(self) -> None:
+        near = [open_strip(strip(number, x_m=60 * number), 5000) for number in range(1, BUNDLE + 1)]
+        far = open_strip(strip(9, x_m=2000), 10)
+        assert CBBA.assign(situation([*near, far], [helper(p_detect=0.2), helper("beta", p_detect=0.9)]))["alpha"] == 9
+
+    def test_of_equals_the_first_name(self) -> None:
+        told = situation([open_strip(strip(1))], [helper("beta"), helper("alpha")])
+        assert CBBA.assign(told) == {"alpha": 1}
+
+    def test_what_a_helper_at_work_will_do_better_is_left_to_it(self) -> None:
+        # beta will be free beside strip 1 in 102.5 s; alpha, 1500 m away, has strip 2 to do.
+        beta = at_work(helper("beta", y_m=-205), open_strip(strip(9, y_m=-200)))
+        jobs = [open_strip(strip(1, y_m=100), 3000), open_strip(strip(2, x_m=1500, y_m=400), 1500)]
+        assert CBBA.assign(situation(jobs, [helper("alpha", x_m=1500), beta])) == {"alpha": 2}
+
+
+class TestAgreement:
+    @settings(max_examples=150, deadline=None)
+    @given(told=situations())
+    def test_all_believe_the_same_and_each_strip_is_in_one_bundle(self, told: Situation) -> None:
+        bidders = agreed(told, by_number(told))
+        for number, one in enumerate(bidders):
+            assert one.claims.winners.tolist() == bidders[0].claims.winners.tolist()
+            assert one.claims.bids.tolist() == bidders[0].claims.bids.tolist()
+            assert sorted(one.bundle) == sorted(one.path) == np.flatnonzero(one.claims.winners == number).tolist()
+            bids = one.claims.bids[one.bundle]
+            assert (np.diff(bids) <= 0).all()
+            assert (bids > 0).all()
+
+    @settings(max_examples=150, deadline=None)
+    @given(told=situations())
+    def test_who_is_idle_could_serve_only_what_another_has_bid_more_for(self, told: Situation) -> None:
+        jobs = by_number(told)
+        for one in agreed(told, jobs):
+            if not one.bundle:
+                worth = [alone(told, job, one.helper) for job in jobs]
+                assert (np.array(worth) <= one.claims.bids * (1 + 1e-9)).all()
+
+    @settings(max_examples=100, deadline=None)
+    @given(told=situations(most_strips=5))
+    def test_a_helper_alone_claims_what_adds_the_most_where_it_adds_the_most(self, told: Situation) -> None:
+        settled = tuple(replace(one, settles_s=0.0) for one in told.strips)
+        for helpers in told.helpers[:1], told.helpers[1:2]:
+            self.check_claims(replace(told, strips=settled, helpers=helpers))
+
+    @pytest.mark.parametrize("seed", range(1, 6))
+    def test_so_it_does_where_there_is_time_for_all(self, seed: int) -> None:
+        self.check_claims(large_situation(7, 1, seed))
+
+    def check_claims(self, told: Situation) -> None:
+        jobs = by_number(told)
+        one = next(iter(agreed(told, jobs)), None)
+        if one is None:
+            return
+        path: list[int] = []
+        bid = np.inf
+        for claimed in one.bundle:
+            before = path_score(told, [jobs[place] for place in path])
+            longer = {
+                (strip, place): [*path[:place], strip, *path[place:]]
+                for strip in set(range(len(jobs))) - set(path)
+                for place in range(len(path) + 1)
+            }
+            added = {key: path_score(told, [jobs[place] for place in way]) - before for key, way in longer.items()}
+            best = max(added.values())
+            assert max(added[key] for key in added if key[0] == claimed) == pytest.approx(best)
+            bid = min(bid, best)
+            assert one.claims.bids[claimed] == pytest.approx(bid)
+            path = [place for place in one.path if place == claimed or place in path]
+            assert path_score(told, [jobs[place] for place in path]) - before == pytest.approx(best)
+
+
+@pytest.mark.parametrize("seed", range(1, 6))
+class TestALargeFleet:
+    def test_all_are_sent_to_strips_of_their_own_after_no_more_rounds_than_strips(
+        self, seed: int, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        told = large_situation(60, 10, seed)
+        rounds, claim = [0] * 10, Bidder.claim
+
+        def counted(bidder: Bidder) -> bool:
+            rounds[int(bidder.helper.vehicle[-2:])] += 1
+            return claim(bidder)
+
+        monkeypatch.setattr(Bidder, "claim", counted)
+        offers = CBBA.assign(told)
+        assert set(offers) == {one.vehicle for one in told.free}
+        assert len(set(offers.values())) == len(offers)
+        assert len(set(rounds)) == 1
+        assert rounds[0] <= 10 * BUNDLE  # each round settles at least the highest bid that is still disputed
+
+    def test_it_takes_less_than_20_ms_for_60_strips_and_5_helpers(self, seed: int) -> None:
+        assert milliseconds(CBBA, large_situation(60, 5, seed)) < 20
