@@ -16,6 +16,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from secondlook.compare.flights import Contender, Flown, contenders, fly_all
+from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
 from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
@@ -25,6 +26,7 @@ from secondlook.scenario import load_scenario
 
 FAILED = 1
 MOST_SEEDS = 10_000
+LAST_SEED = 2**32 - 1  # that a scenario may have
 WIDEST = 500  # characters
 
 
@@ -37,7 +39,10 @@ def compare(
             help="Allocators; self and self-longer: no helper, primaries revisit themselves. All, if left out.",
         ),
     ] = "",
-    seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="Each flies with seeds 1 to N.")] = 10,
+    seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="How many seeds each flies with.")] = 10,
+    first_seed: Annotated[
+        int, typer.Option(min=0, max=LAST_SEED - MOST_SEEDS, help="The first of them; the others follow.")
+    ] = 1,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
     ] = None,
@@ -55,17 +60,24 @@ def compare(
     for contender in chosen:
         build_fleet(contender.scenario, record=False)
     flown: Flown = {}
-    failure = _fly(chosen, seeds, jobs or os.cpu_count() or 1, flown, shown=sys.stderr.isatty() and not as_json)
-    title = f"{mission.name}, seeds 1 to {seeds}"
+    numbers = range(first_seed, first_seed + seeds)
+    shown = sys.stderr.isatty() and not as_json
+    failure = _fly(chosen, numbers, jobs or os.cpu_count() or 1, flown, shown=shown)
+    stood, objective = standings(flown), objective_of(mission)
+    reacting = verdict(chosen, {one.name: one.against_first for one in stood}, objective)
+    title = f"{mission.name}, seeds {numbers[0]} to {numbers[-1]}"
+    content = json.dumps(comparison_as_json(flown, stood, mission.name, objective, reacting), indent=2)
     if as_json:
-        typer.echo(json.dumps(comparison_as_json(flown, mission.name), indent=2))
-    elif standings(flown):
-        told = table(standings(flown), title)
+        typer.echo(content)
+    elif stood:
+        told = table(stood, f"{title}, judged by {OBJECTIVES[objective].what} when the mission ends", objective)
         console = Console(soft_wrap=True, highlight=False)
         console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off
         console.print(told)
-    if out is not None and standings(flown):
-        _write(flown, mission.name, title, out)
+        if reacting is not None:
+            typer.echo(reacting.sentence)
+    if out is not None and stood:
+        _write(content, flown, title, out)
         if not as_json:
             typer.echo(f"Files: {out / 'compare.json'}, {out / 'risk.png'}")
     sentences = [*failures(flown), *([failure] if failure else [])]
@@ -74,9 +86,9 @@ def compare(
         raise typer.Exit(FAILED)
 
 
-def _fly(chosen: list[Contender], seeds: int, jobs: int, flown: Flown, *, shown: bool) -> str:
+def _fly(chosen: list[Contender], seeds: range, jobs: int, flown: Flown, *, shown: bool) -> str:
     """Flies all; what went wrong with the comparison itself, in a sentence, or nothing."""
-    total = seeds * len(chosen)
+    total = len(seeds) * len(chosen)
     columns = (
         TextColumn("{task.description}"),
         BarColumn(),
@@ -93,7 +105,7 @@ def _fly(chosen: list[Contender], seeds: int, jobs: int, flown: Flown, *, shown:
 
         try:
             with signals_interrupt():
-                fly_all(chosen, range(1, seeds + 1), jobs, flown, tell)
+                fly_all(chosen, seeds, jobs, flown, tell)
         except KeyboardInterrupt:
             return f"interrupted after {_count(flown)} of {total} missions"
         except BrokenProcessPool:
@@ -114,8 +126,7 @@ def _prepare(folder: Path) -> None:
         raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
 
 
-def _write(flown: Flown, name: str, title: str, folder: Path) -> None:
-    content = json.dumps(comparison_as_json(flown, name), indent=2)
+def _write(content: str, flown: Flown, title: str, folder: Path) -> None:
     try:
         (folder / "compare.json").write_text(content + "\n", encoding="utf-8")
         # Only who draws needs matplotlib.

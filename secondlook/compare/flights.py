@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
@@ -17,20 +18,48 @@ from secondlook.scenario import Scenario, make_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR
 from secondlook.worker_pool import worker_pool
 
-SELF = "self"
-SELF_LONGER = "self-longer"
-BASELINES = {
-    SELF: "no helper, the primaries pass again where they saw badly, until the same end of the mission",
-    SELF_LONGER: "the same, until the fleet's vehicle-seconds are used up",
-}
+NONE = "none"
+"""The allocator without second looks."""
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What was usual before, flown for comparison. `change`: makes it of a scenario, in whose data it changes what is
+    other. `told_nothing`: its second looks hang on nothing that is seen while the mission lasts."""
+
+    change: Callable[[Scenario, dict[str, Any]], None]
+    told_nothing: bool = False
+
+
+def _self(scenario: Scenario, data: dict[str, Any]) -> None:
+    """No helper, the primaries pass again where they saw badly, until the same end of the mission."""
+    data["vehicles"] = {key: {**data["vehicles"][key], "revisits": True} for key in scenario.survey_vehicles}
+    if data["coordinator"]["allocator"] == NONE:
+        data["coordinator"]["allocator"] = "greedy"
+
+
+def _self_longer(scenario: Scenario, data: dict[str, Any]) -> None:
+    """The same, until the fleet's vehicle-seconds are used up."""
+    _self(scenario, data)
+    data["mission"]["deadline_factor"] = equal_vehicle_seconds(scenario)
+
+
+BASELINES: Mapping[str, Baseline] = {"self": Baseline(_self), "self-longer": Baseline(_self_longer)}
 
 
 @dataclass(frozen=True)
 class Contender:
-    """`name`: an allocator's or a baseline's. `scenario`: what it flies, but for the seed."""
+    """`name`: an allocator's or a baseline's. `scenario`: what it flies, but for the seed. `told_nothing`: of what is
+    seen while the mission lasts."""
 
     name: str
     scenario: Scenario
+    told_nothing: bool = False
+
+    @property
+    def reacts(self) -> bool:
+        """Whether its second looks go where something was seen badly."""
+        return not self.told_nothing and self.name != NONE
 
     def with_seed(self, seed: int) -> Scenario:
         """The mission of one seed."""
@@ -48,7 +77,8 @@ def contenders(scenario: Scenario, names: Sequence[str] = ()) -> list[Contender]
     twice = next((name for index, name in enumerate(chosen) if name in chosen[:index]), None)
     if twice is not None:
         raise UserError(f"--allocators: {twice} is not allowed twice")
-    return [Contender(name, _scenario_of(scenario, name)) for name in chosen]
+    blind = {name for name, baseline in BASELINES.items() if baseline.told_nothing}
+    return [Contender(name, _scenario_of(scenario, name), name in blind) for name in chosen]
 
 
 def equal_vehicle_seconds(scenario: Scenario) -> float:
@@ -62,18 +92,14 @@ def equal_vehicle_seconds(scenario: Scenario) -> float:
 
 def _scenario_of(scenario: Scenario, name: str) -> Scenario:
     data = scenario.model_dump(mode="json", exclude_none=True)
-    if name not in BASELINES:
+    if name in BASELINES:
+        BASELINES[name].change(scenario, data)
+    else:
         try:
             ALLOCATOR.maker(name)
         except Exception as error:
             raise UserError(f"--allocators: {name} is not allowed; {error}, or {' or '.join(BASELINES)}") from error
         data["coordinator"]["allocator"] = name
-        return make_scenario(data)
-    data["vehicles"] = {key: {**data["vehicles"][key], "revisits": True} for key in scenario.survey_vehicles}
-    if data["coordinator"]["allocator"] == "none":
-        data["coordinator"]["allocator"] = "greedy"
-    if name == SELF_LONGER:
-        data["mission"]["deadline_factor"] = equal_vehicle_seconds(scenario)
     return make_scenario(data)
 
 
@@ -92,7 +118,9 @@ class Result:
 
     `primary_s`: when the last primary had surveyed all. `at_primary_s`, `at_105`: then, and at 1.05 times that;
     `at_end`: when the mission was over. `survey_alone`: mean residual risk without any second look. `removed_m2`: what
-    second looks removed of it, times the area. `served`: strips done. `over_time`: about every 10 s.
+    second looks removed of it, times the area. `served`: strips done. `targets_found`: the share that some vehicle has
+    detected, and `targets_expected` what the map lets expect of that, None without targets. `over_time`: about every
+    10 s.
     """
 
     seed: int
@@ -104,6 +132,8 @@ class Result:
     survey_alone: float
     removed_m2: float
     served: int
+    targets_found: float | None
+    targets_expected: float | None
     over_time: tuple[Risk, ...]
 
 
@@ -129,7 +159,7 @@ def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
         return Failure(scenario.seed, "the mission was over before the survey")
     at_primary_s, at_105 = (Risk(**at) for at in summary["risk_at"])
     at_end = Risk(mission_s, summary["risk"]["mean"], summary["risk"]["worst30_mean"])
-    alone = summary["risk_primary_alone"]
+    alone, truth = summary["risk_primary_alone"], summary["truth"]
     return Result(
         seed=scenario.seed,
         digest=summary["digest"],
@@ -140,6 +170,8 @@ def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
         survey_alone=alone["mean"],
         removed_m2=(alone["mean"] - at_end.mean) * alone["cells"] * scenario.area.cell_m**2,
         served=summary["hotspots"]["revisited"],
+        targets_found=None if not truth["targets"] else 1 - truth["missed_share"],
+        targets_expected=None if not truth["targets"] else 1 - truth["predicted_missed_share"],
         over_time=(*notes.taken, at_end),
     )
 

@@ -10,6 +10,7 @@ import numpy as np
 from rich.table import Table
 
 from secondlook.compare.flights import Failure, Flown, Result
+from secondlook.compare.paired import OBJECTIVES, Paired, Verdict, paired
 
 
 @dataclass(frozen=True)
@@ -25,10 +26,9 @@ class Standing:
     """One contender over all seeds that it has flown to the end.
 
     Residual risk, mean over the area and over the worst 30 % of it, when the last primary had surveyed all, at 1.05
-    times that, and at the mission's end, which is `ends_at` times that. `served`: strips done. `removed_m2`: see
-    `Result`. `wins`, `losses`: on how many seeds its mean risk at the end is lower or higher than the first
-    contender's, of those that both have flown; with `worst30_` the same over the worst 30 %. `failed`: missions that
-    failed.
+    times that, and at the mission's end, which is `ends_at` times that. `served`: strips done. `removed_m2`,
+    `targets_found`, `targets_expected`: see `Result`. `failed`: missions that failed. `against_first`: by objective, as
+    far as both have flown the same seeds; empty for the first contender itself.
     """
 
     name: str
@@ -44,20 +44,20 @@ class Standing:
     worst30_mean_end: Spread
     served: Spread
     removed_m2: Spread
-    wins: int
-    losses: int
-    worst30_wins: int
-    worst30_losses: int
+    targets_found: Spread | None
+    targets_expected: Spread | None
+    against_first: dict[str, Paired]
 
 
 def standings(flown: Flown) -> list[Standing]:
     """Those with at least one mission flown, in their order."""
     done = {
-        name: {seed: one for seed, one in by_seed.items() if isinstance(one, Result)} for name, by_seed in flown.items()
+        name: {seed: one for seed, one in sorted(by_seed.items()) if isinstance(one, Result)}
+        for name, by_seed in flown.items()
     }
-    first = next(iter(done.values()), {})
+    first = next(iter(done), "")
     return [
-        _standing(name, list(by_seed.values()), len(flown[name]) - len(by_seed), first)
+        _standing(name, by_seed, len(flown[name]) - len(by_seed), {} if name == first else done[first])
         for name, by_seed in done.items()
         if by_seed
     ]
@@ -73,8 +73,10 @@ def failures(flown: Flown) -> list[str]:
     ]
 
 
-def as_json(flown: Flown, scenario: str) -> dict[str, Any]:
-    """For programs: the standings, and every result without its course."""
+def as_json(
+    flown: Flown, standings: Sequence[Standing], scenario: str, objective: str, reacting: Verdict | None
+) -> dict[str, Any]:
+    """For programs: the standings, whether reacting was worth it, and every result without its course."""
     results = [
         {"contender": name, **{key: value for key, value in asdict(one).items() if key != "over_time"}}
         for name, by_seed in flown.items()
@@ -82,17 +84,24 @@ def as_json(flown: Flown, scenario: str) -> dict[str, Any]:
     ]
     return {
         "scenario": scenario,
-        "contenders": [asdict(standing) for standing in standings(flown)],
+        "objective": objective,
+        "reacting": None if reacting is None else asdict(reacting),
+        "contenders": [asdict(standing) for standing in standings],
         "missions": results,
     }
 
 
-def _standing(name: str, results: Sequence[Result], failed: int, first: dict[int, Result]) -> Standing:
-    def spread(what: Callable[[Result], float]) -> Spread:
-        values = np.array([what(one) for one in results], dtype=np.float64)
-        return Spread(float(values.mean()), float(values.std(ddof=1)) if values.size > 1 else 0.0)
+def _standing(name: str, by_seed: dict[int, Result], failed: int, first: dict[int, Result]) -> Standing:
+    results = list(by_seed.values())
 
-    both = [(one.at_end, first[one.seed].at_end) for one in results if one.seed in first]
+    def spread(what: Callable[[Result], float]) -> Spread:
+        return _spread([what(one) for one in results])
+
+    def spread_if_any(what: Callable[[Result], float | None]) -> Spread | None:
+        values = [value for one in results if (value := what(one)) is not None]
+        return _spread(values) if values else None
+
+    compared = {key: paired(by_seed, first, objective) for key, objective in OBJECTIVES.items()}
     return Standing(
         name=name,
         flown=len(results),
@@ -107,50 +116,61 @@ def _standing(name: str, results: Sequence[Result], failed: int, first: dict[int
         worst30_mean_end=spread(lambda one: one.at_end.worst30_mean),
         served=spread(lambda one: float(one.served)),
         removed_m2=spread(lambda one: one.removed_m2),
-        wins=sum(own.mean < other.mean for own, other in both),
-        losses=sum(own.mean > other.mean for own, other in both),
-        worst30_wins=sum(own.worst30_mean < other.worst30_mean for own, other in both),
-        worst30_losses=sum(own.worst30_mean > other.worst30_mean for own, other in both),
+        targets_found=spread_if_any(lambda one: one.targets_found),
+        targets_expected=spread_if_any(lambda one: one.targets_expected),
+        against_first={key: found for key, found in compared.items() if found is not None},
     )
 
 
-AT = 1.05
-"""Times the survey's duration: the second of the times at which risk is told."""
+def _spread(values: Sequence[float]) -> Spread:
+    array = np.array(values, dtype=np.float64)
+    return Spread(float(array.mean()), float(array.std(ddof=1)) if array.size > 1 else 0.0)
 
 
-def table(standings: Sequence[Standing], title: str) -> Table:
-    """A line for each contender: mean over the seeds, and the standard deviation. What would only repeat other columns,
-    or say that nothing failed, is left out."""
-    ends_later = any(abs(one.ends_at.mean - AT) > 0.005 for one in standings)
-    some_failed = any(one.failed for one in standings)
+def table(standings: Sequence[Standing], title: str, objective: str) -> Table:
+    """A line for each contender: means over the seeds when the mission ends, and how far these lie above the first
+    contender's. What would say nothing, or the same in each line, is left out."""
     made = Table(title=title, title_justify="left", box=None, pad_edge=False, header_style="")
     made.add_column("", no_wrap=True)
-    for name in (
-        "primary ends:\nmean",
-        "\nworst 30 %",
-        f"{AT:g} times that:\nmean",
-        "\nworst 30 %",
-        *(("mission ends:\nat", "\nmean", "\nworst 30 %") if ends_later else ()),
-        "strips\nserved",
-        "risk removed\nm²",
-        "better, worse than\nthe first: mean",
-        "\nworst 30 %",
-        *(("\nfailed",) if some_failed else ()),
-    ):
-        made.add_column(name, justify="right", no_wrap=True)
-    for index, one in enumerate(standings):
-        made.add_row(
-            one.name,
-            *(_risk(spread) for spread in (one.mean, one.worst30_mean, one.mean_105, one.worst30_mean_105)),
-            *((f"{one.ends_at.mean:.2f}", _risk(one.mean_end), _risk(one.worst30_mean_end)) if ends_later else ()),
-            f"{one.served.mean:.1f} ± {one.served.deviation:.1f}",
-            f"{one.removed_m2.mean:.0f} ± {one.removed_m2.deviation:.0f}",
-            f"{one.wins}, {one.losses} of {one.flown}" if index else "",
-            f"{one.worst30_wins}, {one.worst30_losses}" if index else "",
-            *((str(one.failed),) if some_failed else ()),
-        )
+    columns = [[one.name for one in standings]]
+
+    def add(header: str, cells: list[str]) -> None:
+        made.add_column(header, justify="right", no_wrap=True)
+        columns.append(cells)
+
+    add("mean\nrisk", [f"{one.mean_end.mean:.3f}" for one in standings])
+    add("worst\n30 %", [f"{one.worst30_mean_end.mean:.3f}" for one in standings])
+    if any(one.targets_found for one in standings):
+        add("targets\nexpected", [_share(one.targets_expected) for one in standings])
+        add("targets\nfound", [_share(one.targets_found) for one in standings])
+    add("strips\nserved", [f"{one.served.mean:.1f}" for one in standings])
+    if any(abs(one.ends_at.mean - standings[0].ends_at.mean) > 0.005 for one in standings):
+        add("ends\nat", [f"{one.ends_at.mean:.2f}" for one in standings])
+    pairs = [pair for one in standings for pair in one.against_first.values()]
+    if pairs:
+        sure = "" if all(pair.low is None for pair in pairs) else " (95 %)"
+        for key in OBJECTIVES:
+            if key in {"mean", "worst30", objective}:
+                header = f"{OBJECTIVES[key].word}: above\nthe first's{sure}"
+                add(header, [_above(one.against_first.get(key)) for one in standings])
+        add("better,\nworse", [_seeds(one.against_first.get(objective)) for one in standings])
+    if any(one.failed for one in standings):
+        add("\nfailed", [str(one.failed) for one in standings])
+    for row in zip(*columns, strict=True):
+        made.add_row(*row)
     return made
 
 
-def _risk(spread: Spread) -> str:
-    return f"{spread.mean:.3f} ± {spread.deviation:.3f}"
+def _share(spread: Spread | None) -> str:
+    return "" if spread is None else f"{spread.mean:.3f}"
+
+
+def _above(pair: Paired | None) -> str:
+    if pair is None:
+        return ""
+    interval = "" if pair.low is None else f" ({pair.low:+.3f}, {pair.high:+.3f})"
+    return f"{pair.difference:+.3f}{interval}"
+
+
+def _seeds(pair: Paired | None) -> str:
+    return "" if pair is None else f"{pair.better}, {pair.worse}"

@@ -16,22 +16,28 @@ from pathlib import Path
 
 import pytest
 from flights import BRIEF, until
+from results import result
+from rich.console import Console
 
 from secondlook import cli
-from secondlook.compare.flights import Failure, Flown, Result, Risk, contenders, equal_vehicle_seconds, fly
+from secondlook.compare.flights import (
+    BASELINES,
+    Baseline,
+    Contender,
+    Failure,
+    Flown,
+    Result,
+    Risk,
+    contenders,
+    equal_vehicle_seconds,
+    fly,
+)
 from secondlook.compare.plot import _lines
-from secondlook.compare.standings import failures, standings, table
+from secondlook.compare.standings import Standing, failures, standings, table
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR
-
-
-def result(seed: int, end: float, *, served: int = 3, ends_at: float = 1.05, worse: float = 0.2) -> Result:
-    """A mission over 1000 s of survey, with this mean risk from then on, and so much more over the worst 30 %."""
-    then, later = Risk(1000, end, end + worse), Risk(1050, end, end + worse)
-    at_end = Risk(1000 * ends_at, end, end + worse)
-    return Result(seed, "", 1000, then, later, at_end, 0.7, (0.7 - end) * 100, served, (Risk(500, 0.9, 1.0), at_end))
 
 
 class TestWhoIsCompared:
@@ -90,21 +96,68 @@ class TestStandings:
         assert (other.mean_end.mean, other.mean_end.deviation) == pytest.approx((0.44, 0.04 / math.sqrt(2)))
         assert equal.mean.deviation == 0
 
-    def test_wins_and_losses_count_the_seeds_that_both_have_flown(self) -> None:
+    def test_each_is_compared_with_the_first_by_every_objective(self) -> None:
         first, other, equal = standings(FLOWN)
-        assert [(one.wins, one.losses) for one in (first, other, equal)] == [(0, 0), (1, 1), (0, 0)]
-        worst = [(one.worst30_wins, one.worst30_losses) for one in (first, other, equal)]
-        assert worst == [(0, 0), (2, 0), (0, 0)]
+        assert first.against_first == {}
+        assert set(other.against_first) == {"mean", "worst30", "targets"}
+        assert (other.against_first["mean"].better, other.against_first["mean"].worse) == (1, 1)
+        assert (other.against_first["worst30"].better, other.against_first["worst30"].worse) == (2, 0)
+        assert equal.against_first["mean"].difference == 0
+
+    def test_targets_are_told_where_there_are_any(self) -> None:
+        flown: Flown = {"first": {1: result(1, 0.4, found=0.5), 2: result(2, 0.4, found=0.7)}}
+        (one,) = standings(flown)
+        assert one.targets_found is not None
+        assert one.targets_expected is not None
+        assert (one.targets_found.mean, one.targets_expected.mean) == pytest.approx((0.6, 0.5))
+        (none,) = standings({"first": {1: result(1, 0.4, found=None, expected=None)}})
+        assert (none.targets_found, none.targets_expected) == (None, None)
 
     def test_what_failed_is_counted_and_told(self) -> None:
         assert standings(FLOWN)[1].failed == 1
         assert failures(FLOWN) == ["other, seed 3: it failed"]
 
     def test_columns_that_say_nothing_are_left_out(self) -> None:
-        full = table(standings(FLOWN), "")
-        fewer = table(standings({"first": FLOWN["first"]}), "")
-        longer = table(standings({"first": {1: result(1, 0.4, ends_at=2)}}), "")
-        assert [len(one.columns) for one in (fewer, full, longer)] == [9, 10, 12]
+        alone = standings({"first": FLOWN["first"]})
+        assert columns(alone) == ["", "mean risk", "worst 30 %", "targets expected", "targets found", "strips served"]
+        assert columns(standings({"first": {1: result(1, 0.4, found=None, expected=None)}})) == [
+            "", "mean risk", "worst 30 %", "strips served",
+        ]  # fmt: skip
+        assert columns(standings(FLOWN))[6:] == [
+            "mean: above the first's", "worst 30 %: above the first's", "better, worse", " failed",
+        ]  # fmt: skip
+        longer = standings({"first": {1: result(1, 0.4)}, "other": {1: result(1, 0.4, ends_at=2)}})
+        assert "ends at" in columns(longer)
+
+    def test_a_row_by_hand(self) -> None:
+        flown: Flown = {
+            "first": {seed: result(seed, 0.4) for seed in range(1, 7)},
+            "other": {seed: result(seed, 0.44, worse=0.1) for seed in range(1, 7)},
+        }
+        stood = standings(flown)
+        assert cells(stood, "mean") == [
+            "other", "0.440", "0.540", "0.500", "0.600", "3.0",
+            "+0.040 (+0.040, +0.040)", "-0.060 (-0.060, -0.060)", "0, 6",
+        ]  # fmt: skip
+        assert cells(stood, "worst30")[-1] == "6, 0"
+        assert cells(stood, "targets")[-2:] == ["+0.000 (+0.000, +0.000)", "0, 0"]
+
+    def test_a_table_of_all_that_are_bundled_is_no_wider_than_120_characters(self) -> None:
+        names = [one.name for one in contenders(load_scenario("tellaro"))]
+        flown: Flown = {
+            name: {seed: result(seed, 0.4 + 0.1 * place, ends_at=1.05 + place) for seed in range(1, 51)}
+            for place, name in enumerate(names)
+        }
+        assert Console(width=500).measure(table(standings(flown), "", "mean")).maximum <= 120
+
+
+def columns(stood: list[Standing]) -> list[str]:
+    return [str(column.header).replace("\n", " ") for column in table(stood, "", "mean").columns]
+
+
+def cells(stood: list[Standing], objective: str) -> list[str]:
+    """Of the last line."""
+    return [str(list(column.cells)[-1]) for column in table(stood, "", objective).columns]
 
 
 def test_a_mission_is_flown_as_by_run(tmp_path: Path) -> None:
@@ -114,6 +167,8 @@ def test_a_mission_is_flown_as_by_run(tmp_path: Path) -> None:
     assert isinstance(flown, Result)
     assert flown.digest == summary["digest"]
     assert (flown.at_end.mean, flown.served) == (summary["risk"]["mean"], summary["hotspots"]["revisited"])
+    assert flown.targets_found == 1 - summary["truth"]["missed_share"]
+    assert flown.targets_expected == 1 - summary["truth"]["predicted_missed_share"]
     removed = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
     assert flown.removed_m2 == pytest.approx(removed * summary["risk"]["cells"] * 25)
     assert [risk.t_s for risk in flown.over_time] == sorted(risk.t_s for risk in flown.over_time)
@@ -158,7 +213,8 @@ class TestCommand:
         ]  # fmt: skip
         greedy, none = written["contenders"]
         assert greedy["removed_m2"]["mean"] > none["removed_m2"]["mean"] == 0
-        assert none["losses"] == 2
+        assert none["against_first"]["mean"]["worse"] == 2
+        assert (written["objective"], written["reacting"]) == ("mean", None)
         assert (tmp_path / "out" / "risk.png").read_bytes().startswith(b"\x89PNG")
 
     def test_json_alone_is_printed(self, command: Command, by_hand: None) -> None:
@@ -171,8 +227,40 @@ class TestCommand:
     ) -> None:
         code, out, err = command()
         assert (code, err) == (1, "other, seed 3: it failed\n")
+        assert out.startswith("tellaro, seeds 1 to 10, judged by the mean residual risk when the mission ends\n")
         assert "failed" in out
-        assert "0.400 ± 0.100" in out
+        assert "0.440" in out
+
+    def test_seeds_are_flown_from_the_first_one(self, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+        told: list[int] = []
+
+        def fly_all(chosen: object, seeds: range, jobs: int, flown: Flown, progress: object) -> None:
+            told.extend(seeds)
+            flown["none"] = {seed: result(seed, 0.4) for seed in seeds}
+
+        monkeypatch.setattr("secondlook.commands.compare.fly_all", fly_all)
+        code, out, err = command("--allocators", "none", "--seeds", "3", "--first-seed", "1001")
+        assert (code, err, told) == (0, "", [1001, 1002, 1003])
+        assert "seeds 1001 to 1003" in out
+
+    def test_a_line_under_the_table_says_whether_reacting_was_worth_it(
+        self, command: Command, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def fly_all(chosen: list[Contender], seeds: range, jobs: int, flown: Flown, progress: object) -> None:
+            ends = {"plan": 0.3, "greedy": 0.2, "blind": 0.4}
+            flown.update({one.name: {seed: result(seed, ends[one.name]) for seed in seeds} for one in chosen})
+
+        blind = Baseline(lambda scenario, data: None, told_nothing=True)
+        monkeypatch.setattr("secondlook.compare.flights.BASELINES", {**BASELINES, "blind": blind})
+        monkeypatch.setattr("secondlook.commands.compare.fly_all", fly_all)
+        _, out, _ = command("--allocators", "plan,greedy,blind", "--seeds", "6")
+        assert out.splitlines()[-1].startswith(
+            "reacting was worth it: plan leaves 0.300, 0.100 less than blind (95 %: "
+        )
+        _, out, _ = command("--allocators", "plan,greedy,blind", "--seeds", "6", "--json")
+        assert json.loads(out)["reacting"]["worth"] is True
+        _, out, _ = command("--allocators", "plan,greedy", "--seeds", "6")
+        assert "reacting" not in out
 
     @pytest.mark.parametrize(
         ("raised", "told"),
