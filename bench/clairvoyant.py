@@ -35,7 +35,7 @@ from bench.clairvoyant_schedule import best_schedule
 from bench.flown_legs import FlownLegs
 from bench.legs import Schedule, Simulator
 from bench.removable import Clairvoyance, Removable
-from secondlook.compare.flights import BASELINES, Failure, contenders, fly
+from secondlook.compare.flights import Failure, contenders, fly
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.signals import signals_interrupt
@@ -194,8 +194,7 @@ def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
     if not scenario.revisit_vehicles:
         raise UserError(f"{arguments.scenario}: has no helper whose schedule could be compared")
     allocators = arguments.allocators.split(",") if arguments.allocators else [scenario.coordinator.allocator]
-    contenders(scenario, allocators)  # refuses unknown names before anything flies
-    alone = next((name for name in allocators if name in BASELINES), None)
+    alone = next((one.name for one in contenders(scenario, allocators) if not one.scenario.revisit_vehicles), None)
     if alone is not None:
         raise UserError(f"--allocators: {alone} is not allowed; it flies without the helpers that are compared")
     columns = (TextColumn("clairvoyant"), BarColumn(), MofNCompleteColumn(), TextColumn("seeds"), TimeRemainingColumn())

@@ -1,4 +1,4 @@
-"""How long a revision of the rolling plan takes, and how that grows with strips and helpers.
+"""How long planning the routes takes, and how that grows with strips and helpers.
 
 python -m bench.planning_time [--seeds 5] [--json]
 
@@ -18,7 +18,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from coordinator.allocate.rolling import RollingAllocator
+from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.service import expected_service
 from coordinator.allocate.simple import NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
@@ -62,7 +62,7 @@ def situation(strips: int, helpers: int, seed: int) -> Situation:
 
     open_strips = tuple(strip(number) for number in range(1, strips + 1))
     found = tuple(helper(number) for number in range(helpers))
-    return Situation(0.0, 7200.0, open_strips, found, later_m2ps=25.0)
+    return Situation(0.0, 7200.0, open_strips, found)
 
 
 def milliseconds(allocator: Allocator, one: Situation) -> float:
@@ -80,7 +80,7 @@ def measure(seeds: int) -> list[dict[str, float]]:
     rows = []
     for strips, helpers in SIZES:
         situations = [situation(strips, helpers, seed) for seed in range(1, seeds + 1)]
-        plan = [milliseconds(RollingAllocator(), one) for one in situations]
+        plan = [milliseconds(RoutesAllocator(), one) for one in situations]
         nearest = [milliseconds(NearestAllocator(), one) for one in situations]
         rows.append(
             {

@@ -9,9 +9,7 @@ import numpy as np
 
 from bench.swath import Swath
 from comms.node import Received
-from comms.said.messages import CoverageTile, Look
 from planner.dubins import Pose
-from planner.footprints.cells import look_on_grid
 from planner.types import BoolArray, FloatArray, GridSpec
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
@@ -19,7 +17,6 @@ from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import Scenario
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.seabed import make_seabed
-from sim_world.sonar import CurveSonar
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,9 +54,9 @@ class LegHelper:
 class Removable:
     """A mission as a clairvoyant sees it.
 
-    `risk`: the residual risk that the survey alone leaves, grid shape, 0 outside the area. `released_s`: when each cell
-    had its last look by a primary, or when a primary said that none would come any more, if that was sooner. `ends_s`:
-    the mission's deadline; `primary_s`: when the last primary had surveyed all.
+    `risk`: the residual risk that the survey alone leaves, grid shape, 0 outside the area. `released_s`: from when on a
+    look at each cell counts; of a mission that was flown that is from the first second, as looks multiply in any order.
+    `ends_s`: the mission's deadline; `primary_s`: when the last primary had surveyed all.
     """
 
     grid: GridSpec
@@ -85,8 +82,6 @@ class Clairvoyance:
 
     scenario: Scenario
     metrics: Metrics = field(default_factory=Metrics)
-    _looked_s: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    _settled_s: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def __post_init__(self) -> None:
         rho = self.scenario.mission.rho
@@ -98,23 +93,6 @@ class Clairvoyance:
     def hear(self, received: Received) -> None:
         """Takes one message, in the order of sending."""
         self.metrics.hear(received)
-        message, now_s = received.message, received.header.sent_ms / 1000
-        if self.metrics.map is None or received.vehicle not in self.scenario.survey_vehicles:
-            return
-        if not self._looked_s.size:
-            self._looked_s = np.full(self.metrics.map.grid.shape, -np.inf)
-            self._settled_s = np.full(self.metrics.map.grid.shape, np.inf)
-        # A primary's second looks come after its survey and do not count as its last.
-        surveying = self.metrics.vehicles[received.vehicle].finished_ms is None
-        if isinstance(message, Look) and message.valid and surveying:
-            rows, columns, p_detect = look_on_grid(self.metrics.map.grid, message.geometry, message.p_detect)
-            self._looked_s[rows, columns][p_detect > 0] = now_s
-        elif isinstance(message, CoverageTile):
-            window = np.s_[
-                message.first_row : message.first_row + message.settled.shape[0],
-                message.first_column : message.first_column + message.settled.shape[1],
-            ]
-            self._settled_s[window] = np.minimum(self._settled_s[window], np.where(message.settled, now_s, np.inf))
 
     def removable(self) -> Removable:
         """What the messages told; raises ValueError where the survey was not finished."""
@@ -132,7 +110,7 @@ class Clairvoyance:
             grid=metrics.map.grid,
             inside=metrics.inside,
             risk=np.where(metrics.inside, risk, 0.0),
-            released_s=np.minimum(np.where(self._looked_s >= 0, self._looked_s, np.inf), self._settled_s),
+            released_s=np.zeros(metrics.map.grid.shape),
             primary_s=primary_ms / 1000,
             ends_s=primary_ms / 1000 * self.scenario.mission.deadline_factor,
             helpers=leg_helpers(self.scenario, metrics.map.grid, metrics.inside),
@@ -162,7 +140,7 @@ def leg_helpers(scenario: Scenario, grid: GridSpec, inside: BoolArray) -> tuple[
 def _leg_sensor(world: WorldConfig, body: VehicleConfig, grid: GridSpec, inside: BoolArray) -> LegSensor:
     curve = body.sensor.curve
     swath = Swath.of(grid, 2 * float(curve.range_m[-1]))
-    sonar = (body.sensor.sonar or CurveSonar)(curve=curve, seabed=make_seabed(world.seabed, world.area, world.seed))
+    sonar = body.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed))
     x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
     # Either side looks across the same crests: a leg there and a leg back see alike.
     bearing_rad = grid.frame.heading_rad + math.pi / 2

@@ -3,49 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 
 from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
-from coordinator.cut.cutter import Cutter
-from coordinator.cut.strips import Cut
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 
-SWEEPING_SHARE = 0.7  # of a helper's time, that it spends on strips and not on the way
-
 
 class Briefing:
-    """Reads ledger, vehicles and cutter as they are when it is asked; changes none of them."""
+    """Reads ledger and vehicles as they are when it is asked; changes none of them. `p_detect`: what a look along a
+    strip was expected to have when it was cut."""
 
-    def __init__(self, config: CoordinatorConfig, ledger: Ledger, fleet: KnownFleet, cutter: Cutter) -> None:
+    def __init__(self, config: CoordinatorConfig, ledger: Ledger, fleet: KnownFleet, p_detect: float) -> None:
         self._config = config
-        self._grid = fleet.map.grid
+        self._p_detect = p_detect
         self._ledger = ledger
         self._vehicles = fleet.vehicles
         self._primaries = fleet.primaries.values()
-        self._cutter = cutter
 
-    def situation(self, now_ms: int, coming: Sequence[Cut]) -> Situation:
-        """What is decided on now. `coming`: what will be a strip when it has settled."""
+    def situation(self, now_ms: int) -> Situation:
+        """What is decided on now."""
         helpers = self.helpers(now_ms)
-        deadline_s = self.expected_deadline_s()
-        under_way = (one.track_under_way for one in self._primaries)
-        ends_s = [one.ends_s for one in under_way if one is not None]
         return Situation(
             now_s=now_ms / 1000,
-            deadline_s=deadline_s,
+            deadline_s=self.expected_deadline_s(),
             strips=tuple(self.open_strip(record) for record in self._ledger.in_state(StripState.OPEN)),
             helpers=helpers,
-            coming=tuple(self.coming_strip(cut) for cut in coming),
             switch_margin=self._config.switch_margin,
-            later_m2ps=self._worth_later_m2ps(helpers, deadline_s, coming),
-            later_s=min(ends_s, default=math.inf),
         )
 
     def helpers(self, now_ms: int) -> tuple[Helper, ...]:
@@ -61,40 +49,18 @@ class Briefing:
             return math.inf
         return max(known_ms) * self._config.deadline_factor / 1000
 
-    def coming_strip(self, cut: Cut) -> OpenStrip:
-        """What will be a strip, as an allocator sees it."""
-        strip = cut.strip(self._grid, 0)
-        return OpenStrip(strip, self._risk_m2(cut), cut.settles_s)
-
     def open_strip(self, record: StripRecord) -> OpenStrip:
         """A strip as an allocator sees it."""
-        return OpenStrip(record.strip, self._risk_m2(record.cut), record.cut.settles_s)
+        return OpenStrip(record.strip, record.cut.counts_m2 / self._p_detect)
 
-    def sweeps_m2(self, now_ms: int) -> float:
-        """What helpers have time to sweep until the mission ends; infinite while nobody can tell."""
-        deadline_s = self.expected_deadline_s()
-        if math.isinf(deadline_s):
-            return math.inf
-        helpers = self.helpers(now_ms)
-        return SWEEPING_SHARE * sum(max(0.0, deadline_s - one.free_s) * one.speed_mps * one.swath_m for one in helpers)
-
-    def _worth_later_m2ps(self, helpers: Sequence[Helper], deadline_s: float, coming: Sequence[Cut]) -> float:
-        """Of what is open, and of what is to come if the rest of the area is like what has settled."""
-        if not helpers or math.isinf(deadline_s):
-            return 0.0
-        speed_mps = sum(one.speed_mps for one in helpers) / len(helpers)
-        cell_m, overhead_m, to_come = self._grid.cell_m, self._cutter.rules.overhead_m, self._cutter.more_to_come
-
-        def supply(cut: Cut, count: float) -> Supply:
-            length_m = cut.window.rows * cell_m
-            return Supply(cut.counts_m2, (length_m + overhead_m) / speed_mps, count)
-
-        supplies = [supply(cut, 1.0 + to_come) for cut in coming]
-        for record in self._ledger:
-            if record.state is not StripState.WITHDRAWN:
-                there = 1.0 if record.state is StripState.OPEN else 0.0
-                supplies.append(supply(record.cut, there + to_come))
-        return worth_later_m2ps(supplies, sum(max(0.0, deadline_s - one.free_s) for one in helpers))
+    def time_m(self, now_ms: int) -> float:
+        """The metres that helpers have time, and battery, to fly until the mission ends; infinite while nobody can tell
+        of either."""
+        deadline_s, helpers = self.expected_deadline_s(), self.helpers(now_ms)
+        if not helpers:  # some may still come
+            left_s = max(0.0, deadline_s - now_ms / 1000)
+            return sum(left_s * one.entry.speed_mps for one in self._vehicles.values() if one.entry.role.revisits)
+        return sum(max(0.0, min(deadline_s, one.lasts_until_s) - one.free_s) * one.speed_mps for one in helpers)
 
     def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
         """A helper as an allocator sees it; None where it is lost or can be given nothing."""
@@ -131,26 +97,3 @@ class Briefing:
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
         )
-
-    def _risk_m2(self, cut: Cut) -> float:
-        return cut.counts_m2 / self._cutter.rules.p_detect
-
-
-@dataclass(frozen=True)
-class Supply:
-    """Strips of a kind: what one look removes at each (residual risk times m2), the seconds it takes, and how many."""
-
-    removed_m2: float
-    service_s: float
-    count: float
-
-
-def worth_later_m2ps(supplies: Iterable[Supply], helpers_s: float) -> float:
-    """The rate of the last strip served if `helpers_s` seconds go to the strips of the best rates first; 0 where the
-    time suffices for all of them."""
-    left_s = helpers_s
-    for supply in sorted(supplies, key=lambda one: -one.removed_m2 / one.service_s):
-        left_s -= supply.service_s * supply.count
-        if left_s < 0:
-            return supply.removed_m2 / supply.service_s
-    return 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -27,8 +28,8 @@ def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priorit
 class CoordinatorConfig:
     """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
     age of a vehicle's state from which it counts as lost. `min_strip_m`, `max_strip_m`: length of a strip.
-    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, at most:
-    it falls where helpers have time for more.
+    `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
+    there is.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
     `priorities`: ground whose residual risk counts more, or less.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens."""
@@ -41,4 +42,6 @@ class CoordinatorConfig:
     worth_risk: float
     switch_margin: float
     separation_m: float = 0.0
+    objective: Literal["mean", "worst30", "both"] = "both"
+    strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
     priorities: tuple[PriorityGround, ...] = ()

@@ -9,23 +9,26 @@ from itertools import chain
 from comms.node import Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.codec import Header
-from comms.said.messages import AgentState, CoverageTile, Hotspot, Plan, TaskStatus
+from comms.said.messages import AgentState, CoverageTile, Curve, Hotspot, Plan, TaskStatus
 from coordinator.agenda import Agenda, Item
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.dispatch import Dispatch
+from coordinator.expect.expectation import ExpectedMap
+from coordinator.fixed import Beforehand, Lanes
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import NUMBERS_A_SECOND, Ledger
 from coordinator.mission_end import MissionEnd
 from coordinator.outbox import Outbox
-from coordinator.strip_cutting import StripCutting, cutter_for
+from coordinator.strip_cutting import StripCutting
 from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
+from planner.footprints import footprint_of
 from planner.region import Region
 
 log = logging.getLogger("secondlook.coordinator")
 
-CUT_WITHIN_MS = 60_000  # of tiles that come without a hotspot
+CUT_WITHIN_MS = 60_000  # of news by which no helper can be sent at once
 
 
 class Coordinator:
@@ -44,6 +47,7 @@ class Coordinator:
         self._outbox = Outbox()
         self._has_begun = False
         self._cutting: StripCutting | None = None  # where there are helpers
+        self._fixed: Beforehand | Lanes | None = None  # where second looks do not react to what is seen
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
@@ -78,13 +82,21 @@ class Coordinator:
         inside = Region(run.outline, run.hole_outlines).inside(run.grid.spec)
         self.fleet = fleet = KnownFleet(run, config.lost_after_ms, now_ms)
         ledger = Ledger(self._first_number)
-        cutter = cutter_for(run, config, fleet.map, inside)
-        self._strips = strips = StripLife(ledger, fleet, inside, cutter, agenda, outbox)
-        self._dispatch = Dispatch(config, fleet, inside, strips, agenda, outbox)
+        helpers = [one.entry for one in fleet.helpers]
+        narrowest = min(helpers, key=lambda one: footprint_of(one.sonar).reach.strip_width_m, default=None)
+        p_detect = 0.0 if narrowest is None else narrowest.p_detect
+        expected = ExpectedMap(fleet, inside, p_detect)
+        self._strips = strips = StripLife(ledger, fleet, inside, expected, agenda, outbox)
         self._end = MissionEnd(config.deadline_factor, fleet, strips, agenda, outbox)
-        if cutter is not None:
-            self._briefing = Briefing(config, ledger, fleet, cutter)
-            self._cutting = StripCutting(cutter, self._briefing, fleet, strips, agenda)
+        if narrowest is not None:
+            self._briefing = Briefing(config, ledger, fleet, p_detect)
+            self._cutting = StripCutting(narrowest, config, inside, expected, self._briefing, fleet, strips)
+            if config.strips == "beforehand":
+                self._fixed = Beforehand(self._cutting, self._briefing, fleet, strips)
+            elif config.strips != "reacting":
+                self._fixed = Lanes(inside, fleet, strips, across=config.strips == "lanes_across")
+        allocator = config.allocator if self._fixed is None else self._fixed.routes
+        self._dispatch = Dispatch(config, allocator, fleet, inside, strips, agenda, outbox)
         self._has_begun = True
 
     def _hear(self, received: Received, now_ms: int) -> None:
@@ -96,13 +108,19 @@ class Coordinator:
             if self.fleet.hear_tile(received, message):
                 self._agenda.add(Item.CUT, now_ms + CUT_WITHIN_MS)
         elif isinstance(message, Hotspot) and self._cutting is not None:
-            self._cutting.hear_hotspot(received, message, now_ms)
+            if self._cutting.hear_hotspot(received, message):
+                self._agenda.add(Item.CUT, now_ms)
         elif isinstance(message, AgentState) and vehicle is not None:
             self._hear_state(vehicle, header, message, now_ms)
         elif isinstance(message, TaskStatus) and vehicle is not None:
             self._strips.hear_status(vehicle, header, message, now_ms)
-        elif isinstance(message, Plan) and vehicle is not None:
-            vehicle.hear_plan(header, message)
+        elif isinstance(message, Plan | Curve) and vehicle is not None and vehicle.hear_survey(header, message):
+            self._cut_soon(now_ms)
+
+    def _cut_soon(self, now_ms: int) -> None:
+        """There is news of the survey: cut at once where a helper can be sent by it, else before long."""
+        at_hand = any(one.is_idle or one.is_on_its_way for one in self.fleet.helpers)
+        self._agenda.add(Item.CUT, now_ms if at_hand else now_ms + CUT_WITHIN_MS)
 
     def _hear_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost, before = vehicle.is_idle, vehicle.is_finished, vehicle.lost, vehicle.state
@@ -111,7 +129,7 @@ class Coordinator:
         name = vehicle.entry.vehicle
         if was_lost:
             log.info("%s is heard again", name)
-        if vehicle.is_finished and not was_finished:
+        if before is None or (vehicle.is_finished and not was_finished):
             self._agenda.add(Item.CUT, now_ms)
         if vehicle.is_idle and not was_idle:
             self._agenda.add(Item.ASSIGN, now_ms)
@@ -120,14 +138,15 @@ class Coordinator:
         self._strips.hear_state(vehicle, header, state, now_ms, was_idle=was_idle)
 
     def _cut(self, now_ms: int) -> None:
-        if self._cutting is not None:
+        if self._fixed is not None:
+            self._fixed.cut(now_ms)
+        elif self._cutting is not None:
             self._cutting.cut(now_ms)
         self._agenda.add(Item.ASSIGN, now_ms)
 
     def _assign(self, now_ms: int) -> None:
         if self._cutting is not None:
-            self._cutting.open_what_is_ripe(now_ms)
-            self._dispatch.assign(self._briefing.situation(now_ms, self._cutting.coming), now_ms)
+            self._dispatch.assign(self._briefing.situation(now_ms), now_ms)
 
     def _step(self, now_ms: int) -> Step:
         return Step(self._outbox.empty(), self._next_wake_ms(now_ms))

@@ -10,7 +10,7 @@ from comms.said.messages import TaskAction
 from coordinator.agenda import Agenda, Item
 from coordinator.allocate.allocators import checked_offers, offers_let_through
 from coordinator.allocate.service import expected_service
-from coordinator.allocate.situation import Situation
+from coordinator.allocate.situation import Allocator, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.fleet import KnownFleet
 from coordinator.keep_apart.right_of_way import Instruction, RightOfWay, Underway
@@ -27,13 +27,14 @@ class Dispatch:
     def __init__(
         self,
         config: CoordinatorConfig,
+        allocator: Allocator,
         fleet: KnownFleet,
         inside: BoolArray,
         strips: StripLife,
         agenda: Agenda,
         outbox: Outbox,
     ) -> None:
-        self._allocator = config.allocator
+        self._allocator = allocator
         self._fleet = fleet
         self._strips = strips
         self._agenda = agenda

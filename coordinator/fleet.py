@@ -39,6 +39,11 @@ class KnownFleet:
         """The primaries that have not surveyed all and are not given up."""
         return [one for one in self.primaries.values() if one.finished_ms is None]
 
+    @property
+    def helpers(self) -> list[KnownVehicle]:
+        """Those that take strips."""
+        return [one for one in self.vehicles.values() if one.entry.role.revisits]
+
     def hear_tile(self, received: Received, tile: CoverageTile) -> bool:
         """Joins a tile to the map; returns whether it was news. One that does not fit the grid is dropped."""
         name, incarnation = received.vehicle, received.header.incarnation

@@ -13,8 +13,8 @@ from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, StripState, TaskAction, TaskState, TaskStatus
 from coordinator.agenda import Agenda, Item
 from coordinator.allocate.service import Service
-from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import Cut
+from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.outbox import Outbox
@@ -32,8 +32,7 @@ LATE_MS = 60_000  # and so much more
 class StripLife:
     """Writes the `ledger`, and says each change of it; nobody else does.
 
-    `inside`: the area's cells, shape of the grid. `cutter`: learns from strips that are done; None where there is no
-    helper, and so no strip.
+    `inside`: the area's cells, shape of the grid. `expected`: learns from strips that are done.
     """
 
     def __init__(
@@ -41,26 +40,27 @@ class StripLife:
         ledger: Ledger,
         fleet: KnownFleet,
         inside: BoolArray,
-        cutter: Cutter | None,
+        expected: ExpectedMap,
         agenda: Agenda,
         outbox: Outbox,
     ) -> None:
         self.ledger = ledger
         self._fleet = fleet
         self._inside = inside
-        self._cutter = cutter
+        self._expected = expected
         self._agenda = agenda
         self._outbox = outbox
 
-    def open(self, cut: Cut, now_ms: int) -> None:
+    def open(self, cut: Cut, now_ms: int, why: str) -> None:
         """Opens a new strip where it is cut."""
         strip = cut.strip(self._fleet.map.grid, self.ledger.next_number)
-        self._outbox.add_strip(self.ledger.open(strip, cut, now_ms, "badly seen"))
+        self._outbox.add_strip(self.ledger.open(strip, cut, now_ms, why))
 
     def revise(self, record: StripRecord, cut: Cut) -> None:
         """Moves an open strip to where it is cut now, if that is news; who has refused it may be offered it again."""
         change_m2 = abs(cut.counts_m2 - record.cut.counts_m2)
-        if record.window == cut.window and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
+        same = record.window == cut.window and record.cut.foreseen == cut.foreseen
+        if same and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
             return
         self.ledger.revise(record, cut.strip(self._fleet.map.grid, record.strip.number), cut)
         for vehicle in self._fleet.vehicles.values():
@@ -216,8 +216,7 @@ class StripLife:
         name, share = vehicle.entry.vehicle, self._seen_share(record)
         if share >= COVERED_SHARE:
             vehicle.failures = 0
-            if self._cutter is not None:
-                self._cutter.learn(record.window, name, vehicle.entry.p_detect)
+            self._expected.learn(record.window, name, self._of(record)[1].levels_before, vehicle.entry.p_detect)
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         else:
             vehicle.note_failure(record.window)

@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
-from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
+from comms.said.messages import AgentState, Curve, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import Service
-from coordinator.cut.ground import TrackUnderWay
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
@@ -17,7 +18,7 @@ from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.risk import LevelArray
 from planner.sweep import Pass, distance_over, pass_over
-from planner.types import Strip
+from planner.types import DetectionCurve, Strip
 
 log = logging.getLogger("secondlook.coordinator")
 
@@ -81,8 +82,8 @@ class KnownVehicle:
     `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
-    has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, for a
-    primary.
+    has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and
+    `curves`: P(y) by track, 0 for that of earlier missions, for a primary.
     """
 
     entry: RosterVehicle
@@ -98,7 +99,9 @@ class KnownVehicle:
     failures: int = 0
     unanswered: int = 0
     plan: Plan | None = None
+    curves: dict[int, DetectionCurve] = field(default_factory=dict)
     _plan_order: Order = _NONE_YET
+    _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
@@ -118,6 +121,11 @@ class KnownVehicle:
             return False
         on_its_way = self.state.mode is Mode.TRANSIT and (not self.entry.role.surveys or self.finished_ms is not None)
         return on_its_way or self.state.mode is Mode.REVISIT
+
+    @property
+    def is_on_its_way(self) -> bool:
+        """Whether it is on its way to a strip."""
+        return self.is_at_a_strip and self.state is not None and self.state.mode is Mode.TRANSIT
 
     @property
     def is_finished(self) -> bool:
@@ -142,12 +150,26 @@ class KnownVehicle:
             self.finished_ms = None
         return True
 
-    def hear_plan(self, header: Header, plan: Plan) -> None:
-        """Hears its plan; the newest counts."""
+    def hear_survey(self, header: Header, message: Plan | Curve) -> bool:
+        """Hears its plan, or P(y) as it was measured on a track; the newest counts. Returns whether it was news."""
+        return self._hear_plan(header, message) if isinstance(message, Plan) else self._hear_curve(header, message)
+
+    def _hear_plan(self, header: Header, plan: Plan) -> bool:
         order = (header.incarnation, plan.revision)
-        if order > self._plan_order:
-            self._plan_order = order
-            self.plan = plan
+        if order <= self._plan_order:
+            return False
+        self._plan_order = order
+        self.plan = plan
+        return True
+
+    def _hear_curve(self, header: Header, curve: Curve) -> bool:
+        order = (header.incarnation, header.sequence)
+        range_m = np.arange(curve.p_detect.size, dtype=np.float64) * curve.range_bin_m
+        if order <= self._curve_orders.get(curve.track, _NONE_YET) or range_m.size < 2 or curve.range_bin_m <= 0:
+            return False
+        self._curve_orders[curve.track] = order
+        self.curves[curve.track] = DetectionCurve(range_m, curve.p_detect)
+        return True
 
     @property
     def is_trusted(self) -> bool:
@@ -190,17 +212,6 @@ class KnownVehicle:
         if self.finished_ms is not None:
             return self.finished_ms
         return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms)
-
-    @property
-    def track_under_way(self) -> TrackUnderWay | None:
-        """The track that a primary flies; None where it flies none, or not yet, or nobody can tell."""
-        if self.lost or self.state is None or self.plan is None or self.state.mode is not Mode.SURVEY:
-            return None
-        track = next((one for one in self.plan.tracks if one.number == self.state.works_on and not one.flown), None)
-        if track is None or self.state.expected_end_ms == 0:
-            return None
-        sees, ends_s = footprint_of(self.entry.sonar), self.state.expected_end_ms / 1000
-        return TrackUnderWay(track, ends_s, self.entry.speed_mps, sees.widest_m, sees.lead_m)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

@@ -11,13 +11,13 @@ from typing import Protocol
 
 from coordinator.allocate.auction import AuctionAllocator
 from coordinator.allocate.cbba import CbbaAllocator
-from coordinator.allocate.rolling import RollingAllocator
+from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.simple import FirstComeAllocator, GreedyAllocator, NearestAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 
 ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
     {
-        "plan": RollingAllocator,
+        "plan": RoutesAllocator,
         "auction": AuctionAllocator,
         "cbba": CbbaAllocator,
         "greedy": GreedyAllocator,
@@ -28,7 +28,7 @@ ALLOCATORS: Mapping[str, Callable[[], Allocator]] = MappingProxyType(
 )
 
 
-ASKED = 3
+ASKED = 6
 """An allocator is asked so often at most for offers that may be made."""
 ASKED_LATER_S = 20.0
 """What may not be offered for long is asked for again after this time."""

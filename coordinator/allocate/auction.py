@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordinator.allocate.service import StripTable
-from coordinator.allocate.simple import SOON_S
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
 
@@ -50,7 +49,7 @@ class AuctionAllocator:
         return {
             bidder.helper.vehicle: bidder.bought[0]
             for bidder in bidders
-            if bidder.helper.task is None and bidder.bought and bidder.leaves_s <= situation.now_s + SOON_S
+            if bidder.helper.task is None and bidder.bought
         }
 
 
@@ -60,9 +59,8 @@ class _Bidder:
     def __init__(self, helper: Helper, strips: Sequence[OpenStrip], deadline_s: float) -> None:
         self.helper = helper
         self.bought: list[int] = []
-        self.leaves_s = 0.0
         self._numbers = [one.strip.number for one in strips]
-        self._table = StripTable(strips, helper, deadline_s)
+        self._table, self._deadline_s = StripTable(strips, helper), deadline_s
         self._pose, self._free_s = helper.free_at, helper.free_s
         self._unsold = np.ones(len(strips), dtype=np.bool_)
         self._rate_strips()
@@ -83,12 +81,10 @@ class _Bidder:
         self._unsold[place] = False
         if bid.vehicle != self.helper.vehicle:
             return
-        if not self.bought:
-            self.leaves_s = float(self._found.leaves_s[0, place])
         self.bought.append(bid.number)
-        self._pose, self._free_s = Pose(*self._found.leave[0, place].tolist()), float(self._found.free_s[0, place])
+        self._pose, self._free_s = Pose(*self._leave[place].tolist()), float(self._ends_s[place])
         self._rate_strips()
 
     def _rate_strips(self) -> None:
-        self._found = self._table.served_from(np.array([self._pose]), np.array([self._free_s]))
-        self._m2ps = self._found.removed_m2[0] / (self._found.free_s[0] - self._free_s)
+        removed_m2, self._ends_s, self._leave = self._table.best_from(self._pose, self._free_s, self._deadline_s)
+        self._m2ps = removed_m2 / (self._ends_s - self._free_s)

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from coordinator.allocate.service import StripTable, sweeps
+from coordinator.allocate.service import StripTable
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.types import BoolArray, FloatArray
 
@@ -140,25 +140,21 @@ class _Routes:
 
     def __init__(self, helper: Helper, situation: Situation, strips: Sequence[OpenStrip], most: int) -> None:
         self._helper, self._now_s, self._deadline_s = helper, situation.now_s, situation.deadline_s
-        table = StripTable(strips, helper, situation.deadline_s)
-        here = np.array([helper.free_at], dtype=np.float64)
-        first = table.served_from(here, np.array([helper.free_s]))
-        rates = first.removed_m2[0] / (first.free_s[0] - helper.free_s)
+        alone = StripTable(strips, helper)
+        removed_m2, ends_s, _ = alone.best_from(helper.free_at, helper.free_s, situation.deadline_s)
+        rates = removed_m2 / (ends_s - helper.free_s)
         best = np.argsort(-rates, kind="stable")[:most]
         self._places = np.sort(best[rates[best] > 0])
         self._strips = len(strips)
         considered = [strips[place] for place in self._places]
-        ways = [sweeps(one.strip, helper) for one in considered]
-        each = max(map(len, ways), default=1)
-        ends = np.array([way[min(n, len(way) - 1)].leave for way in ways for n in range(each)]).reshape(-1, each, 3)
-        froms = np.vstack([here, ends.reshape(-1, 3)])
-        found = table.of(self._places).served_from(froms, np.full(len(froms), helper.free_s))
-        end = np.abs(found.leave[:, :, np.newaxis] - ends).sum(axis=3).argmin(axis=2)
+        table = StripTable(considered, helper)
+        to_begin_s, ways = table.shortest_from(np.vstack([[helper.free_at], table.leave.reshape(-1, 3)]))
+        numbers = np.arange(len(considered))
         # From each of these to each strip: the time until it is free again, and from where it then sets out.
-        self._takes_s = found.free_s - helper.free_s
-        self._then = 1 + each * np.arange(len(considered)) + end
-        self._sweep_s = np.array([way[0].length_m - 2 * helper.run_in_m for way in ways]) / helper.speed_mps
-        self._removable_m2 = helper.p_detect * np.array([one.risk_m2 for one in considered], dtype=np.float64)
+        self._takes_s = to_begin_s + table.sonar_on_s[numbers, ways] + helper.run_in_m / helper.speed_mps
+        self._then = 1 + table.leave.shape[1] * numbers + ways
+        self._sweep_s = table.sonar_on_s[:, 0]
+        self._removable_m2 = table.worth_m2
 
     def gains(self, path: Sequence[int]) -> tuple[FloatArray, IntArray]:
         """What each strip adds to the score of a path at the best place in it, 0 for what is in it already, and that

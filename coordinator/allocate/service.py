@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from coordinator.allocate.situation import Helper, OpenStrip
 from planner.dubins import Pose, path_lengths_m
@@ -16,10 +17,8 @@ from planner.types import FloatArray, Strip
 
 @dataclass(frozen=True)
 class Service:
-    """A helper's service of a strip: when it sets out, when its sonar goes on, when it has seen all, and where and when
-    it is free."""
+    """A helper's service of a strip: when its sonar goes on, when it has seen all, and where and when it is free."""
 
-    leaves_s: float
     begins_s: float
     ends_s: float
     free_at: Pose
@@ -36,18 +35,13 @@ def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
 
 
 def expected_service(one: OpenStrip, helper: Helper) -> Service:
-    """The service of a strip from where and when a helper is free, flown the shortest way, as its agent does. Where the
-    strip is still settling the helper sets out as late as it must."""
+    """The service of a strip from where and when a helper is free, flown the shortest way, as its agent does."""
     sweep, way_m = shortest_sweep(sweeps(one.strip, helper), helper.free_at, helper.turn_radius_m)
     to_begin_s = (way_m + helper.run_in_m) / helper.speed_mps
     sonar_on_s = (sweep.length_m - 2 * helper.run_in_m) / helper.speed_mps
     begins_s = helper.free_s + to_begin_s
-    if one.settles_s > 0:
-        wake_s = one.settles_s - (one.strip.length_m / helper.speed_mps if sweep.follows else 0.0)
-        begins_s = max(begins_s, wake_s)
     ends_s = begins_s + sonar_on_s
     return Service(
-        leaves_s=begins_s - to_begin_s,
         begins_s=begins_s,
         ends_s=ends_s,
         free_at=sweep.leave,
@@ -62,64 +56,54 @@ def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: floa
     return helper.p_detect * one.risk_m2 * served.share_by(deadline_s)
 
 
-@dataclass(frozen=True)
-class ServiceArrays:
-    """Services as arrays of shape (n, strips), for n places: what each removes by the deadline, 0 where it cannot be;
-    when the helper sets out; when it is free; and `leave`, shape (n, strips, 3), its pose then."""
-
-    removed_m2: FloatArray
-    leaves_s: FloatArray
-    free_s: FloatArray
-    leave: FloatArray
-
-
 class StripTable:
-    """What a helper finds at each of some strips. Strips that it is not to be offered are worth nothing to it."""
+    """What a helper finds at each of some strips, flown in each of some ways; of a strip that has fewer the last is
+    repeated. All arrays have shape (strips, ways), poses a third axis of 3.
 
-    def __init__(self, strips: Sequence[OpenStrip], helper: Helper, deadline_s: float) -> None:
-        self._helper = helper
-        self._deadline_s = deadline_s
+    `entry`, `leave`: the poses in which a way is begun, before its run-in, and left, behind its run-out. `sonar_on_s`:
+    from when its sonar goes on until all is seen. `worth_m2`: what the strip's sweep removes, shape (strips,); 0 for
+    one that the helper is not to be offered.
+    """
+
+    def __init__(self, strips: Sequence[OpenStrip], helper: Helper) -> None:
         ways = [sweeps(one.strip, helper) for one in strips]
         most = max(map(len, ways), default=1)
         filled = [(*way, *[way[-1]] * (most - len(way))) for way in ways]
         shape = (len(strips), most)
-        self._entry = np.array([one.entry for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
-        self._leave = np.array([one.leave for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
-        self._length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
-        settles_s = np.array([one.settles_s for one in strips], dtype=np.float64)
-        wake_s = settles_s - np.array([one.strip.length_m for one in strips]) / helper.speed_mps
-        follows = np.array([one.follows for way in filled for one in way], dtype=np.bool_).reshape(shape)
-        may_begin_s = np.where(follows, wake_s[:, np.newaxis], settles_s[:, np.newaxis])
-        self._may_begin_s = np.where(settles_s[:, np.newaxis] > 0, may_begin_s, -np.inf)
+        self.helper = helper
+        self.entry = np.array([one.entry for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
+        self.leave = np.array([one.leave for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
+        length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
+        self.sonar_on_s: FloatArray = (length_m - 2 * helper.run_in_m) / helper.speed_mps
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
-        self._removable_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
+        self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 
-    def of(self, chosen: np.ndarray[tuple[int], np.dtype[np.intp]]) -> StripTable:
-        """The table of some of the strips, by their places."""
-        table = object.__new__(StripTable)
-        table.__dict__ = {
-            name: value[chosen] if isinstance(value, np.ndarray) else value for name, value in self.__dict__.items()
-        }
-        return table
+    def to_begin_s(self, poses: FloatArray) -> FloatArray:
+        """How long it is from poses, shape (n, 3), until the sonar goes on, shape (n, strips, ways)."""
+        way_m = path_lengths_m(poses, self.entry.reshape(-1, 3), self.helper.turn_radius_m)
+        return (way_m.reshape(len(poses), *self.sonar_on_s.shape) + self.helper.run_in_m) / self.helper.speed_mps
 
-    def served_from(self, poses: FloatArray, times_s: FloatArray) -> ServiceArrays:
-        """The services of all strips, each by itself, from poses, shape (n, 3), at these times, shape (n,)."""
-        helper, (count, ways) = self._helper, self._length_m.shape
-        speed_mps, run_in_m = helper.speed_mps, helper.run_in_m
-        way_m = path_lengths_m(poses, self._entry.reshape(-1, 3), helper.turn_radius_m).reshape(len(poses), count, ways)
-        # To the micrometre: of equals the first.
-        chosen = np.round(way_m + self._length_m, 6).argmin(axis=2)[:, :, np.newaxis]
-        way_m = np.take_along_axis(way_m, chosen, axis=2)[:, :, 0]
-        strips = np.arange(count)
-        which = chosen[:, :, 0]
-        to_begin_s = (way_m + run_in_m) / speed_mps
-        begins_s = np.maximum(times_s[:, np.newaxis] + to_begin_s, self._may_begin_s[strips, which])
-        sonar_on_s = (self._length_m[strips, which] - 2 * run_in_m) / speed_mps
-        share = np.clip((self._deadline_s - begins_s) / sonar_on_s, 0.0, 1.0)
-        ends_s = begins_s + sonar_on_s
-        return ServiceArrays(
-            removed_m2=np.where(ends_s <= helper.lasts_until_s, self._removable_m2 * share, 0.0),
-            leaves_s=begins_s - to_begin_s,
-            free_s=ends_s + run_in_m / speed_mps,
-            leave=self._leave[strips, which],
-        )
+    def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
+        """Of each strip the way that is shortest from poses, shape (n, 3), as an agent flies it: how long it is until
+        the sonar goes on, and which way that is, both of shape (n, strips)."""
+        to_begin_s = self.to_begin_s(poses)
+        # To the microsecond: of equals the first.
+        ways = np.round(to_begin_s + self.sonar_on_s, 6).argmin(axis=2)
+        return np.take_along_axis(to_begin_s, ways[:, :, np.newaxis], axis=2)[:, :, 0], ways
+
+    def removed_m2(self, begins_s: FloatArray, deadline_s: float) -> FloatArray:
+        """What services remove by the deadline that begin at these times, shape (n, strips, ways); nothing where the
+        battery does not last to their end."""
+        share = np.clip((deadline_s - begins_s) / self.sonar_on_s, 0.0, 1.0)
+        lasts = begins_s + self.sonar_on_s <= self.helper.lasts_until_s
+        return np.where(lasts, self.worth_m2[:, np.newaxis] * share, 0.0)
+
+    def best_from(self, pose: Pose, free_s: float, deadline_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of each strip, served from a pose at a time by the way that is shortest: what that removes, when it ends,
+        shape (strips,), and the pose in which it is left, shape (strips, 3)."""
+        (to_begin_s,), (way,) = self.shortest_from(np.array([pose], dtype=np.float64))
+        strips = np.arange(to_begin_s.size)
+        begins_s, sonar_on_s = free_s + to_begin_s, self.sonar_on_s[strips, way]
+        ends_s = begins_s + sonar_on_s + self.helper.run_in_m / self.helper.speed_mps
+        removed_m2 = self.removed_m2(begins_s[:, np.newaxis], deadline_s)
+        return removed_m2[strips, way], ends_s, self.leave[strips, way]

@@ -8,9 +8,6 @@ from dataclasses import dataclass
 from coordinator.allocate.service import Service, expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 
-SOON_S = 1.0
-"""A strip is offered so long before the helper has to set out."""
-
 
 @dataclass(frozen=True)
 class GreedyAllocator:
@@ -64,7 +61,7 @@ def _best_pairs(
             if one.strip.number not in helper.refused:
                 served = expected_service(one, helper)
                 removed = removed_m2(one, helper, served, situation.deadline_s)
-                if removed > 0 and served.leaves_s <= situation.now_s + SOON_S:
+                if removed > 0:
                     rated.append((merit(helper, one, served, removed), -one.strip.number, helper.vehicle))
     rated.sort(key=lambda pair: pair[2])
     rated.sort(key=lambda pair: pair[:2], reverse=True)

@@ -13,15 +13,10 @@ from planner.types import Strip
 @dataclass(frozen=True)
 class OpenStrip:
     """A strip and the residual risk on it as it counts in the objective, summed over its cells and times their area; a
-    sweep by a helper is expected to remove its `p_detect` of that.
-
-    `settles_s`: when all of it will have settled, 0 if it has. Until then a helper must follow in the survey's wake,
-    the strip's way, and not overtake it.
-    """
+    sweep by a helper is expected to remove its `p_detect` of that."""
 
     strip: Strip
     risk_m2: float
-    settles_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -56,20 +51,15 @@ class Situation:
     """All that an allocator decides on. Times are seconds since the mission's start.
 
     `deadline_s`: when the mission is expected to be over, infinite while nobody can tell. `strips`: the open ones.
-    `coming`: what is still settling and may soon be a strip; not to be offered yet, its numbers are 0. `helpers`: those
-    that are there. `switch_margin`: share of a task's worth by which turning a helper round must be better.
-    `later_m2ps`: what a second of a helper is expected to remove from `later_s` on (residual risk times m2), when there
-    will be more strips.
+    `helpers`: those that are there. `switch_margin`: share of a task's worth by which turning a helper round must be
+    better.
     """
 
     now_s: float
     deadline_s: float
     strips: tuple[OpenStrip, ...]
     helpers: tuple[Helper, ...]
-    coming: tuple[OpenStrip, ...] = ()
     switch_margin: float = 0.2
-    later_m2ps: float = 0.0
-    later_s: float = 0.0
 
     @property
     def free(self) -> tuple[Helper, ...]:

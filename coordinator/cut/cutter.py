@@ -1,170 +1,115 @@
-"""Where a second look is worth flying to, and what is still to come: from the hotspots, the fleet's map, what helpers
-have found, and what the primaries are about to settle. Cut anew is only where something has changed."""
+"""Cuts as many strips as helpers have time for: the price of a metre flown is found at which they are just so many."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 
-import numpy as np
-
-from comms.said.messages import Hotspot
-from coordinator.cut.ground import BadlySeen, ExpectedLooks, Growth, Place, Revision, TrackUnderWay
-from coordinator.cut.strips import Cut, CuttingRules, cut_strips, stretches
+from coordinator.cut.ground import Ground
+from coordinator.cut.strips import Cut, CuttingRules, cut_windows
 from coordinator.cut.window import Window
-from planner.fleet_map import FleetMap
-from planner.risk import NATS_PER_LEVEL
-from planner.types import BoolArray, FloatArray, GridSpec
+from planner.types import GridSpec
 
-RISK_STEP = 0.05
-"""Worth is told in steps, so that it does not change with every look."""
-
-
-def worth_risk(risk: FloatArray, cells: float, least_weight: float = 1.0) -> float:
-    """Residual risk from which a cell is worth a second look, if helpers have time for so many: rounded down to a step,
-    at least one, of what counts least. `risk`: as it counts, of the cells that may be worth one."""
-    count = int(cells)
-    least_step = RISK_STEP * least_weight
-    if count >= risk.size:
-        return least_step
-    least = float(np.partition(risk, risk.size - 1 - count)[risk.size - 1 - count])
-    return max(least_step, int(least / RISK_STEP + 1e-9) * RISK_STEP)
-
-
-@dataclass
-class LastCut:
-    """Remembers one cut at a time; before the first one all has changed."""
-
-    grid: GridSpec
-    _arrays: tuple[FloatArray | BoolArray, ...] = ()
-    _rules: CuttingRules | None = None
-    _claimed: frozenset[Window] = frozenset()
-
-    def changed_columns(
-        self,
-        risk: FloatArray,
-        open_cells: BoolArray,
-        growth: Growth,
-        rules: CuttingRules,
-        claimed: Iterable[Window],
-    ) -> BoolArray:
-        """Columns, shape (columns,), with a cell whose risk, settling or strip is another than at the last cut, and
-        those two swaths beside; all of them where the rules are others.
-
-        `claimed`: the windows that are a strip's, or will be; where one has gone its cells have changed. Remembers
-        the arrays and the rules.
-        """
-        arrays = (risk, open_cells, growth.risk, growth.settles_s, growth.descending)
-        if rules != self._rules:
-            self._arrays, self._rules = arrays, rules
-            return np.ones(self.grid.columns, dtype=np.bool_)
-        changed = np.zeros(self.grid.shape, dtype=np.bool_)
-        for now, before in zip(arrays, self._arrays, strict=True):
-            changed |= now != before
-        found = np.zeros(self.grid.columns, dtype=np.bool_)
-        found |= changed.any(axis=0)
-        for window in self._claimed.difference(claimed):
-            found[window.columns] = True
-        self._arrays = arrays
-        reach = 2 * rules.columns(self.grid)
-        columns = np.zeros_like(found)
-        for stretch in stretches(found):
-            columns[max(0, stretch.start - reach) : stretch.stop + reach] = True
-        return columns
-
-    def remember(self, claimed: Iterable[Window]) -> None:
-        """Remembers the windows that are a strip's, or will be, after the cut."""
-        self._claimed = frozenset(claimed)
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """The area as it was at one time. `columns`: those to be cut anew; for the other arrays see `cut_strips`."""
-
-    columns: BoolArray
-    risk: FloatArray
-    open_cells: BoolArray
-    growth: Growth
+SPARE_STRIPS = 4  # so many more than helpers have time for, so that there is a choice to the end
+STEP = 1.2  # by which the price is changed until they are so many
+MOST_STEPS = 48  # more than from the least price to the highest there is
+STAYS_FOR = 0.01  # share by which strips cut anew must be better than those that are open
 
 
 class Cutter:
-    """Cuts the area again and again, each time only where something has changed.
+    """Remembers the price, which hardly changes from one cut to the next. `least_worth`: what a cell has to count for a
+    look to be worth flying there whatever time there is, as a mean over a swath (residual risk times m2)."""
 
-    `inside`: the area's cells, shape of the map's grid. `rules`: their `worth_risk` is the most that it may become; it
-    falls where helpers have time for more than is badly seen. `weights`: how many times a cell's risk counts
-    when strips are compared.
-    """
-
-    def __init__(self, fleet: FleetMap, inside: BoolArray, rules: CuttingRules, weights: FloatArray) -> None:
+    def __init__(self, grid: GridSpec, rules: CuttingRules, least_worth: float) -> None:
         self.rules = rules
-        self._weights = weights
-        self._least_weight = min(1.0, float(weights[weights > 0].min(initial=1.0)))
-        self.more_to_come = 0.0
-        """Area that is still to settle, as a multiple of what has."""
-        self._most_worth_risk = rules.worth_risk
-        self._fleet = fleet
-        self._inside = inside
-        self._inside_cells = int(inside.sum())
-        self._badly_seen = BadlySeen(fleet.grid, inside)
-        self._expected_looks = ExpectedLooks(fleet.grid)
-        self._last_cut = LastCut(fleet.grid)
+        self._grid = grid
+        self._least_price = least_worth * rules.swath_m / grid.cell_area_m2
+        self._price = self._least_price
+        self.threshold = 0.0
+        """Residual risk from which on a cell will be of the worst, see `Ground`."""
 
-    def hear_hotspot(self, place: Place, revision: Revision, message: Hotspot) -> bool:
-        """Hears a hotspot's newest word; returns whether it was news."""
-        return self._badly_seen.hear(place, revision, message)
+    def cut(self, ground: Ground, time_m: float, claimed: Sequence[Window], opened: Sequence[Window]) -> list[Cut]:
+        """The strips worth flying, where helpers can fly `time_m` until the mission ends, infinite while nobody can
+        tell.
 
-    def learn(self, window: Window, helper: str, typical: float) -> None:
-        """Learns what second looks find, from what a helper that has swept a window has told of it.
-
-        `typical`: its P_d as the run tells it.
+        `claimed`: windows that are with a vehicle. `opened`: those of the open strips, which stay where they are if
+        what is cut anew is hardly better.
         """
-        layer = self._fleet.layers.get(helper)
-        if layer is not None:
-            p_detect = -np.expm1(-NATS_PER_LEVEL * layer.largest_levels[window.cells].astype(np.float64))
-            self._expected_looks.learn(window, p_detect, typical)
-
-    def assess(
-        self, primaries: Mapping[str, TrackUnderWay | None], sweeps_m2: float, claimed: Sequence[Window]
-    ) -> Ground:
-        """Assesses the area as it is now: what is badly seen, what still grows, and what a look must bring.
-
-        `primaries`: the track that each flies. `sweeps_m2`: what helpers have time for until the mission ends, infinite
-        while nobody can tell. `claimed`: the windows that are a strip's, or will be.
-        """
-        fleet, inside = self._fleet, self._inside
-        settled = fleet.settled_by(primaries)
-        risk = self._badly_seen.risk(fleet, settled)
-        risk = risk * self._expected_looks.factor(risk)
-        open_cells = self._badly_seen.still_open(fleet.told_by(primaries), settled)
-        growth = Growth.none(fleet.grid)
-        for name, under_way in primaries.items():
-            if under_way is not None and name in fleet.layers:
-                growth.add(fleet.grid, inside, risk, fleet.layers[name], under_way)
-        ahead = int((inside & ~settled & (growth.settles_s == 0)).sum())
-        self.more_to_come = ahead / max(1, self._inside_cells - ahead)
-        if math.isfinite(sweeps_m2):
-            cells = sweeps_m2 / fleet.grid.cell_area_m2 / (1.0 + self.more_to_come)
-            counts = risk * self._weights
-            marginal = worth_risk(counts[counts > 0], cells, self._least_weight)
-            worth = min(self._most_worth_risk, marginal)
-            self.rules = replace(self.rules, worth_risk=worth, marginal_risk=marginal)
-        columns = self._last_cut.changed_columns(risk, open_cells, growth, self.rules, claimed)
-        return Ground(columns, risk, open_cells, growth)
-
-    def cut(self, ground: Ground, claimed: Sequence[Window]) -> list[Cut]:
-        """The strips in the columns to be cut anew, best first; `claimed`: windows that are a strip's already."""
-        return cut_strips(
-            self._fleet.grid,
-            ground.risk,
-            ground.open_cells,
-            self.rules,
-            claimed,
-            ground.growth,
-            ground.columns,
-            self._weights,
+        left = ground.copy()
+        for window in claimed:
+            left.fly(window)
+        if time_m <= 0:  # nobody can be sent any more: what is open is left as it is
+            self._expect_worst(left, time_m, ())
+            return _cuts(left, opened, self._grid.cell_area_m2)
+        anew = _cuts(left, self._windows(left, time_m), self._grid.cell_area_m2)
+        as_open = _cuts(left, opened, self._grid.cell_area_m2)
+        suffices = self._metres(opened) >= min(
+            self._enough_m(time_m, opened), self._metres([one.window for one in anew])
         )
+        stays = suffices and self._profit(as_open) >= (1.0 - STAYS_FOR) * self._profit(anew)
+        cuts = as_open if stays else anew
+        self._expect_worst(left, time_m, cuts)
+        return cuts
 
-    def remember(self, claimed: Sequence[Window]) -> None:
-        """Remembers the windows that are a strip's, or will be, after the cut."""
-        self._last_cut.remember(claimed)
+    def _expect_worst(self, left: Ground, time_m: float, cuts: Sequence[Cut]) -> None:
+        """Finds from which residual risk on a cell will be of the worst, if helpers fly the best of the strips."""
+        for cut in self._best_first(cuts):
+            time_m -= self._metres([cut.window])
+            if time_m < 0:
+                break
+            left.fly(cut.window)
+        self.threshold = left.worst_from()
+
+    def _windows(self, ground: Ground, time_m: float) -> list[Window]:
+        """As many windows as there is time for, at the highest price at which they are, and behind them some to
+        spare."""
+        found = self._at(ground, self._price)
+        for _ in range(MOST_STEPS):
+            if self._metres(found) < time_m:
+                if self._price <= self._least_price:
+                    break
+                self._price = max(self._least_price, self._price / STEP)
+                found = self._at(ground, self._price)
+            else:
+                dearer = self._at(ground, self._price * STEP)
+                if self._metres(dearer) < time_m:
+                    break
+                self._price, found = self._price * STEP, dearer
+        price, left = self._price, ground.copy()
+        for window in found:
+            left.fly(window)
+        while self._metres(found) < self._enough_m(time_m, found) and price > self._least_price:
+            price = max(self._least_price, price / STEP**2)
+            new = [one for one in self._at(left, price) if not one.is_at_one_of(found)]
+            for window in new:
+                left.fly(window)
+            found = [*found, *new]
+        return found
+
+    def _enough_m(self, time_m: float, found: Sequence[Window]) -> float:
+        return time_m + SPARE_STRIPS * self._metres(found) / max(1, len(found))
+
+    def _at(self, ground: Ground, price: float) -> list[Window]:
+        return cut_windows(self._grid, ground, self.rules, price)
+
+    def _metres(self, windows: Sequence[Window]) -> float:
+        return sum(one.cells_long * self._grid.cell_m + self.rules.overhead_m for one in windows)
+
+    def _profit(self, cuts: Sequence[Cut]) -> float:
+        return sum(one.counts_m2 for one in cuts) - self._price * self._metres([one.window for one in cuts])
+
+    def _best_first(self, cuts: Sequence[Cut]) -> list[Cut]:
+        return sorted(cuts, key=lambda one: -one.counts_m2 / self._metres([one.window]))
+
+
+def _cuts(ground: Ground, windows: Sequence[Window], cell_area_m2: float) -> list[Cut]:
+    """What windows bring if they are flown one after the other."""
+    left, found = ground.copy(), list[Cut]()
+    for window in windows:
+        cells = window.cells
+        worth = left.worth(cells)
+        counts_m2 = float(worth.sum())
+        removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * cell_area_m2
+        foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
+        found.append(Cut(window, removed_m2, counts_m2, foreseen))
+        left.fly(window)
+    return found

@@ -10,12 +10,14 @@ SAME_PLACE = 0.75  # share of a window's cells
 
 @dataclass(frozen=True)
 class Window:
-    """A rectangle of whole cells: rows [first_row, end_row), columns [first_column, end_column)."""
+    """A rectangle of whole cells: rows [first_row, end_row), columns [first_column, end_column). Its strip runs up the
+    rows, along the tracks, or `across` them, along the columns."""
 
     first_row: int
     end_row: int
     first_column: int
     end_column: int
+    across: bool = False
 
     @property
     def cells(self) -> tuple[slice, slice]:
@@ -33,9 +35,24 @@ class Window:
         return self.end_row - self.first_row
 
     @property
+    def columns_wide(self) -> int:
+        """Number of columns."""
+        return self.end_column - self.first_column
+
+    @property
     def size(self) -> int:
         """Number of cells."""
-        return self.rows * (self.end_column - self.first_column)
+        return self.rows * self.columns_wide
+
+    @property
+    def turned(self) -> Window:
+        """The same on the grid with rows and columns exchanged."""
+        return Window(self.first_column, self.end_column, self.first_row, self.end_row, not self.across)
+
+    @property
+    def cells_long(self) -> int:
+        """Number of cells that its strip is long."""
+        return self.columns_wide if self.across else self.rows
 
     def shared(self, other: Window) -> int:
         """Number of cells that lie in both."""

@@ -44,7 +44,35 @@ def _self_longer(scenario: Scenario, data: dict[str, Any]) -> None:
     data["mission"]["deadline_factor"] = equal_vehicle_seconds(scenario)
 
 
-BASELINES: Mapping[str, Baseline] = {"self": Baseline(_self), "self-longer": Baseline(_self_longer)}
+def _lawnmower(scenario: Scenario, data: dict[str, Any]) -> None:
+    """Helpers share the area and mow it, lane by lane along the tracks, from the first second."""
+    data["coordinator"]["strips"] = "lanes"
+
+
+def _across(scenario: Scenario, data: dict[str, Any]) -> None:
+    """The same across the tracks."""
+    data["coordinator"]["strips"] = "lanes_across"
+
+
+def _beforehand(scenario: Scenario, data: dict[str, Any]) -> None:
+    """Helpers fly the best routes for what is expected when the mission begins, whatever is seen."""
+    data["coordinator"]["strips"] = "beforehand"
+
+
+def _second_survey(scenario: Scenario, data: dict[str, Any]) -> None:
+    """No helper, the primaries survey once more across their tracks, until the fleet's vehicle-seconds are used up."""
+    _self_longer(scenario, data)
+    data["coordinator"]["strips"] = "lanes_across"
+
+
+BASELINES: Mapping[str, Baseline] = {
+    "lawnmower": Baseline(_lawnmower, told_nothing=True),
+    "across": Baseline(_across, told_nothing=True),
+    "beforehand": Baseline(_beforehand, told_nothing=True),
+    "self": Baseline(_self),
+    "self-longer": Baseline(_self_longer),
+    "second_survey": Baseline(_second_survey),
+}
 
 
 @dataclass(frozen=True)

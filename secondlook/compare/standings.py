@@ -150,7 +150,7 @@ def table(standings: Sequence[Standing], title: str, objective: str) -> Table:
     if pairs:
         sure = "" if all(pair.low is None for pair in pairs) else " (95 %)"
         for key in OBJECTIVES:
-            if key in {"mean", "worst30", objective}:
+            if key in {"mean", "worst30"} or (key == objective and key != "both"):  # which is these two
                 header = f"{OBJECTIVES[key].word}: above\nthe first's{sure}"
                 add(header, [_above(one.against_first.get(key)) for one in standings])
         add("better,\nworse", [_seeds(one.against_first.get(objective)) for one in standings])

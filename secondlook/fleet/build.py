@@ -267,6 +267,8 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         max_strip_m=scenario.coordinator.max_strip_m,
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
+        strips=scenario.coordinator.strips,
+        objective=scenario.coordinator.objective,
         separation_m=scenario.mission.separation_m,
         priorities=tuple(PriorityGround((one.polygon_m,), one.weight) for one in scenario.area.priorities),
     )

@@ -126,9 +126,16 @@ class Coordinator(Mapping):
     """Least length of a strip."""
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
     """Largest length of a strip, at least `min_strip_m`."""
-    worth_risk: OpenShare = 0.3
+    worth_risk: OpenShare = 0.05
     """Mean residual risk, times the weight of the ground, over the helper's swath from which a further metre of strip
-    is worth flying, at most: less where helpers have time for more."""
+    is worth flying, whatever time there is."""
+    strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
+    """Where second looks go: `reacting` to all that is heard; to the best routes that can be planned `beforehand`; to
+    `lanes` side by side that helpers mow from the first second, along the tracks or across. The last three are what the
+    first is compared with: for them `allocator` counts for nothing."""
+    objective: Literal["mean", "worst30", "both"] = "both"
+    """What second looks are to bring down: the `mean` residual risk, that of the worst 30 % of the area (`worst30`), or
+    `both`, the mean counting four times as much."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
     """A helper is turned round for a plan that is better by at least this share."""
 

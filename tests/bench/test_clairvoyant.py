@@ -180,8 +180,9 @@ class TestALegOnTheMap:
         inside = np.ones(grid.shape, dtype=np.bool_)
         (flown_by,) = leg_helpers(scenario, grid, inside)
         assert flown_by.sensor.swath.width == width
-        strip = strip_of(grid, Window(4, 16, 20, 20 + width), 1, descending=not up)
+        strip = strip_of(grid, Window(4, 16, 20, 20 + width), 1)
         (leg,) = legs_over_strip(strip, 2 * range_m)
+        leg = leg if up else replace(leg, start=leg.end, end=leg.start)
 
         world = fleet.specs["world"].config
         config = next(body for body in world.vehicles if body.vehicle == "helper")
@@ -195,7 +196,7 @@ class TestALegOnTheMap:
         coverage, fleet_map = CoverageLayer("helper", grid), FleetMap(grid)
         maneuver = Maneuver(1, ManeuverKind.FOLLOW, *leg.start, *leg.end, 5)
         for first_along_m in (0.0, 20.0, 40.0):
-            stretch = Stretch(maneuver, strip.heading_rad, first_along_m, 4)
+            stretch = Stretch(maneuver, leg.heading_rad, first_along_m, 4)
             coverage.add(looks.look(stretch, 0, (0, 0), 0)[0])
         for _, tile in coverage.changed_tiles():
             assert isinstance(tile, CoverageTile)
@@ -300,7 +301,7 @@ class TestAFlownMission:
         made = clairvoyance.removable()
         assert made.ends_s == pytest.approx(1.05 * summary["time"]["primary_s"])
         assert made.risk[made.inside].mean() == pytest.approx(summary["risk_primary_alone"]["mean"])
-        assert (made.released_s[made.inside] <= made.primary_s + 0.1).all()
+        assert not made.released_s.any()  # a look counts whenever it happens
         # The helper sees 15 m to either side.
         assert made.helpers[0].sensor.swath.width == 6
         legs = flown.schedule(made.grid, made.helpers)

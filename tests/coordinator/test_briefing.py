@@ -1,21 +1,84 @@
-"""What an allocator is told helpers' time is worth, by hand."""
+"""What an allocator is told of strips, helpers and time, by hand."""
 
 from __future__ import annotations
 
+import math
+
 import pytest
+from by_hand import HELPER, PRIMARY, run_info
 
-from coordinator.briefing import Supply, worth_later_m2ps
+from comms.said.codec import Header
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
+from coordinator.allocate.simple import GreedyAllocator
+from coordinator.briefing import Briefing
+from coordinator.config import CoordinatorConfig
+from coordinator.cut.strips import Cut
+from coordinator.cut.window import Window
+from coordinator.fleet import KnownFleet
+from coordinator.ledger import Ledger
 
-# Rates of 40, 30 and 10; 200 s, 2 x 100 s and 300 s.
-SUPPLIES = [Supply(3000, 100, 2), Supply(8000, 200, 1), Supply(3000, 300, 1)]
+CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30, 400, 0.3, 0.2)
 
 
-@pytest.mark.parametrize(
-    ("helpers_s", "rate"), [(0, 40), (199, 40), (201, 30), (399, 30), (401, 10), (699, 10), (700, 0), (9000, 0)]
-)
-def test_it_is_the_rate_of_the_last_strip_there_is_time_for(helpers_s: float, rate: float) -> None:
-    assert worth_later_m2ps(SUPPLIES, helpers_s) == pytest.approx(rate)
+class Known:
+    """What a coordinator knows of the fleet by hand, and its briefing."""
+
+    def __init__(self) -> None:
+        self.fleet = KnownFleet(run_info(400, 400), CONFIG.lost_after_ms, 0)
+        self.ledger = Ledger()
+        self.briefing = Briefing(CONFIG, self.ledger, self.fleet, 0.7)
+
+    def heard(self, name: str, mode: Mode, works_on: int = 0, end_ms: int = 0, battery: float = 1.0) -> None:
+        """A vehicle's state, sent at 50 s."""
+        state = AgentState(mode, works_on, battery, end_ms, 122.5, 0, 0)
+        self.fleet.vehicles[name].hear_state(Header(name, 0, 1, 50_000), state, 50_000)
+
+    def survey_ends(self, end_ms: int) -> None:
+        """The primary is on its only track."""
+        plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 400, False),), (), (), "")
+        self.fleet.vehicles[PRIMARY].hear_survey(Header(PRIMARY, 0, 1, 0), plan)
+        self.heard(PRIMARY, Mode.SURVEY, 1, end_ms)
 
 
-def test_with_nothing_to_do_time_is_worth_nothing() -> None:
-    assert worth_later_m2ps([], 100) == 0
+class TestTheTimeLeft:
+    def test_the_deadline_is_a_multiple_of_the_last_primary_s_end(self) -> None:
+        known = Known()
+        assert known.briefing.expected_deadline_s() == math.inf
+        known.survey_ends(1_000_000)
+        assert known.briefing.expected_deadline_s() == pytest.approx(1050)
+
+    def test_helpers_have_time_for_so_many_metres(self) -> None:
+        known = Known()
+        assert known.briefing.time_m(50_000) == math.inf
+        known.heard(HELPER, Mode.IDLE)
+        assert known.briefing.time_m(50_000) == pytest.approx(14_400 * 2)  # what its battery lasts
+        known.survey_ends(1_000_000)
+        assert known.briefing.time_m(50_000) == pytest.approx((1050 - 50) * 2)
+        assert known.briefing.time_m(1_050_000) == known.briefing.time_m(2_000_000) == 0
+
+    def test_the_battery_ends_it(self) -> None:
+        known = Known()
+        known.survey_ends(1_000_000)
+        known.heard(HELPER, Mode.IDLE, battery=0.01)  # 144 s from 50 s on
+        assert known.briefing.time_m(150_000) == pytest.approx((194 - 150) * 2)
+
+    def test_while_no_helper_was_heard_some_may_still_come(self) -> None:
+        known = Known()
+        known.survey_ends(1_000_000)
+        assert known.briefing.helpers(50_000) == ()
+        assert known.briefing.time_m(50_000) == pytest.approx((1050 - 50) * 2)
+
+
+def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
+    known = Known()
+    known.heard(HELPER, Mode.IDLE)
+    cut = Cut(Window(10, 70, 20, 30), 2100.0, 4200.0)
+    known.ledger.open(cut.strip(known.fleet.map.grid, 1), cut, 0, "badly seen")
+    told = known.briefing.situation(60_000)
+    (one,) = told.strips
+    assert one.strip.number == 1
+    assert one.risk_m2 == pytest.approx(4200 / 0.7)
+    (helper,) = told.helpers
+    assert (helper.vehicle, helper.free_s, helper.task, helper.refused) == (HELPER, 60, None, frozenset())
+    known.fleet.vehicles[HELPER].refused.add(1)
+    assert known.briefing.helpers(60_000)[0].refused == {1}

@@ -98,30 +98,25 @@ class TestFromHotspotToTask:
         told.settle()
         assert told.states() == {1: ACCEPTED}
 
-    def test_what_grows_waits_and_what_has_grown_does_not(self) -> None:
+    def test_what_may_still_grow_does_not_wait(self) -> None:
         told = coordinator()
         told.hotspot(growing=True)
         told.settle()
-        assert told.strips() == {}
-        told.hotspot(revision=2, growing=False)
-        told.settle()
         assert told.states() == {1: OFFERED}
 
-    def test_tiles_tell_what_may_still_grow(self) -> None:
+    def test_what_has_not_settled_waits_while_no_plan_tells_what_to_expect_there(self) -> None:
         told = coordinator()
-        settled = np.zeros(GRID.shape, dtype=np.bool_)
-        settled[10:70, :40] = True
+        settled = np.ones(GRID.shape, dtype=np.bool_)
+        settled[HOT_CELLS] = False
         risk = np.full(GRID.shape, 0.1)
         risk[HOT_CELLS] = 1.0
         told.layer(PRIMARY, risk, settled)
-        told.hotspot()
         told.settle()
         assert told.strips() == {}
-        settled[:] = True
-        told.layer(PRIMARY, risk, settled)
-        told.hotspot(revision=2)
+        told.plan(22.5)  # far from there
         told.settle()
-        assert told.states() == {1: OFFERED}
+        assert OFFERED in told.states().values()
+        assert 122.5 in {strip.start_x_m for strip in told.strips().values()}
 
     def test_a_battery_that_does_not_last_gets_nothing(self) -> None:
         told = coordinator(idle=())

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
@@ -16,6 +17,8 @@ from comms.said.messages import (
     Hotspot,
     HotspotState,
     Mode,
+    Plan,
+    PlannedTrack,
     StripState,
     StripStatus,
     Task,
@@ -78,6 +81,11 @@ class Told:
         message = TaskStatus(strip, state, 0, 0, reason)
         self.node.hear(f"agent/{name}/task_status/1", message, at_ms=at_ms)
 
+    def plan(self, *tracks_x_m: float, revision: int = 1) -> None:
+        """The primary's plan: tracks to the north, numbered from 1, none of which it has flown."""
+        tracks = (PlannedTrack(at, x_m, x_m, 0, x_m, 400, False) for at, x_m in enumerate(tracks_x_m, 1))
+        self.node.hear(f"agent/{PRIMARY}/plan", Plan(revision, tuple(tracks), (60,), (), ""))
+
     def layer(self, name: str, risk: np.ndarray, settled: np.ndarray | None = None) -> None:
         """All tiles of a vehicle whose layer leaves this risk; settled everywhere if not told otherwise."""
         levels = to_levels(-np.log(risk))
@@ -133,8 +141,11 @@ def coordinator(
     allocator: Allocator | None = None,
     idle: Sequence[str] = (HELPER,),
     max_strip_m: float = 400,
+    strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting",
+    area: Sequence[tuple[float, float]] | None = None,
 ) -> Told:
-    """A coordinator that was told of the run; the primary surveys, and these helpers are free."""
+    """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
+    one that is no full square."""
     config = CoordinatorConfig(
         allocator=allocator or GreedyAllocator(),
         deadline_factor=1.05,
@@ -143,9 +154,13 @@ def coordinator(
         max_strip_m=max_strip_m,
         worth_risk=0.3,
         switch_margin=0.2,
+        strips=strips,
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
-    told.node.hear("run", run_info(400, 400, vehicles=vehicles), at_ms=1)
+    run = run_info(400, 400, vehicles=vehicles)
+    if area is not None:
+        run = replace(run, area=tuple(Vertex(*corner) for corner in area))
+    told.node.hear("run", run, at_ms=1)
     for entry in vehicles:
         if entry.role is Role.SURVEY:
             told.state(entry.vehicle, Mode.SURVEY, 1)

@@ -53,7 +53,7 @@ def situations(draw: st.DrawFn, most_strips: int = 7) -> Situation:
 
     def any_strip(number: int) -> OpenStrip:
         one = strip(number, draw(place), draw(place), draw(st.integers(30, 400)), draw(angle))
-        return OpenStrip(one, draw(st.integers(0, 9)) * 1000.0, draw(st.sampled_from([0.0, 0.0, 500.0])))
+        return OpenStrip(one, draw(st.integers(0, 9)) * 1000.0)
 
     strips = [any_strip(number) for number in range(1, draw(st.integers(0, most_strips)) + 1)]
     helpers: list[Helper] = []
@@ -70,4 +70,4 @@ def situations(draw: st.DrawFn, most_strips: int = 7) -> Situation:
         )
         helpers.append(at_work(one, any_strip(100 + len(helpers))) if draw(st.booleans()) else one)
     deadline_s = draw(st.sampled_from([0.0, 300.0, HOUR_S, math.inf]))
-    return Situation(0, deadline_s, tuple(strips), tuple(helpers), later_m2ps=draw(st.sampled_from([0.0, 20.0])))
+    return Situation(0, deadline_s, tuple(strips), tuple(helpers))

@@ -84,9 +84,6 @@ def _situations() -> st.SearchStrategy[Situation]:
         deadline_s=st.sampled_from([100.0, 500.0, 4000.0, math.inf]),
         strips=_strips(1),
         helpers=_helpers(),
-        coming=_strips(max_size=1).map(lambda coming: tuple(_numbered(one, 0) for one in coming)),
-        later_m2ps=st.sampled_from([0.0, 10.0]),
-        later_s=st.sampled_from([0.0, 700.0]),
     )
 
 
@@ -101,7 +98,7 @@ def _open_strips() -> st.SearchStrategy[OpenStrip]:
         st.sampled_from([10.0, 50.0]),
     )
     worth_m2 = st.sampled_from([0.0, 1.0, 250.0, 250.0, 4000.0])
-    return st.builds(OpenStrip, strips, worth_m2, st.sampled_from([0.0, 0.0, 400.0]))
+    return st.builds(OpenStrip, strips, worth_m2)
 
 
 def _strips(min_size: int = 0, max_size: int = 6) -> st.SearchStrategy[tuple[OpenStrip, ...]]:

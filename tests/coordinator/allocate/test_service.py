@@ -16,38 +16,54 @@ from planner.dubins import Pose
 
 
 @settings(max_examples=60, deadline=None)
-@given(told=situations(), late_s=st.sampled_from([0.0, 77.0]), picked=st.data())
-def test_each_is_as_by_itself(told: Situation, late_s: float, picked: st.DataObject) -> None:
-    if not told.strips:
-        return
+@given(told=situations(), late_s=st.sampled_from([0.0, 77.0]))
+def test_each_is_as_by_itself(told: Situation, late_s: float) -> None:
     for one in told.helpers:
-        table = StripTable(told.strips, one, told.deadline_s)
-        places = np.array(picked.draw(st.lists(st.sampled_from(range(len(told.strips))), min_size=1, unique=True)))
-        poses = [one.free_at, Pose(50, -20, 2.0)]
-        times_s = np.array([one.free_s, one.free_s + late_s])
-        found = table.of(places).served_from(np.array(poses), times_s)
-        for row, (pose, time_s) in enumerate(zip(poses, times_s, strict=True)):
-            there = replace(one, free_at=pose, free_s=float(time_s))
-            for column, place in enumerate(places):
-                job = told.strips[place]
+        table = StripTable(told.strips, one)
+        for pose, time_s in ((one.free_at, one.free_s), (Pose(50, -20, 2.0), one.free_s + late_s)):
+            there = replace(one, free_at=pose, free_s=time_s)
+            removed, free_s, leave = table.best_from(pose, time_s, told.deadline_s)
+            assert removed.shape == free_s.shape == (len(told.strips),)
+            for place, job in enumerate(told.strips):
                 served = expected_service(job, there)
                 expected = 0.0 if job.strip.number in one.refused else removed_m2(job, there, served, told.deadline_s)
-                assert found.removed_m2[row, column] == pytest.approx(expected)
-                assert found.leaves_s[row, column] == pytest.approx(served.leaves_s)
-                assert found.free_s[row, column] == pytest.approx(served.free_s)
-                assert found.leave[row, column] == pytest.approx(served.free_at)
+                assert removed[place] == pytest.approx(expected)
+                assert free_s[place] == pytest.approx(served.free_s)
+                assert leave[place] == pytest.approx(served.free_at)
 
 
-class TestInTheWake:
-    def test_a_helper_sets_out_so_that_it_does_not_overtake(self) -> None:
-        # 100 s for the 200 m of the strip, which has settled at 400 s: on it from 300 s, 50 s on the way.
-        served = expected_service(replace(open_strip(strip(1)), settles_s=400), helper())
-        assert (served.leaves_s, served.begins_s, served.ends_s) == pytest.approx((250, 300, 400))
+@settings(max_examples=60, deadline=None)
+@given(told=situations())
+def test_of_all_ways_the_shortest_is_the_one_that_is_expected(told: Situation) -> None:
+    for one in told.helpers:
+        table = StripTable(told.strips, one)
+        poses = np.array([one.free_at, Pose(50, -20, 2.0)])
+        to_begin_s = table.to_begin_s(poses)
+        assert to_begin_s.shape == (2, *table.sonar_on_s.shape)
+        for row, pose in enumerate(poses.tolist()):
+            there = replace(one, free_at=Pose(*pose), free_s=0.0)
+            for place, job in enumerate(told.strips):
+                ends_s = to_begin_s[row, place] + table.sonar_on_s[place]
+                assert ends_s.min() == pytest.approx(expected_service(job, there).ends_s)
 
-    def test_against_the_wake_it_waits_until_all_has_settled(self) -> None:
-        served = expected_service(replace(open_strip(strip(1)), settles_s=400), helper(y_m=400, heading_rad=np.pi))
-        assert (served.leaves_s, served.begins_s, served.ends_s) == pytest.approx((350, 400, 500))
 
-    def test_who_comes_late_goes_at_once(self) -> None:
-        served = expected_service(replace(open_strip(strip(1)), settles_s=120), helper())
-        assert (served.leaves_s, served.ends_s) == pytest.approx((0, 150))
+class TestByHand:
+    """200 m at 2 m/s, from 100 m before it; and from 100 m beyond it, headed for it."""
+
+    TABLE = StripTable([open_strip(strip(1)), open_strip(strip(2))], helper(refused=frozenset({2}), lasts_until_s=200))
+
+    def test_how_long_it_is_to_the_nearer_end(self) -> None:
+        poses = np.array([Pose(0, 0, 0), Pose(0, 400, np.pi)])
+        assert self.TABLE.to_begin_s(poses).min(axis=2) == pytest.approx(np.full((2, 2), 50))
+        assert self.TABLE.sonar_on_s == pytest.approx(np.full(self.TABLE.sonar_on_s.shape, 100))
+
+    @pytest.mark.parametrize(
+        ("begins_s", "deadline_s", "removed"),
+        [(50, np.inf, 700), (50, 100, 350), (50, 50, 0), (100, 1000, 700), (101, 1000, 0)],
+    )
+    def test_what_is_flown_by_the_deadline_counts_if_the_battery_lasts(
+        self, begins_s: float, deadline_s: float, removed: float
+    ) -> None:
+        found = self.TABLE.removed_m2(np.full((1, *self.TABLE.sonar_on_s.shape), begins_s), deadline_s)
+        assert found[0, 0] == pytest.approx(removed)
+        assert (found[0, 1] == 0).all()  # it has refused that one

@@ -1,91 +1,213 @@
-"""Cutting again and again: what time is worth, by hand, and that it, and what ground counts, reaches the cut."""
+"""As many strips as there is time for: what a metre costs, by hand, and when strips stay where they are."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from comms.said.messages import CoverageTile
-from coordinator.cut.cutter import RISK_STEP, Cutter, worth_risk
+from coordinator.cut.cutter import SPARE_STRIPS, Cutter
+from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.strips import Cut, CuttingRules
-from planner.fleet_map import FleetMap
-from planner.risk import NATS_PER_LEVEL
-from planner.tiles import tiles
+from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
-GRID = GridSpec(SweepFrame(0, 0, 0), 5, 40, 60)
-RULES = CuttingRules(swath_m=50, p_detect=0.7, worth_risk=0.25, overhead_m=40, min_strip_m=30, max_strip_m=400)
-COLUMN_M2 = 5 * 300
+GRID = GridSpec(SweepFrame(0, 0, 0), 5, 120, 60)  # twelve swaths of 300 m
+RULES = CuttingRules(swath_m=50, overhead_m=100, min_strip_m=30, max_strip_m=400)
+STRIP_M = 300 + 100
+LOOK = 0.5
+LEAST = 0.1 * LOOK * 25  # what a look at 0.1 removes of a cell
 
 
-def fleet_that_left(risk: FloatArray) -> FleetMap:
-    """A map of which all has settled, with about this residual risk."""
-    fleet = FleetMap(GRID, 0.0)
-    levels = np.rint(-np.log(risk) / NATS_PER_LEVEL).astype(np.uint8)
-    settled = np.ones(GRID.shape, dtype=np.bool_)
-    for tile in tiles(GRID):
-        cells = levels[tile.window]
-        told = CoverageTile(1, tile.first_row, tile.first_column, cells, cells, settled[tile.window])
-        fleet.join("primary", 0, told)
-    return fleet
+def ground(risk: FloatArray, objective: str = "mean") -> Ground:
+    return Ground(
+        risk=risk,
+        look=np.full(GRID.shape, LOOK),
+        weights=np.full(GRID.shape, 25.0),
+        is_seen=np.ones(GRID.shape, dtype=np.bool_),
+        objective=OBJECTIVES[objective],
+        threshold=0.0,
+    )
 
 
-def cuts(risk: FloatArray, sweeps_m2: float, weights: FloatArray | None = None) -> tuple[Cutter, list[Cut]]:
-    inside = np.ones(GRID.shape, dtype=np.bool_)
-    cutter = Cutter(fleet_that_left(risk), inside, RULES, np.ones(GRID.shape) if weights is None else weights)
-    ground = cutter.assess({"primary": None}, sweeps_m2, ())
-    return cutter, cutter.cut(ground, ())
-
-
-@pytest.fixture
-def ridge() -> FloatArray:
-    """Columns of five each with 0.6, 0.9, 0.9, 0.6 from 50 m on, then 0.4; 0.1 elsewhere."""
-    risk = np.full(GRID.shape, 0.1)
-    risk[:, 10:30] = np.repeat([0.6, 0.9, 0.9, 0.6], 5)
-    risk[:, 32:] = 0.4
+def lanes(*risks: float) -> FloatArray:
+    """A map of lanes a swath wide with these risks, and nothing beside them."""
+    risk = np.zeros(GRID.shape)
+    for number, value in enumerate(risks):
+        risk[:, 10 * number : 10 * number + 10] = value
     return risk
 
 
-def test_where_time_is_short_strips_lie_side_by_side(ridge: FloatArray) -> None:
-    # Time for all of the ridge and half of the 0.4. By what that is worth a strip's 68 rows cost 27; two of 0.75 bring
-    # 90, that on the 0.9 brings 54.
-    cutter, found = cuts(ridge, (20 + 4) * COLUMN_M2)
-    assert cutter.rules.worth_risk == RULES.worth_risk
-    assert cutter.rules.marginal_risk == pytest.approx(0.375, abs=0.026)
-    assert sorted(one.window.first_column for one in found[:2]) == [10, 20]
+def lane(number: int) -> Window:
+    return Window(0, 60, 10 * number, 10 * number + 10)
 
 
-def test_where_time_suffices_for_all_the_best_strip_comes_first(ridge: FloatArray) -> None:
-    cutter, found = cuts(ridge, 100 * COLUMN_M2)
-    assert cutter.rules.worth_risk == cutter.rules.marginal_risk < RULES.worth_risk
-    assert found[0].window.first_column == 15
+TWELVE = lanes(*np.linspace(0.95, 0.4, 12).tolist())
 
 
-def test_ground_that_counts_more_raises_what_time_is_worth(ridge: FloatArray) -> None:
-    weights = np.ones(GRID.shape)
-    weights[:, 20:30] = 3.0
-    plain, _ = cuts(ridge, 9.5 * COLUMN_M2)
-    weighted, found = cuts(ridge, 9.5 * COLUMN_M2, weights)
-    assert plain.rules.marginal_risk == pytest.approx(0.875, abs=0.026)  # 10 columns have 0.9
-    assert weighted.rules.marginal_risk == pytest.approx(1.775, abs=0.051)  # 10 have 3 times 0.9 or 0.6
-    assert found[0].window.first_column == 20
-    assert found[0].counts_m2 == pytest.approx(3 * found[0].removable_m2)
+def windows(cuts: list[Cut]) -> list[Window]:
+    return [one.window for one in cuts]
 
 
-def test_ground_that_counts_little_is_cut_where_there_is_time() -> None:
-    _, found = cuts(np.full(GRID.shape, 0.8), 100 * COLUMN_M2, np.full(GRID.shape, 0.02))
-    assert len(found) == 4  # the whole of it, 40 columns
+def price(cutter: Cutter) -> float:
+    """Of a metre flown."""
+    return cutter._price
 
 
-class TestWorthRisk:
-    RISK = np.array([0.9, 0.62, 0.62, 0.41, 0.3, 0.12, 0.01])
+class TestTime:
+    @pytest.mark.parametrize("strips", [1, 3, 5])
+    def test_so_many_are_cut_as_there_is_time_for_and_a_few_more_the_best_first(self, strips: int) -> None:
+        cuts = Cutter(GRID, RULES, LEAST).cut(ground(TWELVE), (strips - 0.5) * STRIP_M, (), ())
+        assert strips + SPARE_STRIPS <= len(cuts) < 12
+        assert windows(cuts) == [lane(number) for number in range(len(cuts))]
 
-    @pytest.mark.parametrize(
-        ("cells", "worth"),
-        [(0, 0.9), (1, 0.6), (2.9, 0.6), (3, 0.4), (4, 0.3), (5, 0.1), (6, 0.05), (7, 0.05), (99, 0.05)],
-    )
-    def test_it_is_the_risk_of_the_first_cell_there_is_no_time_for_in_steps(self, cells: float, worth: float) -> None:
-        assert worth_risk(self.RISK, cells) == pytest.approx(worth)
+    @pytest.mark.parametrize("time_m", [12.5 * STRIP_M, math.inf])
+    def test_where_there_is_time_for_all_all_are_cut_at_the_least_price(self, time_m: float) -> None:
+        cutter = Cutter(GRID, RULES, LEAST)
+        assert set(windows(cutter.cut(ground(TWELVE), time_m, (), ()))) == {lane(number) for number in range(12)}
+        assert price(cutter) == pytest.approx(0.1 * LOOK * 50)
 
-    def test_where_nothing_is_left_it_is_the_least(self) -> None:
-        assert worth_risk(np.array([]), 0) == RISK_STEP
+    def test_what_is_worth_less_than_the_least_is_not_cut_whatever_time_there_is(self) -> None:
+        # A strip of 300 m costs 400 m at 0.1 of a swath: what a look at 0.133 brings along it.
+        cutter = Cutter(GRID, RULES, LEAST)
+        assert windows(cutter.cut(ground(lanes(0.13, 0.0, 0.14)), math.inf, (), ())) == [lane(2)]
+
+    def test_without_time_nothing_is_cut(self) -> None:
+        assert Cutter(GRID, RULES, LEAST).cut(ground(TWELVE), 0.0, (), ()) == []
+
+    def test_where_nothing_is_to_be_looked_at_nothing_is_cut(self) -> None:
+        assert Cutter(GRID, RULES, LEAST).cut(ground(lanes()), math.inf, (), ()) == []
+
+    def test_the_price_rises_where_time_is_short_and_falls_again_never_below_the_least(self) -> None:
+        cutter = Cutter(GRID, RULES, LEAST)
+        least = price(cutter)
+        cutter.cut(ground(TWELVE), 2.5 * STRIP_M, (), ())
+        # Three strips are worth more than 400 m at this, and at 1.2 times as much they are not three.
+        of_third, step = 0.85 * LOOK * 50 * 300 / STRIP_M, 1.2
+        assert of_third / step <= price(cutter) < of_third
+        dear = price(cutter)
+        cutter.cut(ground(TWELVE), 6.5 * STRIP_M, (), ())
+        assert least < price(cutter) < dear
+        cutter.cut(ground(TWELVE), math.inf, (), ())
+        assert price(cutter) == least
+
+    @pytest.mark.parametrize("objective", sorted(OBJECTIVES))
+    def test_the_first_cut_finds_the_price_however_far_it_lies_above_the_least(self, objective: str) -> None:
+        cutter = Cutter(GRID, RULES, 1e-3 * 25)
+        first = cutter.cut(ground(TWELVE, objective), 1.5 * STRIP_M, (), ())
+        found = price(cutter)
+        assert cutter.cut(ground(TWELVE, objective), 1.5 * STRIP_M, (), ()) == first
+        assert price(cutter) == found > 100 * 1e-3 * 50
+
+    def test_where_time_is_short_two_side_by_side_are_cut_where_there_is_time_for_two(self) -> None:
+        # Five columns each of 0.6, 0.9, 0.9, 0.6: the best strip lies on the 0.9, but two beside it bring more.
+        risk = lanes()
+        risk[:, 10:30] = np.repeat([0.6, 0.9, 0.9, 0.6], 5)
+        one, two = (windows(Cutter(GRID, RULES, LEAST).cut(ground(risk), n * STRIP_M, (), ())) for n in (0.9, 1.9))
+        assert one[0] == Window(0, 60, 15, 25)
+        assert set(two[:2]) == {Window(0, 60, 10, 20), Window(0, 60, 20, 30)}
+
+
+class TestWhatIsTold:
+    def test_what_a_strip_brings(self) -> None:
+        told = ground(lanes(0.8), "both")
+        told.weights[:] *= 2.0
+        (cut,) = Cutter(GRID, RULES, LEAST).cut(told, math.inf, (), ())
+        # 600 cells of 25 m2, of which a look removes 0.4; that counts twice, 0.8 for the mean and 0.2 / 0.3 for the
+        # worst.
+        assert cut.removable_m2 == pytest.approx(600 * 25 * 0.4)
+        assert cut.counts_m2 == pytest.approx(2 * (0.8 + 0.2 / 0.3) * 600 * 25 * 0.4)
+
+    def test_foreseen_is_what_is_for_the_most_part_not_seen_yet(self) -> None:
+        told = ground(lanes(0.8, 0.8))
+        told.is_seen[29:, :10] = False  # 31 rows of 60
+        told.is_seen[31:, 10:] = False  # 29 rows
+        cuts = Cutter(GRID, RULES, LEAST).cut(told, math.inf, (), ())
+        assert {one.window: one.foreseen for one in cuts} == {lane(0): True, lane(1): False}
+
+    def test_the_ground_is_left_as_it_is(self) -> None:
+        told = ground(TWELVE.copy())
+        Cutter(GRID, RULES, LEAST).cut(told, math.inf, [lane(0)], [lane(1)])
+        assert (told.risk == TWELVE).all()
+
+    def test_from_where_on_a_cell_is_of_the_worst_is_asked_after_what_there_is_time_for(self) -> None:
+        cutter = Cutter(GRID, RULES, LEAST)
+        risk = lanes(0.9, 0.9, 0.9, 0.9, *[0.6] * 6, 0.5, 0.5)
+        assert cutter.threshold == 0.0
+        cutter.cut(ground(risk), 0.0, (), ())
+        assert cutter.threshold == pytest.approx(0.9)  # four of twelve
+        cutter.cut(ground(risk), 1.5 * STRIP_M, (), ())
+        assert cutter.threshold == pytest.approx(0.6)  # three of twelve
+        cutter.cut(ground(risk), 1.5 * STRIP_M, [lane(1), lane(2)], ())
+        assert cutter.threshold == pytest.approx(0.6)
+        cutter.cut(ground(risk), 7.5 * STRIP_M, [lane(1), lane(2)], ())
+        # All but 0.6, 0.5 and 0.5 have been flown; the next is what is left of 0.9.
+        assert cutter.threshold == pytest.approx(0.45)
+
+
+class TestClaimed:
+    def test_what_is_with_a_vehicle_counts_as_flown(self) -> None:
+        # What a look leaves of 0.9 is 0.45: worth one more, after 0.6 and 0.5.
+        risk = lanes(0.9, 0.6, 0.5)
+        cuts = Cutter(GRID, RULES, LEAST).cut(ground(risk), 2.5 * STRIP_M, [lane(0)], ())
+        assert windows(cuts) == [lane(1), lane(2), lane(0)]
+        assert cuts[2].removable_m2 == pytest.approx(600 * 25 * 0.45 * LOOK)
+
+    def test_what_is_claimed_in_part_is_worth_the_rest(self) -> None:
+        (cut,) = Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9)), math.inf, [Window(0, 30, 0, 10)], ())
+        assert cut.window == lane(0)
+        assert cut.counts_m2 == pytest.approx(600 * 25 * (0.9 + 0.45) / 2 * LOOK)
+
+
+class TestOpenStrips:
+    def test_they_stay_where_what_is_cut_anew_is_hardly_better(self) -> None:
+        risk = lanes(0.9)
+        opened = Window(0, 60, 1, 11)  # a column aside: nine tenths
+        risk[:, 10] = 0.89
+        assert windows(Cutter(GRID, RULES, LEAST).cut(ground(risk), math.inf, (), [opened])) == [opened]
+
+    def test_they_are_cut_anew_where_that_is_better(self) -> None:
+        opened = Window(0, 60, 1, 11)  # brings nine tenths of what the lane does
+        assert windows(Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9)), math.inf, (), [opened])) == [lane(0)]
+
+    def test_what_they_bring_is_told_anew(self) -> None:
+        (cut,) = Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.7)), math.inf, (), [lane(0)])
+        assert cut.window == lane(0)
+        assert cut.removable_m2 == pytest.approx(600 * 25 * 0.35)
+
+    def test_they_do_not_stay_where_there_is_time_for_more(self) -> None:
+        cuts = Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9, 0.89)), math.inf, (), [lane(0)])
+        assert windows(cuts) == [lane(0), lane(1)]
+
+    def test_they_are_dropped_where_they_pay_no_more(self) -> None:
+        assert Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.05)), math.inf, (), [lane(0)]) == []
+
+    def test_cutting_again_changes_nothing(self) -> None:
+        cutter = Cutter(GRID, RULES, LEAST)
+        first = cutter.cut(ground(TWELVE), 3.5 * STRIP_M, (), ())
+        assert cutter.cut(ground(TWELVE), 3.5 * STRIP_M, (), windows(first)) == first
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    risks=st.lists(st.sampled_from([0.0, 0.2, 0.5, 0.8, 1.0]), min_size=12, max_size=12),
+    strips=st.sampled_from([0.0, 0.5, 2.0, 6.0, math.inf]),
+    claimed=st.lists(st.integers(0, 11), max_size=3, unique=True),
+    objective=st.sampled_from(sorted(OBJECTIVES)),
+)
+def test_each_tells_what_those_before_it_and_those_that_are_claimed_leave(
+    risks: list[float], strips: float, claimed: list[int], objective: str
+) -> None:
+    left = ground(lanes(*risks), objective)
+    cutter = Cutter(GRID, RULES, LEAST)
+    cuts = cutter.cut(left, strips * STRIP_M, [lane(number) for number in claimed], ())
+    for number in claimed:
+        left.fly(lane(number))
+    for one in cuts:
+        assert one.counts_m2 == pytest.approx(left.worth()[one.window.cells].sum())
+        assert one.removable_m2 == pytest.approx(left.risk[one.window.cells].sum() * LOOK * 25)
+        assert one.counts_m2 > LEAST / 25 * 50 * (one.window.rows * 5 + 100)  # 50 m a swath
+        left.fly(one.window)

@@ -18,7 +18,6 @@ from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import expected_service, sweeps
 from coordinator.allocate.situation import OpenStrip
 from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close
-from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
 from planner.sweep import shortest_sweep
 
@@ -68,9 +67,6 @@ class TestCourses:
         state = AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0)
         laid = survey_course(entry, state, Plan(1, (track,), (), (), ""), 0)
         assert laid.at(100)[0][:2] == pytest.approx((0, 370))
-        under_way = KnownVehicle(entry, 0, state, plan=Plan(1, (track,), (), (), "")).track_under_way
-        assert under_way is not None
-        assert (under_way.range_m, under_way.lead_m) == pytest.approx((50 / math.sqrt(2), 30))
 
     def test_a_run_out_is_sailed_to_its_end(self) -> None:
         entry = vehicle("primary", Role.SURVEY)

@@ -44,8 +44,26 @@ class TestWhoIsCompared:
     def test_without_names_the_scenarios_own_allocator_comes_first_and_the_baselines_last(self) -> None:
         names = [one.name for one in contenders(load_scenario("tellaro", ["coordinator.allocator=none"]))]
         assert names[0] == "none"
-        assert names[-2:] == ["self", "self-longer"]
-        assert set(names) == {*ALLOCATOR.ours, "self", "self-longer"}
+        assert names[-len(BASELINES) :] == list(BASELINES)
+        assert set(names) == {*ALLOCATOR.ours, *BASELINES}
+
+    @pytest.mark.parametrize(
+        ("name", "strips"), [("lawnmower", "lanes"), ("across", "lanes_across"), ("beforehand", "beforehand")]
+    )
+    def test_those_that_are_told_nothing_have_the_same_fleet_and_time(self, name: str, strips: str) -> None:
+        scenario = load_scenario("two-helpers")
+        (blind,) = contenders(scenario, [name])
+        coordinator = scenario.coordinator.model_copy(update={"strips": strips})
+        assert blind.told_nothing
+        assert blind.scenario == scenario.model_copy(update={"coordinator": coordinator})
+
+    def test_a_second_survey_is_flown_by_the_primaries_across_their_tracks(self) -> None:
+        (second,) = contenders(load_scenario("two-helpers"), ["second_survey"])
+        assert not second.told_nothing  # its mission ends later
+        assert second.scenario.survey_vehicles["primary"].revisits
+        assert not second.scenario.revisit_vehicles
+        assert second.scenario.coordinator.strips == "lanes_across"
+        assert second.scenario.mission.deadline_factor == pytest.approx(3.1)
 
     def test_an_allocator_changes_nothing_else(self) -> None:
         scenario = load_scenario("tellaro")
@@ -69,7 +87,7 @@ class TestWhoIsCompared:
 
     def test_an_unknown_name_is_told_with_those_that_are_known(self) -> None:
         with pytest.raises(
-            UserError, match=r"^--allocators: nobody is not allowed; must be .*greedy.* or self-longer$"
+            UserError, match=r"^--allocators: nobody is not allowed; must be .*greedy.* or second_survey$"
         ):
             contenders(load_scenario("tellaro"), ["nobody"])
 
@@ -99,7 +117,7 @@ class TestStandings:
     def test_each_is_compared_with_the_first_by_every_objective(self) -> None:
         first, other, equal = standings(FLOWN)
         assert first.against_first == {}
-        assert set(other.against_first) == {"mean", "worst30", "targets"}
+        assert set(other.against_first) == {"mean", "worst30", "both", "targets"}
         assert (other.against_first["mean"].better, other.against_first["mean"].worse) == (1, 1)
         assert (other.against_first["worst30"].better, other.against_first["worst30"].worse) == (2, 0)
         assert equal.against_first["mean"].difference == 0
@@ -149,6 +167,7 @@ class TestStandings:
             for place, name in enumerate(names)
         }
         assert Console(width=500).measure(table(standings(flown), "", "mean")).maximum <= 120
+        assert Console(width=500).measure(table(standings(flown), "", "both")).maximum <= 120
 
 
 def columns(stood: list[Standing]) -> list[str]:
@@ -214,7 +233,7 @@ class TestCommand:
         greedy, none = written["contenders"]
         assert greedy["removed_m2"]["mean"] > none["removed_m2"]["mean"] == 0
         assert none["against_first"]["mean"]["worse"] == 2
-        assert (written["objective"], written["reacting"]) == ("mean", None)
+        assert (written["objective"], written["reacting"]) == ("both", None)
         assert (tmp_path / "out" / "risk.png").read_bytes().startswith(b"\x89PNG")
 
     def test_json_alone_is_printed(self, command: Command, by_hand: None) -> None:
@@ -227,7 +246,8 @@ class TestCommand:
     ) -> None:
         code, out, err = command()
         assert (code, err) == (1, "other, seed 3: it failed\n")
-        assert out.startswith("tellaro, seeds 1 to 10, judged by the mean residual risk when the mission ends\n")
+        judged = "four fifths of the mean residual risk and a fifth of the worst 30 %'s"
+        assert out.startswith(f"tellaro, seeds 1 to 10, judged by {judged} when the mission ends\n")
         assert "failed" in out
         assert "0.440" in out
 
@@ -255,7 +275,7 @@ class TestCommand:
         monkeypatch.setattr("secondlook.commands.compare.fly_all", fly_all)
         _, out, _ = command("--allocators", "plan,greedy,blind", "--seeds", "6")
         assert out.splitlines()[-1].startswith(
-            "reacting was worth it: plan leaves 0.300, 0.100 less than blind (95 %: "
+            "reacting was worth it: plan leaves 0.340, 0.100 less than blind (95 %: "
         )
         _, out, _ = command("--allocators", "plan,greedy,blind", "--seeds", "6", "--json")
         assert json.loads(out)["reacting"]["worth"] is True

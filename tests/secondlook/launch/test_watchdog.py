@@ -105,9 +105,9 @@ def test_what_cannot_be_interrupted_is_ended_with_the_process() -> None:
 @pytest.mark.parametrize(
     ("bus", "patience_s", "sentence"),
     [
-        ("local", PATIENCE_S, r"coordinator has not come back within 0\.5 s at 50\.\d{3} s of the mission"),
+        ("local", PATIENCE_S, r"coordinator has not come back within 0\.5 s at 0\.\d{3} s of the mission"),
         # Its processes have to start within that too.
-        ("zenoh", 5.0, r"nothing heard for 5 s at 50\.\d{3} s of the mission: no answer from coordinator"),
+        ("zenoh", 5.0, r"nothing heard for 5 s at 0\.\d{3} s of the mission: no answer from coordinator"),
     ],
 )
 def test_a_part_that_never_returns_ends_the_mission_and_names_its_node(
@@ -117,7 +117,7 @@ def test_a_part_that_never_returns_ends_the_mission_and_names_its_node(
     with pytest.raises(RunFailedError) as caught:
         fleet.run()
     assert re.fullmatch(sentence, str(caught.value))
-    assert 50 < fleet.heard.now_s < 51
+    assert fleet.heard.now_s < 1
 
 
 def test_the_command_says_so_in_one_sentence_and_where_it_was_in_a_file(
@@ -131,5 +131,5 @@ def test_the_command_says_so_in_one_sentence_and_where_it_was_in_a_file(
         cli.main()
     printed = capsys.readouterr()
     assert (stopped.value.code, printed.out) == (1, "")
-    assert re.fullmatch(r"coordinator has not come back within 0\.5 s at 50\.\d{3} s of the mission; .*\n", printed.err)
+    assert re.fullmatch(r"coordinator has not come back within 0\.5 s at 0\.\d{3} s of the mission; .*\n", printed.err)
     assert "in loop" in (tmp_path / "logs" / "launcher.txt").read_text()

@@ -259,7 +259,7 @@ def test_moments_are_in_order_and_end_with_the_mission(mission: RecordedMission)
     told = " ".join(one.text for one in found)
     assert "primary plans: spacing for " in told
     assert "primary tells of the first badly seen place" in told
-    assert "helper begins its first second look, at strip 1" in told
+    assert re.search(r"helper begins its first second look, at strip \d+", told)
     assert "primary has finished the survey" in told
 
 

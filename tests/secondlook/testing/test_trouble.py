@@ -65,7 +65,7 @@ class TestNodes:
 
     def test_a_vehicle_that_is_cut_off_is_not_heard_by_the_coordinator(self, brief: MakeFleet) -> None:
         fleet = brief()
-        fleet.cut_off("primary", from_s=10, for_s=80)
+        fleet.cut_off("primary", from_s=0, for_s=90)
         assert min(one.header.sent_ms for one in fleet.run().messages("coord/strip/*")) >= 90_000
         assert any(10 <= at_s < 90 for at_s in times_s(fleet.run(), "primary"))
 
@@ -81,9 +81,10 @@ class TestMessages:
         fleet = brief()
         fleet.drop("agent/*/hotspot/*")
         fleet.drop("agent/*/coverage/*")
+        fleet.drop("agent/*/plan")
         flight = fleet.run()
         assert flight.messages("coord/strip/*") == []
-        lost = [*flight.messages("agent/*/hotspot/*"), *flight.messages("agent/*/coverage/*")]
+        lost = [one for what in ("hotspot/*", "coverage/*", "plan") for one in flight.messages(f"agent/*/{what}")]
         assert flight.summary["dropped"] == {"lost by a fault": len(lost)}
 
     @pytest.mark.parametrize(

@@ -1,0 +1,278 @@
+"""Routes to the deadline: which strips the helpers serve, as a team, and in which order, so that most is removed.
+
+A beam search over partial plans. The helper that is free first goes on, so that all plans of a beam grow in time
+together; it may also leave the rest to the others, who may be nearer, or see better. Plans are compared by what they
+have removed and what may still be: what is left of the strips, best first, each with the time that it takes by itself,
+for the time that the helpers have left. So what counts against a plan is the time that it spends on ways, not that it
+leaves a good strip for later. (Team orienteering; the estimate is the fractional knapsack.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from coordinator.allocate.service import StripTable, expected_service, removed_m2
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
+from planner.types import FloatArray
+
+BEAM = 12
+"""Plans carried from one strip to the next."""
+HORIZON_S = 4 * 3600.0
+"""How far ahead is planned while nobody can tell when the mission ends."""
+MOST_STRIPS = 64
+"""So many strips are planned with, those that bring most for the time they take."""
+LATER_SHARE = 0.5
+"""Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come."""
+TOLERANCE_M2 = 1e-6
+
+
+@dataclass(frozen=True)
+class Routes:
+    """What helpers are to serve: by vehicle the numbers of strips in order, and what all that removes by the
+    deadline."""
+
+    removed_m2: float
+    strips: Mapping[str, tuple[int, ...]]
+
+
+@dataclass(frozen=True)
+class RoutesAllocator:
+    """The default allocator: see the module. Each free helper is offered the first strip of its route.
+
+    A helper on its way to a strip is turned round where the routes are then better by `switch_margin` of what its task
+    is worth.
+    """
+
+    beam: int = BEAM
+
+    def assign(self, situation: Situation) -> Mapping[str, int]:
+        """See `Allocator`."""
+        helpers = sorted(situation.helpers, key=lambda one: one.vehicle)
+        if not situation.strips or all(one.sweeping for one in helpers):
+            return {}
+        deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
+        routes = plan_routes(situation.strips, helpers, deadline_s, self.beam)
+        offers = {one.vehicle: routes.strips[one.vehicle][0] for one in situation.free if routes.strips[one.vehicle]}
+        for helper in helpers:
+            if helper.task is not None and not helper.sweeping:
+                other = self._turned_round(situation, helpers, helper, helper.task, routes.removed_m2, deadline_s)
+                if other is not None and other not in offers.values():
+                    offers[helper.vehicle] = other
+        return offers
+
+    def _turned_round(
+        self,
+        situation: Situation,
+        helpers: Sequence[Helper],
+        helper: Helper,
+        task: OpenStrip,
+        planned_m2: float,
+        deadline_s: float,
+    ) -> int | None:
+        """The strip that a helper would be sent to if it gave its task back; None where that is not better by the
+        margin."""
+        free = replace(helper, task=None, free_at=helper.pose, free_s=situation.now_s)
+        worth_m2 = removed_m2(task, free, expected_service(task, free), deadline_s)
+        team = [free if one is helper else one for one in helpers]
+        routes = plan_routes((*situation.strips, task), team, deadline_s, self.beam)
+        route = routes.strips[helper.vehicle]
+        if not route or route[0] == task.strip.number:
+            return None
+        better_m2 = routes.removed_m2 - planned_m2 - worth_m2
+        return route[0] if better_m2 > situation.switch_margin * worth_m2 else None
+
+
+def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float, beam: int) -> Routes:
+    """The routes of a team from where and when each helper is free."""
+    if not helpers or not strips:
+        return Routes(0.0, {one.vehicle: () for one in helpers})
+    team = _Team(strips, helpers, deadline_s)
+    best_m2 = 0.0
+    routes: tuple[tuple[int, ...], ...] = ((),) * len(helpers)
+    plans = _Plans.begun(team)
+    while True:
+        grown = plans.grown(team)
+        if grown.best_m2 > best_m2 + TOLERANCE_M2:
+            best_m2, routes = grown.best_m2, grown.best
+        if not grown.rows.size:
+            break
+        plans = plans.chosen(team, grown, beam)
+    numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
+    return Routes(best_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)))
+
+
+class _Team:
+    """What each helper finds at each strip, from its start and from behind each other strip.
+
+    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `way`: shape (helpers, nodes,
+    strips): how long it is from there until the sonar is on at a strip, flown the way that is shortest, as a helper's
+    agent does, and the node that this is. `sonar_on_s`: shape (helpers, nodes). `worth_m2`: (helpers, strips).
+    `alone_s`: what a strip takes by itself, and `alone_m2`: what it brings at most, shape (strips,). `later_m2ps`: what
+    a second is worth for which no strip is left.
+    """
+
+    def __init__(self, strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> None:
+        self.helpers = helpers
+        self.strips = _most_promising(strips, helpers)
+        tables = [StripTable(self.strips, one) for one in helpers]
+        count, ways = len(self.strips), max(one.sonar_on_s.shape[1] for one in tables)
+        self.start = count * ways
+        places = np.arange(count)
+        shape = (len(helpers), self.start + 1, count)
+        self.to_begin_s, self.sonar_on_s = np.full(shape, np.inf), np.zeros(shape[:2])
+        self.way = np.zeros(shape, dtype=np.intp)
+        for number, (helper, table) in enumerate(zip(helpers, tables, strict=True)):
+            own = table.sonar_on_s.shape[1]
+            nodes = (places[:, np.newaxis] * ways + np.arange(own)).ravel()
+            poses = np.vstack([table.leave.reshape(-1, 3), [helper.free_at]])
+            rows = np.append(nodes, self.start)
+            self.to_begin_s[number, rows], chosen = table.shortest_from(poses)
+            self.way[number, rows] = places * ways + chosen
+            self.sonar_on_s[number, nodes] = table.sonar_on_s.ravel()
+        self.worth_m2 = np.array([one.worth_m2 for one in tables])
+        self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
+        self.lasts_s = np.array([one.lasts_until_s for one in helpers])
+        self.until_s = np.minimum(self.lasts_s, deadline_s)
+        self.deadline_s = deadline_s
+        self.alone_m2 = self.worth_m2.max(axis=0)
+        sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
+        self.alone_s = sweeps_s + self._usual_way_s(count)
+        self.later_m2ps = LATER_SHARE * float((self.alone_m2 / self.alone_s).min())
+        self.by_rate = np.argsort(-self.alone_m2 / self.alone_s, kind="stable")
+        self.rank = np.argsort(self.by_rate, kind="stable")
+
+    def _usual_way_s(self, count: int) -> float:
+        """The way to the strip that is nearest, as it mostly is."""
+        nearest_s = self.to_begin_s[:, : self.start].copy()
+        nearest_s[:, np.arange(self.start), np.arange(self.start) // (self.start // count)] = np.inf
+        least_s = np.append(nearest_s.min(axis=(0, 2)), self.to_begin_s[:, self.start].min())
+        return float(np.median(least_s[np.isfinite(least_s)]))
+
+
+def _most_promising(strips: Sequence[OpenStrip], helpers: Sequence[Helper]) -> list[OpenStrip]:
+    """At most `MOST_STRIPS`, by number."""
+
+    def rate(one: OpenStrip) -> float:
+        way_m = min(np.hypot(one.strip.start[0] - h.free_at.x_m, one.strip.start[1] - h.free_at.y_m) for h in helpers)
+        return -one.risk_m2 / (one.strip.length_m + float(way_m))
+
+    most = sorted(strips, key=rate)[:MOST_STRIPS] if len(strips) > MOST_STRIPS else strips
+    return sorted(most, key=lambda one: one.strip.number)
+
+
+@dataclass(frozen=True, eq=False)
+class _Grown:
+    """Every plan by every strip that it may go on with: shape (plans, strips). `next`: who goes on. `rows`, `strips`:
+    the plans that go on and the strips by which they do, the most promising first; a strip beyond the last one stands
+    for none, where who is next leaves the rest to the others. `best_m2`, `best`: of the best one, its routes."""
+
+    next: np.ndarray
+    begins_s: FloatArray
+    gained_m2: FloatArray
+    rows: np.ndarray
+    strips: np.ndarray
+    best_m2: float
+    best: tuple[tuple[int, ...], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Plans:
+    """The beam. `nodes`, `free_s`: shape (plans, helpers), where each helper is and when it is free, infinite for one
+    that finds nothing any more; `used`: shape (plans, strips); `removed_m2`: shape (plans,)."""
+
+    nodes: np.ndarray
+    free_s: FloatArray
+    used: np.ndarray
+    removed_m2: FloatArray
+    routes: list[tuple[tuple[int, ...], ...]]
+
+    @classmethod
+    def begun(cls, team: _Team) -> _Plans:
+        """One plan, in which nobody has begun."""
+        helpers, strips = len(team.helpers), len(team.strips)
+        free_s = np.array([[one.free_s for one in team.helpers]], dtype=np.float64)
+        nodes = np.full((1, helpers), team.start)
+        return cls(nodes, free_s, np.zeros((1, strips), dtype=np.bool_), np.zeros(1), [((),) * helpers])
+
+    def grown(self, team: _Team) -> _Grown:
+        """What each plan may go on with; a helper that finds nothing drops out, and the next one goes on."""
+        plans = np.arange(len(self.removed_m2))
+        for _ in team.helpers:
+            one = self.free_s.argmin(axis=1)
+            now_s = self.free_s[plans, one][:, np.newaxis]
+            at = self.nodes[plans, one]
+            begins_s = now_s + team.to_begin_s[one, at]
+            sweeps_s = team.sonar_on_s[one[:, np.newaxis], team.way[one, at]]
+            share = np.clip((team.deadline_s - begins_s) / sweeps_s, 0.0, 1.0)
+            lasts = begins_s + sweeps_s <= team.lasts_s[one][:, np.newaxis]
+            gained_m2 = np.where(lasts & ~self.used, team.worth_m2[one] * share, 0.0)
+            idle = (gained_m2.max(axis=1) <= 0.0) & np.isfinite(now_s[:, 0])
+            if not idle.any():
+                break
+            self.free_s[plans[idle], one[idle]] = np.inf
+        gained_m2 = np.where(np.isfinite(now_s), gained_m2, 0.0)
+        total_m2 = self.removed_m2[:, np.newaxis] + gained_m2
+        row, strip = divmod(int(total_m2.argmax()), len(team.strips))
+        best = self._routes_with(row, int(one[row]), strip) if gained_m2[row, strip] > 0 else self.routes[row]
+        ends_s = begins_s + sweeps_s + team.run_out_s[one][:, np.newaxis]
+        has_others = np.isfinite(self.free_s).sum(axis=1, keepdims=True) > 1
+        goes_on = np.hstack([gained_m2 > 0, has_others])
+        so_far_m2 = np.hstack([total_m2, self.removed_m2[:, np.newaxis]])
+        ranks = np.where(goes_on, so_far_m2 + self._still_m2(team, one, ends_s), -np.inf)
+        order = np.argsort(-ranks, axis=None, kind="stable")[: int(goes_on.sum())]
+        rows, strips = np.divmod(order, ranks.shape[1])
+        return _Grown(one, begins_s, gained_m2, rows, strips, float(total_m2[row, strip]), best)
+
+    def chosen(self, team: _Team, grown: _Grown, beam: int) -> _Plans:
+        """The most promising plans; of those that serve the same strips and leave helpers at the same places one."""
+        none = len(team.strips)
+        kept, seen = [], set()
+        for row, strip in zip(grown.rows.tolist(), grown.strips.tolist(), strict=True):
+            one = int(grown.next[row])
+            nodes, used, free_s = self.nodes[row].copy(), self.used[row].copy(), self.free_s[row].copy()
+            free_s[one] = np.inf
+            if strip != none:
+                nodes[one], used[strip] = team.way[one, self.nodes[row, one], strip], True
+                free_s[one] = grown.begins_s[row, strip] + team.sonar_on_s[one, nodes[one]] + team.run_out_s[one]
+            key = nodes.tobytes() + used.tobytes() + np.isfinite(free_s).tobytes()
+            if key not in seen:
+                seen.add(key)
+                kept.append((row, strip, one, nodes, used, free_s))
+                if len(kept) == beam:
+                    break
+        gained_m2 = [0.0 if strip == none else grown.gained_m2[row, strip] for row, strip, *_ in kept]
+        return _Plans(
+            nodes=np.array([nodes for *_, nodes, _, _ in kept]),
+            free_s=np.array([free_s for *_, free_s in kept]),
+            used=np.array([used for *_, used, _ in kept]),
+            removed_m2=self.removed_m2[[row for row, *_ in kept]] + gained_m2,
+            routes=[
+                self.routes[row] if strip == none else self._routes_with(row, one, strip)
+                for row, strip, one, *_ in kept
+            ],
+        )
+
+    def _routes_with(self, row: int, helper: int, strip: int) -> tuple[tuple[int, ...], ...]:
+        routes = self.routes[row]
+        return (*routes[:helper], (*routes[helper], strip), *routes[helper + 1 :])
+
+    def _still_m2(self, team: _Team, one: np.ndarray, ends_s: FloatArray) -> FloatArray:
+        """What the strips that are left may bring in the time that is left, shape (plans, strips + 1), if a plan goes
+        on with each, or without who is next: the best first, by themselves."""
+        left_s = np.where(np.isfinite(self.free_s), np.maximum(team.until_s - self.free_s, 0.0), 0.0)
+        others_s = left_s.sum(axis=1) - left_s[np.arange(len(one)), one]
+        time_s = others_s[:, np.newaxis] + np.maximum(team.until_s[one][:, np.newaxis] - ends_s, 0.0)
+        there = ~self.used[:, team.by_rate]
+        seconds = np.cumsum(there * team.alone_s[team.by_rate], axis=1)
+        worth_m2 = np.cumsum(there * team.alone_m2[team.by_rate], axis=1)
+        before_s = (seconds - there * team.alone_s[team.by_rate])[:, team.rank]
+        counted = before_s <= time_s  # the strip itself is among the best that fill the time: it is not there any more
+        time_s = np.hstack([time_s + np.where(counted, team.alone_s, 0.0), others_s[:, np.newaxis]])
+        seconds = np.hstack([np.zeros((len(one), 1)), seconds, seconds[:, -1:] + HORIZON_S])
+        worth_m2 = np.hstack([np.zeros((len(one), 1)), worth_m2, worth_m2[:, -1:] + HORIZON_S * team.later_m2ps])
+        still_m2 = np.array([np.interp(time_s[row], seconds[row], worth_m2[row]) for row in range(len(one))])
+        still_m2[:, :-1] -= np.where(counted, team.alone_m2, 0.0)
+        return still_m2

@@ -1,0 +1,86 @@
+"""The expected map: for every cell the residual risk that is expected to be left at the mission's end by what the fleet
+does anyway, and what a helper's look would remove of it.
+
+Looks multiply, so their order does not matter: what is known is the looks so far and the tracks that primaries still
+mean to fly. Where cells have settled, or a hotspot was told, that is what was seen; elsewhere it is what P(y) lets
+expect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from coordinator.cut.window import Window
+from coordinator.expect.hotspots import Hotspots
+from coordinator.expect.seabed import Seabed
+from coordinator.expect.tracks import expected_tracks
+from coordinator.fleet import KnownFleet
+from planner.risk import HIGHEST_P_DETECT, MOST_LEVELS, NATS_PER_LEVEL, LevelArray
+from planner.types import BoolArray, FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """The expected map at one time; arrays of grid shape. `risk`: the residual risk expected to be left, 0 where no
+    second look goes; `look`: the share of it that a helper's look there is expected to remove; `is_seen`: where that
+    rests on what was seen and not on what is expected of tracks to come."""
+
+    risk: FloatArray
+    look: FloatArray
+    is_seen: BoolArray
+
+
+class ExpectedMap:
+    """Made anew from what the fleet has said whenever it is asked. `inside`: the area's cells, shape of the grid;
+    `p_detect`: what a helper's look is told to have."""
+
+    def __init__(self, fleet: KnownFleet, inside: BoolArray, p_detect: float) -> None:
+        self.hotspots = Hotspots(fleet.map.grid, inside)
+        self._fleet = fleet
+        self._inside = inside
+        self._p_detect = p_detect
+        self._seabed = Seabed(fleet.map.grid)
+
+    def learn(self, window: Window, helper: str, before: LevelArray, typical: float) -> None:
+        """Learns what second looks find from a pass over a window. `before`: what the helper's layer told there
+        before it, the sum over its looks; `typical`: its P_d as the run tells it."""
+        gained = self._fleet.levels(helper, window).astype(np.float64) - before
+        layer = self._fleet.map.layers.get(helper)
+        if layer is not None:  # where the sum is full the best look is all that is known
+            full = layer.sum_levels[window.cells] == MOST_LEVELS
+            gained = np.where(full, np.maximum(gained, layer.largest_levels[window.cells]), gained)
+        self._seabed.learn(window, -np.expm1(-NATS_PER_LEVEL * np.maximum(gained, 0.0)), typical)
+
+    def now(self) -> Expectation:
+        """What is expected by all that was heard. Ground ahead of the survey is told of once every primary that
+        surveys has said its plan."""
+        fleet, rho = self._fleet, self._fleet.map.rho
+        tracks = expected_tracks(fleet.map.grid, fleet.primaries)
+        primaries, helpers, largest = self._nats_so_far()
+        share, helpers_share = self._seabed.shares(primaries, tracks.flown)
+        nats = primaries + helpers + share * tracks.ahead
+        largest = np.maximum(largest, share * tracks.largest_ahead)
+        look_nats = -np.log1p(-np.minimum(self._p_detect * helpers_share, HIGHEST_P_DETECT))
+        more = np.maximum(look_nats - largest, 0.0) if rho > 0 else 0.0  # what it adds to the largest single look
+        settled = fleet.map.settled_by(fleet.primaries)
+        hot, told_risk = self.hotspots.drawn()
+        has_tiles = settled | (primaries + helpers > 0)
+        risk = np.where(hot & ~has_tiles, told_risk, np.exp(-(largest * rho + nats * (1 - rho))))
+        is_seen = settled | hot
+        plans_are_known = all(one.plan is not None for one in fleet.primaries.values())
+        return Expectation(
+            risk=np.where(self._inside & (is_seen | plans_are_known), risk, 0.0),
+            look=-np.expm1(-(more * rho + look_nats * (1 - rho))),
+            is_seen=is_seen,
+        )
+
+    def _nats_so_far(self) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """-ln(1 - P_d) of all looks so far: summed over those of primaries and of helpers, and the largest of all."""
+        primaries, helpers, largest = np.zeros((3, *self._fleet.map.grid.shape))
+        for name, layer in self._fleet.map.layers.items():
+            sums = primaries if name in self._fleet.primaries else helpers
+            sums += NATS_PER_LEVEL * layer.sum_levels
+            np.maximum(largest, NATS_PER_LEVEL * layer.largest_levels, out=largest)
+        return primaries, helpers, largest

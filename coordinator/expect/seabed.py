@@ -1,0 +1,76 @@
+"""How well looks do on the ground of this area: what they found beside what P(y) let expect of them.
+
+A seabed that hides mines from one vehicle hides them from another, in part: from nearer, from another side, with
+another kind of sonar it may not. What was found about a place tells of the ground there, and how far what primaries
+found holds for helpers the helpers' own looks tell.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from coordinator.cut.window import Window
+from planner.types import FloatArray, GridSpec
+
+ABOUT_M = 20.0
+"""So far to either side of a cell ground is taken to be alike: of single cells the looks' errors are too large."""
+DOUBT = 0.1
+"""P_d that looks must have been expected to have, on average about a cell, to count as much as what holds elsewhere."""
+DOUBT_OF_HELPERS = 0.005
+"""P_d that helpers' looks must have been told to have, on average over the grid, to count as much as that they find
+it."""
+LEAST_SHARE = 0.1
+MOST_OF_TOLD = 1.1
+
+
+class Seabed:
+    """Learns from looks. What tracks found is compared with their mean, for P(y) is measured on this very ground; what
+    helpers found with what they are told to have."""
+
+    def __init__(self, grid: GridSpec) -> None:
+        self._cells = max(0, round(ABOUT_M / grid.cell_m))
+        self._found: FloatArray = np.zeros(grid.shape)
+        self._told: FloatArray = np.zeros(grid.shape)
+
+    def learn(self, window: Window, p_detect: FloatArray, typical: float) -> None:
+        """Learns from a pass of a helper over a window's cells: the P_d that it found at each, shape of the window, 0
+        where it did not look; `typical`: what it is told to have."""
+        seen = p_detect > 0
+        self._found[window.cells][seen] += p_detect[seen]
+        self._told[window.cells][seen] += typical
+
+    def shares(self, found_nats: FloatArray, expected_nats: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What part of the P_d expected of a look is expected to be found, grid shape: of a primary's by its P(y), and
+        of a helper's by what it is told to have.
+
+        `found_nats`, `expected_nats`: -ln(1 - P_d) of all looks of the primaries, as they told and as their P(y) let
+        expect.
+        """
+        expected = -np.expm1(-expected_nats)
+        found = np.where(expected_nats > 0, -np.expm1(-found_nats), 0.0)
+        found_about, told_about = self._about(found), self._about(expected)
+        by_tracks = (found_about + DOUBT) / (told_about + DOUBT)
+        told = float((self._told * by_tracks).sum())
+        doubt = DOUBT_OF_HELPERS * self._found.size
+        of_helpers = (float(self._found.sum()) + doubt) / (told + doubt)
+        found_about += self._about(self._found) / of_helpers
+        told_about += self._about(self._told)
+        share = np.clip((found_about + DOUBT) / (told_about + DOUBT), LEAST_SHARE, 1 / LEAST_SHARE)
+        return share, np.minimum(of_helpers * share, MOST_OF_TOLD)
+
+    def _about(self, values: FloatArray) -> FloatArray:
+        """The mean over the cells about each, of those that there are."""
+        for axis in (0, 1):
+            values = _sliding_mean(values, self._cells, axis)
+        return values
+
+
+def _sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
+    """The mean over up to `beside` places before and behind each along an axis."""
+    size = values.shape[axis]
+    total = np.zeros((size + 1, values.shape[1 - axis]))
+    np.cumsum(values if axis == 0 else values.T, axis=0, out=total[1:])
+    places = np.arange(size)
+    first, end = np.maximum(places - beside, 0), np.minimum(places + beside + 1, size)
+    mean: FloatArray = (total[end] - total[first]) / (end - first)[:, np.newaxis]
+    return mean if axis == 0 else mean.T

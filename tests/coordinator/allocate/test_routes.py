@@ -1,0 +1,213 @@
+"""Routes to the deadline: by hand, and against all orders of a few strips."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import permutations, product
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from situations import at_work, helper, open_strip, situation, situations, strip
+
+from bench.planning_time import situation as large_situation
+from coordinator.allocate.routes import BEAM, HORIZON_S, MOST_STRIPS, Routes, RoutesAllocator, plan_routes
+from coordinator.allocate.service import expected_service, removed_m2
+from coordinator.allocate.simple import GreedyAllocator
+from coordinator.allocate.situation import Helper, OpenStrip, Situation
+
+PLAN = RoutesAllocator()
+NEAR, FAR = open_strip(strip(2, y_m=100)), open_strip(strip(1, y_m=600))
+"""One behind the other, both straight ahead of `helper()`: the near one from 50 s to 150 s, then the far one from 300 s
+to 400 s. A look removes 700 m2 of each."""
+
+
+def routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float = 3600) -> Routes:
+    return plan_routes(strips, helpers, deadline_s, BEAM)
+
+
+def after(order: Sequence[OpenStrip], one: Helper, deadline_s: float) -> tuple[float, Helper]:
+    """What a sequence of services removes by the deadline, and the helper behind it."""
+    total_m2 = 0.0
+    for job in order:
+        served = expected_service(job, one)
+        total_m2 += 0.0 if job.strip.number in one.refused else removed_m2(job, one, served, deadline_s)
+        one = replace(one, free_at=served.free_at, free_s=served.free_s)
+    return total_m2, one
+
+
+def most_m2(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> float:
+    """What the best of all routes removes: every share of the strips, some left out, in every order."""
+
+    def alone_m2(one: Helper, own: tuple[OpenStrip, ...]) -> float:
+        return max(after(order, one, deadline_s)[0] for order in permutations(own))
+
+    def shared(owners: tuple[int, ...]) -> float:
+        own = [tuple(job for job, owner in zip(strips, owners, strict=True) if owner == k) for k in range(len(helpers))]
+        return sum(alone_m2(*pair) for pair in zip(helpers, own, strict=True))
+
+    return max(shared(owners) for owners in product(range(len(helpers) + 1), repeat=len(strips)))
+
+
+class TestOneHelper:
+    def test_in_the_order_of_the_way(self) -> None:
+        found = routes([FAR, NEAR], [helper()])
+        assert found.strips == {"alpha": (2, 1)}
+        assert found.removed_m2 == pytest.approx(1400)
+
+    @pytest.mark.parametrize(
+        ("deadline_s", "route", "removed"),
+        [(400, (2, 1), 1400), (350, (2, 1), 1050), (300, (2,), 700), (100, (2,), 350), (50, (), 0)],
+    )
+    def test_the_deadline_cuts_the_last_one(self, deadline_s: float, route: tuple[int, ...], removed: float) -> None:
+        found = routes([FAR, NEAR], [helper()], deadline_s)
+        assert found.strips == {"alpha": route}
+        assert found.removed_m2 == pytest.approx(removed)
+
+    def test_a_better_one_farther_away_is_served_later_rather_than_the_near_one_left(self) -> None:
+        rich = open_strip(strip(1, y_m=600), 9000)
+        told = situation([NEAR, rich], [helper()], deadline_s=400)
+        assert GreedyAllocator().assign(told) == {"alpha": 1}
+        assert PLAN.assign(told) == {"alpha": 2}
+        assert routes(told.strips, told.helpers, 400).removed_m2 == pytest.approx(7000)
+
+    def test_where_there_is_time_for_one_it_is_the_one_that_brings_more(self) -> None:
+        # Ahead 1500 m2 from 300 s to 400 s; behind 1000 m2, a turn about away.
+        behind = open_strip(strip(2, y_m=-600))
+        assert routes([replace(FAR, risk_m2=1500), behind], [helper()], 400).strips == {"alpha": (1,)}
+        assert routes([replace(FAR, risk_m2=500), behind], [helper()], 400).strips == {"alpha": (2,)}
+
+    def test_it_takes_the_way_that_leads_past_more(self) -> None:
+        # To the north two strips in a row, to the south a single one that brings a little more.
+        north = [open_strip(strip(1, y_m=100)), open_strip(strip(2, y_m=310))]
+        south = open_strip(strip(3, y_m=-300), 1100)
+        assert routes([*north, south], [helper()], 260).strips == {"alpha": (1, 2)}
+
+    @pytest.mark.parametrize(("lasts_s", "route"), [(400.1, (2, 1)), (399.9, (2,)), (149.9, ())])
+    def test_the_battery_must_last(self, lasts_s: float, route: tuple[int, ...]) -> None:
+        assert routes([FAR, NEAR], [helper(lasts_until_s=lasts_s)]).strips == {"alpha": route}
+
+    def test_what_it_has_refused_is_not_in_its_route(self) -> None:
+        assert routes([FAR, NEAR], [helper(refused=frozenset({2}))]).strips == {"alpha": (1,)}
+
+    def test_while_nobody_can_tell_when_the_mission_ends_it_plans_all_the_same(self) -> None:
+        assert PLAN.assign(situation([FAR, NEAR], [helper()], deadline_s=math.inf)) == {"alpha": 2}
+
+    def test_of_very_many_it_plans_with_those_that_bring_most(self) -> None:
+        poor = {7, 30, 66}
+        jobs = [
+            open_strip(strip(number, x_m=60 * number), 1 if number in poor else 1000)
+            for number in range(1, MOST_STRIPS + len(poor) + 1)
+        ]
+        (route,) = plan_routes(jobs, [helper()], HORIZON_S, 1).strips.values()
+        assert set(route) == {job.strip.number for job in jobs} - poor
+
+    def test_without_strips_or_helpers_there_are_no_routes(self) -> None:
+        assert routes([], [helper()]) == Routes(0.0, {"alpha": ()})
+        assert routes([NEAR], []) == Routes(0.0, {})
+
+
+class TestSeveralHelpers:
+    BESIDE = open_strip(strip(3, x_m=300, y_m=100))
+
+    def test_each_takes_what_lies_ahead_of_it(self) -> None:
+        found = routes([NEAR, self.BESIDE, FAR], [helper(), helper("beta", x_m=300)], 400)
+        assert found.strips == {"alpha": (2, 1), "beta": (3,)}
+        assert found.removed_m2 == pytest.approx(2100)
+
+    def test_one_that_finds_nothing_does_not_end_the_routes_of_the_others(self) -> None:
+        empty, unwilling = helper("alpha", lasts_until_s=10), helper("gamma", refused=frozenset({1, 2}))
+        found = routes([FAR, NEAR], [empty, helper("beta"), unwilling])
+        assert found.strips == {"alpha": (), "beta": (2, 1), "gamma": ()}
+
+    def test_who_is_free_first_leaves_to_another_what_that_one_serves_better(self) -> None:
+        # alpha would be on the strip at 180 s, for a fifth of it; beta, free at 50 s, from 100 s to 200 s.
+        alpha, beta = helper(y_m=-260), helper("beta", free_s=50)
+        found = routes([NEAR], [alpha, beta], 200)
+        assert found.strips == {"alpha": (), "beta": (2,)}
+        assert found.removed_m2 == pytest.approx(700)
+        assert routes([NEAR], [alpha], 200).removed_m2 == pytest.approx(140)
+
+    def test_what_a_helper_at_work_will_do_better_is_left_to_it(self) -> None:
+        # beta will be free beside strip 1 in 102.5 s; alpha, 1500 m away, has strip 2 to do.
+        beta = at_work(helper("beta", y_m=-205), open_strip(strip(9, y_m=-200)))
+        alpha = helper("alpha", x_m=1500)
+        jobs = [open_strip(strip(1, y_m=100), 3000), open_strip(strip(2, x_m=1500, y_m=400), 1500)]
+        assert PLAN.assign(situation(jobs, [alpha, beta])) == {"alpha": 2}
+
+    @settings(max_examples=150, deadline=None)
+    @given(told=situations())
+    def test_nobody_idles_who_could_serve_what_is_in_no_route(self, told: Situation) -> None:
+        until_s = min(told.deadline_s, HORIZON_S)
+        found = routes(told.strips, told.helpers, until_s)
+        jobs = {job.strip.number: job for job in told.strips}
+        left = jobs.keys() - {number for route in found.strips.values() for number in route}
+        for one in told.helpers:
+            _, behind = after([jobs[number] for number in found.strips[one.vehicle]], one, until_s)
+            assert all(after([jobs[number]], behind, until_s)[0] == 0 for number in left)
+
+    @pytest.mark.parametrize("seed", range(1, 4))
+    def test_in_a_large_fleet_each_gets_its_own_and_only_the_free_and_those_turned_round_are_told(
+        self, seed: int
+    ) -> None:
+        asked = large_situation(60, 8, seed)
+        offers = PLAN.assign(asked)
+        assert len(set(offers.values())) == len(offers)
+        assert {one.vehicle for one in asked.free} <= set(offers) <= {one.vehicle for one in asked.helpers}
+
+
+class TestTurningRound:
+    def on_its_way(self, risk_m2: float) -> Helper:
+        """A helper on its way to a strip 400 m ahead."""
+        return at_work(helper(), open_strip(strip(9, y_m=400), risk_m2))
+
+    def test_for_much_more_it_is_turned_round(self) -> None:
+        told = situation([open_strip(strip(1, y_m=-200), 9000)], [self.on_its_way(1000)], deadline_s=260)
+        assert PLAN.assign(told) == {"alpha": 1}
+
+    def test_for_less_than_the_margin_it_is_not(self) -> None:
+        told = situation([open_strip(strip(1, y_m=-300), 1150)], [self.on_its_way(1000)], deadline_s=320)
+        assert PLAN.assign(told) == {}
+        assert PLAN.assign(replace(told, switch_margin=0.0)) == {"alpha": 1}
+
+    def test_once_it_is_sweeping_it_is_left_at_it(self) -> None:
+        busy = replace(self.on_its_way(1000), sweeping=True)
+        assert PLAN.assign(situation([open_strip(strip(1, y_m=-200), 9000)], [busy], deadline_s=260)) == {}
+
+    def test_if_both_can_be_done_it_goes_on(self) -> None:
+        told = situation([open_strip(strip(1, y_m=650), 1200)], [self.on_its_way(1000)])
+        assert PLAN.assign(told) == {}
+
+
+class TestAgainstAllOrders:
+    @settings(max_examples=60, deadline=None)
+    @given(told=situations(most_strips=4))
+    def test_one_or_two_helpers_do_as_well_as_can_be_with_a_wide_beam(self, told: Situation) -> None:
+        helpers, until_s = told.helpers[:2], min(told.deadline_s, HORIZON_S)
+        found = plan_routes(told.strips, helpers, until_s, 200)
+        assert found.removed_m2 == pytest.approx(most_m2(told.strips, helpers, until_s), rel=0.001)
+
+    @settings(max_examples=60, deadline=None)
+    @given(told=situations(most_strips=4))
+    def test_with_the_usual_beam_helpers_alike_do_as_well_to_a_few_percent(self, told: Situation) -> None:
+        one, until_s = helper(), min(told.deadline_s, HORIZON_S)
+        helpers = [
+            replace(one, vehicle=told_of.vehicle, pose=told_of.pose, free_at=told_of.free_at, free_s=told_of.free_s)
+            for told_of in told.helpers[:2]
+        ]
+        best_m2 = most_m2(told.strips, helpers, until_s)
+        assert 0.95 * best_m2 <= routes(told.strips, helpers, until_s).removed_m2 <= best_m2 + 1e-6
+
+    @settings(max_examples=40, deadline=None)
+    @given(told=situations(), data=st.data())
+    def test_what_routes_tell_to_remove_they_do_and_the_order_of_asking_changes_nothing(
+        self, told: Situation, data: st.DataObject
+    ) -> None:
+        until_s = min(told.deadline_s, HORIZON_S)
+        found = routes(told.strips, told.helpers, until_s)
+        jobs = {job.strip.number: job for job in told.strips}
+        removed = [after([jobs[n] for n in found.strips[one.vehicle]], one, until_s)[0] for one in told.helpers]
+        assert found.removed_m2 == pytest.approx(sum(removed))
+        assert routes(data.draw(st.permutations(told.strips)), told.helpers, until_s) == found

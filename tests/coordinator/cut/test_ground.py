@@ -1,0 +1,84 @@
+"""What a second look is worth, cell by cell, by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.window import Window
+from planner.types import FloatArray
+
+
+def ground(
+    risk: FloatArray, look: float = 0.5, *, objective: str = "mean", threshold: float = 0.0, weight: float = 25.0
+) -> Ground:
+    return Ground(
+        risk=risk,
+        look=np.full(risk.shape, look),
+        weights=np.full(risk.shape, weight),
+        is_seen=np.ones(risk.shape, dtype=np.bool_),
+        objective=OBJECTIVES[objective],
+        threshold=threshold,
+    )
+
+
+class TestWorth:
+    # A look takes half of 0.8, 0.5, 0.4 and 0. Above 0.3 lie 0.5, 0.2, 0.1 and 0 of it before, 0.1, 0, 0 and 0 after:
+    # 0.4, 0.2, 0.1 and 0 less, over the 30 % of the area which these are.
+    RISK = np.array([[0.8, 0.5, 0.4, 0.0]])
+
+    @pytest.mark.parametrize(
+        ("objective", "worth"),
+        [
+            ("mean", [0.4, 0.25, 0.2, 0.0]),
+            ("worst30", [0.4 / 0.3, 0.2 / 0.3, 0.1 / 0.3, 0.0]),
+            ("both", [0.32 + 0.08 / 0.3, 0.2 + 0.04 / 0.3, 0.16 + 0.02 / 0.3, 0.0]),
+        ],
+    )
+    def test_it_is_what_a_look_takes_of_what_counts(self, objective: str, worth: list[float]) -> None:
+        told = ground(self.RISK, objective=objective, threshold=0.3).worth()
+        assert told[0] == pytest.approx([25 * one for one in worth])
+
+    def test_with_a_threshold_of_nothing_the_worst_are_all(self) -> None:
+        told = ground(self.RISK, objective="worst30", threshold=0.0).worth()
+        assert told == pytest.approx(ground(self.RISK).worth() / 0.3)
+
+    def test_what_stays_below_the_threshold_does_not_count_for_the_worst(self) -> None:
+        assert not ground(self.RISK, objective="worst30", threshold=0.8).worth().any()
+
+    def test_it_may_be_asked_of_some_cells(self) -> None:
+        one = ground(np.arange(12.0).reshape(3, 4) / 12, objective="both", threshold=0.4)
+        cells = Window(1, 3, 1, 2).cells
+        assert one.worth(cells) == pytest.approx(one.worth()[cells])
+
+
+class TestFly:
+    def test_a_look_takes_its_share_where_it_goes_and_only_of_the_copy(self) -> None:
+        one = ground(np.full((2, 3), 0.8), look=0.75)
+        flown = one.copy()
+        flown.fly(Window(0, 1, 1, 3))
+        flown.fly(Window(0, 2, 2, 3))
+        assert flown.risk == pytest.approx(np.array([[0.8, 0.2, 0.05], [0.8, 0.8, 0.2]]))
+        assert (one.risk == 0.8).all()
+
+    def test_what_was_worth_is_less_by_what_was_flown(self) -> None:
+        one = ground(np.array([[0.8]]))
+        one.fly(Window(0, 1, 0, 1))
+        assert one.worth()[0, 0] == pytest.approx(25 * 0.2)
+
+
+class TestWorstFrom:
+    def test_three_in_ten_of_those_that_are_looked_at_lie_above_it(self) -> None:
+        # Eleven cells in steps of 0.05 from 0.5 to 1: seven steps of ten up is 0.85, which 0.9, 0.95 and 1 exceed.
+        risk = np.append(np.linspace(0.5, 1.0, 11), np.zeros(9))[np.newaxis, :]
+        assert ground(risk).worst_from() == pytest.approx(0.85)
+
+    def test_where_nothing_is_looked_at_it_is_nothing(self) -> None:
+        assert ground(np.zeros((2, 2))).worst_from() == 0.0
+
+    def test_flying_the_worst_brings_it_down(self) -> None:
+        one = ground(np.array([[1.0] * 3 + [0.4] * 7]))
+        assert one.worst_from() == pytest.approx(0.4 + 0.3 * 0.6)  # between the seventh and the eighth of ten: 6.3 up
+        one.fly(Window(0, 1, 0, 3))
+        assert one.worst_from() == pytest.approx(0.4 + 0.3 * 0.1)

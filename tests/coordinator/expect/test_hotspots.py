@@ -1,0 +1,82 @@
+"""Hotspots as they are heard, drawn on the grid."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from coordinator_by_hand import ELSEWHERE, GRID, HOT, HOT_CELLS, box
+
+from comms.said.messages import Hotspot, HotspotState
+from coordinator.expect.hotspots import Hotspots
+
+Box = tuple[float, float, float, float]
+ELSEWHERE_CELLS = np.s_[10:70, 60:70]
+FIRST = (0, 1)
+
+
+def hotspot(place: Box | None = HOT, mean_risk: float = 0.5) -> Hotspot:
+    """One with this outline; none withdraws it."""
+    state = HotspotState.WITHDRAWN if place is None else HotspotState.ACTIVE
+    return Hotspot(1, state, () if place is None else box(*place), mean_risk, 600, False, 0)
+
+
+@pytest.fixture
+def hotspots() -> Hotspots:
+    return Hotspots(GRID, np.ones(GRID.shape, dtype=np.bool_))
+
+
+def drawn(hotspots: Hotspots) -> np.ndarray:
+    """The told risk, after it was made sure that it is told where hotspots are, and only there."""
+    hot, told = hotspots.drawn()
+    assert ((told > 0) == hot).all()
+    return told
+
+
+def told(*places: tuple[tuple[slice, slice], float]) -> np.ndarray:
+    values = np.zeros(GRID.shape)
+    for cells, risk in places:
+        values[cells] = risk
+    return values
+
+
+def test_it_holds_the_cells_whose_centres_lie_in_it(hotspots: Hotspots) -> None:
+    assert not drawn(hotspots).any()
+    assert hotspots.hear(("p", 1), FIRST, hotspot())
+    assert (drawn(hotspots) == told((HOT_CELLS, 0.5))).all()
+
+
+def test_of_revisions_the_newest_counts_whenever_it_comes(hotspots: Hotspots) -> None:
+    assert hotspots.hear(("p", 1), (0, 2), hotspot(HOT, 0.5))
+    assert not hotspots.hear(("p", 1), (0, 2), hotspot(ELSEWHERE, 0.7))
+    assert not hotspots.hear(("p", 1), (0, 1), hotspot(ELSEWHERE, 0.7))
+    assert (drawn(hotspots) == told((HOT_CELLS, 0.5))).all()
+    assert hotspots.hear(("p", 1), (1, 1), hotspot(ELSEWHERE, 0.7))  # its sender has started anew
+    assert (drawn(hotspots) == told((ELSEWHERE_CELLS, 0.7))).all()
+
+
+def test_one_that_is_withdrawn_holds_nothing(hotspots: Hotspots) -> None:
+    hotspots.hear(("p", 1), FIRST, hotspot(HOT))
+    hotspots.hear(("p", 2), FIRST, hotspot(ELSEWHERE))
+    assert drawn(hotspots).any()
+    assert hotspots.hear(("p", 1), (0, 2), hotspot(None))
+    assert (drawn(hotspots) == told((ELSEWHERE_CELLS, 0.5))).all()
+
+
+def test_where_two_lie_on_each_other_the_worse_counts(hotspots: Hotspots) -> None:
+    hotspots.hear(("p", 1), FIRST, hotspot(HOT, 0.8))
+    hotspots.hear(("q", 1), FIRST, hotspot((97.5, 0.0, 397.5, 200.0), 0.6))
+    assert (drawn(hotspots) == told((np.s_[0:40, 20:80], 0.6), (HOT_CELLS, 0.8))).all()
+
+
+def test_what_lies_outside_the_area_is_left_out() -> None:
+    inside = np.ones(GRID.shape, dtype=np.bool_)
+    inside[:, 25:] = False
+    hotspots = Hotspots(GRID, inside)
+    hotspots.hear(("p", 1), FIRST, hotspot())
+    assert (drawn(hotspots) == told((np.s_[10:70, 20:25], 0.5))).all()
+
+
+@pytest.mark.parametrize("place", [(900.0, 0.0, 950.0, 100.0), (0.0, -200.0, 50.0, -100.0), (101.0, 51.0, 102.0, 52.0)])
+def test_one_that_holds_no_cell_is_heard_and_draws_nothing(hotspots: Hotspots, place: Box) -> None:
+    assert hotspots.hear(("p", 1), FIRST, hotspot(place))
+    assert not drawn(hotspots).any()

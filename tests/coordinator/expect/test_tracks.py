@@ -1,0 +1,166 @@
+"""What tracks are expected to see, by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from by_hand import PRIMARY, vehicle
+
+from comms.said.announcement import Role, RosterVehicle
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
+from coordinator.expect.tracks import Tracks, expected_tracks
+from coordinator.vehicles import KnownVehicle
+from planner.footprints import footprint_of
+from planner.types import DetectionCurve, FloatArray, GridSpec, SweepFrame
+
+GRID = GridSpec(SweepFrame(0, 0, 0), 5, 81, 80)  # column i is centred at 5 i m, row j at 5 j + 2.5 m
+UP = PlannedTrack(1, 200, 200, 0, 200, 400, False)
+DOWN = PlannedTrack(1, 200, 200, 400, 200, 0, False)
+LINEAR = DetectionCurve(np.array([0.0, 100.0]), np.array([0.5, 0.0]))
+HALF = DetectionCurve(np.array([20.0, 100.0]), np.array([0.5, 0.5]))
+ENTRY = vehicle(PRIMARY, Role.SURVEY)
+WEDGE = replace(ENTRY, vehicle="ahead", near_m=10, far_m=60, footprint="wedge", half_angle_rad=0.8)
+
+
+def primary(
+    *tracks: PlannedTrack,
+    curves: dict[int, DetectionCurve] | None = None,
+    entry: RosterVehicle = ENTRY,
+    r_adpt_m: tuple[int, ...] = (),
+) -> KnownVehicle:
+    """One that has told its plan."""
+    plan = Plan(1, tracks, r_adpt_m, (), "")
+    return KnownVehicle(entry, heard_ms=0, plan=plan, curves={} if curves is None else curves)
+
+
+def expected(*primaries: KnownVehicle) -> Tracks:
+    return expected_tracks(GRID, {f"{number}": one for number, one in enumerate(primaries)})
+
+
+def at(y_m: float, mode: Mode = Mode.SURVEY, works_on: int = 1) -> AgentState:
+    return AgentState(mode, works_on, 1.0, 0, 200, y_m, 0)
+
+
+def p_detect(nats: FloatArray) -> FloatArray:
+    return -np.expm1(-nats)
+
+
+class TestPlannedTracks:
+    def test_a_track_multiplies_the_risk_of_the_cells_beside_it_by_what_its_curve_leaves(self) -> None:
+        found = expected(primary(UP, curves={1: LINEAR}))
+        # 0 m to a side 0.5, 50 m 0.25, 95 m 0.025, 100 m and beyond nothing.
+        places = [40, 30, 50, 21, 59, 20, 60, 0, 80]
+        left = np.exp(-found.ahead[:, places])
+        assert left[0] == pytest.approx([0.5, 0.75, 0.75, 0.975, 0.975, 1, 1, 1, 1])
+        assert (left == left[0]).all()
+        assert (found.largest_ahead == found.ahead).all()
+        assert not found.flown.any()
+
+    def test_tracks_multiply_and_the_largest_look_is_told(self) -> None:
+        second = PlannedTrack(2, 250, 250, 400, 250, 0, False)
+        found = expected(primary(UP, second, curves={1: LINEAR}))
+        # Columns 40 and 45 lie 0 and 50 m, and 25 and 25 m, from them.
+        assert np.exp(-found.ahead[7, [40, 45]]) == pytest.approx([0.5 * 0.75, 0.625**2])
+        assert p_detect(found.largest_ahead[7, [40, 45]]) == pytest.approx([0.5, 0.375])
+
+    def test_only_what_lies_beside_a_track_between_its_ends(self) -> None:
+        found = expected(primary(PlannedTrack(1, 200, 200, 100, 200, 200, False), curves={1: HALF}))
+        beside = np.zeros(GRID.shape, dtype=np.bool_)
+        beside[20:40, 20:37] = beside[20:40, 44:61] = True  # 20 to 100 m to either side
+        assert ((found.ahead > 0) == beside).all()
+
+    @pytest.mark.parametrize("heading_deg", [0, 37, 90, 180, 301])
+    def test_whichever_way_the_grid_lies(self, heading_deg: float) -> None:
+        frame = SweepFrame(1000, -500, math.radians(heading_deg))
+        (x0_m, x1_m), (y0_m, y1_m) = frame.to_mission(np.array([201.0, 201.0]), np.array([0.0, 400.0]))
+        track = PlannedTrack(1, 201, float(x0_m), float(y0_m), float(x1_m), float(y1_m), False)
+        turned = expected_tracks(replace(GRID, frame=frame), {PRIMARY: primary(track, curves={1: LINEAR})})
+        plain = expected(primary(replace(UP, start_x_m=201, end_x_m=201), curves={1: LINEAR}))
+        assert turned.ahead == pytest.approx(plain.ahead, abs=1e-9)
+
+    def test_a_track_across_the_rows(self) -> None:
+        found = expected(primary(PlannedTrack(1, 0, 0, 200, 400, 200, False), curves={1: LINEAR}))
+        # Row 44 is centred at 222.5 m.
+        assert p_detect(found.ahead[44]) == pytest.approx(0.5 * (1 - 0.225))
+
+
+class TestWhatIsFlown:
+    def test_flown_tracks_are_not_ahead_any_more(self) -> None:
+        found = expected(primary(replace(UP, flown=True), curves={1: LINEAR}))
+        assert not found.ahead.any()
+        assert not found.largest_ahead.any()
+        assert p_detect(found.flown[0, [40, 30]]) == pytest.approx([0.5, 0.25])
+
+    @pytest.mark.parametrize(
+        ("track", "y_m", "passed"), [(UP, 100, slice(0, 20)), (DOWN, 300, slice(60, 80)), (UP, -20, slice(0, 0))]
+    )
+    def test_that_under_way_is_ahead_only_ahead_of_the_vehicle(
+        self, track: PlannedTrack, y_m: float, passed: slice
+    ) -> None:
+        one = primary(track, curves={1: LINEAR})
+        one.state = at(y_m)
+        found, whole = expected(one), expected(primary(track, curves={1: LINEAR}))
+        is_passed = np.zeros(GRID.shape, dtype=np.bool_)
+        is_passed[passed] = True
+        assert (found.flown == np.where(is_passed, whole.ahead, 0)).all()
+        assert (found.ahead == np.where(is_passed, 0, whole.ahead)).all()
+
+    @pytest.mark.parametrize("state", [at(100, Mode.TRANSIT), at(100, works_on=2)])
+    def test_what_it_does_not_survey_it_does_not_pass(self, state: AgentState) -> None:
+        one = primary(UP, curves={1: LINEAR})
+        one.state = state
+        assert not expected(one).flown.any()
+
+    def test_who_looks_ahead_has_seen_what_lies_ahead(self) -> None:
+        one = primary(UP, curves={1: LINEAR}, entry=WEDGE)
+        one.state = at(100)
+        lead_m = footprint_of(WEDGE.sonar).lead_m
+        rows = int(np.count_nonzero(GRID.along_m <= 100 + lead_m))
+        found = expected(one)
+        assert rows > 20
+        assert found.flown[:rows, 40].all()
+        assert not found.flown[rows:].any()
+        assert found.ahead[rows:, 40].all()
+
+    def test_who_has_finished_or_is_given_up_flies_no_more(self) -> None:
+        one = primary(replace(UP, flown=True), replace(DOWN, number=2), curves={1: LINEAR})
+        one.finished_ms = 1000
+        found = expected(one)
+        assert found.flown.any()
+        assert not found.ahead.any()
+
+    def test_who_has_told_no_plan_adds_nothing(self) -> None:
+        found = expected(KnownVehicle(ENTRY, heard_ms=0))
+        assert not found.flown.any()
+        assert not found.ahead.any()
+
+
+class TestCurves:
+    def test_before_any_it_is_half_midway_to_what_tracks_are_spaced_for_and_nothing_at_both_ends(self) -> None:
+        found = p_detect(expected(primary(UP, r_adpt_m=(80, 100))).ahead)
+        # From 40 to 100 m: at 55 and 85 m 0.5 * 4 * 1/4 * 3/4.
+        assert found[0, [48, 51, 54, 57, 60, 26, 70]] == pytest.approx([0, 0.375, 0.5, 0.375, 0, 0.5, 0])
+
+    def test_others_are_taken_where_it_has_none_if_their_sonar_is_alike(self) -> None:
+        new, other = primary(UP), primary(curves={3: LINEAR})
+        assert (expected(new, other).ahead == expected(primary(UP, curves={1: LINEAR})).ahead).all()
+        unlike = primary(curves={3: LINEAR}, entry=WEDGE)
+        assert (expected(new, unlike).ahead == expected(new).ahead).all()
+
+    def test_its_own_come_first(self) -> None:
+        own = primary(UP, curves={1: HALF})
+        assert (expected(primary(curves={1: LINEAR}), own).ahead == expected(own).ahead).all()
+
+    def test_the_newest_four_are_averaged(self) -> None:
+        flat = {
+            track: DetectionCurve(np.array([0.0, 100.0]), np.full(2, value))
+            for track, value in {0: 0.9, 5: 0.5, 1: 0.8, 2: 0.2, 3: 0.3, 4: 0.4}.items()
+        }
+        assert p_detect(expected(primary(UP, curves=flat)).ahead[0, 30]) == pytest.approx(0.35)
+
+    def test_that_of_earlier_missions_counts_until_there_is_another(self) -> None:
+        assert p_detect(expected(primary(UP, curves={0: LINEAR})).ahead[0, 30]) == pytest.approx(0.25)
+        assert p_detect(expected(primary(UP, curves={0: LINEAR, 1: HALF})).ahead[0, 30]) == pytest.approx(0.5)

@@ -1,0 +1,183 @@
+"""Second looks that do not react to what is seen: lanes, and routes planned beforehand, by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+import pytest
+from by_hand import HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
+from coordinator_by_hand import DONE, ELSEWHERE, GRID, HOT, OFFERED, OPEN, TWO_HELPERS, WITHDRAWN, Told, coordinator
+
+from comms.said.announcement import Role
+from comms.said.messages import Mode, StripStatus, TaskState
+from planner.region import Region
+from planner.types import BoolArray
+
+LANES = ("lanes", "lanes_across")
+DENTED = ((0.0, 0.0), (400.0, 0.0), (400.0, 400.0), (300.0, 400.0), (200.0, 100.0), (100.0, 400.0), (0.0, 400.0))
+BOTH = (HELPER, SECOND_HELPER)
+
+
+def cells_of(strip: StripStatus) -> BoolArray:
+    """The cells whose centres lie on a strip, shape of the grid."""
+    x_m, y_m = GRID.across_m[np.newaxis, :] - strip.start_x_m, GRID.along_m[:, np.newaxis] - strip.start_y_m
+    sin, cos = np.sin(strip.heading_rad), np.cos(strip.heading_rad)
+    along_m, beside_m = x_m * sin + y_m * cos, x_m * cos - y_m * sin
+    on_it: BoolArray = (np.abs(beside_m) < strip.width_m / 2) & (along_m > 0) & (along_m < strip.length_m)
+    return on_it
+
+
+def at_x_m(told: Told) -> list[float]:
+    """Where the lanes lie, by number."""
+    return [strip.start_x_m for _, strip in sorted(told.strips().items())]
+
+
+def serve(told: Told, name: str, risk: np.ndarray) -> int:
+    """A helper serves what it was offered last; returns its number. `risk`: what its looks have left, changed."""
+    number = [strip for vehicle, _, strip in told.tasks() if vehicle == name][-1]
+    told.status(name, number, TaskState.ACCEPTED)
+    told.state(name, Mode.REVISIT, number)
+    risk[cells_of(told.strips()[number])] *= 0.3
+    told.layer(name, risk)
+    told.status(name, number, TaskState.DONE)
+    told.state(name, Mode.IDLE)
+    told.settle()
+    assert told.states()[number] is DONE
+    return number
+
+
+class TestLanes:
+    @pytest.mark.parametrize("strips", LANES)
+    @pytest.mark.parametrize("area", [None, DENTED])
+    @pytest.mark.parametrize(("vehicles", "idle"), [(TWO_HELPERS[:2], BOTH[:1]), (TWO_HELPERS, BOTH)])
+    def test_together_they_cover_the_area(
+        self,
+        strips: Literal["lanes", "lanes_across"],
+        area: tuple[tuple[float, float], ...] | None,
+        vehicles: tuple[object, ...],
+        idle: tuple[str, ...],
+    ) -> None:
+        told = coordinator(vehicles, idle=idle, strips=strips, area=area)  # type: ignore[arg-type]
+        inside = Region(area or run_info(400, 400).outline).inside(GRID)
+        covered = np.any([cells_of(one) for one in told.strips().values()], axis=0)
+        assert inside.sum() > 4000
+        assert covered[inside].all()
+        assert {one.width_m for one in told.strips().values()} == {50}
+
+    def test_each_is_as_long_as_the_area_is_there(self) -> None:
+        told = coordinator(strips="lanes", area=DENTED)
+        lengths_m = {one.start_x_m: one.length_m for one in told.strips().values()}
+        assert lengths_m[22.5] == 400
+        # Columns 40 to 49 begin at 200 m, right beside the dent's foot, which climbs by 3 m a metre: to 247.5 m.
+        assert lengths_m[222.5] == pytest.approx(100 + 3 * 45, abs=15)
+
+    def test_it_begins_at_its_side_and_all_are_there_from_the_first_second(self) -> None:
+        told = coordinator(strips="lanes")
+        assert told.node.now_ms <= 3
+        assert at_x_m(told) == [22.5, 72.5, 122.5, 172.5, 222.5, 272.5, 322.5, 372.5, 377.5]
+        assert told.states() == {1: OFFERED, **dict.fromkeys(range(2, 10), OPEN)}
+        assert {one.start_y_m for one in told.strips().values()} == {0}
+
+    def test_across_they_run_from_west_to_east(self) -> None:
+        told = coordinator(strips="lanes_across")
+        lanes = [strip for _, strip in sorted(told.strips().items())]
+        assert [lane.start_y_m for lane in lanes] == [25, 75, 125, 175, 225, 275, 325, 375]
+        assert {lane.start_x_m for lane in lanes} == {-2.5}
+        assert {lane.length_m for lane in lanes} == {405}
+        assert [lane.heading_rad for lane in lanes] == pytest.approx([np.pi / 2] * 8)
+
+    def test_they_are_flown_in_order_and_then_back_again(self) -> None:
+        told = coordinator(strips="lanes")
+        risk = np.ones(GRID.shape)
+        flown = [serve(told, HELPER, risk) for _ in range(18)]
+        assert flown == list(range(1, 19))
+        assert at_x_m(told)[9:18] == at_x_m(told)[8::-1]
+        assert at_x_m(told)[18:] == at_x_m(told)[:9]
+        assert told.states()[19] is OFFERED
+
+    def test_what_is_seen_changes_nothing(self) -> None:
+        told = coordinator(strips="lanes")
+        before = told.strips()
+        told.plan(60.0, 180.0)
+        told.hotspot(ELSEWHERE)
+        told.layer(PRIMARY, np.full(GRID.shape, 0.5))
+        told.keep_alive([PRIMARY, HELPER], 5)
+        assert {number: strip.start_x_m for number, strip in told.strips().items()} == {
+            number: strip.start_x_m for number, strip in before.items()
+        }
+
+    def test_nothing_is_shared_out_before_all_helpers_are_heard(self) -> None:
+        told = coordinator(TWO_HELPERS, strips="lanes")
+        assert told.strips() == {}
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.settle()
+        assert {name for name, _, _ in told.tasks()} == set(BOTH)
+
+
+class TestSharing:
+    def test_two_that_are_alike_have_a_half_each_on_their_sides(self) -> None:
+        # Columns 0 to 39 and 40 to 80: at 122.5 m and 322.5 m both are nearer to the east end of their own.
+        told = coordinator(TWO_HELPERS, idle=BOTH, strips="lanes")
+        assert at_x_m(told) == [172.5, 122.5, 72.5, 22.5, 377.5, 372.5, 322.5, 272.5, 222.5]
+        assert {name: number for name, _, number in told.tasks()} == {HELPER: 1, SECOND_HELPER: 5}
+
+    def test_who_is_three_times_as_fast_has_three_quarters(self) -> None:
+        # Columns 0 to 19 and 20 to 80.
+        fast = (*TWO_HELPERS[:2], replace(TWO_HELPERS[2], speed_mps=6.0))
+        told = coordinator(fast, idle=BOTH, strips="lanes")
+        assert at_x_m(told)[:2] == [72.5, 22.5]
+        assert min(at_x_m(told)[2:]) == 122.5
+
+    def test_the_side_counts_and_not_the_name(self) -> None:
+        west = vehicle("west", Role.REVISIT)  # at 122.5 m, as all but the second helper
+        told = coordinator((TWO_HELPERS[0], west, TWO_HELPERS[2]), idle=("west", SECOND_HELPER), strips="lanes")
+        places_m = {name: told.strips()[number].start_x_m for name, _, number in told.tasks()}
+        assert places_m == {"west": 172.5, SECOND_HELPER: 377.5}
+
+    def test_each_flies_its_own(self) -> None:
+        told = coordinator(TWO_HELPERS, idle=BOTH, strips="lanes")
+        risk = np.ones(GRID.shape)
+        flown = [serve(told, HELPER, risk) for _ in range(5)]
+        assert flown == [1, 2, 3, 4, 10]  # 5 to 9 are the other's; 10 is where 4 is
+        assert at_x_m(told)[9:] == [22.5, 72.5, 122.5, 172.5]
+
+
+class TestBeforehand:
+    def test_nothing_is_planned_before_the_primary_has_said_its_plan(self) -> None:
+        told = coordinator(strips="beforehand")
+        told.hotspot()
+        told.settle()
+        assert told.strips() == {}
+        assert told.tasks() == []
+        told.plan(60.0, 180.0, 300.0)
+        told.settle()
+        assert list(told.states().values()).count(OFFERED) == 1
+
+    def test_strips_stay_as_first_planned(self) -> None:
+        told = coordinator(strips="beforehand")
+        told.plan(60.0, 180.0, 300.0)
+        told.settle()
+        before = told.strips()
+        assert list(told.states().values()).count(OPEN) > 1
+        risk = np.full(GRID.shape, 0.01)
+        risk[:, 70:] = 1.0
+        told.layer(PRIMARY, risk)
+        told.hotspot(HOT)
+        told.plan(60.0, 200.0, 340.0, revision=2)
+        told.settle()
+        told.keep_alive([PRIMARY, HELPER], 5)
+        after = told.strips()
+        assert after.keys() == before.keys()
+        places = [[(one.start_x_m, one.start_y_m, one.length_m) for one in every.values()] for every in (before, after)]
+        assert places[0] == places[1]
+
+    def test_what_is_in_no_route_is_withdrawn(self) -> None:
+        told = coordinator(strips="beforehand", idle=())
+        told.state(HELPER, Mode.IDLE, battery=0.03)  # 432 s: for one strip of 400 m and the way to it, not for two
+        told.plan(60.0, 180.0, 300.0)
+        told.settle()
+        states = list(told.states().values())
+        assert states.count(OFFERED) == 1
+        assert states.count(WITHDRAWN) == len(states) - 1 > 1
