@@ -66,7 +66,7 @@ class Lanes:
             if all(one is not None and one.state in (StripState.DONE, StripState.FAILED) for one in records):
                 first = ledger.next_number
                 for lane in lanes:
-                    self._strips.open(Cut(lane, self._removable_m2(lane), 0.0), now_ms, "a lane")
+                    self._strips.open(Cut(lane, self._removable_m2(lane), 0.0, foreseen=True), now_ms, "a lane")
                 self.routes.routes[name] = list(range(first, ledger.next_number))
                 self._lanes[name] = lanes[::-1]
 

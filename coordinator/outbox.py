@@ -30,6 +30,8 @@ class Outbox:
             removable_m2=record.cut.removable_m2,
             vehicle=record.vehicle,
             reason=record.reason[:200],
+            why=record.cut.why[:200],
+            foreseen=record.cut.foreseen,
         )
         self._waiting.append(Publication(STRIP.key(number=strip.number), message))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 from comms.node import Received
 from comms.said.announcement import RosterVehicle
@@ -15,6 +16,7 @@ from coordinator.cut.strips import CuttingRules
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE
+from coordinator.reasons import Reasons
 from coordinator.strip_life import StripLife
 from planner.footprints import footprint_of
 from planner.types import BoolArray
@@ -52,6 +54,7 @@ class StripCutting:
         self._expected = expected
         self._briefing = briefing
         self._fleet = fleet
+        self._reasons = Reasons(fleet.map.grid, fleet.primaries)
         self._strips = strips
 
     def hear_hotspot(self, received: Received, message: Hotspot) -> bool:
@@ -62,6 +65,7 @@ class StripCutting:
     def cut(self, now_ms: int) -> None:
         """Cuts anew, and opens, revises and withdraws strips by that."""
         expected, ledger = self._expected.now(), self._strips.ledger
+        why = partial(self._reasons.why, risk=expected.risk)
         ground = Ground(
             risk=expected.risk,
             look=expected.look,
@@ -78,8 +82,8 @@ class StripCutting:
             same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:
                 unmatched.remove(same)
-                self._strips.revise(same, cut)
+                self._strips.revise(same, cut, why)
             else:
-                self._strips.open(cut, now_ms, "expected to be badly seen" if cut.foreseen else "badly seen")
+                self._strips.open(cut, now_ms, why(cut))
         for record in unmatched:
             self._strips.withdraw(record, now_ms)

@@ -6,7 +6,7 @@ done the map decides, not the word.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 from comms.said.codec import Header
@@ -52,17 +52,20 @@ class StripLife:
         self._outbox = outbox
 
     def open(self, cut: Cut, now_ms: int, why: str) -> None:
-        """Opens a new strip where it is cut."""
+        """Opens a new strip where it is cut. `why`: what makes it worth a second look."""
+        cut = replace(cut, why=why)
         strip = cut.strip(self._fleet.map.grid, self.ledger.next_number)
         self._outbox.add_strip(self.ledger.open(strip, cut, now_ms, why))
 
-    def revise(self, record: StripRecord, cut: Cut) -> None:
-        """Moves an open strip to where it is cut now, if that is news; who has refused it may be offered it again."""
+    def revise(self, record: StripRecord, cut: Cut, why: Callable[[Cut], str]) -> None:
+        """Moves an open strip to where it is cut now, if that is news; who has refused it may be offered it again.
+        `why`: tells what makes it worth a second look."""
         change_m2 = abs(cut.counts_m2 - record.cut.counts_m2)
         same = record.window == cut.window and record.cut.foreseen == cut.foreseen
         if same and change_m2 <= WORTH_SAYING * record.cut.counts_m2:
             return
-        self.ledger.revise(record, cut.strip(self._fleet.map.grid, record.strip.number), cut)
+        strip = cut.strip(self._fleet.map.grid, record.strip.number)
+        self.ledger.revise(record, strip, replace(cut, why=why(cut)))
         for vehicle in self._fleet.vehicles.values():
             vehicle.refused.discard(record.strip.number)
         self._outbox.add_strip(record)

@@ -28,6 +28,8 @@ TARGET_DETECTED: Colour = (120, 255, 160)
 TRUE_POSE: Colour = (120, 255, 160)
 WARNING: Colour = (255, 176, 0)
 
+FORESEEN: Colour = (110, 160, 255)  # while it is open
+
 STRIP: dict[StripState, Colour] = {
     StripState.OPEN: (255, 64, 64),
     StripState.OFFERED: (255, 180, 220),

@@ -40,7 +40,8 @@ class SecondLooks:
         self._note(received, hotspot.state, partial(self._draw_hotspot, received, hotspot))
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
-        """Draws the strip in the colour of its state, with its id and what it may remove; faint once it is done."""
+        """Draws the strip in the colour of its state, an open one that is foreseen in one of its own, with its id, what
+        it may remove and why it is there; faint once it is done."""
         self._note(received, strip.state, partial(self._draw_strip, received, strip))
 
     def advance(self, time_ms: int) -> None:
@@ -88,7 +89,7 @@ class SecondLooks:
             self._labelled.discard(number)
             return
         wide = strip.width_m >= self._labelled_m
-        style = (strip.state, wide)
+        style = (strip.state, wide, strip.foreseen)
         place = strip.as_strip(number)
         self._drawn[number] = (style, place)
         # Often nothing but its worth has changed, or nothing but its place and its worth.
@@ -96,7 +97,7 @@ class SecondLooks:
         moved = restyled or place != drawn_place
         outline = rr.LineStrips3D.from_fields(
             strips=strip_ring(place, STRIP_Z_M) if moved else None,
-            labels=f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_whose(strip)}",
+            labels=f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_more(strip)}",
         )
         self._canvas.put(time_ms, path, outline, *([_strip_style(*style)] if restyled else []))
         shows = wide or strip.state in IN_HAND
@@ -119,10 +120,11 @@ def _hotspot_style() -> rr.LineStrips3D:
 
 
 @cache
-def _strip_style(state: StripState, wide: bool) -> rr.LineStrips3D:
+def _strip_style(state: StripState, wide: bool, foreseen: bool) -> rr.LineStrips3D:
     done = state is StripState.DONE
+    colour = palette.FORESEEN if foreseen and state is StripState.OPEN else palette.STRIP[state]
     return rr.LineStrips3D.from_fields(
-        colors=[palette.STRIP[state]],
+        colors=[colour],
         radii=rr.Radius.ui_points((0.8 if done else 1.5) if wide else (0.4 if done else 0.6)),
         show_labels=False,  # it is told under the pointer
     )
@@ -138,8 +140,8 @@ def _label_style(shows: bool, state: StripState) -> rr.Points3D:
     )
 
 
-def _whose(strip: StripStatus) -> str:
-    return f", {strip.vehicle}" if strip.vehicle else ""
+def _more(strip: StripStatus) -> str:
+    return "".join(f", {one}" for one in (strip.why, strip.vehicle) if one)
 
 
 def _words(strip: StripStatus, number: int) -> str:

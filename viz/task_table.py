@@ -36,6 +36,7 @@ class TaskTable:
         self._ended: deque[_Row] = deque(maxlen=MOST_ENDED)
         self._strips: dict[int, StripStatus] = {}
         self._counts: Counter[StripState] = Counter()
+        self._foreseen: Counter[StripState] = Counter()
         self._pace = Pace(0)
         self._pace.note(0)
 
@@ -44,11 +45,16 @@ class TaskTable:
         number = received.number
         before = self._strips.get(number)
         self._strips[number] = strip
-        if before is None or before.state is not strip.state:
-            self._counts[strip.state] += 1
+        if before is None or (before.state, before.foreseen) != (strip.state, strip.foreseen):
+            self._count(strip, 1)
             if before is not None:
-                self._counts[before.state] -= 1
+                self._count(before, -1)
             self._pace.note(received.header.sent_ms)
+
+    def _count(self, strip: StripStatus, more: int) -> None:
+        self._counts[strip.state] += more
+        if strip.foreseen:
+            self._foreseen[strip.state] += more
 
     def on_task_status(self, received: Received, status: TaskStatus) -> None:
         """Takes the vehicle's word on its task."""
@@ -87,7 +93,11 @@ class TaskTable:
             for vehicle, row in sorted(self._in_hand.items())
         ]
         rows += map(self._line, self._ended)
-        return "\n".join([f"Strips: {counts}", "", HEAD, *rows])
+        head = [f"Strips: {counts}", ""]
+        if self._foreseen:
+            of_them = ", ".join(f"{self._foreseen[state]} {state.value}" for state in COUNTED)
+            head += [f"Foreseen, expected to be badly seen and not found so, blue while open: {of_them}", ""]
+        return "\n".join([*head, HEAD, *rows])
 
     def _line(self, row: _Row) -> str:
         status = row.status

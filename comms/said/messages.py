@@ -258,7 +258,9 @@ class StripState(enum.Enum):
 @dataclass(frozen=True, slots=True)
 class StripStatus:
     """A strip and where it stands. `removable_m2`: the residual risk, summed over its cells and times their area, that
-    one look by the helper's sensor is expected to remove. `vehicle`: who it is with, empty for nobody."""
+    one look by the helper's sensor is expected to remove. `vehicle`: who it is with, empty for nobody. `reason`: why it
+    stands so. `why`: what makes the place worth a second look; `foreseen`: whether that is expected for the most part,
+    of ground not seen yet, and not found. Both as of its newest cut, or of when it was offered."""
 
     revision: Count
     state: StripState
@@ -270,6 +272,8 @@ class StripStatus:
     removable_m2: SquareMetres
     vehicle: OptionalIdentifier
     reason: Text
+    why: Text = ""
+    foreseen: YesNo = False
 
     def as_strip(self, number: int) -> Strip:
         """The strip as planning uses it; its number is in the key."""

@@ -11,7 +11,7 @@ import operator
 import re
 import reprlib
 from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cached_property, lru_cache
 from typing import Annotated, Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
@@ -280,7 +280,8 @@ class Many:
 
 
 class Record:
-    """A frozen dataclass as a positional array of its fields."""
+    """A frozen dataclass as a positional array of its fields. The last ones, if they have defaults, may be missing: one
+    written before there were such fields reads as if it had the defaults."""
 
     def __init__(self, cls: type[Any]) -> None:
         hints = get_type_hints(cls, include_extras=True)
@@ -289,6 +290,8 @@ class Record:
         self.fields: tuple[tuple[str, Callable[[Any], Any], Callable[[Any], Any]], ...] = tuple(
             (name, kind.encode, kind.decode) for name, kind in kinds.items()
         )
+        told = [kinds[field.name].encode(field.default) for field in fields(cls) if field.default is not MISSING]
+        self._defaults: tuple[Any, ...] = tuple(told)
         self._encode, self._decode = _put_together(cls, kinds)
 
     def encode(self, value: Any) -> list[Any]:
@@ -299,7 +302,10 @@ class Record:
 
     def decode(self, wire: Any) -> Any:
         if type(wire) is not list or len(wire) != len(self.fields):
-            raise WireError(f"{self.cls.__name__} needs a list of {len(self.fields)} fields")
+            lacks = len(self.fields) - len(wire) if type(wire) is list else -1
+            if not 0 < lacks <= len(self._defaults):
+                raise WireError(f"{self.cls.__name__} needs a list of {len(self.fields)} fields")
+            wire = [*wire, *self._defaults[-lacks:]]
         try:
             return self._decode(*wire)
         except MISFITS:

@@ -36,12 +36,14 @@ class CuttingRules:
 @dataclass(frozen=True)
 class Cut:
     """A strip's window and the risk that one look along it is expected to remove (residual risk times m2); `counts_m2`:
-    what that counts in the objective. `foreseen`: whether most of that is expected, and not seen yet."""
+    what that counts in the objective. `foreseen`: whether most of that is expected, and not seen yet; `why`: what makes
+    it so, in words."""
 
     window: Window
     removable_m2: float
     counts_m2: float
     foreseen: bool = False
+    why: str = ""
 
     def strip(self, grid: GridSpec, number: int) -> Strip:
         """The strip that it becomes under a number."""

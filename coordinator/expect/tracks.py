@@ -39,7 +39,7 @@ def expected_tracks(grid: GridSpec, primaries: Mapping[str, KnownVehicle]) -> Tr
     for vehicle in primaries.values():
         if vehicle.plan is None:
             continue
-        curve = _curve(vehicle, primaries.values())
+        curve = curve_of(vehicle, primaries.values())
         lead_m = footprint_of(vehicle.entry.sonar).lead_m
         for track in vehicle.plan.tracks:
             passed_m = _passed_m(track, vehicle, lead_m)
@@ -53,7 +53,8 @@ def expected_tracks(grid: GridSpec, primaries: Mapping[str, KnownVehicle]) -> Tr
     return found
 
 
-def _curve(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> DetectionCurve:
+def curve_of(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> DetectionCurve:
+    """P(y) that a primary's tracks are expected to have, by what it and the others have measured."""
     alike = [vehicle, *(one for one in primaries if one.entry.footprint == vehicle.entry.footprint)]
     measured = next((one.curves for one in alike if one.curves), None)
     if measured is None:

@@ -57,8 +57,8 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     hotspots = summary["hotspots"]
     table.add_row(
         "strips",
-        f"{hotspots['published']} found, {hotspots['revisited']} revisited, {hotspots['open']} open, "
-        f"{hotspots['withdrawn']} withdrawn, {hotspots['failed']} failed",
+        f"{hotspots['published']} cut, {hotspots['revisited']} revisited ({hotspots['foreseen_revisited']} foreseen), "
+        f"{hotspots['open']} open, {hotspots['withdrawn']} withdrawn, {hotspots['failed']} failed",
     )
     table.add_row("residual risk", f"{risk['mean']:.3f}, primary alone {alone['mean']:.3f}")
     table.add_row("worst 30 %", f"{risk['worst30_mean']:.3f}, primary alone {alone['worst30_mean']:.3f}")

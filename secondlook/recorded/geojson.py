@@ -145,6 +145,8 @@ def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str
                 "published_s": strip.history[0].t_s,
                 "ended_s": strip.history[-1].t_s,
                 "reason": strip.history[-1].reason,
+                "why": strip.why,
+                "foreseen": strip.foreseen,
             },
         )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import math
+from collections import Counter
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
@@ -254,6 +255,7 @@ class Metrics:
 
     def _strip_summary(self) -> dict[str, Any]:
         states = [strip.status.state for strip in self.strips.values()]
+        foreseen = Counter(strip.status.state for strip in self.strips.values() if strip.status.foreseen)
         published = [strip.published_ms for strip in self.strips.values()]
         accepted = [strip.accepted_ms for strip in self.strips.values() if strip.accepted_ms is not None]
         return {
@@ -262,6 +264,8 @@ class Metrics:
             "open": sum(states.count(state) for state in _STILL_OPEN),
             "withdrawn": states.count(StripState.WITHDRAWN),
             "failed": states.count(StripState.FAILED),
+            "foreseen": foreseen.total(),
+            "foreseen_revisited": foreseen[StripState.DONE],
             "first_published_s": min(published) / 1000 if published else None,
             "first_assigned_s": min(accepted) / 1000 if accepted else None,
         }

@@ -67,7 +67,8 @@ class StripRecord:
     """A strip as the coordinator last told it, and each change of its state in `history`.
 
     `expected_m2`: the residual risk, summed over its cells and times their area, that one look was expected to remove
-    when the strip was first published. `vehicle`: who it is or was with at last, "" for nobody.
+    when the strip was first published. `vehicle`: who it is or was with at last, "" for nobody. `why`: what made its
+    place worth a second look; `foreseen`: whether that was expected of ground not seen yet, and not found.
     """
 
     strip: Strip
@@ -75,6 +76,8 @@ class StripRecord:
     vehicle: str
     expected_m2: float
     history: tuple[StripEvent, ...]
+    why: str = ""
+    foreseen: bool = False
 
     @property
     def number(self) -> int:
@@ -117,4 +120,6 @@ def _record(number: int, told: list[Received[StripStatus]]) -> StripRecord:
         next((event.vehicle for event in reversed(history) if event.vehicle), ""),
         told[0].message.removable_m2,
         tuple(history),
+        last.why,
+        last.foreseen,
     )

@@ -122,7 +122,8 @@ class Story:
             return None
         if strip.state is StripState.OPEN:
             size = f"{strip.length_m:.0f} m x {strip.width_m:.0f} m"
-            return f"strip {number} open: {size}, {strip.removable_m2:.0f} m² of risk to remove", False
+            why = f"{strip.why}; " if strip.why else ""
+            return f"strip {number} open: {why}{size}, {strip.removable_m2:.0f} m² of risk to remove", False
         if strip.state in (StripState.WITHDRAWN, StripState.FAILED):
             return f"strip {number} {strip.state.value}{_because(strip.reason)}", strip.state is StripState.FAILED
         return None  # the vehicle's own answers tell the rest

@@ -230,12 +230,12 @@ def _number(frame: MapFrame, strip: StripRecord, place_m: Point) -> Element:
 def _strip(frame: MapFrame, strip: StripRecord, ids: str) -> Element:
     return element(
         "a",
-        element("title", f"strip {strip.number}: {fate_in_words(strip)}"),
+        element("title", f"strip {strip.number}{', foreseen' * strip.foreseen}: {fate_in_words(strip)}"),
         element("path", d=frame.line(strip.polygon), class_="casing"),
         element("path", d=frame.line(strip.polygon), class_="outline"),
         href=f"#strip-{strip.number}",
         id=f"{ids}{strip.number}",
-        class_=f"strip {FATE_CLASS[strip.state]}",
+        class_=f"strip {FATE_CLASS[strip.state]}{' foreseen' * strip.foreseen}",
     )
 
 

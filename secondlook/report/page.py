@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 import statistics
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -17,9 +17,10 @@ import jinja2
 import numpy as np
 from markupsafe import Markup
 
+from comms.said.messages import StripState
 from planner.footprints import footprint_of
 from secondlook.errors import UserError
-from secondlook.recorded import RecordedMission, RiskMap, load_run
+from secondlook.recorded import RecordedMission, RiskMap, StripRecord, load_run
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
 from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map
@@ -57,6 +58,31 @@ class TargetFigures:
     found_by: dict[str, int]
     missed: int
     predicted_missed_share: float
+
+
+@dataclass(frozen=True)
+class KindFigures:
+    """Strips of a kind, foreseen or found: how many were `cut`, how many `served`, and the residual risk that is less
+    over these by all second looks, summed over their cells and times their area. A cell of several counts for each in
+    equal parts."""
+
+    cut: int
+    served: int
+    removed_m2: float
+
+
+def kind_figures(strips: Sequence[StripRecord], before: RiskMap, after: RiskMap) -> dict[str, KindFigures]:
+    """By kind; `before` and `after`: the risk at the end by the primaries alone and by all."""
+    served = [(one, after.cells_within(one.polygon)) for one in strips if one.state is StripState.DONE]
+    times = np.zeros(after.risk.shape)
+    for _, cells in served:
+        times[cells] += 1
+    less_m2 = (before.risk - after.risk) * after.grid.cell_area_m2 / np.maximum(times, 1)
+    figures = {}
+    for word, kind in (("foreseen", True), ("found", False)):
+        removed_m2 = [float(less_m2[cells].sum()) for one, cells in served if one.foreseen is kind]
+        figures[word] = KindFigures(sum(one.foreseen is kind for one in strips), len(removed_m2), sum(removed_m2))
+    return figures
 
 
 def report_page(mission: RecordedMission) -> str:
@@ -99,6 +125,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "tracks": mission.tracks,
         "paths": mission.paths,
         "fates": [fate(strip, before, after) for strip in mission.strips],
+        "kinds": kind_figures(mission.strips, before, after),
         "targets": _targets(mission, after),
         "log": log,
     }

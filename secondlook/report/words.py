@@ -48,6 +48,8 @@ class Fate:
     risk_before: float
     risk_after: float
     history: list[tuple[float, str]]
+    why: str
+    foreseen: bool
 
 
 def fate_in_words(strip: StripRecord) -> str:
@@ -75,6 +77,8 @@ def fate(strip: StripRecord, before: RiskMap, after: RiskMap) -> Fate:
         risk_before=before.mean_of(cells),
         risk_after=after.mean_of(cells),
         history=[(event.t_s, event.reason or event.state.value.replace("_", " ")) for event in strip.history],
+        why=strip.why,
+        foreseen=strip.foreseen,
     )
 
 

@@ -48,7 +48,7 @@ class TestFromHotspotToTask:
         said = told.settle()
         strip, task, offered = (one.message for one in said)
         # Centred at (97.5 + 147.5) / 2; 300 m x 50 m of risk 0.8, of which 0.7 is removed.
-        assert strip == StripStatus(1, OPEN, 122.5, 50, 0, 300, 50, 0.8 * 0.7 * 15_000, "", "badly seen")
+        assert strip == StripStatus(1, OPEN, 122.5, 50, 0, 300, 50, 0.8 * 0.7 * 15_000, "", "badly seen", "badly seen")
         assert task == Task(TaskAction.TAKE, 1, 122.5, 50, 0, 300, 50)
         assert isinstance(offered, StripStatus)
         assert (offered.state, offered.vehicle, offered.revision) == (OFFERED, HELPER, 2)

@@ -102,6 +102,31 @@ def test_changes_of_open_strips_are_drawn_once_a_minute(record: Record, tmp_path
     assert worths(path, 3) == [(81, "810"), (140, "1400")]
 
 
+def test_what_is_foreseen_is_told_apart_and_why(record: Record, tmp_path: Path) -> None:
+    def said(time_s: float, state: StripState, why: str) -> Received:
+        strip = replace(STRIP, state=state, why=why, foreseen=why.startswith("expected"))
+        return says(time_s, 1, state, 100)._replace(message=strip)
+
+    expected, found = "expected beside track 5: nadir gap", "seen badly by track 5: nadir gap"
+    states = StripState.OPEN, StripState.OFFERED, StripState.DONE
+    path = record([
+        RUN,
+        *(said(time_s, state, expected) for time_s, state in zip((10, 20, 30), states, strict=True)),
+        *(said(time_s, state, found) for time_s, state in zip((40, 50, 60), states, strict=True)),
+    ], tmp_path / "strips.rrd")  # fmt: skip
+    told = [text.split(", ")[2] for _, (text,) in rows(path, "/strips/1", "LineStrips3D:labels")]
+    assert told == [expected] * 3 + [found] * 3
+    colours = [
+        (red << 24) | (green << 16) | (blue << 8) | 0xFF
+        for red, green, blue in (palette.FORESEEN, *(palette.STRIP[one] for one in (*states[1:], *states)))
+    ]
+    assert [colour for _, (colour,) in rows(path, "/strips/1", "LineStrips3D:colors")] == colours
+    tables = [text for _, (text,) in rows(path, "/tasks", "TextDocument:text")]
+    assert "Foreseen" not in tables[0]
+    assert "blue while open: 1 open, 0 done, 0 withdrawn, 0 failed\n" in tables[1]
+    assert "blue while open: 0 open, 0 done, 0 withdrawn, 0 failed\n" in tables[-1]
+
+
 def test_what_is_held_back_is_drawn_when_its_minute_is_over(record: Record, tmp_path: Path) -> None:
     is_open = StripState.OPEN
     said = [RUN, says(0, 1, is_open, 1), says(1, 1, is_open, 2), passes(2), says(3, 1, is_open, 3), passes(61.999)]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import MISSING, fields, is_dataclass, replace
 from typing import Any, get_type_hints
 
 import msgpack
@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 from largest_message import MESSAGE_TYPES, headers, largest_message
 from same_message import assert_same
 
+from comms.said.announcement import RosterVehicle
 from comms.said.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, SCHEMA_VERSION, Header, decode, encode
 from comms.said.messages import (
     AgentState,
@@ -26,6 +27,7 @@ from comms.said.messages import (
     Mode,
     Nav,
     StripState,
+    StripStatus,
     Task,
 )
 from comms.said.topics import TASK, TOPICS, Topic
@@ -131,6 +133,45 @@ def test_a_record_is_converted_as_its_fields_kinds_say(message_type: type[Any], 
             record.decode(wire)
     else:
         assert_same(record.decode(wire), message_type(*by_field))
+
+
+WITH_DEFAULTS = [
+    (record, field.name, [one.name for one in fields(record)].index(field.name))
+    for record in (*MESSAGE_TYPES, RosterVehicle)
+    for field in fields(record)
+    if field.default is not MISSING
+]
+
+
+@pytest.mark.parametrize(("record", "field", "place"), WITH_DEFAULTS, ids=lambda one: getattr(one, "__name__", one))
+@settings(max_examples=10)
+@given(data=st.data())
+def test_one_written_before_there_were_its_last_fields_has_their_defaults(
+    record: type[Any], field: str, place: int, data: st.DataObject
+) -> None:
+    codec, message = record_of(record), data.draw(any_message(record))
+    earlier = codec.decode(codec.encode(message)[:place])
+    later = [one for one in fields(record)[place:] if one.default is not MISSING]
+    assert field in [one.name for one in later]
+    assert_same(earlier, replace(codec.decode(codec.encode(message)), **{one.name: one.default for one in later}))
+
+
+@by_type
+def test_one_that_lacks_a_field_without_a_default_or_has_one_too_many_is_refused(message_type: type[Any]) -> None:
+    codec = record_of(message_type)
+    needed = sum(one.default is MISSING for one in fields(message_type))
+    wire = codec.encode(largest_message(message_type, tile_cells=1))
+    for wrong in (wire[: needed - 1], [*wire, 0]):
+        with pytest.raises(WireError, match=f"^{message_type.__name__} needs a list of {len(wire)} fields$"):
+            codec.decode(wrong)
+
+
+@pytest.mark.parametrize("wrong", [b"no", None, 7])
+def test_a_field_that_does_not_fit_is_named_also_where_the_last_are_missing(wrong: object) -> None:
+    codec = record_of(StripStatus)
+    wire = codec.encode(largest_message(StripStatus, tile_cells=1))[:10]
+    with pytest.raises(WireError, match=r"^StripStatus\.reason: "):
+        codec.decode([*wire[:9], wrong])
 
 
 def test_a_payload_is_a_positional_array_behind_the_schema_version() -> None:

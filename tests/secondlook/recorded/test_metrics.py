@@ -56,8 +56,9 @@ class Stream:
     def state(self, at_s: float, name: str, mode: Mode) -> None:
         self.say(at_s, f"agent/{name}/state", AgentState(mode, 0, 1, 0, 0, 0, 0))
 
-    def strip(self, at_s: float, number: int, state: StripState) -> None:
-        self.say(at_s, f"coord/strip/{number}", StripStatus(1, state, 0, 0, 0, 50, 50, 10, "", ""))
+    def strip(self, at_s: float, number: int, state: StripState, *, foreseen: bool = False) -> None:
+        status = StripStatus(1, state, 0, 0, 0, 50, 50, 10, "", "", foreseen=foreseen)
+        self.say(at_s, f"coord/strip/{number}", status)
 
 
 def begun(run: RunInfo = RUN) -> Stream:
@@ -220,13 +221,15 @@ class TestStrips:
             (620, 5, StripState.OPEN), (621, 5, StripState.OFFERED),
         ]  # fmt: skip
         for at_s, number, state in steps:
-            stream.strip(at_s, number, state)
+            stream.strip(at_s, number, state, foreseen=number in (1, 2) or at_s in (450, 460))
         assert stream.metrics.summary()["hotspots"] == {
             "published": 5,
             "revisited": 1,
             "open": 2,
             "withdrawn": 1,
             "failed": 1,
+            "foreseen": 3,
+            "foreseen_revisited": 1,
             "first_published_s": 400,
             "first_assigned_s": 402,
         }

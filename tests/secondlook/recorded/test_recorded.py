@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -30,7 +31,7 @@ from comms.said.topics import PLAN, STATE, STRIP, Topic
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
-from secondlook.recorded import Activity, RecordedMission, RiskMap
+from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
 from secondlook.recorded.second_looks import strips
 from secondlook.recorded.vehicles import activities, tracks
 
@@ -219,6 +220,15 @@ def test_a_strip_is_its_rectangle_and_tells_its_changes() -> None:
     ]
     assert (strip.number, strip.state, strip.vehicle, strip.expected_m2) == (7, StripState.WITHDRAWN, "h", 90.0)
     assert (strip.first(StripState.OPEN), strip.first(StripState.DONE)) == (1.0, None)
+
+
+def test_a_strip_is_foreseen_if_it_was_at_last() -> None:
+    def foreseen(*words: str) -> list[StripRecord]:
+        told = [replace(status(StripState.OPEN), why=why, foreseen=why.startswith("expected")) for why in words]
+        return strips(heard(STRIP, "coordinator", float(t_s), one, number=7) for t_s, one in enumerate(told))
+
+    assert [(one.foreseen, one.why) for one in foreseen("expected", "seen")] == [(False, "seen")]
+    assert [(one.foreseen, one.why) for one in foreseen("seen", "expected")] == [(True, "expected")]
 
 
 def test_activities_go_on_until_the_next_begins() -> None:

@@ -58,6 +58,15 @@ def strip(state: StripState, reason: str = "") -> Received:
     return said(STRIP, StripStatus(1, state, 0, 0, 0, 200, 60, 1234.0, "", reason), number=3)
 
 
+def test_of_a_strip_it_is_told_why_it_is_there() -> None:
+    found = strip(StripState.OPEN)
+    assert isinstance(found.message, StripStatus)
+    foreseen = replace(found.message, why="expected beside track 5: nadir gap", foreseen=True)
+    (line,) = Story().tell(found._replace(message=foreseen))
+    words = "strip 3 open: expected beside track 5: nadir gap; 200 m x 60 m, 1234 m² of risk to remove"
+    assert line.text == words
+
+
 def task(state: TaskState, reason: str = "", progress: float = 0.0) -> Received:
     return said(TASK_STATUS, TaskStatus(3, state, progress, 90_400, reason), vehicle="helper", number=7)
 

@@ -32,7 +32,7 @@ from secondlook.report import report_page
 from secondlook.report.charts import MARK_PX, RiskSample, risk_chart, risk_series, shares, timeline
 from secondlook.report.drawing import LEVELS, OUTSIDE, UNSEEN, as_pixels, indexed_png, palette, ticks, viridis
 from secondlook.report.maps import MOST_PIXELS, MapFrame, number_places
-from secondlook.report.page import command_to_reproduce
+from secondlook.report.page import command_to_reproduce, kind_figures
 from secondlook.report.words import Moment, log_lines, moments
 from secondlook.scenario import load_scenario
 
@@ -341,6 +341,34 @@ def test_a_map_of_very_many_cells_is_drawn_with_fewer_pixels() -> None:
     # Each pixel is three cells high.
     _, _, _, down, _, _ = map(float, re.findall(r"[-\d.e]+", drawn.attrib["transform"]))
     assert down == pytest.approx(-30.0)
+
+
+def test_risk_removed_is_told_by_kind_and_no_cell_counts_twice() -> None:
+    def strip(first_x_m: float, state: StripState, *, foreseen: bool) -> StripRecord:
+        # Two columns of the three cells of 10 m, which are centred at 100, 110 and 120 m.
+        return StripRecord(Strip(1, (first_x_m, 50.0), 0.0, 10.0, 20.0), state, "", 1.0, (), foreseen=foreseen)
+
+    before, after = risk_map([[0.8, 0.8, 0.9]]), risk_map([[0.6, 0.4, 0.1]])
+    done = [strip(105.0, StripState.DONE, foreseen=True), strip(115.0, StripState.DONE, foreseen=False)]
+    left = [strip(115.0, StripState.OPEN, foreseen=True)]
+    # The first cell, of 100 m2, is foreseen alone, the last found alone, of that between each has a half.
+    figures = kind_figures([*done, *left], before, after)
+    assert list(figures) == ["foreseen", "found"]
+    assert [(one.cut, one.served) for one in figures.values()] == [(2, 1), (1, 1)]
+    assert [one.removed_m2 for one in figures.values()] == pytest.approx([20.0 + 40.0 / 2, 80.0 + 40.0 / 2])
+
+
+def test_the_page_tells_which_strips_are_foreseen_and_why(page: Page, mission: RecordedMission) -> None:
+    assert any(strip.foreseen for strip in mission.strips)
+    for strip in mission.strips:
+        assert strip.why in page.told
+    kinds = Counter(strip.foreseen for strip in mission.strips)
+    figures = kind_figures(mission.strips, mission.risk(vehicles=mission.primaries), mission.risk())
+    for word, kind in (("foreseen", True), ("found", False)):
+        assert figures[word].cut == kinds[kind]
+        assert f"{word}{kinds[kind]}{figures[word].served}{figures[word].removed_m2:.0f} m²" in page.told
+    shown = [one for one in page.all("class") if re.fullmatch(r"strip \w+ foreseen", one)]
+    assert len(shown) == kinds[True]
 
 
 def test_numbers_of_strips_keep_apart() -> None:

@@ -1,0 +1,110 @@
+"""Why a strip lies where it does, in words for people: beside which tracks, and what these do not see well there."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from comms.said.messages import PlannedTrack
+from coordinator.cut.strips import Cut
+from coordinator.expect.tracks import curve_of
+from coordinator.vehicles import KnownVehicle
+from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec
+
+MOST_CELLS = 12  # to a side of a strip that are looked at
+NAMED_SHARE = 0.25  # of a strip's risk, from which a track or a cause is named
+MOST_TRACKS = 3  # that are named
+NADIR_GAP, RANGE_END, BEYOND, BEST = "nadir gap", "range's end", "ends of tracks", "even where tracks see best"
+
+Value = TypeVar("Value", bound=Hashable)
+
+
+class Reasons:
+    """Reads the plans and curves of the `primaries` as they are when it is asked."""
+
+    def __init__(self, grid: GridSpec, primaries: Mapping[str, KnownVehicle]) -> None:
+        self._grid = grid
+        self._primaries = primaries
+
+    def why(self, cut: Cut, risk: FloatArray) -> str:
+        """What makes a cut's place worth a second look: "seen badly by track 3: nadir gap", or of one that is foreseen
+        "expected beside tracks 5 and 6: range's end". `risk`: residual risk expected to be left, shape of the grid.
+
+        Where P(y) is below half of its best, nearer than that or farther, is the nadir gap and the range's end.
+        """
+        known = [
+            (name, one, track)
+            for name, one in self._primaries.items()
+            for track in (one.plan.tracks if one.plan else ())
+        ]
+        beside = known if cut.foreseen else [one for one in known if one[2].flown] or known
+        if not beside:
+            return "expected to be badly seen" if cut.foreseen else "badly seen"
+        x_m, y_m, weights = self._sampled(cut, risk)
+        apart_m, is_beyond = _apart(x_m, y_m, [track for _, _, track in beside])
+        nearest = apart_m.argmin(axis=0)
+        places = np.arange(nearest.size)
+        apart_m, is_beyond = apart_m[nearest, places], is_beyond[nearest, places]
+        curves = {name: curve_of(one, self._primaries.values()) for name, one in self._primaries.items()}
+        causes = np.full(nearest.size, BEST, dtype=object)
+        for at in np.unique(nearest):
+            here = nearest == at
+            causes[here] = _causes(apart_m[here], curves[beside[at][0]])
+        causes[is_beyond] = BEYOND
+        tracks = [beside[at] for at in _named(nearest.tolist(), weights)[:MOST_TRACKS]]
+        by = "expected beside" if cut.foreseen else "seen badly by"
+        return f"{by} {self._in_words(tracks)}: {_listed(_named(causes.tolist(), weights))}"
+
+    def _sampled(self, cut: Cut, risk: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Places of some of a cut's cells, and what each weighs: its risk."""
+        window, grid = cut.window, self._grid
+        rows, columns = (
+            np.unique(np.linspace(first, end - 1, MOST_CELLS).round().astype(int))
+            for first, end in ((window.first_row, window.end_row), (window.first_column, window.end_column))
+        )
+        x_m, y_m = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
+        weights = risk[np.ix_(rows, columns)].ravel()
+        return x_m.ravel(), y_m.ravel(), weights if weights.any() else np.ones_like(weights)
+
+    def _in_words(self, beside: Sequence[tuple[str, KnownVehicle, PlannedTrack]]) -> str:
+        """Their numbers; of several primaries with whose they are."""
+        if len(self._primaries) == 1:
+            numbers = sorted(track.number for _, _, track in beside)
+            return f"track{'s' if len(numbers) > 1 else ''} {_listed([str(one) for one in numbers])}"
+        return _listed([f"{name}'s track {number}" for name, number in sorted((n, t.number) for n, _, t in beside)])
+
+
+def _apart(x_m: FloatArray, y_m: FloatArray, tracks: Sequence[PlannedTrack]) -> tuple[FloatArray, BoolArray]:
+    """How far places are from each track, shape (tracks, places), and whether they lie beyond its ends."""
+    ends = np.array([(one.start_x_m, one.start_y_m, one.end_x_m, one.end_y_m) for one in tracks])
+    start_x, start_y, end_x, end_y = ends.T[:, :, np.newaxis]
+    length = np.maximum(np.hypot(end_x - start_x, end_y - start_y), 1e-9)
+    east, north = (end_x - start_x) / length, (end_y - start_y) / length
+    along = (x_m - start_x) * east + (y_m - start_y) * north
+    across = (x_m - start_x) * north - (y_m - start_y) * east
+    over = np.maximum(np.maximum(-along, along - length), 0.0)
+    return np.hypot(across, over), over > 0
+
+
+def _causes(apart_m: FloatArray, curve: DetectionCurve) -> list[str]:
+    best = int(curve.p_detect.argmax())
+    is_low = 2 * curve.p_detect < curve.p_detect[best]
+    near_m = curve.range_m[:best][is_low[:best]].max(initial=-1.0)
+    far_m = curve.range_m[best:][is_low[best:]].min(initial=curve.range_m[-1])
+    return [NADIR_GAP if one <= near_m else RANGE_END if one >= far_m else BEST for one in apart_m]
+
+
+def _named(values: Sequence[Value], weights: FloatArray) -> list[Value]:
+    """Those values that have their share of the weight, the heaviest first; the heaviest in any case."""
+    sums: dict[Value, float] = {}
+    for value, weight in zip(values, weights.tolist(), strict=True):
+        sums[value] = sums.get(value, 0.0) + weight
+    order = sorted(sums, key=lambda one: -sums[one])
+    least = NAMED_SHARE * sum(sums.values())
+    return [one for place, one in enumerate(order) if place == 0 or sums[one] >= least]
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
