@@ -112,7 +112,7 @@ class Clairvoyance:
             risk=np.where(metrics.inside, risk, 0.0),
             released_s=np.zeros(metrics.map.grid.shape),
             primary_s=primary_ms / 1000,
-            ends_s=primary_ms / 1000 * self.scenario.mission.deadline_factor,
+            ends_s=self.scenario.mission.ends_s(primary_ms / 1000),
             helpers=leg_helpers(self.scenario, metrics.map.grid, metrics.inside),
         )
 

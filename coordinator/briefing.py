@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
@@ -42,12 +40,12 @@ class Briefing:
         return tuple(helper for helper in found if helper is not None)
 
     def expected_deadline_s(self) -> float:
-        """When the mission is expected to be over; infinite while nobody can tell."""
+        """When the mission is expected to be over at the latest; infinite while nobody can tell."""
         ends_ms = [one.expected_end_ms for one in self._primaries]
         known_ms = [end_ms for end_ms in ends_ms if end_ms is not None]
         if not known_ms or len(known_ms) < len(ends_ms):
-            return math.inf
-        return max(known_ms) * self._config.deadline_factor / 1000
+            return self._config.deadline_s
+        return min(self._config.deadline_s, max(known_ms) * self._config.deadline_factor / 1000)
 
     def open_strip(self, record: StripRecord) -> OpenStrip:
         """A strip as an allocator sees it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
@@ -26,8 +27,10 @@ def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priorit
 
 @dataclass(frozen=True)
 class CoordinatorConfig:
-    """`deadline_factor`: the mission ends at the latest at this multiple of the last primary's end. `lost_after_ms`:
-    age of a vehicle's state from which it counts as lost. `min_strip_m`, `max_strip_m`: length of a strip.
+    """The mission ends at the latest at `deadline_factor` times the last primary's end, or at `deadline_s`; what does
+    not hold is infinite.
+    `lost_after_ms`: age of a vehicle's state from which it counts as lost.
+    `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
@@ -41,6 +44,7 @@ class CoordinatorConfig:
     max_strip_m: float
     worth_risk: float
     switch_margin: float
+    deadline_s: float = math.inf
     separation_m: float = 0.0
     objective: Literal["mean", "worst30", "both"] = "both"
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"

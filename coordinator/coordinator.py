@@ -87,7 +87,7 @@ class Coordinator:
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
         expected = ExpectedMap(fleet, inside, p_detect)
         self._strips = strips = StripLife(ledger, fleet, inside, expected, agenda, outbox)
-        self._end = MissionEnd(config.deadline_factor, fleet, strips, agenda, outbox)
+        self._end = MissionEnd(config, fleet, strips, agenda, outbox)
         if narrowest is not None:
             self._briefing = Briefing(config, ledger, fleet, p_detect)
             self._cutting = StripCutting(narrowest, config, inside, expected, self._briefing, fleet, strips)

@@ -3,6 +3,7 @@ planned once for what is expected at the start. What coordination has to beat.""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import StripState
-from coordinator.allocate.routes import BEAM, HORIZON_S, plan_routes
+from coordinator.allocate.routes import BEAM, plan_routes
 from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
 from coordinator.cut.strips import Cut, columns_across
@@ -117,7 +118,8 @@ def _lanes(inside: BoolArray, first: int, end: int, width: int) -> list[Window]:
 
 
 class Beforehand:
-    """Plans routes once, for what is expected when every primary has said its first plan, and keeps to them."""
+    """Plans routes once, to the deadline and for what is expected when every primary has said its first plan, and keeps
+    to them."""
 
     def __init__(self, cutting: StripCutting, briefing: Briefing, fleet: KnownFleet, strips: StripLife) -> None:
         self.routes = FixedRoutes()
@@ -129,11 +131,12 @@ class Beforehand:
     def cut(self, now_ms: int) -> None:
         """Opens the strips of the routes, as soon as these can be planned."""
         waits = any(one.plan is None for one in self._fleet.primaries.values())
-        if self.routes.routes or waits or any(one.state is None for one in self._fleet.helpers):
+        waits |= any(one.state is None for one in self._fleet.helpers)
+        if self.routes.routes or waits or not math.isfinite(self._briefing.expected_deadline_s()):
             return
         self._cutting.cut(now_ms)
         situation = self._briefing.situation(now_ms)
-        routes = plan_routes(situation.strips, situation.helpers, min(situation.deadline_s, HORIZON_S), BEAM)
+        routes = plan_routes(situation.strips, situation.helpers, situation.deadline_s, BEAM)
         self.routes.routes = {name: list(numbers) for name, numbers in routes.strips.items()}
         planned = {number for numbers in routes.strips.values() for number in numbers}
         for record in self._strips.ledger.in_state(StripState.OPEN):

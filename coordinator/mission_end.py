@@ -6,6 +6,7 @@ import math
 
 from comms.said.messages import MissionOver
 from coordinator.agenda import Agenda, Item
+from coordinator.config import CoordinatorConfig
 from coordinator.fleet import KnownFleet
 from coordinator.outbox import Outbox
 from coordinator.strip_life import StripLife
@@ -14,15 +15,15 @@ SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
 
 class MissionEnd:
-    """The mission is over when every primary has finished and no strip is left, at the latest at `deadline_factor`
-    times the last primary's end. `over`: what was said of that, None until then."""
+    """The mission is over when every primary has finished and no strip is left, at the latest at the deadline, by the
+    last primary's end or by the clock. `over`: what was said of that, None until then."""
 
     def __init__(
-        self, deadline_factor: float, fleet: KnownFleet, strips: StripLife, agenda: Agenda, outbox: Outbox
+        self, config: CoordinatorConfig, fleet: KnownFleet, strips: StripLife, agenda: Agenda, outbox: Outbox
     ) -> None:
         self.over: MissionOver | None = None
         self._over_ms = 0
-        self._deadline_factor = deadline_factor
+        self._config = config
         self._fleet = fleet
         self._strips = strips
         self._agenda = agenda
@@ -30,14 +31,14 @@ class MissionEnd:
 
     def find(self, now_ms: int) -> None:
         """Finds whether the mission is over, and says so."""
-        if self._fleet.surveying:
-            return
-        left = self._strips.unended
-        if not left:
+        left, surveying = self._strips.unended, self._fleet.surveying
+        if not left and not surveying:
             reason = "every primary has finished and no strip is left"
         elif now_ms >= self._deadline_ms():
-            end = f"{self._deadline_factor:g} times the last primary's end"
-            reason = f"{end} is reached, {len(left)} strips are left"
+            by_the_clock = math.isfinite(self._config.deadline_s)
+            end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"
+            cut_short = ", the survey is not finished" if surveying else ""
+            reason = f"{end} is reached{cut_short}, {len(left)} strips are left"
         else:
             return
         self._strips.leave_all(now_ms)
@@ -58,9 +59,14 @@ class MissionEnd:
                 self._agenda.add(Item.SAY_OVER, again_ms)
 
     def deadlines_ms(self) -> list[int]:
-        """When the mission is over at the latest, once every primary has finished."""
-        return [] if self._fleet.surveying else [self._deadline_ms()]
+        """When the mission is over at the latest, if that is known already."""
+        deadline_ms = self._deadline_ms()
+        return [] if deadline_ms == math.inf else [int(deadline_ms)]
 
-    def _deadline_ms(self) -> int:
+    def _deadline_ms(self) -> float:
+        if math.isfinite(self._config.deadline_s):
+            return math.ceil(self._config.deadline_s * 1000)
+        if self._fleet.surveying:
+            return math.inf
         ends_ms = [one.finished_ms or 0 for one in self._fleet.primaries.values()]
-        return math.ceil(max(ends_ms, default=0) * self._deadline_factor)
+        return math.ceil(max(ends_ms, default=0) * self._config.deadline_factor)

@@ -70,7 +70,8 @@ def compare(
     if as_json:
         typer.echo(content)
     elif stood:
-        told = table(stood, f"{title}, judged by {OBJECTIVES[objective].what} when the mission ends", objective)
+        judged = f"judged by {OBJECTIVES[objective].what} when the mission ends"
+        told = table(stood, f"{title}, {judged}\nIt ends {mission.mission.deadline} at the latest.", objective)
         console = Console(soft_wrap=True, highlight=False)
         console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off
         console.print(told)

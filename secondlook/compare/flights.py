@@ -41,7 +41,12 @@ def _self(scenario: Scenario, data: dict[str, Any]) -> None:
 def _self_longer(scenario: Scenario, data: dict[str, Any]) -> None:
     """The same, until the fleet's vehicle-seconds are used up."""
     _self(scenario, data)
-    data["mission"]["deadline_factor"] = equal_vehicle_seconds(scenario)
+    longer, mission = equal_vehicle_seconds(scenario), scenario.mission
+    if mission.deadline_s is None:
+        data["mission"]["deadline_factor"] = longer
+    else:
+        data["mission"]["deadline_s"] = longer
+        data["mission"]["time_limit_s"] = max(mission.time_limit_s, longer)
 
 
 def _lawnmower(scenario: Scenario, data: dict[str, Any]) -> None:
@@ -110,12 +115,15 @@ def contenders(scenario: Scenario, names: Sequence[str] = ()) -> list[Contender]
 
 
 def equal_vehicle_seconds(scenario: Scenario) -> float:
-    """The deadline factor with which the primaries alone spend the vehicle-seconds of the whole fleet.
+    """The deadline, as the scenario has it, with which the primaries alone spend the fleet's vehicle-seconds.
 
-    Counted are a primary's seconds until the last of them has surveyed all, and a helper's until the deadline.
+    Counted are a helper's seconds until the deadline, and a primary's until the last of them has surveyed all; until
+    the deadline, too, where that is by the clock.
     """
-    primaries, helpers = len(scenario.survey_vehicles), len(scenario.revisit_vehicles)
-    return 1.0 + scenario.mission.deadline_factor * helpers / primaries
+    mission, helpers_each = scenario.mission, len(scenario.revisit_vehicles) / len(scenario.survey_vehicles)
+    if mission.deadline_s is not None:
+        return mission.deadline_s * (1.0 + helpers_each)
+    return 1.0 + mission.ends_s(1.0) * helpers_each
 
 
 def _scenario_of(scenario: Scenario, name: str) -> Scenario:

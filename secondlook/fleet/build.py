@@ -261,7 +261,8 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
     return CoordinatorConfig(
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
-        deadline_factor=scenario.mission.deadline_factor,
+        deadline_factor=scenario.mission.deadline_factor or math.inf,
+        deadline_s=scenario.mission.deadline_s or math.inf,
         lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,

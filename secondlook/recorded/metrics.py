@@ -53,6 +53,11 @@ class VehicleFigures:
     finished_ms: int | None = None
     surveyed: VehicleLayer | None = None
 
+    @property
+    def has_surveyed_all(self) -> bool:
+        """Whether no track is left that it has not flown, by its plan: the mission may have ended before."""
+        return self.plan is None or all(track.flown for track in self.plan.tracks)
+
 
 @dataclass
 class StripFigures:
@@ -103,7 +108,7 @@ class Metrics:
             vehicle.plan = message
         elif isinstance(message, AgentState) and vehicle is not None:
             vehicle.ended_ms = received.header.sent_ms
-            if message.mode is Mode.FINISHED and vehicle.finished_ms is None:
+            if message.mode is Mode.FINISHED and vehicle.finished_ms is None and vehicle.has_surveyed_all:
                 vehicle.finished_ms = received.header.sent_ms
                 if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
                     vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))

@@ -26,6 +26,7 @@ from secondlook.scenario.values import (
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
 # Beyond, a metre of easting is more degrees than a map can show.
+DEADLINE_FACTOR = 1.05
 Latitude = Annotated[float, Field(ge=-89, le=89)]
 Longitude = Annotated[float, Field(ge=-180, le=180)]
 Headings = Annotated[tuple[Heading, Heading], BeforeValidator(check_pair), Field(strict=False)]
@@ -43,14 +44,53 @@ class Origin(Mapping):
 class Mission(Mapping):
     """When the mission ends, and how its risk is computed."""
 
-    deadline_factor: Annotated[float, Field(ge=1, le=100)] = 1.05
-    """The mission is over at the latest at so many times the survey's duration, of several the last one's."""
-    time_limit_s: Duration = 20_000.0
+    deadline_s: Duration | None = None
+    """The mission is over at the latest at this time, whether or not the survey is. Left out, `deadline_factor` tells
+    when."""
+    deadline_factor: Annotated[float, Field(ge=1, le=100)] | None = Field(
+        default_factory=lambda data: None if data.get("deadline_s") else DEADLINE_FACTOR,
+        json_schema_extra={"default": DEADLINE_FACTOR},
+    )
+    """The mission is over at the latest at so many times the survey's duration, of several the last one's. Not beside
+    `deadline_s`, or null."""
+    time_limit_s: Annotated[Duration, Field(validate_default=True)] = 20_000.0
     """The run fails if it is not over by then."""
     rho: Share = 0.0
     """Correlation of looks in the residual risk: 0 independent, as in the paper, 1 only the best look counts."""
     separation_m: Annotated[float, Field(ge=0, le=1000)] = 12.0
     """Helpers give way to whom they would come nearer; 0: they need not."""
+
+    def ends_s(self, survey_s: float) -> float:
+        """When the mission is over at the latest, if the last survey ends at `survey_s`."""
+        if self.deadline_s is not None:
+            return self.deadline_s
+        assert self.deadline_factor is not None
+        return self.deadline_factor * survey_s
+
+    @property
+    def deadline(self) -> str:
+        """In words."""
+        if self.deadline_s is not None:
+            return f"at {self.deadline_s:g} s"
+        return f"at {self.deadline_factor:g} times the survey's duration"
+
+    @field_validator("deadline_factor")
+    @classmethod
+    def _check_one_deadline(cls, factor: float | None, info: ValidationInfo) -> float | None:
+        deadline_s = info.data.get("deadline_s")
+        if factor is not None and deadline_s is not None:
+            raise refused(f"must be left out, or null, beside deadline_s, {deadline_s:g}")
+        if factor is None and "deadline_s" in info.data and deadline_s is None:
+            raise refused("must be at least 1 without deadline_s")
+        return factor
+
+    @field_validator("time_limit_s")
+    @classmethod
+    def _check_limit(cls, time_limit_s: float, info: ValidationInfo) -> float:
+        deadline_s = info.data.get("deadline_s")
+        if deadline_s is not None and time_limit_s < deadline_s:
+            raise refused(f"must be at least deadline_s, {deadline_s:g}")
+        return time_limit_s
 
 
 class UniformSeabed(Mapping):

@@ -89,7 +89,7 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
     if not overs or primary_s is None:
         return []
     over_ms = overs[0].header.sent_ms
-    if over_ms >= int(primary_s * 1000 * flight.scenario.mission.deadline_factor):
+    if over_ms >= int(1000 * flight.scenario.mission.ends_s(primary_s)):
         return []
     return [
         f"strip {number} was still {last.message.state.value} when the mission was over at {over_ms / 1000:.3f} s,"

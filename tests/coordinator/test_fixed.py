@@ -155,6 +155,17 @@ class TestBeforehand:
         told.settle()
         assert list(told.states().values()).count(OFFERED) == 1
 
+    def test_routes_go_to_the_deadline_and_no_farther(self) -> None:
+        # Three tracks of 400 m at 1.5 m/s, and the ways to them, take some 1300 s; the helper serves 400 m in 225 s.
+        routes = []
+        for deadline_s in (None, 500.0, 250.0):
+            told = coordinator(strips="beforehand", deadline_s=deadline_s)
+            told.plan(60.0, 180.0, 300.0)
+            told.settle()
+            routes.append(sum(one.state is not WITHDRAWN for one in told.strips().values()))
+        assert routes[0] > routes[1] == 2
+        assert routes[2] == 1
+
     def test_strips_stay_as_first_planned(self) -> None:
         told = coordinator(strips="beforehand")
         told.plan(60.0, 180.0, 300.0)

@@ -69,6 +69,29 @@ class TestTheEnd:
         assert told.strips()[1].reason == f"left when the mission was over: {HELPER} has not ended it"
         assert told.strips()[2].reason == "left when the mission was over: nobody has served it"
 
+    def test_by_the_clock_it_is_over_at_the_deadline_whether_or_not_the_survey_is(self) -> None:
+        told = coordinator(deadline_s=50)
+        told.hotspot()
+        told.settle()
+        told.keep_alive((PRIMARY, HELPER), 45)
+        assert told.node.all(MissionOver) == []
+        said = told.node.wait(10)
+        over = next(one for one in said if isinstance(one.message, MissionOver))
+        assert over.at_ms == 50_000
+        assert over.message == MissionOver("the deadline is reached, the survey is not finished, 1 strips are left")
+        assert told.states() == {1: OPEN}
+
+    def test_by_the_clock_it_waits_for_strips_until_the_deadline_and_no_longer_than_there_are_any(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY, deadline_s=50)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        told.settle()
+        told.keep_alive((PRIMARY, HELPER), 30)  # far beyond 1.05 times the survey's duration
+        assert told.node.all(MissionOver) == []
+        told.layer(HELPER, looked())
+        told.status(HELPER, 1, TaskState.DONE)
+        told.settle()
+        assert told.node.all(MissionOver) == [MissionOver("every primary has finished and no strip is left")]
+
     def test_it_waits_for_what_is_being_served(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)
         told.state(PRIMARY, Mode.FINISHED, at_ms=20_000_000 // 1000)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -143,12 +144,14 @@ def coordinator(
     max_strip_m: float = 400,
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting",
     area: Sequence[tuple[float, float]] | None = None,
+    deadline_s: float | None = None,
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
-    one that is no full square."""
+    one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration."""
     config = CoordinatorConfig(
         allocator=allocator or GreedyAllocator(),
-        deadline_factor=1.05,
+        deadline_factor=1.05 if deadline_s is None else math.inf,
+        deadline_s=math.inf if deadline_s is None else deadline_s,
         lost_after_ms=30_000,
         min_strip_m=30,
         max_strip_m=max_strip_m,
@@ -170,9 +173,14 @@ def coordinator(
     return told
 
 
-def with_a_helper(state: TaskState = TaskState.ACCEPTED, vehicles: tuple[RosterVehicle, ...] = FLEET) -> Told:
+def with_a_helper(
+    state: TaskState = TaskState.ACCEPTED,
+    vehicles: tuple[RosterVehicle, ...] = FLEET,
+    *,
+    deadline_s: float | None = None,
+) -> Told:
     """Strip 1 is with the helper, as far as this."""
-    told = coordinator(vehicles)
+    told = coordinator(vehicles, deadline_s=deadline_s)
     told.hotspot()
     told.settle()
     assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)]

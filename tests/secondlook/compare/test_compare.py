@@ -85,6 +85,12 @@ class TestWhoIsCompared:
     def test_vehicle_seconds_are_shared_by_all_primaries(self) -> None:
         assert equal_vehicle_seconds(load_scenario("wide")) == pytest.approx(1 + 1.05 * 8 / 3)
 
+    def test_by_the_clock_primaries_alone_have_the_fleets_time_until_the_deadline(self) -> None:
+        settings = ["mission.deadline_factor=null", "mission.deadline_s=8000"]
+        (longer,) = contenders(load_scenario("two-helpers", settings), ["self-longer"])
+        mission = longer.scenario.mission
+        assert (mission.deadline_s, mission.deadline_factor, mission.time_limit_s) == (24_000, None, 24_000)
+
     def test_an_unknown_name_is_told_with_those_that_are_known(self) -> None:
         with pytest.raises(
             UserError, match=r"^--allocators: nobody is not allowed; must be .*greedy.* or second_survey$"
@@ -248,8 +254,13 @@ class TestCommand:
         assert (code, err) == (1, "other, seed 3: it failed\n")
         judged = "four fifths of the mean residual risk and a fifth of the worst 30 %'s"
         assert out.startswith(f"tellaro, seeds 1 to 10, judged by {judged} when the mission ends\n")
+        assert out.splitlines()[1] == "It ends at 1.05 times the survey's duration at the latest."
         assert "failed" in out
         assert "0.440" in out
+
+    def test_the_deadline_is_told_as_the_scenario_has_it(self, command: Command, by_hand: None) -> None:
+        _, out, _ = command("--set", "mission.deadline_factor=null", "--set", "mission.deadline_s=3000")
+        assert out.splitlines()[1] == "It ends at 3000 s at the latest."
 
     def test_seeds_are_flown_from_the_first_one(self, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
         told: list[int] = []

@@ -108,6 +108,14 @@ class TestPaths:
         assert (summary["primary_s"], summary["vehicles"][PRIMARY]["ended_s"]) == (100, 100)
         assert summary["vehicles"][HELPER]["ended_s"] == 115
 
+    def test_a_primary_whose_survey_was_cut_short_has_not_ended_it(self) -> None:
+        stream = begun()
+        tracks = tuple(PlannedTrack(n, 0, 0, 0, 0, 200, n < 3) for n in (1, 2, 3))
+        stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (138,), (130,), ""))
+        stream.state(100, PRIMARY, Mode.FINISHED)
+        summary = stream.metrics.summary()
+        assert (summary["primary_s"], summary["risk_at"]) == (None, [])
+
 
 class TestRisk:
     def test_layers_are_joined_and_the_primary_stands_alone_beside_them(self) -> None:

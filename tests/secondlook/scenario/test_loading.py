@@ -111,6 +111,18 @@ def test_the_headland_is_concave_has_a_hole_and_leaves_the_heading_to_us() -> No
     assert len(plan_for(scenario, "primary", math.pi / 2).parts) > 1
 
 
+def test_a_deadline_by_the_clock_stands_in_place_of_the_other_one(write: Write, valid_text: str) -> None:
+    by_the_clock = load_scenario(write(f"{valid_text}\nmission: {{deadline_s: 3000}}\n"))
+    assert (by_the_clock.mission.deadline_s, by_the_clock.mission.deadline_factor) == (3000, None)
+    assert (by_the_clock.mission.ends_s(100.0), by_the_clock.mission.deadline) == (3000, "at 3000 s")
+    assert load_scenario(write(by_the_clock.to_yaml())) == by_the_clock
+    overridden = load_scenario("tellaro", ["mission.deadline_factor=null", "mission.deadline_s=3000"])
+    assert overridden.mission == by_the_clock.mission
+    usual = load_scenario(write(valid_text)).mission
+    assert (usual.deadline_s, usual.ends_s(100.0)) == (None, 105)
+    assert usual.deadline == "at 1.05 times the survey's duration"
+
+
 def test_defaults_fill_what_a_short_file_leaves_out(write: Write, valid_text: str) -> None:
     scenario = load_scenario(write(valid_text))
     assert (scenario.seed, scenario.description, scenario.area.cell_m) == (0, "", 5)

@@ -456,6 +456,29 @@ MISTAKES = {
         "name: trial\nmission: {deadline_factor: 0.99}",
         ["bad.yaml:2: mission.deadline_factor: 0.99 is not allowed; must be at least 1"],
     ),
+    "two deadlines": (
+        "name: trial",
+        "name: trial\nmission: {deadline_factor: 1.05, deadline_s: 3000}",
+        [
+            "bad.yaml:2: mission.deadline_factor: 1.05 is not allowed; must be left out, or null, beside deadline_s, "
+            "3000"
+        ],
+    ),
+    "no deadline": (
+        "name: trial",
+        "name: trial\nmission: {deadline_factor: null}",
+        ["bad.yaml:2: mission.deadline_factor: nothing is not allowed; must be at least 1 without deadline_s"],
+    ),
+    "deadline that is none": (
+        "name: trial",
+        "name: trial\nmission: {deadline_factor: null, deadline_s: 0}",
+        ["bad.yaml:2: mission.deadline_s: 0 is not allowed; must be greater than 0"],
+    ),
+    "deadline after the time limit": (
+        "name: trial",
+        "name: trial\nmission: {deadline_s: 30000}",
+        ["bad.yaml:2: mission.time_limit_s: 20000.0, the default, is not allowed; must be at least deadline_s, 30000"],
+    ),
     "unknown seabed": (
         "name: trial",
         "name: trial\nseabed: {kind: rocky}",
