@@ -46,6 +46,6 @@ class CoordinatorConfig:
     switch_margin: float
     deadline_s: float = math.inf
     separation_m: float = 0.0
-    objective: Literal["mean", "worst30", "both"] = "both"
+    objective: Literal["mean", "worst30", "both", "targets"] = "both"
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
     priorities: tuple[PriorityGround, ...] = ()

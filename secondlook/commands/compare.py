@@ -56,6 +56,7 @@ def compare(
     if out is not None:
         _prepare(out)
     mission = load_scenario(scenario, set_ or ())
+    objective = objective_of(mission)
     chosen = contenders(mission, [name.strip() for name in allocators.split(",")] if allocators else ())
     for contender in chosen:
         build_fleet(contender.scenario, record=False)
@@ -63,7 +64,7 @@ def compare(
     numbers = range(first_seed, first_seed + seeds)
     shown = sys.stderr.isatty() and not as_json
     failure = _fly(chosen, numbers, jobs or os.cpu_count() or 1, flown, shown=shown)
-    stood, objective = standings(flown), objective_of(mission)
+    stood = standings(flown)
     reacting = verdict(chosen, {one.name: one.against_first for one in stood}, objective)
     title = f"{mission.name}, seeds {numbers[0]} to {numbers[-1]}"
     content = json.dumps(comparison_as_json(flown, stood, mission.name, objective, reacting), indent=2)

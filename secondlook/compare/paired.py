@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.types import FloatArray
 from secondlook.compare.flights import Contender, Result
+from secondlook.errors import UserError
 from secondlook.scenario import Scenario
 
 RESAMPLES = 10_000
@@ -53,8 +54,13 @@ OBJECTIVES: Mapping[str, Objective] = {
 
 
 def objective_of(scenario: Scenario) -> str:
-    """The name of the objective by which those that fly a scenario are judged."""
-    return scenario.coordinator.objective
+    """The name of the objective by which those that fly a scenario are judged. Raises UserError where none of their
+    missions has a value."""
+    objective = scenario.coordinator.objective
+    if objective == "targets" and scenario.targets.count == 0:
+        others = " or ".join(one for one in OBJECTIVES if one != objective)
+        raise UserError(f"coordinator.objective: targets is not allowed here, targets.count is 0; must be {others}")
+    return objective
 
 
 @dataclass(frozen=True)

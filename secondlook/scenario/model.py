@@ -173,9 +173,11 @@ class Coordinator(Mapping):
     """Where second looks go: `reacting` to all that is heard; to the best routes that can be planned `beforehand`; to
     `lanes` side by side that helpers mow from the first second, along the tracks or across. The last three are what the
     first is compared with: for them `allocator` counts for nothing."""
-    objective: Literal["mean", "worst30", "both"] = "both"
-    """What second looks are to bring down: the `mean` residual risk, that of the worst 30 % of the area (`worst30`), or
-    `both`, the mean counting four times as much."""
+    objective: Literal["mean", "worst30", "both", "targets"] = "both"
+    """What second looks are to bring down: the `mean` residual risk, that of the worst 30 % of the area (`worst30`),
+    `both`, the mean counting four times as much, or the share of `targets` expected to be missed. Helpers do the same
+    for the last as for the mean, for a cell's risk is the chance that a target there is missed; `area.priorities` then
+    tell where targets lie thicker. What differs is by what `secondlook compare` judges."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
     """A helper is turned round for a plan that is better by at least this share."""
 

@@ -258,6 +258,28 @@ class TestCommand:
         assert "failed" in out
         assert "0.440" in out
 
+    @pytest.mark.parametrize(
+        ("objective", "what", "better"),
+        [("mean", "the mean residual risk", "2, 4"), ("targets", "the share of targets expected to be found", "5, 1")],
+    )
+    def test_they_are_judged_by_the_objective_that_was_chosen(
+        self, command: Command, monkeypatch: pytest.MonkeyPatch, objective: str, what: str, better: str
+    ) -> None:
+        # The other leaves less on 2 of 6 seeds, and is expected to find more on 5.
+        def fly_all(chosen: object, seeds: range, jobs: int, flown: Flown, progress: object) -> None:
+            flown["plan"] = {seed: result(seed, 0.4, expected=0.5) for seed in seeds}
+            flown["greedy"] = {
+                seed: result(seed, 0.3 if seed <= 2 else 0.5, expected=0.6 if seed <= 5 else 0.4) for seed in seeds
+            }
+
+        monkeypatch.setattr("secondlook.commands.compare.fly_all", fly_all)
+        arguments = ("--allocators", "plan,greedy", "--seeds", "6", "--set", f"coordinator.objective={objective}")
+        _, out, _ = command(*arguments)
+        assert f"judged by {what} when the mission ends\n" in out
+        assert next(line for line in out.splitlines() if line.startswith("greedy")).endswith(better)
+        _, out, _ = command(*arguments, "--json")
+        assert json.loads(out)["objective"] == objective
+
     def test_the_deadline_is_told_as_the_scenario_has_it(self, command: Command, by_hand: None) -> None:
         _, out, _ = command("--set", "mission.deadline_factor=null", "--set", "mission.deadline_s=3000")
         assert out.splitlines()[1] == "It ends at 3000 s at the latest."

@@ -12,6 +12,7 @@ from results import result
 
 from secondlook.compare.flights import Contender, Result
 from secondlook.compare.paired import OBJECTIVES, Paired, Verdict, objective_of, paired, verdict
+from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 
 SCENARIO = load_scenario("tellaro")
@@ -54,6 +55,17 @@ class TestDifferences:
             {"mean": 0.4, "worst30": 0.65, "both": 0.45, "targets": 0.5}
         )
         assert objective_of(SCENARIO) in OBJECTIVES
+
+    def test_it_is_the_scenarios_whatever_that_is(self) -> None:
+        for name in OBJECTIVES:
+            assert objective_of(load_scenario("tellaro", [f"coordinator.objective={name}"])) == name
+
+    def test_targets_are_no_objective_where_there_are_none(self) -> None:
+        without = load_scenario("tellaro", ["coordinator.objective=targets", "targets.count=0"])
+        with pytest.raises(
+            UserError, match=r"^coordinator\.objective: targets is not allowed here, .*must be mean or worst30 or both$"
+        ):
+            objective_of(without)
 
 
 class TestIntervals:
