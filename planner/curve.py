@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -57,6 +58,12 @@ class RangeTally:
         return DetectionCurve(
             np.arange(self._sums.size, dtype=np.float64) * self._range_bin_m, self._sums / self._profiles
         )
+
+
+def mean_curve(curves: Sequence[DetectionCurve]) -> DetectionCurve:
+    """The mean P(y) of curves, at the points of the one that has most. Raises ValueError where there is no curve."""
+    range_m = max((one.range_m for one in curves), key=len)
+    return DetectionCurve(range_m, np.mean([one.at(range_m) for one in curves], axis=0))
 
 
 def effective_range_m(curve: DetectionCurve, threshold: float) -> int | None:

@@ -11,6 +11,7 @@ from itertools import permutations
 
 from planner.area import SurveyArea, lawnmower
 from planner.convex_parts import convex_parts, is_all_but_convex
+from planner.profile_spacing import Known, SpacingTerms, first_decision
 from planner.region import Region
 from planner.spacing import track_count
 from planner.spacing_planners import AdaptiveSpacing, SpacingPlanner, lowest_range_m
@@ -123,12 +124,14 @@ def first_plan(
     nadir_gap_m: float,
     told_range_m: float,
     spacing: SpacingPlanner | None = None,
+    known: Known | None = None,
+    terms: SpacingTerms | None = None,
     *,
     thorough: bool = True,
 ) -> FirstPlan:
     """The tracks as `spacing` lays them, by Algorithm 1 if left out, each part by itself and from its nearer end.
 
-    For numbers and errors see `parts_in_order`.
+    `known`, `terms`: for a planner that goes by P(y). For numbers and errors see `parts_in_order`.
     """
     parts = parts_in_order(region, track_heading_rad, nadir_gap_m, told_range_m, thorough=thorough)
     spacing = spacing or AdaptiveSpacing(nadir_gap_m, told_range_m)
@@ -136,7 +139,7 @@ def first_plan(
     ranges_m: list[int] = []
     number, here = 1, None
     for part in parts:
-        decision = spacing.decide(part.width_m, 0.0, None)
+        decision = first_decision(spacing, part.width_m, known, terms or SpacingTerms())
         tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number)
         if here and tracks and math.dist(here, tracks[0].end) < math.dist(here, tracks[0].start):
             tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number, first_reverse=True)

@@ -9,6 +9,7 @@ from typing import Protocol, runtime_checkable
 
 from planner.cover import fewest_tracks, spans_left
 from planner.spacing import adapt_range, track_offsets
+from planner.types import DetectionCurve
 
 LENGTH_TOLERANCE_M = 1e-6
 
@@ -18,8 +19,8 @@ class SpacingDecision:
     """Tracks for what is still to be covered.
 
     `range_m`: the sensor range that spaces them (r_adpt). `offsets_m`: across-track offsets in the order of flying.
-    `replans`: whether to ask again after the first two. `note`: in words, what is out of the ordinary; else empty.
-    `singles`: single tracks, not pairs.
+    `replans`: whether to ask again, after the first `asks_after`. `note`: in words, what is out of the ordinary; else
+    empty. `singles`: single tracks, not pairs.
     """
 
     range_m: int
@@ -27,16 +28,19 @@ class SpacingDecision:
     replans: bool
     note: str = ""
     singles: bool = False
+    asks_after: int = 2
 
 
 @dataclass(frozen=True)
 class FlownTrack:
     """A track flown: its offset, and up to which range what lies beside it counts as covered. That is its own r_eff;
-    of a `single` one at least the range that it was laid for, so that no place is planned for twice as it was."""
+    of a `single` one at least the range that it was laid for, so that no place is planned for twice as it was.
+    `curve`: P(y) as it measured it, for who plans by that."""
 
     across_m: float
     range_m: float
     single: bool
+    curve: DetectionCurve | None = None
 
 
 class SpacingPlanner(Protocol):

@@ -17,7 +17,8 @@ class SurveyConfig:
     `threshold`: P_d from which data is admissible. `hotspot_risk`: residual risk from which a settled cell is a
     hotspot. `run_in_m`: straight run before and after each track. `endurance_ms`: mission time on one battery. `prior`:
     P(y) of earlier missions, which holds until the first track is flown (paper, section III-B). `share`: from which to
-    which share of the area's width it surveys, see `planner.region.Region.share`."""
+    which share of the area's width it surveys, see `planner.region.Region.share`. `wanted_risk`: see
+    `planner.profile_spacing.SpacingTerms`."""
 
     vehicle: str
     spacing: SpacingPlanner
@@ -30,6 +31,7 @@ class SurveyConfig:
     endurance_ms: int
     prior: DetectionCurve | None = None
     share: tuple[float, float] = WHOLE
+    wanted_risk: float | None = None
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from planner.area import SurveyArea
 from planner.footprints.footprint import Reach
+from planner.profile_spacing import Known, PartSoFar, ProfilePlanner, SpacingTerms, first_decision
 from planner.spacing import NARROWEST_M
 from planner.spacing_planners import (
     FlownTrack,
@@ -15,7 +16,7 @@ from planner.spacing_planners import (
     counted_range_m,
     lowest_range_m,
 )
-from planner.types import Track
+from planner.types import DetectionCurve, Track
 from vehicle_agent.config import SurveyConfig
 
 TRACKS_A_PAIR = 2
@@ -24,46 +25,49 @@ TRACKS_A_PAIR = 2
 class PartSurvey:
     """Asks the spacing planner and keeps what it is to be told. All offsets are in the part's own sweep frame.
 
-    `r_eff_m` is the effective range after the last track flown, in whatever part; None before the first.
+    `r_eff_m` is the effective range after the last track flown, in whatever part; None before the first. `curve`: P(y)
+    of that track, or by now.
     """
 
-    def __init__(self, area: SurveyArea, config: SurveyConfig) -> None:
+    def __init__(self, area: SurveyArea, config: SurveyConfig, terms: SpacingTerms) -> None:
         self.area = area
         self._config = config
+        self._terms = terms
+        self._before_m: int | None = None
         self._decision: SpacingDecision
         self._covered_m = 0.0
         self._looked: list[FlownTrack] = []
         self._since: list[Track] = []
 
-    def first(self, r_eff_m: int | None) -> SpacingDecision:
+    def first(self, known: Known | None) -> SpacingDecision:
         """The tracks for the whole part."""
-        spacing, width_m = self._config.spacing, self.area.width_m
-        singles = None
-        if r_eff_m is not None and isinstance(spacing, SinglesPlanner):
-            singles = spacing.cover(width_m, (), r_eff_m)
-        self._decision = spacing.decide(width_m, 0.0, r_eff_m) if singles is None else singles
+        self._before_m = known.r_eff_m if known is not None and known.measured else None
+        self._decision = first_decision(self._config.spacing, self.area.width_m, known, self._terms)
         return self._decision
 
-    def flown(self, track: Track, r_eff_m: int) -> None:
-        """Notes a track flown and how far it saw."""
+    def flown(self, track: Track, r_eff_m: int, curve: DetectionCurve) -> None:
+        """Notes a track flown and how well it saw."""
         singles = self._decision.singles
         counted_m = max(r_eff_m, self._decision.range_m) if singles else r_eff_m
-        self._looked.append(FlownTrack(track.across_m, counted_m, singles))
+        self._looked.append(FlownTrack(track.across_m, counted_m, singles, curve))
         self._since.append(track)
 
     def is_due(self, ahead: Sequence[Track]) -> bool:
         """Whether it is time to decide again, `ahead` being the tracks of this part still to be flown."""
         # Where all that a decision laid was refused there is nothing new to decide on.
         new = len(self._since)
-        return self._decision.replans and (new >= TRACKS_A_PAIR or (new > 0 and not ahead))
+        return self._decision.replans and (new >= self._decision.asks_after or (new > 0 and not ahead))
 
-    def next(self, r_eff_m: int) -> SpacingDecision | None:
+    def next(self, r_eff_m: int, curve: DetectionCurve) -> SpacingDecision | None:
         """The tracks for what is left; None where that is nothing."""
         spacing, width_m = self._config.spacing, self.area.width_m
-        self._covered_m = max(self._covered_m, self._edge_m(self._since, r_eff_m))
-        decision = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
-        if decision is None and self._covered_m < width_m - NARROWEST_M:
-            decision = spacing.decide(width_m, self._covered_m, r_eff_m)
+        if isinstance(spacing, ProfilePlanner):
+            decision = spacing.lay(self._so_far(r_eff_m, curve), self._terms)
+        else:
+            self._covered_m = max(self._covered_m, self._edge_m(self._since, r_eff_m))
+            decision = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
+            if decision is None and self._covered_m < width_m - NARROWEST_M:
+                decision = spacing.decide(width_m, self._covered_m, r_eff_m)
         if decision is None or not decision.offsets_m:
             return None
         self._decision, self._since = decision, []
@@ -73,10 +77,14 @@ class PartSurvey:
         """The offset beyond which the next decision may still lay tracks that see; None where it will not."""
         if not self._decision.replans or not ahead:
             return None
-        if self._decision.singles:
-            later = ahead[max(0, TRACKS_A_PAIR - len(self._since)) :]
+        due = max(0, self._decision.asks_after - len(self._since))
+        by_profile = isinstance(self._config.spacing, ProfilePlanner)
+        if by_profile and r_eff_m is None:
+            # Nothing but the range that it was told has laid what comes after the first track.
+            return ahead[0].across_m - reach.far_m
+        if self._decision.singles or by_profile:
             # They will not lie much nearer than they do now.
-            return min(track.across_m for track in later) - reach.far_m if later else None
+            return min(track.across_m for track in ahead[due:]) - reach.far_m if ahead[due:] else None
         pair = [*self._since, *ahead][:TRACKS_A_PAIR]
         known_m = math.floor(reach.far_m) if r_eff_m is None else r_eff_m
         edge_m = self._edge_m(pair, known_m)
@@ -87,6 +95,10 @@ class PartSurvey:
         nearest_m = max(track.across_m for track in pair) + 2 * lowest_range_m(self._config.nadir_gap_m)
         pulled_in_m = min(self._config.spacing.decide(self.area.width_m, edge_m, known_m).offsets_m)
         return min(nearest_m, pulled_in_m) - reach.far_m - cell_m
+
+    def _so_far(self, r_eff_m: int, curve: DetectionCurve) -> PartSoFar:
+        planned_m = self._decision.offsets_m[len(self._since) :]
+        return PartSoFar(self.area.width_m, self._before_m, tuple(self._looked), planned_m, curve, r_eff_m)
 
     def _edge_m(self, tracks: Sequence[Track], r_eff_m: int) -> float:
         """The edge up to which pairs that end with these cover the part."""

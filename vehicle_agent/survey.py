@@ -21,20 +21,25 @@ from comms.said.messages import (
 )
 from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower
-from planner.curve import RangeTally, effective_range_m
+from planner.curve import RangeTally, effective_range_m, mean_curve
 from planner.first_plan import parts_in_order
 from planner.footprints.cells import Ahead, cells_within, settled_cells
 from planner.footprints.footprint import Reach
 from planner.hotspots import HotspotMap, update_hotspots
+from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
 from planner.sweep import shifted
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import WHOLE, SurveyConfig
+from vehicle_agent.helpers_ahead import helper_looks
 from vehicle_agent.part_survey import PartSurvey
 
 HOTSPOTS_EVERY_MS = 30_000
+NEWEST_CURVES = 4
+"""Tracks are laid by the mean P(y) of so many: a track's own has an error in common over all of it."""
+UNSEEN = DetectionCurve(np.array([0.0, 1.0]), np.zeros(2))
 MOST_CURVE_POINTS = 4096  # what a curve may hold on the wire
 
 
@@ -49,6 +54,7 @@ class SurveyAgent(Agent):
         self.later: list[Track] = []  # in the parts after it, as they would lie with what is known now
         self.r_adpt_m: list[int] = []
         self.r_eff_m: list[int] = []
+        self._newest: list[DetectionCurve] = []  # P(y) of the last tracks flown
         self._parts: list[PartSurvey] = []
         self._part = 0
         self._first_reverse = False  # whether tracks of odd numbers run against the part's heading
@@ -76,7 +82,10 @@ class SurveyAgent(Agent):
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
         parts = parts_in_order(region, self._grid.frame.heading_rad, self.config.nadir_gap_m, self.config.range_m)
-        self._parts = [PartSurvey(part, self.config) for part in parts]
+        terms = SpacingTerms(
+            self._grid.cell_m, run.rho, self.config.wanted_risk, helper_looks(run.vehicles, self.vehicle)
+        )
+        self._parts = [PartSurvey(part, self.config, terms) for part in parts]
         self._begin_part(0)
         self._go_on(now_ms)
 
@@ -138,14 +147,23 @@ class SurveyAgent(Agent):
         track = self.ahead.pop(0)
         self.flown.append(track)
         self._looked_to_m = None
-        r_eff_m = 0
+        r_eff_m, curve = 0, UNSEEN
         if self._tally is not None:
             curve = self._tally.curve()
             r_eff_m = effective_range_m(curve, self.config.threshold) or 0
             self._publish_curve(track.number, self._range_bin_m, curve.p_detect, r_eff_m)
         self.r_eff_m.append(r_eff_m)
-        self._parts[self._part].flown(track, r_eff_m)
+        self._newest = [*self._newest, curve][-NEWEST_CURVES:]
+        self._parts[self._part].flown(track, r_eff_m, curve)
         self._after_track(now_ms)
+
+    @property
+    def _known(self) -> Known | None:
+        """What is known of the sonar by now."""
+        if self.r_eff_m:
+            return Known(mean_curve(self._newest), self.r_eff_m[-1], measured=True)
+        prior = self.config.prior
+        return None if prior is None else known_before(prior, self.config.threshold)
 
     def _publish_prior(self, prior: DetectionCurve) -> None:
         """What holds before the first track, as the curve of track 0."""
@@ -160,7 +178,7 @@ class SurveyAgent(Agent):
     def _after_track(self, now_ms: int) -> None:
         part = self._parts[self._part]
         if part.is_due(self.ahead):
-            decision = part.next(self.r_eff_m[-1])
+            decision = part.next(self.r_eff_m[-1], mean_curve(self._newest))
             self.ahead = []
             if decision is not None:
                 self._lay(decision, self._words(decision))
@@ -190,7 +208,7 @@ class SurveyAgent(Agent):
         """Lays the first tracks of a part, from the end that is nearer."""
         self._part = place
         part = self._parts[place]
-        decision = part.first(self.r_eff_m[-1] if self.r_eff_m else None)
+        decision = part.first(self._known)
         if self.flown:
             here = self.flown[-1].end
             legs = lawnmower(part.area, decision.offsets_m[:1], decision.range_m)
@@ -211,7 +229,7 @@ class SurveyAgent(Agent):
         self.ahead = self._legs(self._parts[self._part], decision, self._last_number + 1)
         self.later = []
         for part in self._parts[self._part + 1 :]:
-            to_come = part.first(self.r_eff_m[-1] if self.r_eff_m else None)
+            to_come = part.first(self._known)
             number = self._last_number + len(self.ahead) + len(self.later) + 1
             self.later += self._legs(part, to_come, number)
         if counts:

@@ -6,10 +6,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import shapely
 
-from comms.said.announcement import ClockMode, Grid, Hole, Role, RosterVehicle, RunInfo, Vertex
+from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex
 from comms.said.codec import SCHEMA_VERSION, Header, encode
 from comms.said.routing import RosterNode
 from coordinator.config import CoordinatorConfig
@@ -18,6 +17,7 @@ from planner.region import Region
 from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
+from secondlook.fleet.roster import endurance_ms_of, role_of, roster_vehicle
 from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
 from secondlook.scenario import (
     PatchySeabed,
@@ -87,7 +87,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
             grid.rows,
         ),
         rho=scenario.mission.rho,
-        vehicles=tuple(_roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        vehicles=tuple(roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
         holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
     )
     Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
@@ -100,13 +100,6 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     return Fleet(run_info, roster, specs, round(scenario.mission.time_limit_s * 1000))
 
 
-def _role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
-    """What a vehicle's agent is in the fleet."""
-    if isinstance(vehicle, RevisitVehicle):
-        return Role.REVISIT
-    return Role.SURVEY_REVISIT if vehicle.revisits else Role.SURVEY
-
-
 def _roster_of(scenario: Scenario, *, record: bool) -> tuple[RosterNode, ...]:
     """Every node of a scenario's fleet; `record`: with a recorder."""
     external = scenario.external_vehicles
@@ -115,7 +108,7 @@ def _roster_of(scenario: Scenario, *, record: bool) -> tuple[RosterNode, ...]:
         RosterNode(CLOCK, Role.CLOCK),
         *([RosterNode(WORLD, Role.WORLD, simulated)] if simulated else []),
         *(RosterNode(body_of(name), Role.BODY, (name,)) for name in external),
-        *(RosterNode(name, _role_of(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
+        *(RosterNode(name, role_of(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
         RosterNode(COORDINATOR, Role.COORDINATOR),
         *([RosterNode(RECORDER, Role.RECORDER)] if record else []),
         RosterNode(OBSERVER, Role.OBSERVER),
@@ -135,40 +128,8 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
     return tuple(Vertex(*corner) for corner in corners if corner in convex)
 
 
-def _roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
-    sonar = vehicle.sonar
-    return RosterVehicle(
-        vehicle=name,
-        role=_role_of(vehicle),
-        speed_mps=vehicle.speed_mps,
-        turn_radius_m=vehicle.turn_radius_m,
-        run_in_m=vehicle.run_in_m,
-        near_m=sonar.near_m,
-        far_m=sonar.far_m,
-        p_detect=_mean_p_detect(vehicle),
-        endurance_ms=_endurance_ms(vehicle),
-        footprint=sonar.footprint,
-        half_angle_rad=sonar.half_angle_rad,
-        look_m=sonar.look_m,
-    )
-
-
-def _mean_p_detect(vehicle: SurveyVehicle | RevisitVehicle) -> float:
-    """The mean of P(y) of a pass, over the lateral ranges that it reaches."""
-    footprint = footprint_of(vehicle.sonar)
-    curve = footprint.pass_curve(vehicle.detection_curve)
-    near_m, far_m = footprint.reach.near_m, footprint.reach.far_m
-    within = curve.range_m[(curve.range_m > near_m) & (curve.range_m < far_m)]
-    range_m = np.concatenate([[near_m], within, [far_m]])
-    return float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
-
-
-def _endurance_ms(vehicle: SurveyVehicle | RevisitVehicle) -> int:
-    return max(1, round(vehicle.endurance_s * 1000))
-
-
 def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
-    footprint, endurance_ms = footprint_of(vehicle.sonar), _endurance_ms(vehicle)
+    footprint, endurance_ms = footprint_of(vehicle.sonar), endurance_ms_of(vehicle)
     revisit = RevisitConfig(
         vehicle=name,
         footprint=footprint,
@@ -191,6 +152,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         endurance_ms=endurance_ms,
         prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
         share=vehicle.share,
+        wanted_risk=vehicle.wanted_risk,
     )
     if vehicle.revisits:
         return node_spec(Role.SURVEY_REVISIT, SurveyRevisitConfig(survey, revisit), vehicle.agent)

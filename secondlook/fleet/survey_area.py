@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 from planner.first_plan import FirstPlan, best_heading, first_plan
+from planner.profile_spacing import SpacingTerms, known_before
 from planner.region import Region
 from secondlook.errors import UserError
+from secondlook.fleet.roster import roster_vehicle
 from secondlook.scenario import Scenario, SurveyVehicle
 from secondlook.scenario.plug_ins import SPACING, made
 from vehicle_agent.config import WHOLE
+from vehicle_agent.helpers_ahead import helper_looks
 
 
 def region_of(scenario: Scenario) -> Region:
@@ -33,7 +36,7 @@ def track_heading_rad(scenario: Scenario) -> float:
 
 
 def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
-    """The first tracks of a survey vehicle, by its id, as its spacing planner lays them with the range that it is told.
+    """The first tracks of a survey vehicle, by its id, as its spacing planner lays them with what it is told.
 
     Raises:
         UserError: a spacing planner of the user's fails.
@@ -42,8 +45,14 @@ def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
     region = region_for(scenario, vehicle, heading_rad)
     sonar = vehicle.nadir_gap_m, vehicle.told_range_m
     spacing = made(SPACING, vehicle.spacing, nadir_gap_m=sonar[0], told_range_m=sonar[1])
+    known = None
+    if vehicle.prior_curve is not None:
+        known = known_before(vehicle.prior_curve.detection_curve, vehicle.threshold)
+    fleet = [roster_vehicle(other, one) for other, one in scenario.vehicles.items()]
+    looks = helper_looks(fleet, name)
+    terms = SpacingTerms(scenario.area.cell_m, scenario.mission.rho, vehicle.wanted_risk, looks)
     try:
-        return first_plan(region, heading_rad, *sonar, spacing)
+        return first_plan(region, heading_rad, *sonar, spacing, known, terms)
     except Exception as error:
         if vehicle.spacing in SPACING.ours:
             raise

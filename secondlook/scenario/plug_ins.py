@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from coordinator.allocate.allocators import ALLOCATORS
+from planner.profile_spacing import JointSpacing, ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 from secondlook.errors import UserError
 
@@ -103,7 +104,7 @@ SPACING = PlugInKind(
     "a spacing planner",
     arguments=("nadir_gap_m", "told_range_m"),
     methods={"decide": ("width_m", "covered_m", "r_eff_m")},
-    ours={"adaptive": AdaptiveSpacing, "fixed": FixedSpacing},
+    ours={"adaptive": AdaptiveSpacing, "fixed": FixedSpacing, "profile": ProfileSpacing, "joint": JointSpacing},
 )
 SONAR = PlugInKind(
     "a sonar model",

@@ -28,6 +28,8 @@ from secondlook.scenario.values import (
 
 _SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
+BY_RANGE = ("adaptive", "fixed")
+"""Ways of spacing tracks that know nothing of risk."""
 RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
 """Ids of the nodes that are no vehicles."""
 
@@ -126,8 +128,13 @@ class SurveyVehicle(VehicleBase):
     """r_max, the range that it is told to plan with until it has flown the first pair of tracks; at least 3 times
     `nadir_gap_m`. Left out, r_eff of `prior_curve`."""
     spacing: Annotated[str, plug_in(SPACING)] = "adaptive"
-    """How tracks are spaced: `adaptive`, by what it sees, `fixed`, by the first plan, or `package.module:Class` of your
-    own."""
+    """How tracks are spaced: `adaptive`, by what it sees, `fixed`, by the first plan, `profile`, as many as `adaptive`
+    would lay, but where they leave least in the worst 30 %, by all of P(y), `joint`, the same together with what
+    helpers are expected to look at, or `package.module:Class` of your own."""
+    wanted_risk: OpenShare | None = None
+    """With `profile`, `joint` or a spacing planner of your own: the fewest tracks are laid from which it expects a mean
+    residual risk of the worst 30 % of no more than this, at most three times as many as `adaptive` would lay. Left out,
+    as many as that."""
     threshold: OpenShare = 0.05
     """P_d from which data is admissible."""
     prior_curve: OptionalCurve = None
@@ -148,6 +155,13 @@ class SurveyVehicle(VehicleBase):
         if range_m is not None and range_m < lowest_m - TOLERANCE:
             raise refused(f"must be at least 3 times nadir_gap_m, {lowest_m:g}")
         return range_m
+
+    @field_validator("wanted_risk")
+    @classmethod
+    def _check_wanted_risk(cls, wanted_risk: float | None, info: ValidationInfo) -> float | None:
+        if wanted_risk is not None and info.data.get("spacing") in BY_RANGE:
+            raise refused(f"must be left out with spacing {info.data['spacing']}; profile and joint lay tracks by risk")
+        return wanted_risk
 
     @field_validator("prior_curve")
     @classmethod

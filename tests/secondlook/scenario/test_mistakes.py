@@ -144,8 +144,21 @@ MISTAKES = {
         "range_m: 145\n    spacing: wide",
         [
             'bad.yaml:13: vehicles.primary.spacing: "wide" is not allowed; '
-            "must be adaptive, fixed or package.module:Class of a spacing planner"
+            "must be adaptive, fixed, profile, joint or package.module:Class of a spacing planner"
         ],
+    ),
+    "wanted risk with ranges alone": (
+        "range_m: 145",
+        "range_m: 145\n    wanted_risk: 0.7",
+        [
+            "bad.yaml:13: vehicles.primary.wanted_risk: 0.7 is not allowed; must be left out with spacing adaptive; "
+            "profile and joint lay tracks by risk"
+        ],
+    ),
+    "wanted risk above 1": (
+        "range_m: 145",
+        "range_m: 145\n    spacing: profile\n    wanted_risk: 1.5",
+        ["bad.yaml:14: vehicles.primary.wanted_risk: 1.5 is not allowed; must be less than 1"],
     ),
     "unknown role": (
         "role: revisit",

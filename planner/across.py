@@ -1,0 +1,255 @@
+"""Residual risk across the tracks of one part of the area, and how to move tracks so that its worst 30 % is least.
+
+Looked at is a line across the tracks, in bins of a metre. Risk is judged at as many places of it as the map has cells,
+as the map judges it at its cells' centres; whether ground is seen at all, in each bin. Along the tracks all is taken as
+alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+
+from planner.types import DetectionCurve, FloatArray
+
+MOST_BINS = 5000
+"""Of a metre each, or of as many whole metres as it takes."""
+WORST_SHARE = 0.3
+"""Of the width: what a plan is judged by, as `planner.risk.RiskStatistics.worst30_mean` judges a survey."""
+MEAN_WEIGHT = 0.01
+"""Of the mean beside the worst 30 %, so that of plans alike in that the one that leaves less is taken."""
+SHIFTS = np.array([shift for step in (1, 2, 4, 8, 16, 32) for shift in (-step, step)])
+"""By how many bins tracks are moved at a time."""
+MOST_ROUNDS = 40
+"""Through all tracks. Some ten suffice for the paper's area."""
+MOST_MOVED = 10
+"""Of the tracks to come so many are moved, those that are flown first; there is a next time for the others."""
+COARSE = 8
+"""Bins between the places tried for a track more."""
+LEAST_GAIN = 1e-6
+
+LevelArray = NDArray[np.uint8]
+
+
+class Measured(NamedTuple):
+    """A track: its offset, its P(y), and the r_eff of that."""
+
+    across_m: float
+    curve: DetectionCurve
+    r_eff_m: float
+
+
+@dataclass(frozen=True)
+class HelperLooks:
+    """What helpers are expected to look at while one track is flown: `width_m` of the ground across the tracks, >= 0,
+    over the length of a track, with `p_detect` in [0, 1)."""
+
+    width_m: float = 0.0
+    p_detect: float = 0.0
+
+
+NOBODY = HelperLooks()
+
+
+@dataclass(frozen=True, order=True)
+class Worth:
+    """How good tracks are, less is better: `lost_m`, the width that they see worse than asked, counts before `risk`,
+    the mean of the worst 30 % with a little of the mean of all."""
+
+    lost_m: float
+    risk: float
+
+    def is_better(self, than: Worth) -> bool:
+        """By enough to tell."""
+        return (self.lost_m, self.risk + LEAST_GAIN) < (than.lost_m, than.risk)
+
+
+class Across:
+    """A width with the tracks flown over it, and what tracks to come would make of it.
+
+    `curve`, `r_eff_m`: P(y) of the tracks to come, and its r_eff; a place within it is seen better than one beyond.
+    `cell_m`: of the map. `rho`: as for `planner.risk.residual_risk`. Tracks to come lie on whole bins: `bins` are their
+    offsets in `step_m`.
+    """
+
+    def __init__(
+        self,
+        width_m: float,
+        flown: Sequence[Measured],
+        curve: DetectionCurve,
+        r_eff_m: float,
+        cell_m: float,
+        rho: float = 0.0,
+        helpers: HelperLooks = NOBODY,
+    ) -> None:
+        self.step_m = max(1, math.ceil(width_m / MOST_BINS))
+        self._bins = max(1, math.ceil(width_m / self.step_m))
+        self._rho, self._helpers, self._flown = rho, helpers, len(flown)
+        # What a track sees of every bin, by how far to its right the first bin lies: rows are views of one table.
+        self._farthest = self._bins + math.ceil(float(curve.range_m[-1]) / self.step_m) + 1
+        begin_m = np.arange(-self._farthest, self._farthest + self._bins, dtype=np.float64) * self.step_m
+        cell = max(1, round(cell_m / self.step_m))
+        self._nats = sliding_window_view(_nats(curve, begin_m), self._bins)[:, ::cell]
+        self._levels = sliding_window_view(_levels(curve, begin_m, self.step_m, r_eff_m), self._bins)
+        self._begin_m = np.arange(self._bins, dtype=np.float64) * self.step_m
+        columns = [_nats(own, self._begin_m[::cell] - across_m) for across_m, own, _ in flown]
+        nobody = np.zeros(self._nats.shape[1])
+        self._sum, self._largest = np.add.reduce([nobody, *columns]), np.maximum.reduce([nobody, *columns])
+        self._seen = self._levels_of(flown)
+        self._asked = self._seen
+
+    def ask_for(self, tracks: Sequence[Measured]) -> None:
+        """Whatever these tracks see is asked of every plan."""
+        self._asked = self._levels_of(tracks)
+
+    def lost_m(self, tracks: Sequence[Measured]) -> float:
+        """How much of what is asked is missed by the tracks flown and these."""
+        seen = np.maximum(self._seen, self._levels_of(tracks))
+        return float(np.count_nonzero(seen < self._asked)) * self.step_m
+
+    def _levels_of(self, tracks: Sequence[Measured]) -> LevelArray:
+        seen: LevelArray = np.zeros(self._bins, dtype=np.uint8)
+        for across_m, own, r_eff_m in tracks:
+            seen = np.maximum(seen, _levels(own, self._begin_m - across_m, self.step_m, r_eff_m))
+        return seen
+
+    def worth(self, bins: Sequence[int]) -> Worth:
+        """Of the tracks flown and these."""
+        alone = np.zeros((1, 0), dtype=np.intp)
+        return Worth(float(self._lost_m(bins, alone)[0]), float(self._risk(bins, alone)[0]))
+
+    def worst30(self, bins: Sequence[int]) -> float:
+        """The mean residual risk over the worst 30 % of the width after the tracks flown and these, and what helpers
+        are expected to look at."""
+        total, largest = self._nats_of(bins)
+        return float(self._worst_and_mean(total[np.newaxis], largest[np.newaxis], len(bins))[0][0])
+
+    def refined(self, bins: Sequence[int]) -> list[int]:
+        """The tracks moved, one by one and several together, as long as that is better."""
+        found, worth = sorted(bins), self.worth(bins)
+        moves = _moves(min(len(found), MOST_MOVED))
+        for _ in range(MOST_ROUNDS):
+            before = list(found)
+            for group, shifts in moves:
+                others = [place for index, place in enumerate(found) if index not in group]
+                moved = np.array([found[index] for index in group]) + shifts
+                best, its_worth = self._best(others, moved, worth)
+                if its_worth.is_better(worth):
+                    worth = its_worth
+                    for index, place in zip(group, moved[best].tolist(), strict=True):
+                        found[index] = place
+            if found == before:
+                break
+        return sorted(found)
+
+    def with_one_more(self, bins: Sequence[int]) -> list[int]:
+        """These and the track beside them that is worth most."""
+        places = np.arange(0, self._bins + 1, COARSE)[:, np.newaxis]
+        best, _ = self._best(bins, places, Worth(math.inf, math.inf))
+        return sorted([*bins, int(places[best, 0])])
+
+    def with_one_less(self, bins: Sequence[int]) -> list[int]:
+        """All of these but the one that is worth least."""
+        fewer = [[*bins[:place], *bins[place + 1 :]] for place in range(len(bins))]
+        worths = [self.worth(one) for one in fewer]
+        return fewer[min(range(len(fewer)), key=lambda place: (worths[place].lost_m, worths[place].risk))]
+
+    def _best(self, others: Sequence[int], tried: NDArray[np.intp], than: Worth) -> tuple[int, Worth]:
+        """Which row of tracks tried, shape (rows, tracks), is worth most together with the others, and how much; of
+        those alone that may be better than so much."""
+        risk = self._risk(others, tried)
+        rows = np.arange(len(tried)) if than.lost_m else np.flatnonzero(risk + LEAST_GAIN < than.risk)
+        if not rows.size:
+            return 0, than
+        lost_m = self._lost_m(others, tried[rows])
+        best = int(np.lexsort((risk[rows], lost_m))[0])
+        return int(rows[best]), Worth(float(lost_m[best]), float(risk[rows[best]]))
+
+    def _risk(self, others: Sequence[int], tried: NDArray[np.intp]) -> FloatArray:
+        """`Worth.risk` of the others together with each row of tracks tried, shape (rows,)."""
+        total, largest = (np.tile(nats, (len(tried), 1)) for nats in self._nats_of(others))
+        for column in tried.T:
+            nats = self._nats[self._places(column)]
+            total += nats
+            if self._rho:
+                np.maximum(largest, nats, out=largest)
+        worst, mean = self._worst_and_mean(total, largest, len(others) + tried.shape[1])
+        risk: FloatArray = worst + MEAN_WEIGHT * mean
+        return risk
+
+    def _lost_m(self, others: Sequence[int], tried: NDArray[np.intp]) -> FloatArray:
+        """`Worth.lost_m` of the others together with each row of tracks tried, shape (rows,)."""
+        by_others = self._seen
+        for place in self._places(np.array(others, dtype=np.intp)).tolist():
+            by_others = np.maximum(by_others, self._levels[place])
+        seen: LevelArray = np.tile(by_others, (len(tried), 1))
+        for column in tried.T:
+            np.maximum(seen, self._levels[self._places(column)], out=seen)
+        lost_m: FloatArray = np.count_nonzero(seen < self._asked, axis=1).astype(np.float64) * self.step_m
+        return lost_m
+
+    def _nats_of(self, bins: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+        """By the tracks flown and these: the sum of nats, and the largest of them where that counts."""
+        total, largest = self._sum, self._largest
+        for place in self._places(np.array(bins, dtype=np.intp)).tolist():
+            total = total + self._nats[place]
+            if self._rho:
+                largest = np.maximum(largest, self._nats[place])
+        return total, largest
+
+    def _places(self, bins: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The rows of the tables for tracks at these bins; who lies farther out sees nothing."""
+        return np.minimum(np.maximum(self._farthest - bins, 0), 2 * self._farthest)
+
+    def _worst_and_mean(self, total: FloatArray, largest: FloatArray, ahead: int) -> tuple[FloatArray, FloatArray]:
+        """Of each row, with what helpers look at while all tracks are flown: where most is left."""
+        if self._rho:
+            total = largest + (1.0 - self._rho) * (total - largest)
+        risk = np.exp(-total)
+        bins = risk.shape[1]
+        if self._helpers.width_m > 0.0:
+            times, rest = divmod(self._helpers.width_m * (self._flown + ahead) / (self._bins * self.step_m), 1.0)
+            left = (1.0 - self._helpers.p_detect) ** (1.0 - self._rho)
+            risk *= left**times
+            helped = round(rest * bins)
+            if 0 < helped < bins:
+                risk.partition(bins - helped, axis=1)
+            risk[:, bins - helped :] *= left
+        worst = max(1, round(WORST_SHARE * bins))
+        risk.partition(bins - worst, axis=1)
+        return risk[:, bins - worst :].mean(axis=1), risk.mean(axis=1)
+
+
+def _moves(count: int) -> list[tuple[tuple[int, ...], NDArray[np.intp]]]:
+    """Ways to move so many tracks: which, and by how many bins each, shape (tries, tracks)."""
+    each = np.arange(count)
+    patterns = {tuple((each == place).astype(float)) for place in range(count)}
+    patterns |= {tuple(((each == place) | (each == place + 1)).astype(float)) for place in range(count)}
+    patterns |= {tuple((each >= place).astype(float)) for place in range(count)}
+    patterns |= {tuple(np.maximum(0.0, (each - place + 1) / (count - place))) for place in range(count)}
+    patterns |= {tuple(((each >= place) & ((each - place) % 2 == 0)).astype(float)) for place in range(count)}
+    moves = []
+    for pattern in sorted(patterns, reverse=True):
+        group = tuple(index for index in range(count) if pattern[index])
+        shifts = np.rint(np.outer(SHIFTS, [pattern[index] for index in group])).astype(np.intp)
+        moves.append((group, shifts))
+    return moves
+
+
+def _nats(curve: DetectionCurve, beside_m: FloatArray) -> FloatArray:
+    """-ln(1 - P_d) at these distances from a track, less than 0 to its left."""
+    return -np.log1p(-curve.at(np.abs(beside_m)))
+
+
+def _levels(curve: DetectionCurve, begin_m: FloatArray, step_m: float, r_eff_m: float) -> LevelArray:
+    """How a track sees bins that begin so far beside it: 2 all of a bin within r_eff, 1 all of it, 0 not all."""
+    ends = np.abs(begin_m), np.abs(begin_m + step_m)
+    seen = (curve.at(ends[0]) > 0) & (curve.at(ends[1]) > 0)
+    within = seen & (np.maximum(*ends) <= r_eff_m)
+    return seen.astype(np.uint8) + within.astype(np.uint8)

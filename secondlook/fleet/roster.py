@@ -1,0 +1,50 @@
+"""What is announced of each vehicle of a scenario."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from comms.said.announcement import Role, RosterVehicle
+from planner.footprints import footprint_of
+from secondlook.scenario import RevisitVehicle, SurveyVehicle
+
+
+def roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
+    """A vehicle as it is announced."""
+    sonar = vehicle.sonar
+    return RosterVehicle(
+        vehicle=name,
+        role=role_of(vehicle),
+        speed_mps=vehicle.speed_mps,
+        turn_radius_m=vehicle.turn_radius_m,
+        run_in_m=vehicle.run_in_m,
+        near_m=sonar.near_m,
+        far_m=sonar.far_m,
+        p_detect=_mean_p_detect(vehicle),
+        endurance_ms=endurance_ms_of(vehicle),
+        footprint=sonar.footprint,
+        half_angle_rad=sonar.half_angle_rad,
+        look_m=sonar.look_m,
+    )
+
+
+def _mean_p_detect(vehicle: SurveyVehicle | RevisitVehicle) -> float:
+    """The mean of P(y) of a pass, over the lateral ranges that it reaches."""
+    footprint = footprint_of(vehicle.sonar)
+    curve = footprint.pass_curve(vehicle.detection_curve)
+    near_m, far_m = footprint.reach.near_m, footprint.reach.far_m
+    within = curve.range_m[(curve.range_m > near_m) & (curve.range_m < far_m)]
+    range_m = np.concatenate([[near_m], within, [far_m]])
+    return float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
+
+
+def endurance_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
+    """How long its battery lasts, in whole milliseconds."""
+    return max(1, round(vehicle.endurance_s * 1000))
+
+
+def role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:
+    """What a vehicle's agent is in the fleet."""
+    if isinstance(vehicle, RevisitVehicle):
+        return Role.REVISIT
+    return Role.SURVEY_REVISIT if vehicle.revisits else Role.SURVEY

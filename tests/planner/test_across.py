@@ -1,0 +1,86 @@
+"""Residual risk across the tracks: what hand-worked profiles come to, and that moving tracks makes nothing worse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.across import Across, HelperLooks, Measured
+from planner.types import DetectionCurve
+
+HALF = DetectionCurve(np.array([0.0, 10.0]), np.array([0.5, 0.5]))
+"""P_d 0.5 up to 10 m."""
+GAPPED = DetectionCurve(np.array([9.0, 10.0, 40.0]), np.array([0.0, 0.4, 0.2]))
+"""Nothing up to 9 m, then less and less."""
+
+
+def across(*flown: float, width_m: float = 20.0, rho: float = 0.0, helpers: HelperLooks | None = None) -> Across:
+    seen = [Measured(across_m, HALF, 10.0) for across_m in flown]
+    return Across(width_m, seen, HALF, 10.0, 1.0, rho, helpers or HelperLooks())
+
+
+def test_looks_multiply() -> None:
+    assert across().worst30([10]) == pytest.approx(0.5)
+    assert across(10.0).worst30([10]) == pytest.approx(0.25)
+    assert across(10.0).worst30([]) == pytest.approx(0.5)
+    # Of 40 m a track in the middle of the left half sees that: the worst 30 % lie beyond.
+    assert across(width_m=40.0).worst30([10]) == pytest.approx(1.0)
+
+
+def test_of_correlated_looks_the_best_counts() -> None:
+    assert across(10.0, rho=1.0).worst30([10]) == pytest.approx(0.5)
+    assert across(10.0, rho=0.5).worst30([10]) == pytest.approx(0.5**1.5)
+
+
+def test_helpers_look_where_most_is_left() -> None:
+    # 0.5 everywhere; 16 of 20 m come down to 0.25, so of the worst 6 m there are 4 at 0.5 and 2 at 0.25.
+    helpers = HelperLooks(16.0, 0.5)
+    assert across(helpers=helpers).worst30([10]) == pytest.approx((4 * 0.5 + 2 * 0.25) / 6)
+    # Two tracks take twice as long: 32 m are all once and 12 m twice; 0.25 is 0.125 and 0.0625.
+    assert across(10.0, helpers=helpers).worst30([10]) == pytest.approx(0.125)
+
+
+def test_what_is_asked_and_not_seen_is_lost() -> None:
+    asked = across()
+    asked.ask_for([Measured(10.0, HALF, 10.0)])
+    assert asked.worth([10]).lost_m == 0
+    assert asked.worth([15]).lost_m == 5
+    assert asked.lost_m([Measured(10.5, HALF, 10.0)]) == 1  # of the first metre it sees half
+    assert asked.worth([15, 5]).lost_m == 0
+    # Within r_eff is not the same as beyond it.
+    beyond = Across(20.0, [], HALF, 5.0, 1.0)
+    beyond.ask_for([Measured(10.0, HALF, 10.0)])
+    assert beyond.worth([10]).lost_m == 10
+
+
+def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed() -> None:
+    wide = across(10.0, width_m=40.0)
+    assert wide.with_one_more([]) == [32]
+    assert wide.with_one_less([10, 30]) == [30]
+
+
+def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:
+    wide = Across(12_000.0, [], GAPPED, 40.0, 5.0)
+    assert wide.step_m == 3
+    assert 0.99 < wide.worst30([100]) <= 1.0
+
+
+@given(
+    flown=st.lists(st.integers(-20, 220), max_size=3),
+    bins=st.lists(st.integers(-20, 220), min_size=1, max_size=4),
+    asked=st.lists(st.integers(-20, 220), max_size=4),
+    rho=st.sampled_from([0.0, 0.4]),
+    helped_m=st.sampled_from([0.0, 60.0]),
+)
+def test_moving_makes_nothing_worse(
+    flown: list[int], bins: list[int], asked: list[int], rho: float, helped_m: float
+) -> None:
+    seen = [Measured(float(one), GAPPED, 30.0) for one in flown]
+    ground = Across(200.0, seen, GAPPED, 30.0, 5.0, rho, HelperLooks(helped_m, 0.5))
+    ground.ask_for([Measured(float(one), GAPPED, 30.0) for one in asked])
+    found = ground.refined(bins)
+    assert len(found) == len(bins)
+    assert found == ground.refined(bins)
+    assert ground.worth(found) <= ground.worth(bins)

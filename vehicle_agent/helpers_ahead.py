@@ -1,0 +1,29 @@
+"""What helpers are expected to look at while a primary flies one track, from what is announced of the fleet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from comms.said.announcement import Role, RosterVehicle
+from planner.across import HelperLooks
+from planner.footprints import footprint_of
+
+
+def helper_looks(fleet: Sequence[RosterVehicle], vehicle: str) -> HelperLooks:
+    """By all helpers of a fleet, of which each primary has an equal share, while `vehicle` flies a track.
+
+    A helper is taken to look along strips for as great a share of its time as a primary along tracks; the rest are ways
+    and turns.
+    """
+    primaries = [one for one in fleet if one.role is not Role.REVISIT]
+    helpers = [(one, _width_m(one)) for one in fleet if one.role is Role.REVISIT]
+    area_m2ps = sum(one.speed_mps * width_m for one, width_m in helpers)
+    if not area_m2ps:
+        return HelperLooks()
+    speed_mps = next(one.speed_mps for one in primaries if one.vehicle == vehicle)
+    p_detect = sum(one.speed_mps * width_m * one.p_detect for one, width_m in helpers) / area_m2ps
+    return HelperLooks(area_m2ps / speed_mps / len(primaries), p_detect)
+
+
+def _width_m(helper: RosterVehicle) -> float:
+    return footprint_of(helper.sonar).reach.strip_width_m
