@@ -1,13 +1,14 @@
 """What laying tracks by the whole P(y) is worth: `spacing: profile` and `joint` beside Algorithm 1.
 
 python -m bench.profile_spacing [--seeds 20] [--set KEY=VALUE]
-python -m bench.profile_spacing --scenario tellaro [--seeds 20] [--set KEY=VALUE]
+python -m bench.profile_spacing --scenario tellaro [--wanted-risk 0.65] [--seeds 20] [--set KEY=VALUE]
 
 The first flies the paper's three experiments, the bundled scenario `paper` with the range that each was told, with both
 over the same seas: the seeds are those of the adaptive missions of `secondlook paper --seeds`. Told are means, of the
 difference its standard deviation and its least as well, and the cells that Algorithm 1 saw and `profile` did not, in
-all seeds together. The second flies a scenario with its helpers, seeds 1001, 1002, ..., with each way of spacing:
-tracks, the survey's duration and what the fleet leaves.
+all seeds together. The second flies a scenario with its helpers, seeds 1001, 1002, ..., with each way of spacing, and
+with `joint` for the fewest tracks from which it expects a wanted risk: tracks, the survey's duration and what the fleet
+leaves.
 """
 
 from __future__ import annotations
@@ -86,18 +87,21 @@ def experiments(seeds: int, settings: Sequence[str]) -> Table:
     return table
 
 
-def helped(scenario: str, seeds: int, settings: Sequence[str]) -> Table:
+def helped(scenario: str, seeds: int, settings: Sequence[str], wanted_risk: float | None) -> Table:
     """A scenario with its helpers, a row for each way of spacing."""
     table = Table("spacing", "tracks", "survey, s", "mean", "worst 30 %", "worst 30 % lower by")
     primaries = load_scenario(scenario, settings).survey_vehicles
+    ways = [[f"spacing={one}"] for one in HELPED]
+    if wanted_risk is not None:
+        ways.append(["spacing=joint", f"wanted_risk={wanted_risk}"])
     theirs: list[Flown] = []
-    for spacing in HELPED:
-        told = [*settings, *(f"vehicles.{name}.spacing={spacing}" for name in primaries)]
+    for way in ways:
+        told = [*settings, *(f"vehicles.{name}.{setting}" for name in primaries for setting in way)]
         flown = [fly(scenario, FIRST_SEED + seed, told) for seed in range(seeds)]
         theirs = theirs or flown
         lower = np.array([one.worst30 - other.worst30 for one, other in zip(theirs, flown, strict=True)])
         table.add_row(
-            spacing,
+            ", ".join(way),
             f"{np.mean([one.tracks for one in flown]):.1f}",
             f"{np.mean([one.survey_s for one in flown]):.0f}",
             f"{np.mean([one.mean for one in flown]):.3f}",
@@ -111,13 +115,14 @@ def main() -> None:
     """Prints the table."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scenario")
+    parser.add_argument("--wanted-risk", type=float)
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--set", dest="settings", action="append", default=[])
     args = parser.parse_args()
     if args.scenario is None:
         table = experiments(args.seeds, args.settings)
     else:
-        table = helped(args.scenario, args.seeds, args.settings)
+        table = helped(args.scenario, args.seeds, args.settings, args.wanted_risk)
     Console(width=120).print(table)
 
 

@@ -12,6 +12,7 @@ from comms.said.announcement import Role
 from comms.said.messages import AgentState, CoverageTile, Mode, TaskState, TaskStatus
 from comms.said.topics import LOOK, MANEUVER_STATUS, MISSION_OVER, NAV, TASK
 from planner.footprints.side import SideLooking
+from planner.profile_spacing import JointSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 from planner.types import SonarShape
 from secondlook.testing.checks.any_mail import Letter, letters
@@ -38,7 +39,9 @@ def said_soundly(node: OneNode) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(
-    spacing=st.sampled_from([AdaptiveSpacing(40, 145), FixedSpacing(40, 145), AdaptiveSpacing(0, 30)]),
+    spacing=st.sampled_from(
+        [AdaptiveSpacing(40, 145), FixedSpacing(40, 145), AdaptiveSpacing(0, 30), JointSpacing(40, 145)]
+    ),
     run=st.sampled_from(RUNS),
     before=letters([*SURVEY_MAIL, *OVER], 3),
     mail=letters(SURVEY_MAIL, 25),

@@ -43,6 +43,7 @@ from comms.said.messages import (
 )
 from planner.fleet_map import FleetMap
 from planner.footprints.side import SideLooking
+from planner.profile_spacing import ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
 from planner.types import BoolArray, DetectionCurve, GridSpec, SonarShape
 from vehicle_agent.config import SurveyConfig
@@ -156,6 +157,25 @@ class TestThePapersExperiments:
         assert plan.r_adpt_m == (145,)
         assert offsets(plan) == [145, 250, 540, 645, 935, 1040, 1067]
         assert len(plan.r_eff_m) == 7
+
+    def test_by_the_whole_curve_it_plans_again_after_each_track_and_flies_as_many(self) -> None:
+        agent = on_its_way(survey(ProfileSpacing(40, 145)), run_info())
+        fly_all(agent, SEES_TO_130_M)
+        plan = agent.last(Plan)
+        assert offsets(plan)[0] == 138  # as Algorithm 1 begins
+        assert plan.r_adpt_m == (138,) + (130,) * 7
+        assert [track.flown for track in plan.tracks] == [True] * 8
+        # Seen from 25 to 130 m: nothing is left but what the first track's range, told too long, leaves at the edge.
+        seen = {place for across_m in offsets(plan) for place in range(1213) if 25 <= abs(place - across_m) <= 130}
+        assert set(range(1213)) - seen == set(range(8))
+
+    def test_earlier_missions_curve_lays_the_first_track_as_well(self) -> None:
+        prior = DetectionCurve(np.array([25.0, 130.0]), np.array([0.3, 0.3]))
+        agent = on_its_way(survey(ProfileSpacing(40, 145), prior=prior), run_info())
+        first = agent.last(Plan)
+        assert (first.r_adpt_m, len(first.tracks)) == ((130,), 8)
+        assert min(offsets(first)) <= 130
+        assert first.note.startswith("spacing for 130 m, 8 tracks; by P(y), worst 30 % expected at 0.")
 
     def test_a_curve_follows_each_track(self, experiment_1: OneNode) -> None:
         curves = experiment_1.all(Curve)

@@ -235,6 +235,12 @@ class TestTheTrial:
         assert 0.04 < control["uncovered_share"] < 0.08  # the paper: 4.4 % without the area's edges
         assert adaptive["mean"] < control["mean"]
 
+    def test_as_many_tracks_by_the_whole_curve_leave_less_in_the_worst_30_percent(self) -> None:
+        adaptive, profile = alone(), alone("vehicles.primary.spacing=profile")
+        assert len(profile.all(Plan)[-1][1].tracks) == len(adaptive.all(Plan)[-1][1].tracks)
+        assert profile.summary["risk"]["worst30_mean"] < adaptive.summary["risk"]["worst30_mean"] - 0.03
+        assert profile.summary["risk"]["uncovered_share"] <= adaptive.summary["risk"]["uncovered_share"]
+
     def test_an_area_that_lies_askew_is_surveyed_alike(self) -> None:
         turn = math.radians(37)
         corners = [(u, v) for u, v in ((0, 0), (1212, 0), (1212, 400), (0, 400))]
