@@ -105,7 +105,8 @@ class ProfileSpacing(AdaptiveSpacing):
             offsets_m = [one.across_m for one in to_come]
         else:
             if terms.wanted_risk is not None:
-                bins = _fewest(across, bins, terms.wanted_risk, MOST_TIMES * len(theirs) - len(flown))
+                most = MOST_TIMES * len(theirs) - len(flown)
+                bins = _fewest(across, bins, terms.wanted_risk, most, may_lose=helpers != NOBODY)
             offsets_m = [float(place * across.step_m) for place in bins]
         if not offsets_m:
             return None
@@ -163,7 +164,7 @@ def first_decision(
 @dataclass(frozen=True)
 class JointSpacing(ProfileSpacing):
     """By the whole P(y), and together with what helpers are expected to look at while the tracks are flown: wherever
-    these leave most."""
+    these leave most. To reach a wanted risk with fewer tracks it leaves ground unseen, to the helpers."""
 
     counts_helpers: ClassVar[bool] = True
 
@@ -190,14 +191,15 @@ def _seeing_all(across: Across, to_come: Sequence[Measured], starts: Sequence[Se
     return bins
 
 
-def _fewest(across: Across, bins: list[int], wanted_risk: float, most: int) -> list[int]:
-    """The fewest tracks that leave no more than is wanted in the worst 30 %, at most so many, and miss no more."""
+def _fewest(across: Across, bins: list[int], wanted_risk: float, most: int, *, may_lose: bool) -> list[int]:
+    """The fewest tracks that leave no more than is wanted in the worst 30 %, at most so many; `may_lose`: even if they
+    miss more of what is asked."""
     lost_m = across.worth(bins).lost_m
     while across.worst30(bins) > wanted_risk and len(bins) < most:
         bins = across.refined(across.with_one_more(bins))
     while bins:
         fewer = across.refined(across.with_one_less(bins))
-        if across.worst30(fewer) > wanted_risk or across.worth(fewer).lost_m > lost_m:
+        if across.worst30(fewer) > wanted_risk or (across.worth(fewer).lost_m > lost_m and not may_lose):
             break
         bins = fewer
     return bins

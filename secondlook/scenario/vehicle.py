@@ -133,8 +133,8 @@ class SurveyVehicle(VehicleBase):
     helpers are expected to look at, or `package.module:Class` of your own."""
     wanted_risk: OpenShare | None = None
     """With `profile`, `joint` or a spacing planner of your own: the fewest tracks are laid from which it expects a mean
-    residual risk of the worst 30 % of no more than this, at most three times as many as `adaptive` would lay. Left out,
-    as many as that."""
+    residual risk of the worst 30 % of no more than this, at most three times as many as `adaptive` would lay. With
+    `joint` they may leave ground unseen to helpers. Left out, as many as `adaptive` would lay."""
     threshold: OpenShare = 0.05
     """P_d from which data is admissible."""
     prior_curve: OptionalCurve = None

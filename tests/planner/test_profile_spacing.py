@@ -111,6 +111,12 @@ class TestJoint:
         assert worst30(*joint, helpers=self.HELPERS) < worst30(*alone, helpers=self.HELPERS)
         assert worst30(*joint) > worst30(*alone)
 
+    def test_for_a_wanted_risk_fewer_tracks_may_do_with_helpers(self) -> None:
+        terms = SpacingTerms(5.0, wanted_risk=0.7, helpers=self.HELPERS)
+        joint, alone = (laid(one(40, 130), part(), terms).offsets_m for one in (JointSpacing, ProfileSpacing))
+        assert len(joint) < len(THEIRS) < len(alone)
+        assert worst30(*joint, helpers=self.HELPERS) <= 0.7
+
     def test_without_helpers_it_is_profile(self) -> None:
         assert JointSpacing(40, 130).lay(part(), TERMS) == ProfileSpacing(40, 130).lay(part(), TERMS)
 
