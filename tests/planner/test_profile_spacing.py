@@ -148,7 +148,7 @@ def curve(near_m: float, far_m: float, peak: float) -> DetectionCurve:
     return DetectionCurve(at_m, np.array([0.02, peak, 0.06]))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     planner=st.sampled_from([ProfileSpacing, JointSpacing]),
     width_m=st.sampled_from([1.0, 70.0, 400.0]) | st.floats(1, 900),
