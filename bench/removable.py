@@ -14,7 +14,7 @@ from planner.types import BoolArray, FloatArray, GridSpec
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.recorded.metrics import Metrics
-from secondlook.scenario import Scenario
+from secondlook.scenario import RevisitVehicle, Scenario
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.seabed import make_seabed
 
@@ -77,7 +77,8 @@ class Removable:
 class Clairvoyance:
     """Told every message of a mission, it knows afterwards what there was to remove.
 
-    Raises UserError for a scenario whose objective is another than the clairvoyant's.
+    Raises UserError for a scenario whose objective is another than the clairvoyant's, or with a helper of whom nobody
+    could say beforehand what a leg sees.
     """
 
     scenario: Scenario
@@ -89,6 +90,8 @@ class Clairvoyance:
             raise UserError(f"mission.rho: {rho:g} is not allowed here; must be 0, looks independent of each other")
         if self.scenario.area.priorities:
             raise UserError("area.priorities: not allowed here; must be [], all ground counts alike")
+        for name, helper in self.scenario.revisit_vehicles.items():
+            _require_legs(f"vehicles.{name}", helper, in_current=self.scenario.current is not None)
 
     def hear(self, received: Received) -> None:
         """Takes one message, in the order of sending."""
@@ -115,6 +118,20 @@ class Clairvoyance:
             ends_s=self.scenario.mission.ends_s(primary_ms / 1000),
             helpers=leg_helpers(self.scenario, metrics.map.grid, metrics.inside),
         )
+
+
+def _require_legs(key: str, helper: RevisitVehicle, *, in_current: bool) -> None:
+    """Refuses a helper with whom it hangs on more than a leg's place what a look from it removes."""
+    if helper.body != "simulated":
+        raise UserError(f"{key}.body: {helper.body} is not allowed here; must be simulated, its true P_d known")
+    if helper.sonar.footprint != "side":
+        told = f"{key}.sensor.footprint: {helper.sonar.footprint} is not allowed here; must be side"
+        raise UserError(f"{told}, each place seen once from a leg")
+    if helper.settling is not None:
+        raise UserError(f"{key}.settling: not allowed here; must be left out, all of a leg seen alike")
+    if in_current and helper.sensor.half_at_crab_deg is not None:
+        told = f"{key}.sensor.half_at_crab_deg: not allowed here in a current; must be left out"
+        raise UserError(f"{told}, all legs seen alike whenever they are flown")
 
 
 def leg_helpers(scenario: Scenario, grid: GridSpec, inside: BoolArray) -> tuple[LegHelper, ...]:

@@ -12,25 +12,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bench.clairvoyant import Row, one_seed
 from bench.clairvoyant_bound import Relaxation, upper_bound
 from bench.clairvoyant_schedule import best_schedule
-from bench.flown_legs import FlownLegs
 from bench.legs import Leg, Simulator
-from bench.removable import Clairvoyance, LegHelper, LegSensor, Removable, leg_helpers
+from bench.removable import LegHelper, LegSensor, Removable, leg_helpers
 from bench.row_packing import RowPacking
 from bench.swath import Swath
-from comms.node import Received
-from comms.said.messages import CoverageTile, Maneuver, ManeuverKind, StripState, StripStatus
+from comms.said.messages import CoverageTile, Maneuver, ManeuverKind
 from coordinator.cut.strips import strip_of
 from coordinator.cut.window import Window
 from planner.dubins import Pose
 from planner.fleet_map import FleetMap
 from planner.sweep import legs_over_strip
 from planner.types import FloatArray, GridSpec, SweepFrame
-from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
-from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
@@ -286,101 +281,3 @@ class TestTheBound:
         best = best_schedule(made, bound, 3.0, 1)
         assert 0.8 * bound.removed_m2 <= best.removed_m2 <= bound.removed_m2
         assert best.removed_m2 == pytest.approx(Simulator(made).removed_m2(best.schedule))
-
-
-class TestAFlownMission:
-    def test_what_its_looks_removed_is_what_was_measured_but_for_noise(self, tmp_path: Path) -> None:
-        scenario = load_scenario(BRIEF)
-        clairvoyance, flown = Clairvoyance(scenario), FlownLegs()
-
-        def watch(received: Received) -> None:
-            clairvoyance.hear(received)
-            flown.hear(received)
-
-        summary = run_mission(scenario, RunOptions(tmp_path, "local", record=False, watch=watch))
-        made = clairvoyance.removable()
-        assert made.ends_s == pytest.approx(1.05 * summary["time"]["primary_s"])
-        assert made.risk[made.inside].mean() == pytest.approx(summary["risk_primary_alone"]["mean"])
-        assert not made.released_s.any()  # a look counts whenever it happens
-        # The helper sees 15 m to either side.
-        assert made.helpers[0].sensor.swath.width == 6
-        legs = flown.schedule(made.grid, made.helpers)
-        measured = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
-        removed_m2 = Simulator(made).removed_m2(legs)
-        assert removed_m2 == pytest.approx(measured * made.inside.sum() * 25, rel=0.03)
-        # Flown as they were, not sooner.
-        for leg, begins_s in zip(legs[0], Simulator(made).begins_s(0, legs[0]), strict=True):
-            assert begins_s == pytest.approx(leg.from_s, abs=0.05)
-
-    def test_what_was_swept_once_settled_counts_though_a_primary_comes_again(self, tmp_path: Path) -> None:
-        # Here the survey's tracks get so close to each other that it looks at settled cells once more.
-        clairvoyance, flown = Clairvoyance(load_scenario("patchy", (), 4)), FlownLegs()
-
-        def watch(received: Received) -> None:
-            clairvoyance.hear(received)
-            flown.hear(received)
-
-        options = RunOptions(tmp_path, "local", record=False, watch=watch)
-        summary = run_mission(clairvoyance.scenario, options)
-        made = clairvoyance.removable()
-        measured = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
-        removed_m2 = Simulator(made).removed_m2(flown.schedule(made.grid, made.helpers))
-        assert removed_m2 == pytest.approx(measured * made.inside.sum() * 25, rel=0.03)
-
-    def test_a_seed_is_flown_and_solved(self) -> None:
-        row = one_seed(load_scenario(BRIEF, (), 1), ["greedy", "none"], 2.0)
-        greedy, none = row.removed_m2["greedy"], row.removed_m2["none"]
-        assert greedy is not None
-        assert none == 0
-        assert 0 < greedy <= row.best_m2 <= row.bound_m2 < row.there_m2
-
-    def test_what_contradicts_itself_is_told(self) -> None:
-        row = Row(3, {"plan": 50.0, "none": None}, {"plan": 51.0, "none": None}, 100.0, 80.0, 60.0, 50.0, 1, 1.0, 1.0)
-        assert row.best_m2 == 60
-        told = r"seed 3: plan removes 60\.1 m2, and the best schedule must be at least that, not 60\.0 m2"
-        with pytest.raises(ValueError, match=told):
-            replace(row, removed_m2={"plan": 60.1})
-        with pytest.raises(ValueError, match=r"the best schedule removes 80\.1 m2, and the bound must be"):
-            replace(row, best_m2=80.1)
-        with pytest.raises(ValueError, match=r"the bound removes 100\.1 m2, and all that was there"):
-            replace(row, bound_m2=100.1)
-
-
-class TestFlownLegs:
-    def test_they_are_what_the_helpers_swept_in_order_and_direction(self, tmp_path: Path) -> None:
-        flown, strips = FlownLegs(), []
-
-        def watch(received: Received) -> None:
-            flown.hear(received)
-            if isinstance(received.message, StripStatus) and received.message.state is StripState.DONE:
-                strips.append(received.message)
-
-        run_mission(load_scenario(str(BRIEF), (), 1), RunOptions(tmp_path, "local", record=False, watch=watch))
-        grid = GridSpec(SweepFrame(0, 0, 0), 5, 61, 20)
-        swath = Swath(6)
-        (legs,) = flown.schedule(grid, [replace(helper(), sensor=LegSensor(swath, np.zeros(0)))])
-        assert len(legs) in (len(strips), len(strips) + 1)  # the last may not be flown to its end
-        assert strips
-        for leg, strip in zip(legs, strips, strict=False):
-            assert swath.line(leg.column) * 5 == pytest.approx(strip.start_x_m)
-            assert (leg.end - leg.first) * 5 == strip.length_m
-            assert leg.first * 5 in (strip.start_y_m, strip.start_y_m - strip.length_m)
-        assert {leg.up for leg in legs} == {True, False}
-
-    def test_a_search_that_knows_them_finds_nothing_worse(self) -> None:
-        row = one_seed(load_scenario(str(BRIEF), (), 1), ["plan"], 0.3)
-        removed_m2 = row.removed_m2["plan"]
-        assert removed_m2 is not None
-        assert row.best_m2 >= row.started_m2 >= removed_m2 > 0
-
-
-@pytest.mark.parametrize(
-    ("setting", "key"),
-    [
-        ("mission.rho=0.5", "mission.rho: 0.5"),
-        ("area.priorities=[{polygon_m: [[0, 0], [100, 0], [0, 100]], weight: 2}]", "area.priorities"),
-    ],
-)
-def test_an_objective_that_is_not_the_clairvoyants_is_refused(setting: str, key: str) -> None:
-    with pytest.raises(UserError, match=key):
-        one_seed(load_scenario(BRIEF, [setting]), ["nearest"], 1.0)

@@ -1,0 +1,122 @@
+"""What a fleet's helpers looked at in a mission, look by look as it was flown, by the truth of its sonar."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import groupby
+
+import numpy as np
+
+from bench.legs import Leg, Schedule
+from bench.removable import LegHelper, Removable
+from comms.node import Received
+from comms.said.messages import Look, Maneuver
+from planner.footprints import footprint_of
+from planner.footprints.cells import look_on_grid
+from planner.types import FloatArray, GridSpec
+from secondlook.fleet.build import build_fleet
+from secondlook.scenario import Scenario
+from sim_world.config import VehicleConfig, WorldConfig
+from sim_world.looks import Looks
+from sim_world.seabed import make_seabed
+from sim_world.steadiness import make_current
+from sim_world.targets import Recogniser, Targets
+from sim_world.vehicle import SimulatedVehicle, Stretch
+
+ASKEW_RAD = 1e-3
+"""A look whose heading is off the grid by less ran along it: headings travel in microradians."""
+
+
+@dataclass
+class FlownLooks:
+    """Told every message of a mission, it makes each look of a helper once more, as the world made it but without the
+    errors of the vehicle's estimate. `looks`: those by vehicle, each where it truly was, with the true P_d."""
+
+    scenario: Scenario
+    looks: dict[str, list[Look]] = field(default_factory=dict)
+    _bodies: dict[str, _Body] = field(default_factory=dict)
+    _maneuvers: dict[tuple[str, int], Maneuver] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        world: WorldConfig = build_fleet(self.scenario, record=False).specs["world"].config
+        helpers = self.scenario.revisit_vehicles
+        self._bodies = {body.vehicle: _Body(world, body) for body in world.vehicles if body.vehicle in helpers}
+
+    def hear(self, received: Received) -> None:
+        """Takes one message, in the order of sending."""
+        vehicle, message = received.vehicle, received.message
+        if vehicle not in self._bodies:
+            return
+        if isinstance(message, Maneuver):
+            self._maneuvers[vehicle, message.number] = message
+        elif isinstance(message, Look) and message.valid:
+            maneuver = self._maneuvers[vehicle, message.maneuver]
+            true_look = self._bodies[vehicle].true_look(message, maneuver, received.header.sent_ms)
+            self.looks.setdefault(vehicle, []).append(true_look)
+
+    def leaves(self, grid: GridSpec) -> FloatArray:
+        """The share of the risk of each cell that all looks together leave, grid shape: they multiply in any order."""
+        leaves = np.ones(grid.shape)
+        for look in (look for looks in self.looks.values() for look in looks):
+            rows, columns, p_detect = look_on_grid(grid, look.geometry, look.p_detect)
+            leaves[rows, columns] *= 1 - p_detect
+        return leaves
+
+    def removed_m2(self, mission: Removable) -> float:
+        """The risk that they remove of what the survey leaves, times the area."""
+        return float((mission.risk * (1 - self.leaves(mission.grid))).sum()) * mission.grid.cell_area_m2
+
+
+class _Body:
+    """A helper's body in the world, whose sonar tells the truth."""
+
+    def __init__(self, world: WorldConfig, config: VehicleConfig) -> None:
+        exact = replace(config, sensor=replace(config.sensor, noise_cell=0.0, noise_track=0.0))
+        self._footprint = footprint_of(config.sensor.shape)
+        self._vehicle = SimulatedVehicle(config, world.seed)
+        self._looks = Looks(
+            exact,
+            sonar=config.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed)),
+            targets=Targets(world.area, 0, 0),
+            recogniser=Recogniser(config.sensor.curve, false_alarms_per_km2=0),
+            seed=world.seed,
+            current=make_current(world.current, world.seed),
+        )
+
+    def true_look(self, look: Look, maneuver: Maneuver, passed_ms: int) -> Look:
+        """The look that it told of when it had passed the stretch."""
+        offset_m = self._vehicle.offset_at(passed_ms)
+        bins = round(self._footprint.track_length_m(look.geometry) / look.along_bin_m)
+        stretch = Stretch(maneuver, look.heading_rad, look.first_along_m, bins)
+        made, _ = self._looks.look(stretch, passed_ms / 1000, offset_m, 0.0)
+        return replace(made, origin_x_m=made.origin_x_m + offset_m[0], origin_y_m=made.origin_y_m + offset_m[1])
+
+
+def legs_flown(looks: Mapping[str, Sequence[Look]], mission: Removable) -> Schedule:
+    """The legs of those looks that ran along the grid, on the nearest lines and rows, in the order of flying: a
+    schedule to begin a search with. What looks removed it does not tell."""
+    schedule = []
+    for helper in mission.helpers:
+        maneuvers = groupby(looks.get(helper.name, ()), key=lambda look: look.maneuver)
+        legs = [_leg(mission.grid, helper, list(of_one)) for _, of_one in maneuvers]
+        schedule.append(tuple(leg for leg in legs if leg is not None))
+    return tuple(schedule)
+
+
+def _leg(grid: GridSpec, helper: LegHelper, looks: Sequence[Look]) -> Leg | None:
+    turn_rad = looks[0].heading_rad - grid.frame.heading_rad
+    if abs(math.sin(turn_rad)) > ASKEW_RAD:
+        return None
+    way = 1 if math.cos(turn_rad) > 0 else -1
+    origin_across_m, origin_along_m = map(float, grid.frame.to_sweep(*looks[0].geometry.origin))
+    ends_m = looks[0].first_along_m, looks[-1].first_along_m + looks[-1].geometry.along_bins * looks[-1].along_bin_m
+    begin, end = sorted(round((origin_along_m + way * at_m) / grid.cell_m) for at_m in ends_m)
+    column = helper.sensor.swath.column_at(origin_across_m / grid.cell_m)
+    return Leg(
+        column=min(max(column, 0), grid.columns - 1),
+        first=min(max(begin, 0), grid.rows - 1),
+        end=min(max(end, 1), grid.rows),
+        up=way > 0,
+    )
