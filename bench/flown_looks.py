@@ -25,8 +25,9 @@ from sim_world.steadiness import make_current
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import SimulatedVehicle, Stretch
 
-ASKEW_RAD = 1e-3
-"""A look whose heading is off the grid by less ran along it: headings travel in microradians."""
+STRAIGHT = 1 - 1e-6
+"""Cosine of the angle by which a look that ran along the grid or across it may be off: headings travel in
+microradians."""
 
 
 @dataclass
@@ -95,28 +96,29 @@ class _Body:
 
 
 def legs_flown(looks: Mapping[str, Sequence[Look]], mission: Removable) -> Schedule:
-    """The legs of those looks that ran along the grid, on the nearest lines and rows, in the order of flying: a
-    schedule to begin a search with. What looks removed it does not tell."""
+    """The legs of those looks that ran along the grid or across it, on the nearest lines, in the order of flying: a
+    schedule to begin a search with. What the looks removed it does not tell."""
     schedule = []
     for helper in mission.helpers:
         maneuvers = groupby(looks.get(helper.name, ()), key=lambda look: look.maneuver)
-        legs = [_leg(mission.grid, helper, list(of_one)) for _, of_one in maneuvers]
+        legs = [_leg(mission, helper, list(of_one)) for _, of_one in maneuvers]
         schedule.append(tuple(leg for leg in legs if leg is not None))
     return tuple(schedule)
 
 
-def _leg(grid: GridSpec, helper: LegHelper, looks: Sequence[Look]) -> Leg | None:
-    turn_rad = looks[0].heading_rad - grid.frame.heading_rad
-    if abs(math.sin(turn_rad)) > ASKEW_RAD:
+def _leg(mission: Removable, helper: LegHelper, looks: Sequence[Look]) -> Leg | None:
+    grid = mission.grid
+    turn_rad, cell_m = looks[0].heading_rad - grid.frame.heading_rad, grid.cell_m
+    across = abs(math.sin(turn_rad)) > 0.5
+    way = math.sin(turn_rad) if across else math.cos(turn_rad)
+    if abs(way) < STRAIGHT:
         return None
-    way = 1 if math.cos(turn_rad) > 0 else -1
-    origin_across_m, origin_along_m = map(float, grid.frame.to_sweep(*looks[0].geometry.origin))
-    ends_m = looks[0].first_along_m, looks[-1].first_along_m + looks[-1].geometry.along_bins * looks[-1].along_bin_m
-    begin, end = sorted(round((origin_along_m + way * at_m) / grid.cell_m) for at_m in ends_m)
-    column = helper.sensor.swath.column_at(origin_across_m / grid.cell_m)
-    return Leg(
-        column=min(max(column, 0), grid.columns - 1),
-        first=min(max(begin, 0), grid.rows - 1),
-        end=min(max(end, 1), grid.rows),
-        up=way > 0,
-    )
+    side_m, along_m = map(float, grid.frame.to_sweep(*looks[0].geometry.origin))
+    # In cells, from where the first column and the first row begin.
+    begin, line = ((side_m / cell_m + 0.5), along_m / cell_m - 0.5) if across else (along_m / cell_m, side_m / cell_m)
+    swath, (steps, lines) = helper.sensor(across=across).swath, mission.extent(across=across)
+    last = looks[-1]
+    ends_m = looks[0].first_along_m, last.first_along_m + last.geometry.along_bins * last.along_bin_m
+    first, end = sorted(round(begin + math.copysign(at_m / cell_m, way)) for at_m in ends_m)
+    place = min(max(swath.column_at(line), 0), lines - 1)
+    return Leg(place, min(max(first, 0), steps - 1), min(max(end, 1), steps), way > 0, across)

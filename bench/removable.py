@@ -21,25 +21,19 @@ from sim_world.seabed import make_seabed
 
 @dataclass(frozen=True, eq=False)
 class LegSensor:
-    """What one look from a leg along the grid does.
+    """What one look from a leg along the grid does, or from one across it.
 
     `p_detect`: true P_d of a look at each cell, by the column's place in the swath, shape (width, rows, columns); 0
-    outside the area.
+    outside the area. Of legs across, the same with rows for columns and columns for rows.
     """
 
     swath: Swath
     p_detect: FloatArray
 
-    @property
-    def best(self) -> FloatArray:
-        """The P_d of each cell at its best place in the swath, grid shape."""
-        best: FloatArray = self.p_detect.max(axis=0)
-        return best
-
 
 @dataclass(frozen=True, eq=False)
 class LegHelper:
-    """One helper, with what it flies legs with; `lasts_s`: its endurance."""
+    """One helper, with what it flies legs with; `lasts_s`: its endurance; `sensors`: along the grid, and across it."""
 
     name: str
     start: Pose
@@ -47,25 +41,37 @@ class LegHelper:
     turn_radius_m: float
     run_in_m: float
     lasts_s: float
-    sensor: LegSensor
+    sensors: tuple[LegSensor, LegSensor]
+
+    def sensor(self, *, across: bool) -> LegSensor:
+        """What looks do from legs of one heading."""
+        return self.sensors[across]
+
+    @property
+    def best_p_detect(self) -> FloatArray:
+        """The P_d of each cell at its best place in either swath, grid shape."""
+        along, across = (one.p_detect.max(axis=0) for one in self.sensors)
+        best: FloatArray = np.maximum(along, across.T)
+        return best
 
 
 @dataclass(frozen=True, eq=False)
 class Removable:
-    """A mission as a clairvoyant sees it.
+    """A mission as a clairvoyant sees it: a look counts whenever it happens, as looks multiply in any order.
 
-    `risk`: the residual risk that the survey alone leaves, grid shape, 0 outside the area. `released_s`: from when on a
-    look at each cell counts; of a mission that was flown that is from the first second, as looks multiply in any order.
-    `ends_s`: the mission's deadline; `primary_s`: when the last primary had surveyed all.
+    `risk`: the residual risk that the survey alone leaves, grid shape, 0 outside the area. `ends_s`: the mission's
+    deadline.
     """
 
     grid: GridSpec
     inside: BoolArray
     risk: FloatArray
-    released_s: FloatArray
-    primary_s: float
     ends_s: float
     helpers: tuple[LegHelper, ...]
+
+    def extent(self, *, across: bool) -> tuple[int, int]:
+        """How many cells a leg may be long, and on how many lines it may lie."""
+        return self.grid.shape[::-1] if across else self.grid.shape
 
     @property
     def total_m2(self) -> float:
@@ -113,8 +119,6 @@ class Clairvoyance:
             grid=metrics.map.grid,
             inside=metrics.inside,
             risk=np.where(metrics.inside, risk, 0.0),
-            released_s=np.zeros(metrics.map.grid.shape),
-            primary_s=primary_ms / 1000,
             ends_s=self.scenario.mission.ends_s(primary_ms / 1000),
             helpers=leg_helpers(self.scenario, metrics.map.grid, metrics.inside),
         )
@@ -147,24 +151,29 @@ def leg_helpers(scenario: Scenario, grid: GridSpec, inside: BoolArray) -> tuple[
             turn_radius_m=body.turn_radius_m,
             run_in_m=vehicle.run_in_m,
             lasts_s=vehicle.endurance_s,
-            sensor=_leg_sensor(world, body, grid, inside),
+            sensors=(
+                _leg_sensor(world, body, grid, inside, across=False),
+                _leg_sensor(world, body, grid, inside, across=True),
+            ),
         )
         for name, vehicle in scenario.revisit_vehicles.items()
         for body in (bodies[name],)
     )
 
 
-def _leg_sensor(world: WorldConfig, body: VehicleConfig, grid: GridSpec, inside: BoolArray) -> LegSensor:
+def _leg_sensor(
+    world: WorldConfig, body: VehicleConfig, grid: GridSpec, inside: BoolArray, *, across: bool
+) -> LegSensor:
     curve = body.sensor.curve
     swath = Swath.of(grid, 2 * float(curve.range_m[-1]))
     sonar = body.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed))
     x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
     # Either side looks across the same crests: a leg there and a leg back see alike.
-    bearing_rad = grid.frame.heading_rad + math.pi / 2
+    bearing_rad = grid.frame.heading_rad + (0.0 if across else math.pi / 2)
     by_place = [
         np.where(
             inside, sonar.p_detect(np.full(grid.shape, distance_m), bearing_rad, body.altitude_m, (x_m, y_m), 0.0), 0.0
         )
         for distance_m in np.abs(np.arange(swath.width) - (swath.width - 1) / 2) * grid.cell_m
     ]
-    return LegSensor(swath, np.array(by_place))
+    return LegSensor(swath, np.array([one.T for one in by_place] if across else by_place))

@@ -1,4 +1,4 @@
-"""The columns of the grid that a leg along them sees."""
+"""The columns of the grid that a leg along them sees, or the rows that one across does."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from planner.types import GridSpec
 
 @dataclass(frozen=True, slots=True)
 class Swath:
-    """A leg's swath of `width` columns, as wide as a strip for the same sensor would be.
+    """A leg's swath of `width` columns, as wide as a strip for the same sensor would be. Of a leg across, read rows.
 
     A leg at column c sees columns c - `left` to c + `right`. Its line lies in their middle, as a strip's does: on
     column c where the width is odd, half a cell before it where it is even.

@@ -11,6 +11,7 @@ import pytest
 
 from bench.clairvoyant import Row, one_seed, summary
 from bench.flown_looks import FlownLooks, legs_flown
+from bench.legs import Leg, Simulator
 from bench.removable import Clairvoyance, Removable, leg_helpers
 from bench.swath import Swath
 from comms.node import Received
@@ -32,9 +33,7 @@ def everything(scenario: Scenario) -> Removable:
     """The scenario's area of 100 m by 300 m, of which nothing has been seen yet."""
     grid = build_fleet(scenario, record=False).run_info.grid.spec
     inside = np.ones(grid.shape, dtype=np.bool_)
-    return Removable(
-        grid, inside, np.ones(grid.shape), np.zeros(grid.shape), 100, 105, leg_helpers(scenario, grid, inside)
-    )
+    return Removable(grid, inside, np.ones(grid.shape), 105, leg_helpers(scenario, grid, inside))
 
 
 def look_at(flown: FlownLooks, x_m: float, y_m: float, heading_rad: float, at_ms: int = 9000) -> None:
@@ -72,6 +71,27 @@ class TestALook:
         assert flown.removed_m2(mission) == pytest.approx(24 * ALL_OF_IT)
         look_at(flown, 51, 51, math.pi / 2)
         assert flown.removed_m2(mission) == pytest.approx(24 * 25 * (1 - 0.3**2))
+
+    @pytest.mark.parametrize(
+        ("x_m", "y_m", "heading_rad", "leg"),
+        [
+            # Six columns of 5 m, on a line between two of them: the third of them is at 97.5 + 2.5 m.
+            (97.5, 20, 0.0, Leg(20, 4, 8)),
+            (97.5, 40, math.pi, Leg(20, 4, 8, up=False)),
+            # Six rows, on a line between two of them: row 6 begins at 30 m; column 20 begins at 97.5 m.
+            (97.5, 30, math.pi / 2, Leg(6, 20, 24, across=True)),
+            (117.5, 30, 3 * math.pi / 2, Leg(6, 20, 24, up=False, across=True)),
+        ],
+    )
+    def test_along_the_grid_and_across_it_is_the_leg_by_hand(
+        self, x_m: float, y_m: float, heading_rad: float, leg: Leg
+    ) -> None:
+        scenario = load_scenario(BRIEF, CLEAR_GROUND)
+        flown, mission = FlownLooks(scenario), everything(scenario)
+        look_at(flown, x_m, y_m, heading_rad)
+        assert legs_flown(flown.looks, mission) == ((leg,),)
+        assert flown.removed_m2(mission) == pytest.approx(4 * 6 * ALL_OF_IT)
+        assert Simulator(mission).removed_m2(((leg,),)) == pytest.approx(4 * 6 * ALL_OF_IT)
 
     @pytest.mark.parametrize("heading_rad", [0.3, 0.8, 2.0, 3.1, 4.4, 6.0])
     def test_at_any_heading(self, heading_rad: float) -> None:
@@ -146,7 +166,6 @@ class TestAFlownMission:
 
         summary = run_mission(scenario, RunOptions(tmp_path, "local", record=False, watch=watch))
         made = clairvoyance.removable()
-        assert not made.released_s.any()  # a look counts whenever it happens
         measured = summary["risk_primary_alone"]["mean"] - summary["risk"]["mean"]
         assert flown.removed_m2(made) == pytest.approx(measured * made.inside.sum() * 25, rel=0.03)
 
@@ -183,7 +202,7 @@ class TestAFlownMission:
         assert len(legs) in (len(strips), len(strips) + 1)  # the last may not be flown to its end
         assert strips
         for leg, strip in zip(legs, strips, strict=False):
-            assert swath.line(leg.column) * 5 == pytest.approx(strip.start_x_m)
+            assert swath.line(leg.place) * 5 == pytest.approx(strip.start_x_m)
             assert (leg.end - leg.first) * 5 == strip.length_m
             assert leg.first * 5 in (strip.start_y_m, strip.start_y_m - strip.length_m)
         assert {leg.up for leg in legs} == {True, False}
@@ -200,7 +219,6 @@ class TestARow:
         legs=1,
         removed_m2={"plan": 50.0, "none": None},
         measured_m2={"plan": 51.0, "none": None},
-        bound_s=1.0,
         search_s=1.0,
     )
 
