@@ -2,9 +2,10 @@
 
 Schedules that were flown, and lanes along the area and across it, are flown in `legs.Simulator`, where looks that
 overlap count for what they are, and improved by simulated annealing: legs are moved sideways, made shorter or longer,
-turned round, given to others, taken out and put in. Those that are put in were flown, or are cut where most is to be
-had at the price of a look. As the schedule that is best to begin with is often not the one that becomes best, all are
-annealed for a while, then the best few of what came of them, and at last one.
+turned round, given to others, taken out and put in, and turns from one to the next made sooner or later. Those that are
+put in were flown, or are cut where most is to be had at the price of a look. As the schedule that is best to begin with
+is often not the one that becomes best, all are annealed for a while, then the best few of what came of them, and at
+last one.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ TURN_STEPS = 3
 """As many looks as in so many steps a leg must bring beyond its own, for the turn before it."""
 SURVIVORS = 0.3
 """Share of the schedules that are annealed further, after each round."""
-HOTTEST, COLDEST = 1e-3, 1e-5  # of what is removed: the temperatures of annealing
+HOTTEST, COLDEST = (1e-2, 1e-3), 1e-5
+"""Temperatures of annealing, as shares of what is removed: where the first round begins, where the others do, and where
+all end."""
 
 
 @dataclass(frozen=True)
@@ -55,10 +58,10 @@ def best_schedule(
     started_m2 = max(removed_m2 for removed_m2, _ in found)
     counts = _rounds(len(found))
     left_s = seconds - (time.process_time() - began_s)
-    for count in counts:
+    for number, count in enumerate(counts):
         found = sorted(found, key=lambda one: -one[0])[:count]
-        each_s = left_s / len(counts) / count
-        found = [_annealed(simulator, start, candidates, each_s, chance) for _, start in found]
+        each_s, hottest = left_s / len(counts) / count, HOTTEST[number > 0]
+        found = [_annealed(simulator, start, candidates, each_s, hottest, chance) for _, start in found]
     return Solution(*max(found, key=lambda one: one[0]), started_m2)
 
 
@@ -107,16 +110,21 @@ def _cut(mission: Removable, price_m2: float, *, across: bool) -> list[Leg]:
 
 
 def _annealed(
-    simulator: Simulator, start: Schedule, candidates: Sequence[Leg], seconds: float, chance: np.random.Generator
+    simulator: Simulator,
+    start: Schedule,
+    candidates: Sequence[Leg],
+    seconds: float,
+    hottest: float,
+    chance: np.random.Generator,
 ) -> tuple[float, Schedule]:
-    """The best schedule on a walk through schedules that begins at `start`."""
+    """The best schedule on a walk through schedules that begins at `start`, and at the temperature `hottest`."""
     began_s = time.process_time()
     now, now_m2 = start, simulator.removed_m2(start)
     best, best_m2 = now, now_m2
     while (share := (time.process_time() - began_s) / max(seconds, 1e-9)) < 1:
         changed = _changed(now, candidates, simulator.mission, chance)
         changed_m2 = simulator.removed_m2(changed)
-        temperature = max(best_m2, 1.0) * HOTTEST * (COLDEST / HOTTEST) ** share
+        temperature = max(best_m2, 1.0) * hottest * (COLDEST / hottest) ** share
         if changed_m2 >= now_m2 or chance.random() < math.exp((changed_m2 - now_m2) / temperature):
             now, now_m2 = simulator.in_time(changed), changed_m2
             if now_m2 > best_m2:
@@ -147,9 +155,15 @@ def _changed(
         end = place + 1 if move < 0.42 else int(chance.integers(place + 1, len(legs) + 1))
         by = int(chance.integers(-3, 4))
         legs[place:end] = [_aside(leg, by, mission) for leg in legs[place:end]]
-    elif move < 0.85:
+    elif move < 0.72:
         begin, end = chance.integers(-6, 7, 2).tolist()
         legs[place] = _stretched(legs[place], begin, end, mission)
+    elif move < 0.85:  # where it turns from one leg to the next
+        by = int(chance.integers(-20, 21))
+        for number, leg in enumerate(legs[place : place + 2]):
+            if leg.across == legs[place].across:
+                first = leg.up == (number == 1)  # of the leg before it the end moves, of the next the begin
+                legs[place + number] = _stretched(leg, by if first else 0, 0 if first else by, mission)
     elif move >= 0.92:
         given = legs.pop(place)
         taker = int(chance.integers(len(schedule)))

@@ -273,6 +273,10 @@ class TestTheSearch:
         best = best_schedule(made, bound, 0.8, seed)
         assert 0.55 * bound.removed_m2 <= best.removed_m2 <= bound.removed_m2 + 1e-6
         assert best.removed_m2 == pytest.approx(Simulator(made).removed_m2(best.schedule))
+        for leg in best.schedule[0]:
+            steps, lines = made.extent(across=leg.across)
+            assert 0 <= leg.first < leg.end <= steps
+            assert 0 <= leg.place < lines
 
     def test_time_for_one_leg_across_is_spent_on_it(self) -> None:
         # Rows 2 to 4 are bad, and 50 s suffice to get there and along them once; legs along meet them three cells at
