@@ -226,6 +226,10 @@ def _arguments() -> argparse.Namespace:
 
 
 def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
+    for name, least in (("seeds", 1), ("first_seed", 0), ("jobs", 1)):
+        if getattr(arguments, name) < least:
+            key = name.replace("_", "-")
+            raise UserError(f"--{key}: {getattr(arguments, name)} is not allowed; must be at least {least}")
     scenario = load_scenario(arguments.scenario, arguments.set)
     if not scenario.revisit_vehicles:
         raise UserError(f"{arguments.scenario}: has no helper whose schedule could be compared")
