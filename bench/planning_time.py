@@ -3,8 +3,8 @@
 python -m bench.planning_time [--seeds 5] [--json]
 
 Strips lie at random over 5 km by 2 km, 400 m by 50 m; half of the helpers are free, the others at work. Told is the CPU
-time of one `assign` in milliseconds, mean and worst over the seeds, best of three each; and beside it that of `nearest`
-for the same situations.
+time of one `assign` in milliseconds, mean and worst over the seeds, best of three each; and beside it, for the same
+situations, that of `cbba` and of `nearest`.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from coordinator.allocate.cbba import CbbaAllocator
 from coordinator.allocate.routes import RoutesAllocator
 from coordinator.allocate.service import expected_service
 from coordinator.allocate.simple import NearestAllocator
@@ -81,6 +82,7 @@ def measure(seeds: int) -> list[dict[str, float]]:
     for strips, helpers in SIZES:
         situations = [situation(strips, helpers, seed) for seed in range(1, seeds + 1)]
         plan = [milliseconds(RoutesAllocator(), one) for one in situations]
+        cbba = [milliseconds(CbbaAllocator(), one) for one in situations]
         nearest = [milliseconds(NearestAllocator(), one) for one in situations]
         rows.append(
             {
@@ -88,6 +90,7 @@ def measure(seeds: int) -> list[dict[str, float]]:
                 "helpers": helpers,
                 "plan_ms": float(np.mean(plan)),
                 "plan_worst_ms": max(plan),
+                "cbba_ms": float(np.mean(cbba)),
                 "nearest_ms": float(np.mean(nearest)),
             }
         )
@@ -104,9 +107,9 @@ def main() -> None:
     if arguments.json:
         print(json.dumps(rows, indent=2))
         return
-    table = Table("open strips", "helpers", "plan, ms", "worst", "nearest, ms")
+    table = Table("open strips", "helpers", "plan, ms", "worst", "cbba, ms", "nearest, ms")
     for row in rows:
-        told = (f"{row[name]:.1f}" for name in ("plan_ms", "plan_worst_ms", "nearest_ms"))
+        told = (f"{row[name]:.1f}" for name in ("plan_ms", "plan_worst_ms", "cbba_ms", "nearest_ms"))
         table.add_row(str(row["strips"]), str(row["helpers"]), *told)
     Console().print(table)
 

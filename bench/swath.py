@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from coordinator.cut.strips import columns_across
+from coordinator.cut.strips import cells_wide
 from planner.types import GridSpec
 
 
@@ -21,7 +21,7 @@ class Swath:
     @classmethod
     def of(cls, grid: GridSpec, swath_m: float) -> Swath:
         """The swath of a sensor that sees so many metres across."""
-        return cls(columns_across(grid, swath_m))
+        return cls(min(grid.columns, cells_wide(grid, swath_m)))
 
     @property
     def left(self) -> int:

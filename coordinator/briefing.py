@@ -5,11 +5,13 @@ from __future__ import annotations
 from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
+from coordinator.cut.strips import Cut
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
 from planner.footprints import footprint_of
+from planner.types import Strip
 
 
 class Briefing:
@@ -49,7 +51,11 @@ class Briefing:
 
     def open_strip(self, record: StripRecord) -> OpenStrip:
         """A strip as an allocator sees it."""
-        return OpenStrip(record.strip, record.cut.counts_m2 / self._p_detect)
+        return self.as_open(record.strip, record.cut)
+
+    def as_open(self, strip: Strip, cut: Cut) -> OpenStrip:
+        """The same of one that is not open yet."""
+        return OpenStrip(strip, cut.counts_m2 / self._p_detect)
 
     def time_m(self, now_ms: int) -> float:
         """The metres that helpers have time, and battery, to fly until the mission ends; infinite while nobody can tell

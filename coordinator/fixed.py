@@ -14,7 +14,7 @@ from comms.said.messages import StripState
 from coordinator.allocate.routes import BEAM, plan_routes
 from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
-from coordinator.cut.strips import Cut, columns_across
+from coordinator.cut.strips import Cut, cells_wide
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from coordinator.strip_cutting import StripCutting
@@ -91,7 +91,7 @@ class Lanes:
         found = {}
         for place, name in enumerate(names):
             at_m, entry = entries[name]
-            width = columns_across(grid, footprint_of(entry.sonar).reach.strip_width_m)
+            width = min(inside.shape[1], cells_wide(grid, footprint_of(entry.sonar).reach.strip_width_m))
             lanes = _lanes(inside, edges[place], edges[place + 1], width)
             nearer_end = at_m > (edges[place] + edges[place + 1]) / 2 * grid.cell_m
             found[name] = [self._window(lane) for lane in (lanes[::-1] if nearer_end else lanes)]

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from functools import partial
 
 from comms.node import Received
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import Hotspot, StripState
+from coordinator.allocate.routes import HORIZON_S, plan_routes
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
-from coordinator.cut.cutter import Cutter
+from coordinator.cut.cutter import Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.strips import CuttingRules
+from coordinator.cut.strips import Cut, CuttingRules
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE
@@ -21,6 +23,7 @@ from coordinator.strip_life import StripLife
 from planner.footprints import footprint_of
 from planner.types import BoolArray
 
+COMPARED_BEAM = 6  # of the routes by which strips are compared: half as wide as that of those to be flown
 LEAST_WORTH = 1e-3  # of a cell in m2 for its area: what is worth less is worth nothing
 SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newly cut strip is an open one revised
 
@@ -57,6 +60,19 @@ class StripCutting:
         self._reasons = Reasons(fleet.map.grid, fleet.primaries)
         self._strips = strips
 
+    def _flown(self, now_ms: int) -> Flown:
+        """What helpers fly of strips by the best routes to the deadline; all of it where nobody is there yet."""
+        helpers, grid = self._briefing.helpers(now_ms), self._fleet.map.grid
+        deadline_s = min(self._briefing.expected_deadline_s(), now_ms / 1000 + HORIZON_S)
+
+        def flown(cuts: Sequence[Cut]) -> Mapping[int, float]:
+            if not helpers:
+                return dict.fromkeys(range(len(cuts)), 1.0)
+            strips = [self._briefing.as_open(cut.strip(grid, place), cut) for place, cut in enumerate(cuts)]
+            return plan_routes(strips, helpers, deadline_s, COMPARED_BEAM).shares
+
+        return flown
+
     def hear_hotspot(self, received: Received, message: Hotspot) -> bool:
         """Hears a hotspot's newest word; returns whether it was news."""
         revision = received.header.incarnation, message.revision
@@ -77,7 +93,8 @@ class StripCutting:
         claimed = [record.window for record in ledger.in_state(*WITH_A_VEHICLE)]
         unmatched = ledger.in_state(StripState.OPEN)
         opened = [record.window for record in unmatched]
-        for cut in self._cutter.cut(ground, self._briefing.time_m(now_ms), claimed, opened):
+        time_m, flown = self._briefing.time_m(now_ms), self._flown(now_ms)
+        for cut in self._cutter.cut(ground, time_m, claimed, opened, flown):
             alike = (record for record in unmatched if record.window.across == cut.window.across)
             same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:

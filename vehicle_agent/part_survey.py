@@ -58,6 +58,16 @@ class PartSurvey:
         new = len(self._since)
         return self._decision.replans and (new >= self._decision.asks_after or (new > 0 and not ahead))
 
+    def tentative(self, ahead: Sequence[Track]) -> int:
+        """How many of the tracks of this part still to be flown, the last ones, the next decision may lay elsewhere."""
+        due = max(0, self._decision.asks_after - len(self._since))
+        return max(0, len(ahead) - due) if self.replans else 0
+
+    @property
+    def replans(self) -> bool:
+        """Whether the tracks laid for it so far may be laid anew."""
+        return self._decision.replans
+
     def next(self, r_eff_m: int, curve: DetectionCurve) -> SpacingDecision | None:
         """The tracks for what is left; None where that is nothing."""
         spacing, width_m = self._config.spacing, self.area.width_m

@@ -256,12 +256,14 @@ class SurveyAgent(Agent):
     def _publish_plan(self, note: str) -> None:
         self._plan_revision += 1
         tracks = [(track, True) for track in self.flown] + [(track, False) for track in (*self.ahead, *self.later)]
+        later = len(self.later) if any(part.replans for part in self._parts[self._part + 1 :]) else 0
         message = Plan(
             revision=self._plan_revision,
             tracks=tuple(PlannedTrack(t.number, self._across_m(t), *t.start, *t.end, flown) for t, flown in tracks),
             r_adpt_m=tuple(self.r_adpt_m),
             r_eff_m=tuple(self.r_eff_m),
             note=note,
+            tentative=self._parts[self._part].tentative(self.ahead) + later,
         )
         self.publish(PLAN.key(vehicle=self.vehicle), message)
 

@@ -175,13 +175,15 @@ class PlannedTrack:
 @dataclass(frozen=True, slots=True)
 class Plan:
     """Tracks flown and still planned. `r_adpt_m`: one range a planned pair so far; `r_eff_m`: one a track flown, 0
-    where no range is admissible. `note` says in words what changed."""
+    where no range is admissible. `note` says in words what changed. `tentative`: so many of the tracks, the last ones,
+    may still be laid elsewhere."""
 
     revision: Count
     tracks: Annotated[tuple[PlannedTrack, ...], AtMost(2000)]
     r_adpt_m: Annotated[tuple[Count, ...], AtMost(2000)]
     r_eff_m: Annotated[tuple[Count, ...], AtMost(2000)]
     note: Text
+    tentative: Count = 0
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,11 +31,12 @@ TOLERANCE_M2 = 1e-6
 
 @dataclass(frozen=True)
 class Routes:
-    """What helpers are to serve: by vehicle the numbers of strips in order, and what all that removes by the
-    deadline."""
+    """What helpers are to serve: by vehicle the numbers of strips in order, what all that removes by the deadline, and
+    of each of these strips the share that is flown by then."""
 
     removed_m2: float
     strips: Mapping[str, tuple[int, ...]]
+    shares: Mapping[int, float]
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ class RoutesAllocator:
 def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float, beam: int) -> Routes:
     """The routes of a team from where and when each helper is free."""
     if not helpers or not strips:
-        return Routes(0.0, {one.vehicle: () for one in helpers})
+        return Routes(0.0, {one.vehicle: () for one in helpers}, {})
     team = _Team(strips, helpers, deadline_s)
     best_m2 = 0.0
     routes: tuple[tuple[int, ...], ...] = ((),) * len(helpers)
@@ -101,7 +102,7 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
             break
         plans = plans.chosen(team, grown, beam)
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
-    return Routes(best_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)))
+    return Routes(best_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)), team.shares(routes))
 
 
 class _Team:
@@ -143,6 +144,20 @@ class _Team:
         self.later_m2ps = LATER_SHARE * float((self.alone_m2 / self.alone_s).min())
         self.by_rate = np.argsort(-self.alone_m2 / self.alone_s, kind="stable")
         self.rank = np.argsort(self.by_rate, kind="stable")
+
+    def shares(self, routes: Sequence[Sequence[int]]) -> dict[int, float]:
+        """By number the share of each strip that is flown by the deadline; `routes`: of each helper, the strips'
+        places."""
+        found = {}
+        for one, route in enumerate(routes):
+            at, now_s = self.start, self.helpers[one].free_s
+            for place in route:
+                begins_s, at = now_s + self.to_begin_s[one, at, place], self.way[one, at, place]
+                sweep_s = self.sonar_on_s[one, at]
+                share = min(1.0, max(0.0, (self.deadline_s - begins_s) / sweep_s))
+                found[self.strips[place].strip.number] = float(share)
+                now_s = begins_s + sweep_s + self.run_out_s[one]
+        return found
 
     def _usual_way_s(self, count: int) -> float:
         """The way to the strip that is nearest, as it mostly is."""

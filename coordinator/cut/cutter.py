@@ -1,8 +1,12 @@
-"""Cuts as many strips as helpers have time for: the price of a metre flown is found at which they are just so many."""
+"""Cuts as many strips as helpers have time for: the price of a metre flown is found at which they are just so many.
+
+They are cut along the tracks, where bands lie that were seen badly, and again across them, where there is often room
+for longer ones and fewer turns. Those are chosen that leave less when helpers have flown the best of them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from coordinator.cut.ground import Ground
 from coordinator.cut.strips import Cut, CuttingRules, cut_windows
@@ -12,22 +16,29 @@ from planner.types import GridSpec
 SPARE_STRIPS = 4  # so many more than helpers have time for, so that there is a choice to the end
 STEP = 1.2  # by which the price is changed until they are so many
 MOST_STEPS = 48  # more than from the least price to the highest there is
-STAYS_FOR = 0.01  # share by which strips cut anew must be better than those that are open
+STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be better than those that are open
+TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
+
+Flown = Callable[[Sequence[Cut]], Mapping[int, float]]
+"""Tells how far helpers come in time: by its place in these strips the share that they fly of each, if any."""
 
 
 class Cutter:
-    """Remembers the price, which hardly changes from one cut to the next. `least_worth`: what a cell has to count for a
-    look to be worth flying there whatever time there is, as a mean over a swath (residual risk times m2)."""
+    """Remembers prices and heading, which hardly change from one cut to the next. `least_worth`: what a cell has to
+    count for a look to be worth flying there whatever time there is, as a mean over a swath (residual risk times
+    m2)."""
 
     def __init__(self, grid: GridSpec, rules: CuttingRules, least_worth: float) -> None:
-        self.rules = rules
-        self._grid = grid
-        self._least_price = least_worth * rules.swath_m / grid.cell_area_m2
-        self._price = self._least_price
+        self._cell_area_m2 = grid.cell_area_m2
+        least_price = least_worth * rules.swath_m / grid.cell_area_m2
+        self._ways = [OneHeading(grid, rules, least_price, across=across) for across in (False, True)]
+        self._kept = self._ways[0]
         self.threshold = 0.0
         """Residual risk from which on a cell will be of the worst, see `Ground`."""
 
-    def cut(self, ground: Ground, time_m: float, claimed: Sequence[Window], opened: Sequence[Window]) -> list[Cut]:
+    def cut(
+        self, ground: Ground, time_m: float, claimed: Sequence[Window], opened: Sequence[Window], flown: Flown
+    ) -> list[Cut]:
         """The strips worth flying, where helpers can fly `time_m` until the mission ends, infinite while nobody can
         tell.
 
@@ -37,44 +48,69 @@ class Cutter:
         left = ground.copy()
         for window in claimed:
             left.fly(window)
-        if time_m <= 0:  # nobody can be sent any more: what is open is left as it is
-            self._expect_worst(left, time_m, ())
-            return _cuts(left, opened, self._grid.cell_area_m2)
-        anew = _cuts(left, self._windows(left, time_m), self._grid.cell_area_m2)
-        as_open = _cuts(left, opened, self._grid.cell_area_m2)
-        suffices = self._metres(opened) >= min(
-            self._enough_m(time_m, opened), self._metres([one.window for one in anew])
-        )
-        stays = suffices and self._profit(as_open) >= (1.0 - STAYS_FOR) * self._profit(anew)
-        cuts = as_open if stays else anew
-        self._expect_worst(left, time_m, cuts)
-        return cuts
+        best, after = self._cuts(left, opened), left
+        if time_m > 0:  # else nobody can be sent any more, and what is open is left as it is
+            best = [one for one in best if one.counts_m2 > self._kept.least_m2(one.window)]
+            kept = self._kept
+            gained_m2, after = self._flown(left, best, flown(best))
+            most_m2 = gained_m2 * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
+            for way in self._ways:
+                anew = self._cuts(left, way.windows(left, time_m))
+                gained_m2, after_anew = self._flown(left, anew, flown(anew))
+                gained_m2 *= 1.0 + TURNS_FOR if way is kept else 1.0
+                if gained_m2 > most_m2 or not best:
+                    most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
+        self.threshold = after.worst_from()
+        return best
 
-    def _expect_worst(self, left: Ground, time_m: float, cuts: Sequence[Cut]) -> None:
-        """Finds from which residual risk on a cell will be of the worst, if helpers fly the best of the strips."""
-        for cut in self._best_first(cuts):
-            time_m -= self._metres([cut.window])
-            if time_m < 0:
-                break
-            left.fly(cut.window)
-        self.threshold = left.worst_from()
+    def _flown(self, ground: Ground, cuts: Sequence[Cut], shares: Mapping[int, float]) -> tuple[float, Ground]:
+        """What strips bring beyond what a metre costs at least, and the ground as they leave it."""
+        after, least_m2 = ground.copy(), 0.0
+        for place, share in shares.items():
+            after.fly(cuts[place].window, share)
+            least_m2 += share * self._kept.least_m2(cuts[place].window)
+        return ground.left_m2() - after.left_m2() - least_m2, after
 
-    def _windows(self, ground: Ground, time_m: float) -> list[Window]:
+    def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
+        """What windows bring if they are flown one after the other."""
+        left, found = ground.copy(), list[Cut]()
+        for window in windows:
+            cells = window.cells
+            worth = left.worth(cells)
+            counts_m2 = float(worth.sum())
+            removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * self._cell_area_m2
+            foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
+            found.append(Cut(window, removed_m2, counts_m2, foreseen))
+            left.fly(window)
+        return found
+
+
+class OneHeading:
+    """Cuts windows that all lie `across` the tracks, or all along them. `price`: of a metre flown."""
+
+    def __init__(self, grid: GridSpec, rules: CuttingRules, least_price: float, *, across: bool) -> None:
+        self.price = least_price
+        self._least_price = least_price
+        self._across = across
+        self._grid = grid
+        self._rules = rules
+
+    def windows(self, ground: Ground, time_m: float) -> list[Window]:
         """As many windows as there is time for, at the highest price at which they are, and behind them some to
         spare."""
-        found = self._at(ground, self._price)
+        found = self._at(ground, self.price)
         for _ in range(MOST_STEPS):
             if self._metres(found) < time_m:
-                if self._price <= self._least_price:
+                if self.price <= self._least_price:
                     break
-                self._price = max(self._least_price, self._price / STEP)
-                found = self._at(ground, self._price)
+                self.price = max(self._least_price, self.price / STEP)
+                found = self._at(ground, self.price)
             else:
-                dearer = self._at(ground, self._price * STEP)
+                dearer = self._at(ground, self.price * STEP)
                 if self._metres(dearer) < time_m:
                     break
-                self._price, found = self._price * STEP, dearer
-        price, left = self._price, ground.copy()
+                self.price, found = self.price * STEP, dearer
+        price, left = self.price, ground.copy()
         for window in found:
             left.fly(window)
         while self._metres(found) < self._enough_m(time_m, found) and price > self._least_price:
@@ -85,31 +121,15 @@ class Cutter:
             found = [*found, *new]
         return found
 
+    def least_m2(self, window: Window) -> float:
+        """What a strip there has to count to be worth flying whatever time there is."""
+        return self._least_price * self._metres([window])
+
     def _enough_m(self, time_m: float, found: Sequence[Window]) -> float:
         return time_m + SPARE_STRIPS * self._metres(found) / max(1, len(found))
 
     def _at(self, ground: Ground, price: float) -> list[Window]:
-        return cut_windows(self._grid, ground, self.rules, price)
+        return cut_windows(self._grid, ground, self._rules, price, across=self._across)
 
     def _metres(self, windows: Sequence[Window]) -> float:
-        return sum(one.cells_long * self._grid.cell_m + self.rules.overhead_m for one in windows)
-
-    def _profit(self, cuts: Sequence[Cut]) -> float:
-        return sum(one.counts_m2 for one in cuts) - self._price * self._metres([one.window for one in cuts])
-
-    def _best_first(self, cuts: Sequence[Cut]) -> list[Cut]:
-        return sorted(cuts, key=lambda one: -one.counts_m2 / self._metres([one.window]))
-
-
-def _cuts(ground: Ground, windows: Sequence[Window], cell_area_m2: float) -> list[Cut]:
-    """What windows bring if they are flown one after the other."""
-    left, found = ground.copy(), list[Cut]()
-    for window in windows:
-        cells = window.cells
-        worth = left.worth(cells)
-        counts_m2 = float(worth.sum())
-        removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * cell_area_m2
-        foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
-        found.append(Cut(window, removed_m2, counts_m2, foreseen))
-        left.fly(window)
-    return found
+        return sum(self._rules.metres_flown(one.cells_long * self._grid.cell_m) for one in windows)

@@ -21,7 +21,7 @@ class Objective:
     worst: float
 
 
-OBJECTIVES = {"mean": Objective(1.0, 0.0), "worst30": Objective(0.0, 1.0), "both": Objective(0.8, 0.2)}
+OBJECTIVES = {"mean": Objective(1.0, 0.0), "worst30": Objective(0.0, 1.0), "both": Objective(0.7, 0.3)}
 # A cell's risk is the chance that a target there is missed, and weights say how thick targets lie: the share that is
 # expected to be missed is the weighted mean.
 OBJECTIVES["targets"] = OBJECTIVES["mean"]
@@ -49,9 +49,28 @@ class Ground:
         """One that may be flown."""
         return replace(self, risk=self.risk.copy())
 
-    def fly(self, window: Window) -> None:
-        """A look along a window is flown, or counts as if it were."""
-        self.risk[window.cells] *= 1.0 - self.look[window.cells]
+    @property
+    def turned(self) -> Ground:
+        """The same with rows and columns exchanged, so that what lies across the tracks runs up the rows. Flying the
+        one flies the other."""
+        return replace(self, risk=self.risk.T, look=self.look.T, weights=self.weights.T, is_seen=self.is_seen.T)
+
+    def fly(self, window: Window, share: float = 1.0) -> None:
+        """A look along a window is flown, or counts as if it were; `share`: as far as that, taken alike over all of
+        it."""
+        self.risk[window.cells] *= 1.0 - share * self.look[window.cells]
+
+    def left_m2(self) -> float:
+        """What is left of the objective (residual risk times m2): the worst 30 % as they are now, not by the
+        threshold."""
+        there = self.risk > 0
+        risk, weights = self.risk[there], self.weights[there]
+        left_m2 = self.objective.mean * float((weights * risk).sum())
+        if self.objective.worst and risk.size:
+            worst_from = float(np.quantile(risk, 1.0 - WORST))
+            above_m2 = float((weights * np.maximum(risk - worst_from, 0.0)).sum())
+            left_m2 += self.objective.worst * (worst_from * float(weights.sum()) + above_m2 / WORST)
+        return left_m2
 
     def worst_from(self) -> float:
         """The residual risk from which on cells are of the worst of those that are looked at, as it is now."""

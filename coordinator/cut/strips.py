@@ -1,4 +1,5 @@
-"""Cuts strips: rectangles along the tracks, as wide as the helper's swath, where a second look is worth the most.
+"""Cuts strips: rectangles along the tracks or across them, as wide as the helper's swath, where a second look is worth
+the most.
 
 What a look is expected to bring is summed over every window as wide as the swath; each metre of a strip, and each way
 to one, has its price. Windows side by side are chosen that together bring most beyond that; their cells then count as
@@ -32,6 +33,10 @@ class CuttingRules:
     min_strip_m: float
     max_strip_m: float
 
+    def metres_flown(self, length_m: float) -> float:
+        """For a strip of some length, the way there included."""
+        return length_m + self.overhead_m
+
 
 @dataclass(frozen=True)
 class Cut:
@@ -50,26 +55,30 @@ class Cut:
         return strip_of(grid, self.window, number)
 
 
-def cut_windows(grid: GridSpec, ground: Ground, rules: CuttingRules, price: float) -> list[Window]:
-    """The windows worth flying at a price for each metre flown, those first that lie side by side.
+def cut_windows(
+    grid: GridSpec, ground: Ground, rules: CuttingRules, price: float, *, across: bool = False
+) -> list[Window]:
+    """The windows worth flying at a price for each metre flown, those first that lie side by side; all along the
+    tracks, or all across them.
 
     No window lies by three quarters or more on another one: whether a place is worth two looks is asked when the first
     is under way.
     """
     left, found = ground.copy(), list[Window]()
+    as_cut = left.turned if across else left
     for _ in range(MOST_PASSES):
-        new = [one for one in _side_by_side(grid, left, rules, price) if not one.is_at_one_of(found)]
+        new = [one for one in _side_by_side(grid, as_cut, rules, price) if not one.is_at_one_of(found)]
         if not new:
             break
         for window in new:
-            left.fly(window)
+            as_cut.fly(window)
         found += new
-    return found
+    return [one.turned for one in found] if across else found
 
 
 def _side_by_side(grid: GridSpec, ground: Ground, rules: CuttingRules, price: float) -> list[Window]:
     """Windows up the rows that pay for themselves."""
-    width = min(ground.risk.shape[1], columns_across(grid, rules.swath_m))
+    width = min(ground.risk.shape[1], cells_wide(grid, rules.swath_m))
     block = _block(width)
     worth = _in_blocks(ground.worth(), block)
     cell_m = grid.cell_m * block
@@ -121,9 +130,9 @@ def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
     return Strip(number, start, heading_rad, length_m, width_m)
 
 
-def columns_across(grid: GridSpec, swath_m: float) -> int:
-    """Whole columns of cells that a swath covers, at least one."""
-    return min(grid.columns, max(1, math.floor(swath_m / grid.cell_m + TOLERANCE)))
+def cells_wide(grid: GridSpec, swath_m: float) -> int:
+    """Whole cells that a swath covers side by side, at least one."""
+    return max(1, math.floor(swath_m / grid.cell_m + TOLERANCE))
 
 
 def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:

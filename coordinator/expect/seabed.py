@@ -61,11 +61,11 @@ class Seabed:
     def _about(self, values: FloatArray) -> FloatArray:
         """The mean over the cells about each, of those that there are."""
         for axis in (0, 1):
-            values = _sliding_mean(values, self._cells, axis)
+            values = sliding_mean(values, self._cells, axis)
         return values
 
 
-def _sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
+def sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
     """The mean over up to `beside` places before and behind each along an axis."""
     size = values.shape[axis]
     total = np.zeros((size + 1, values.shape[1 - axis]))

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from comms.said.messages import Mode, PlannedTrack
+from comms.said.messages import Mode, Plan, PlannedTrack
+from coordinator.expect.seabed import sliding_mean
 from coordinator.vehicles import KnownVehicle
 from planner.footprints import footprint_of
 from planner.footprints.cells import EDGE_TOLERANCE_M
@@ -41,16 +42,39 @@ def expected_tracks(grid: GridSpec, primaries: Mapping[str, KnownVehicle]) -> Tr
             continue
         curve = curve_of(vehicle, primaries.values())
         lead_m = footprint_of(vehicle.entry.sonar).lead_m
-        for track in vehicle.plan.tracks:
+        places_known = len(vehicle.plan.tracks) - vehicle.plan.tentative
+        settled, tentative = (found.ahead, found.largest_ahead), np.zeros((2, *grid.shape))
+        for number, track in enumerate(vehicle.plan.tracks):
             passed_m = _passed_m(track, vehicle, lead_m)
             window, along_m, nats = _beside(grid, track, curve)
             has_passed = along_m <= passed_m
             found.flown[window] += np.where(has_passed, nats, 0.0)
             if vehicle.finished_ms is None:
                 to_come = np.where(has_passed, 0.0, nats)
-                found.ahead[window] += to_come
-                np.maximum(found.largest_ahead[window], to_come, out=found.largest_ahead[window])
+                total, largest = settled if number < places_known else tentative
+                total[window] += to_come
+                np.maximum(largest[window], to_come, out=largest[window])
+        if tentative[0].any():
+            total, largest = (_wherever_laid(grid, vehicle.plan, nats) for nats in tentative)
+            np.add(found.ahead, total, out=found.ahead)
+            np.maximum(found.largest_ahead, largest, out=found.largest_ahead)
     return found
+
+
+def _wherever_laid(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:
+    """-ln(1 - P_d) on average over where tracks may come to lie that are not settled yet: anywhere up to half of what
+    tracks are apart to either side, all together."""
+    starts, ends = (
+        np.array(grid.frame.to_sweep(*np.array(places).T))
+        for places in (
+            [(one.start_x_m, one.start_y_m) for one in plan.tracks],
+            [(one.end_x_m, one.end_y_m) for one in plan.tracks],
+        )
+    )
+    run_along = bool(np.abs(ends - starts)[1].sum() >= np.abs(ends - starts)[0].sum())
+    offsets_m = ((starts + ends) / 2)[0 if run_along else 1]
+    apart_m = float(np.ptp(offsets_m)) / max(1, len(plan.tracks) - 1)
+    return -np.log(sliding_mean(np.exp(-nats), round(apart_m / 2 / grid.cell_m), 1 if run_along else 0))
 
 
 def curve_of(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> DetectionCurve:

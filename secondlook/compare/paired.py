@@ -8,11 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordinator.cut.ground import OBJECTIVES as COUNTED
 from planner.types import FloatArray
 from secondlook.compare.flights import Contender, Result
 from secondlook.errors import UserError
 from secondlook.scenario import Scenario
 
+BOTH = COUNTED["both"]
 RESAMPLES = 10_000
 AT_ONCE = 100
 INTERVAL_PERCENT = (2.5, 97.5)
@@ -34,7 +36,7 @@ class Objective:
 
 def _both(one: Result) -> float:
     """As `coordinator.objective` counts them."""
-    return 0.8 * one.at_end.mean + 0.2 * one.at_end.worst30_mean
+    return BOTH.mean * one.at_end.mean + BOTH.worst * one.at_end.worst30_mean
 
 
 OBJECTIVES: Mapping[str, Objective] = {
@@ -42,7 +44,9 @@ OBJECTIVES: Mapping[str, Objective] = {
     "worst30": Objective(
         "worst 30 %", "the mean residual risk of the worst 30 %", "leaves", lambda one: one.at_end.worst30_mean
     ),
-    "both": Objective("both", "four fifths of the mean residual risk and a fifth of the worst 30 %'s", "leaves", _both),
+    "both": Objective(
+        "both", f"{BOTH.mean:g} times the mean residual risk and {BOTH.worst:g} times the worst 30 %'s", "leaves", _both
+    ),
     "targets": Objective(
         "targets expected",
         "the share of targets expected to be found",

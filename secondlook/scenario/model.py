@@ -164,7 +164,7 @@ class Coordinator(Mapping):
     """A vehicle not heard of for so long counts as lost."""
     min_strip_m: Length = 30.0
     """Least length of a strip."""
-    max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
+    max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 2000.0
     """Largest length of a strip, at least `min_strip_m`."""
     worth_risk: OpenShare = 0.05
     """Mean residual risk, times the weight of the ground, over the helper's swath from which a further metre of strip
@@ -175,9 +175,9 @@ class Coordinator(Mapping):
     first is compared with: for them `allocator` counts for nothing."""
     objective: Literal["mean", "worst30", "both", "targets"] = "both"
     """What second looks are to bring down: the `mean` residual risk, that of the worst 30 % of the area (`worst30`),
-    `both`, the mean counting four times as much, or the share of `targets` expected to be missed. Helpers do the same
-    for the last as for the mean, for a cell's risk is the chance that a target there is missed; `area.priorities` then
-    tell where targets lie thicker. What differs is by what `secondlook compare` judges."""
+    `both`, seven tenths the mean and three tenths the worst, or the share of `targets` expected to be missed. Helpers
+    do the same for the last as for the mean, for a cell's risk is the chance that a target there is missed;
+    `area.priorities` then tell where targets lie thicker. What differs is by what `secondlook compare` judges."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
     """A helper is turned round for a plan that is better by at least this share."""
 

@@ -202,9 +202,13 @@ class TestAFlownMission:
         assert len(legs) in (len(strips), len(strips) + 1)  # the last may not be flown to its end
         assert strips
         for leg, strip in zip(legs, strips, strict=False):
-            assert swath.line(leg.place) * 5 == pytest.approx(strip.start_x_m)
+            assert leg.across == (strip.heading_rad > 0)
             assert (leg.end - leg.first) * 5 == strip.length_m
-            assert leg.first * 5 in (strip.start_y_m, strip.start_y_m - strip.length_m)
+            beside_m, along_m = strip.start_x_m, strip.start_y_m
+            if leg.across:  # rows are centred half a cell further than columns are
+                beside_m, along_m = strip.start_y_m - 2.5, strip.start_x_m + 2.5
+            assert swath.line(leg.place) * 5 == pytest.approx(beside_m)
+            assert leg.first * 5 in (along_m, along_m - strip.length_m)
         assert {leg.up for leg in legs} == {True, False}
 
 

@@ -120,7 +120,7 @@ class TestFromHotspotToTask:
 
     def test_a_battery_that_does_not_last_gets_nothing(self) -> None:
         told = coordinator(idle=())
-        told.state(HELPER, Mode.IDLE, battery=0.01)  # 144 s; the strip takes 50 + 300 m at 2 m/s
+        told.state(HELPER, Mode.IDLE, battery=0.002)  # 29 s, not enough for the way to any strip
         told.hotspot()
         told.settle()
         assert told.states() == {1: OPEN}

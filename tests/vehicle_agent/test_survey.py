@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -139,6 +140,18 @@ class TestThePapersExperiments:
         assert len(plans[0].tracks) == 7
         assert plans[0].note == "spacing for 138 m, 7 tracks"
         assert "r_eff 130 m after track 2, spacing 138 to 120 m" in [plan.note for plan in plans]
+
+    def test_it_says_which_tracks_may_still_be_laid_elsewhere_and_the_others_stay(self, experiment_1: OneNode) -> None:
+        plans = experiment_1.all(Plan)
+        tentative = {sum(track.flown for track in plan.tracks): plan.tentative for plan in plans}
+        assert tentative == {0: 5, 1: 5, 2: 4, 3: 4, 4: 2, 5: 2, 6: 0, 7: 0, 8: 0}
+        for before, after in pairwise(plans):
+            known = len(before.tracks) - before.tentative
+            assert offsets(after)[:known] == offsets(before)[:known]
+
+    def test_of_a_fixed_plan_none_may(self) -> None:
+        agent = on_its_way(survey(FixedSpacing(40, 145)), run_info())
+        assert [plan.tentative for plan in agent.all(Plan)] == [0]
 
     def test_tracks_are_flown_to_and_fro_under_numbers_from_1(self, experiment_1: OneNode) -> None:
         tracks = experiment_1.last(Plan).tracks

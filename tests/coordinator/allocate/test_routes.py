@@ -105,8 +105,8 @@ class TestOneHelper:
         assert set(route) == {job.strip.number for job in jobs} - poor
 
     def test_without_strips_or_helpers_there_are_no_routes(self) -> None:
-        assert routes([], [helper()]) == Routes(0.0, {"alpha": ()})
-        assert routes([NEAR], []) == Routes(0.0, {})
+        assert routes([], [helper()]) == Routes(0.0, {"alpha": ()}, {})
+        assert routes([NEAR], []) == Routes(0.0, {}, {})
 
 
 class TestSeveralHelpers:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.cut.cutter import SPARE_STRIPS, Cutter
+from coordinator.cut.cutter import SPARE_STRIPS, Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.strips import Cut, CuttingRules
 from coordinator.cut.window import Window
@@ -52,61 +53,87 @@ def windows(cuts: list[Cut]) -> list[Window]:
     return [one.window for one in cuts]
 
 
+def best_in(time_m: float, *, across: bool = False) -> Flown:
+    """Helpers that fly the best strips first as long as there is time, and only those of one heading."""
+
+    def flown(cuts: Sequence[Cut]) -> Mapping[int, float]:
+        shares, metres = {}, 0.0
+        for place in sorted(range(len(cuts)), key=lambda one: -cuts[one].counts_m2 / length_m(cuts[one])):
+            share = min(1.0, (time_m - metres) / length_m(cuts[place]))
+            if cuts[place].window.across == across and share > 0:
+                shares[place] = share
+                metres += share * length_m(cuts[place])
+        return shares
+
+    return flown
+
+
+def length_m(one: Cut) -> float:
+    return one.window.cells_long * 5 + 100
+
+
+def cut(
+    cutter: Cutter, told: Ground, time_m: float, claimed: Sequence[Window] = (), opened: Sequence[Window] = ()
+) -> list[Cut]:
+    """By helpers that fly along the tracks alone."""
+    return cutter.cut(told, time_m, claimed, opened, best_in(time_m))
+
+
 def price(cutter: Cutter) -> float:
-    """Of a metre flown."""
-    return cutter._price
+    """Of a metre flown along the tracks."""
+    return cutter._ways[0].price
 
 
 class TestTime:
     @pytest.mark.parametrize("strips", [1, 3, 5])
     def test_so_many_are_cut_as_there_is_time_for_and_a_few_more_the_best_first(self, strips: int) -> None:
-        cuts = Cutter(GRID, RULES, LEAST).cut(ground(TWELVE), (strips - 0.5) * STRIP_M, (), ())
+        cuts = cut(Cutter(GRID, RULES, LEAST), ground(TWELVE), (strips - 0.5) * STRIP_M, (), ())
         assert strips + SPARE_STRIPS <= len(cuts) < 12
         assert windows(cuts) == [lane(number) for number in range(len(cuts))]
 
     @pytest.mark.parametrize("time_m", [12.5 * STRIP_M, math.inf])
     def test_where_there_is_time_for_all_all_are_cut_at_the_least_price(self, time_m: float) -> None:
         cutter = Cutter(GRID, RULES, LEAST)
-        assert set(windows(cutter.cut(ground(TWELVE), time_m, (), ()))) == {lane(number) for number in range(12)}
+        assert set(windows(cut(cutter, ground(TWELVE), time_m, (), ()))) == {lane(number) for number in range(12)}
         assert price(cutter) == pytest.approx(0.1 * LOOK * 50)
 
     def test_what_is_worth_less_than_the_least_is_not_cut_whatever_time_there_is(self) -> None:
         # A strip of 300 m costs 400 m at 0.1 of a swath: what a look at 0.133 brings along it.
         cutter = Cutter(GRID, RULES, LEAST)
-        assert windows(cutter.cut(ground(lanes(0.13, 0.0, 0.14)), math.inf, (), ())) == [lane(2)]
+        assert windows(cut(cutter, ground(lanes(0.13, 0.0, 0.14)), math.inf, (), ())) == [lane(2)]
 
     def test_without_time_nothing_is_cut(self) -> None:
-        assert Cutter(GRID, RULES, LEAST).cut(ground(TWELVE), 0.0, (), ()) == []
+        assert cut(Cutter(GRID, RULES, LEAST), ground(TWELVE), 0.0, (), ()) == []
 
     def test_where_nothing_is_to_be_looked_at_nothing_is_cut(self) -> None:
-        assert Cutter(GRID, RULES, LEAST).cut(ground(lanes()), math.inf, (), ()) == []
+        assert cut(Cutter(GRID, RULES, LEAST), ground(lanes()), math.inf, (), ()) == []
 
     def test_the_price_rises_where_time_is_short_and_falls_again_never_below_the_least(self) -> None:
         cutter = Cutter(GRID, RULES, LEAST)
         least = price(cutter)
-        cutter.cut(ground(TWELVE), 2.5 * STRIP_M, (), ())
+        cut(cutter, ground(TWELVE), 2.5 * STRIP_M, (), ())
         # Three strips are worth more than 400 m at this, and at 1.2 times as much they are not three.
         of_third, step = 0.85 * LOOK * 50 * 300 / STRIP_M, 1.2
         assert of_third / step <= price(cutter) < of_third
         dear = price(cutter)
-        cutter.cut(ground(TWELVE), 6.5 * STRIP_M, (), ())
+        cut(cutter, ground(TWELVE), 6.5 * STRIP_M, (), ())
         assert least < price(cutter) < dear
-        cutter.cut(ground(TWELVE), math.inf, (), ())
+        cut(cutter, ground(TWELVE), math.inf, (), ())
         assert price(cutter) == least
 
     @pytest.mark.parametrize("objective", sorted(OBJECTIVES))
     def test_the_first_cut_finds_the_price_however_far_it_lies_above_the_least(self, objective: str) -> None:
         cutter = Cutter(GRID, RULES, 1e-3 * 25)
-        first = cutter.cut(ground(TWELVE, objective), 1.5 * STRIP_M, (), ())
+        first = cut(cutter, ground(TWELVE, objective), 1.5 * STRIP_M, (), ())
         found = price(cutter)
-        assert cutter.cut(ground(TWELVE, objective), 1.5 * STRIP_M, (), ()) == first
+        assert cut(cutter, ground(TWELVE, objective), 1.5 * STRIP_M, (), ()) == first
         assert price(cutter) == found > 100 * 1e-3 * 50
 
     def test_where_time_is_short_two_side_by_side_are_cut_where_there_is_time_for_two(self) -> None:
         # Five columns each of 0.6, 0.9, 0.9, 0.6: the best strip lies on the 0.9, but two beside it bring more.
         risk = lanes()
         risk[:, 10:30] = np.repeat([0.6, 0.9, 0.9, 0.6], 5)
-        one, two = (windows(Cutter(GRID, RULES, LEAST).cut(ground(risk), n * STRIP_M, (), ())) for n in (0.9, 1.9))
+        one, two = (windows(cut(Cutter(GRID, RULES, LEAST), ground(risk), n * STRIP_M, (), ())) for n in (0.9, 1.9))
         assert one[0] == Window(0, 60, 15, 25)
         assert set(two[:2]) == {Window(0, 60, 10, 20), Window(0, 60, 20, 30)}
 
@@ -115,51 +142,87 @@ class TestWhatIsTold:
     def test_what_a_strip_brings(self) -> None:
         told = ground(lanes(0.8), "both")
         told.weights[:] *= 2.0
-        (cut,) = Cutter(GRID, RULES, LEAST).cut(told, math.inf, (), ())
-        # 600 cells of 25 m2, of which a look removes 0.4; that counts twice, 0.8 for the mean and 0.2 / 0.3 for the
+        (found,) = cut(Cutter(GRID, RULES, LEAST), told, math.inf, (), ())
+        # 600 cells of 25 m2, of which a look removes 0.4; that counts twice, 0.7 for the mean and 0.3 / 0.3 for the
         # worst.
-        assert cut.removable_m2 == pytest.approx(600 * 25 * 0.4)
-        assert cut.counts_m2 == pytest.approx(2 * (0.8 + 0.2 / 0.3) * 600 * 25 * 0.4)
+        assert found.removable_m2 == pytest.approx(600 * 25 * 0.4)
+        assert found.counts_m2 == pytest.approx(2 * (0.7 + 0.3 / 0.3) * 600 * 25 * 0.4)
 
     def test_foreseen_is_what_is_for_the_most_part_not_seen_yet(self) -> None:
         told = ground(lanes(0.8, 0.8))
         told.is_seen[29:, :10] = False  # 31 rows of 60
         told.is_seen[31:, 10:] = False  # 29 rows
-        cuts = Cutter(GRID, RULES, LEAST).cut(told, math.inf, (), ())
+        cuts = cut(Cutter(GRID, RULES, LEAST), told, math.inf, (), ())
         assert {one.window: one.foreseen for one in cuts} == {lane(0): True, lane(1): False}
 
     def test_the_ground_is_left_as_it_is(self) -> None:
         told = ground(TWELVE.copy())
-        Cutter(GRID, RULES, LEAST).cut(told, math.inf, [lane(0)], [lane(1)])
+        cut(Cutter(GRID, RULES, LEAST), told, math.inf, [lane(0)], [lane(1)])
         assert (told.risk == TWELVE).all()
 
     def test_from_where_on_a_cell_is_of_the_worst_is_asked_after_what_there_is_time_for(self) -> None:
         cutter = Cutter(GRID, RULES, LEAST)
         risk = lanes(0.9, 0.9, 0.9, 0.9, *[0.6] * 6, 0.5, 0.5)
         assert cutter.threshold == 0.0
-        cutter.cut(ground(risk), 0.0, (), ())
+        cut(cutter, ground(risk), 0.0, (), ())
         assert cutter.threshold == pytest.approx(0.9)  # four of twelve
-        cutter.cut(ground(risk), 1.5 * STRIP_M, (), ())
+        cut(cutter, ground(risk), 1.5 * STRIP_M, (), ())
         assert cutter.threshold == pytest.approx(0.6)  # three of twelve
-        cutter.cut(ground(risk), 1.5 * STRIP_M, [lane(1), lane(2)], ())
+        cut(cutter, ground(risk), 1.5 * STRIP_M, [lane(1), lane(2)], ())
         assert cutter.threshold == pytest.approx(0.6)
-        cutter.cut(ground(risk), 7.5 * STRIP_M, [lane(1), lane(2)], ())
+        cut(cutter, ground(risk), 7.5 * STRIP_M, [lane(1), lane(2)], ())
         # All but 0.6, 0.5 and 0.5 have been flown; the next is what is left of 0.9.
         assert cutter.threshold == pytest.approx(0.45)
+
+
+class TestHeading:
+    ALL_HOT = ground(np.where(np.arange(60)[:, np.newaxis] < 20, 0.9, np.zeros(GRID.shape)))  # 100 m by 600 m
+
+    @pytest.mark.parametrize("across", [False, True])
+    def test_strips_are_cut_as_helpers_leave_least_by_them(self, across: bool) -> None:
+        cuts = Cutter(GRID, RULES, LEAST).cut(self.ALL_HOT, 2 * STRIP_M, (), (), best_in(2 * STRIP_M, across=across))
+        assert {one.window.across for one in cuts} == {across}
+
+    def test_those_across_a_band_are_one_swath_wide_and_as_long_as_allowed(self) -> None:
+        cuts = Cutter(GRID, RULES, LEAST).cut(self.ALL_HOT, math.inf, (), (), best_in(math.inf, across=True))
+        pieces = {Window(row, row + 10, column, column + 60, across=True) for row in (0, 10) for column in (0, 60)}
+        assert set(windows(cuts)) == pieces
+
+    def test_they_turn_only_where_that_is_better_by_a_margin(self) -> None:
+        def helpers_that_fly(along: float, across: float) -> Flown:
+            """So much of every strip."""
+
+            def flown(cuts: Sequence[Cut]) -> Mapping[int, float]:
+                return {place: across if one.window.across else along for place, one in enumerate(cuts)}
+
+            return flown
+
+        # Twelve strips of 100 m along, four of 300 m across: a look at all takes 27,000 m2, and a metre, with 100 m on
+        # the way to each strip, costs 2.5 m2 at least. So 21,000 and 23,000 m2 are gained by flying all.
+        even = 0.5 * 21 / 23
+        cutter = Cutter(GRID, RULES, LEAST)
+        told = self.ALL_HOT
+        opened = windows(cutter.cut(told, math.inf, (), (), helpers_that_fly(0.5, 0.3)))
+        assert not opened[0].across
+        assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5, even * 1.015))) == opened
+        opened = windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5, even * 1.03)))
+        assert opened[0].across
+        assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.015, even))) == opened
+        assert not cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.03, even))[0].window.across
 
 
 class TestClaimed:
     def test_what_is_with_a_vehicle_counts_as_flown(self) -> None:
         # What a look leaves of 0.9 is 0.45: worth one more, after 0.6 and 0.5.
         risk = lanes(0.9, 0.6, 0.5)
-        cuts = Cutter(GRID, RULES, LEAST).cut(ground(risk), 2.5 * STRIP_M, [lane(0)], ())
+        cuts = cut(Cutter(GRID, RULES, LEAST), ground(risk), 2.5 * STRIP_M, [lane(0)], ())
         assert windows(cuts) == [lane(1), lane(2), lane(0)]
         assert cuts[2].removable_m2 == pytest.approx(600 * 25 * 0.45 * LOOK)
 
     def test_what_is_claimed_in_part_is_worth_the_rest(self) -> None:
-        (cut,) = Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9)), math.inf, [Window(0, 30, 0, 10)], ())
-        assert cut.window == lane(0)
-        assert cut.counts_m2 == pytest.approx(600 * 25 * (0.9 + 0.45) / 2 * LOOK)
+        (found,) = cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.9)), math.inf, [Window(0, 30, 0, 10)], ())
+        assert found.window == lane(0)
+        assert found.counts_m2 == pytest.approx(600 * 25 * (0.9 + 0.45) / 2 * LOOK)
 
 
 class TestOpenStrips:
@@ -167,28 +230,28 @@ class TestOpenStrips:
         risk = lanes(0.9)
         opened = Window(0, 60, 1, 11)  # a column aside: nine tenths
         risk[:, 10] = 0.89
-        assert windows(Cutter(GRID, RULES, LEAST).cut(ground(risk), math.inf, (), [opened])) == [opened]
+        assert windows(cut(Cutter(GRID, RULES, LEAST), ground(risk), math.inf, (), [opened])) == [opened]
 
     def test_they_are_cut_anew_where_that_is_better(self) -> None:
         opened = Window(0, 60, 1, 11)  # brings nine tenths of what the lane does
-        assert windows(Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9)), math.inf, (), [opened])) == [lane(0)]
+        assert windows(cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.9)), math.inf, (), [opened])) == [lane(0)]
 
     def test_what_they_bring_is_told_anew(self) -> None:
-        (cut,) = Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.7)), math.inf, (), [lane(0)])
-        assert cut.window == lane(0)
-        assert cut.removable_m2 == pytest.approx(600 * 25 * 0.35)
+        (found,) = cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.7)), math.inf, (), [lane(0)])
+        assert found.window == lane(0)
+        assert found.removable_m2 == pytest.approx(600 * 25 * 0.35)
 
     def test_they_do_not_stay_where_there_is_time_for_more(self) -> None:
-        cuts = Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.9, 0.89)), math.inf, (), [lane(0)])
+        cuts = cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.9, 0.89)), math.inf, (), [lane(0)])
         assert windows(cuts) == [lane(0), lane(1)]
 
     def test_they_are_dropped_where_they_pay_no_more(self) -> None:
-        assert Cutter(GRID, RULES, LEAST).cut(ground(lanes(0.05)), math.inf, (), [lane(0)]) == []
+        assert cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.05)), math.inf, (), [lane(0)]) == []
 
     def test_cutting_again_changes_nothing(self) -> None:
         cutter = Cutter(GRID, RULES, LEAST)
-        first = cutter.cut(ground(TWELVE), 3.5 * STRIP_M, (), ())
-        assert cutter.cut(ground(TWELVE), 3.5 * STRIP_M, (), windows(first)) == first
+        first = cut(cutter, ground(TWELVE), 3.5 * STRIP_M, (), ())
+        assert cut(cutter, ground(TWELVE), 3.5 * STRIP_M, (), windows(first)) == first
 
 
 @settings(max_examples=40, deadline=None)
@@ -203,7 +266,7 @@ def test_each_tells_what_those_before_it_and_those_that_are_claimed_leave(
 ) -> None:
     left = ground(lanes(*risks), objective)
     cutter = Cutter(GRID, RULES, LEAST)
-    cuts = cutter.cut(left, strips * STRIP_M, [lane(number) for number in claimed], ())
+    cuts = cut(cutter, left, strips * STRIP_M, [lane(number) for number in claimed], ())
     for number in claimed:
         left.fly(lane(number))
     for one in cuts:

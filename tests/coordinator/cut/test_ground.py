@@ -34,7 +34,7 @@ class TestWorth:
             ("mean", [0.4, 0.25, 0.2, 0.0]),
             ("worst30", [0.4 / 0.3, 0.2 / 0.3, 0.1 / 0.3, 0.0]),
             ("targets", [0.4, 0.25, 0.2, 0.0]),
-            ("both", [0.32 + 0.08 / 0.3, 0.2 + 0.04 / 0.3, 0.16 + 0.02 / 0.3, 0.0]),
+            ("both", [0.28 + 0.12 / 0.3, 0.175 + 0.06 / 0.3, 0.14 + 0.03 / 0.3, 0.0]),
         ],
     )
     def test_it_is_what_a_look_takes_of_what_counts(self, objective: str, worth: list[float]) -> None:
@@ -52,6 +52,41 @@ class TestWorth:
         one = ground(np.arange(12.0).reshape(3, 4) / 12, objective="both", threshold=0.4)
         cells = Window(1, 3, 1, 2).cells
         assert one.worth(cells) == pytest.approx(one.worth()[cells])
+
+
+class TestLeft:
+    # Ten cells of 25 m2; the worst three are 1.0, 0.9 and 0.8, the quantile lies three tenths above the seventh.
+    RISK = np.array([[0.1, 0.2, 0.3, 0.4, 0.5], [0.6, 0.7, 0.8, 0.9, 1.0]])
+
+    def test_of_the_mean_it_is_the_risk_times_what_it_counts(self) -> None:
+        assert ground(self.RISK).left_m2() == pytest.approx(25 * 5.5)
+
+    def test_of_the_worst_it_is_their_mean_over_as_much_ground_as_there_is(self) -> None:
+        worst_from = 0.7 + 0.3 * 0.1
+        above = (0.07 + 0.17 + 0.27) / 0.3
+        expected = 25 * (10 * worst_from + above)
+        assert ground(self.RISK, objective="worst30").left_m2() == pytest.approx(expected)
+        assert expected == pytest.approx(250 * 0.9)
+
+    def test_both_are_weighed(self) -> None:
+        mean, worst = (ground(self.RISK, objective=one).left_m2() for one in ("mean", "worst30"))
+        assert ground(self.RISK, objective="both").left_m2() == pytest.approx(0.7 * mean + 0.3 * worst)
+
+    def test_where_nothing_is_looked_at_nothing_is_left(self) -> None:
+        assert ground(np.zeros((2, 3)), objective="both").left_m2() == 0.0
+
+
+class TestTurned:
+    def test_what_lies_across_runs_up_its_rows_and_flying_the_one_flies_the_other(self) -> None:
+        one = ground(np.arange(6.0).reshape(2, 3) / 6, look=0.5)
+        window = Window(0, 2, 1, 2, across=True)
+        one.turned.fly(window.turned)
+        assert one.risk == pytest.approx(np.array([[0, 0.5, 2], [3, 2, 5]]) / 6)
+
+    def test_a_look_flown_in_part_takes_its_part(self) -> None:
+        one = ground(np.full((1, 2), 0.8), look=0.5)
+        one.fly(Window(0, 1, 0, 1), 0.25)
+        assert one.risk == pytest.approx(np.array([[0.7, 0.8]]))
 
 
 class TestFly:

@@ -263,3 +263,16 @@ class TestStripOf:
         expected = np.zeros(grid.shape, dtype=np.bool_)
         expected[window.cells] = True
         assert (within == expected).all()
+
+
+@settings(max_examples=60, deadline=None)
+@given(risk=risks, rules=rules_of_all_kinds, price=st.sampled_from([0.2, 1.0, 3.0]))
+def test_across_the_tracks_they_are_cut_as_along_them_on_the_map_turned(
+    risk: FloatArray, rules: CuttingRules, price: float
+) -> None:
+    told = ground(risk, SMALL)
+    turned = GridSpec(SMALL.frame, SMALL.cell_m, SMALL.rows, SMALL.columns)
+    across = cut_windows(SMALL, told, rules, price, across=True)
+    assert [one.turned for one in across] == cut_windows(turned, ground(risk.T.copy(), turned), rules, price)
+    assert all(one.across for one in across)
+    assert (told.risk == risk).all()

@@ -30,9 +30,10 @@ def primary(
     curves: dict[int, DetectionCurve] | None = None,
     entry: RosterVehicle = ENTRY,
     r_adpt_m: tuple[int, ...] = (),
+    tentative: int = 0,
 ) -> KnownVehicle:
     """One that has told its plan."""
-    plan = Plan(1, tracks, r_adpt_m, (), "")
+    plan = Plan(1, tracks, r_adpt_m, (), "", tentative)
     return KnownVehicle(entry, heard_ms=0, plan=plan, curves={} if curves is None else curves)
 
 
@@ -49,6 +50,8 @@ def p_detect(nats: FloatArray) -> FloatArray:
 
 
 class TestPlannedTracks:
+    CLEAR_OF_EDGES = DetectionCurve(np.array([22.0, 98.0]), np.array([0.5, 0.5]))  # 5 to 19 cells of 5 m
+
     def test_a_track_multiplies_the_risk_of_the_cells_beside_it_by_what_its_curve_leaves(self) -> None:
         found = expected(primary(UP, curves={1: LINEAR}))
         # 0 m to a side 0.5, 50 m 0.25, 95 m 0.025, 100 m and beyond nothing.
@@ -65,6 +68,25 @@ class TestPlannedTracks:
         # Columns 40 and 45 lie 0 and 50 m, and 25 and 25 m, from them.
         assert np.exp(-found.ahead[7, [40, 45]]) == pytest.approx([0.5 * 0.75, 0.625**2])
         assert p_detect(found.largest_ahead[7, [40, 45]]) == pytest.approx([0.5, 0.375])
+
+    def test_one_that_may_still_be_laid_elsewhere_may_lie_up_to_half_of_what_tracks_are_apart_aside(self) -> None:
+        known, other = PlannedTrack(1, 100, 100, 0, 100, 400, False), PlannedTrack(2, 300, 300, 400, 300, 0, False)
+        found = expected(primary(known, other, curves={1: self.CLEAR_OF_EDGES}, tentative=1))
+        # It sees 15 columns on either side, of 41 that column 60 may be; column 22 may be the first two of them.
+        assert np.exp(-found.ahead[40, [60, 22]]) == pytest.approx([(30 * 0.5 + 11) / 41, (2 * 0.5 + 39) / 41])
+        # Column 10 lies 50 m beside the known one, and further from the other than that may be moved.
+        assert np.exp(-found.ahead[40, 10]) == pytest.approx(0.5)
+        assert np.exp(-found.largest_ahead[40, 10]) == pytest.approx(0.5)
+
+    def test_so_may_one_that_runs_across_the_grid(self) -> None:
+        known, other = PlannedTrack(1, 0, 0, 102.5, 400, 102.5, False), PlannedTrack(2, 0, 400, 302.5, 0, 302.5, False)
+        found = expected(primary(known, other, curves={1: self.CLEAR_OF_EDGES}, tentative=1))
+        # Of the rows 40 to 79 it sees 15 on either side.
+        assert np.exp(-found.ahead[60, 40]) == pytest.approx((30 * 0.5 + 10) / 40)
+
+    def test_more_than_there_are_are_all(self) -> None:
+        found = expected(primary(UP, curves={1: HALF}, tentative=7))
+        assert found.ahead == pytest.approx(expected(primary(UP, curves={1: HALF})).ahead)
 
     def test_only_what_lies_beside_a_track_between_its_ends(self) -> None:
         found = expected(primary(PlannedTrack(1, 200, 200, 100, 200, 200, False), curves={1: HALF}))

@@ -252,7 +252,7 @@ class TestCommand:
     ) -> None:
         code, out, err = command()
         assert (code, err) == (1, "other, seed 3: it failed\n")
-        judged = "four fifths of the mean residual risk and a fifth of the worst 30 %'s"
+        judged = "0.7 times the mean residual risk and 0.3 times the worst 30 %'s"
         assert out.startswith(f"tellaro, seeds 1 to 10, judged by {judged} when the mission ends\n")
         assert out.splitlines()[1] == "It ends at 1.05 times the survey's duration at the latest."
         assert "failed" in out
@@ -308,7 +308,7 @@ class TestCommand:
         monkeypatch.setattr("secondlook.commands.compare.fly_all", fly_all)
         _, out, _ = command("--allocators", "plan,greedy,blind", "--seeds", "6")
         assert out.splitlines()[-1].startswith(
-            "reacting was worth it: plan leaves 0.340, 0.100 less than blind (95 %: "
+            "reacting was worth it: plan leaves 0.360, 0.100 less than blind (95 %: "
         )
         _, out, _ = command("--allocators", "plan,greedy,blind", "--seeds", "6", "--json")
         assert json.loads(out)["reacting"]["worth"] is True

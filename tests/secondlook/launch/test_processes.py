@@ -32,6 +32,7 @@ from tests.viz.recordings import rows_so_far, verify
 SOON_S = 20.0
 PATIENCE_S = 3.0
 HOSTS = ("world", "primary", "helper", "coordinator", "recorder")
+ENOUGH_BYTES = 30_000  # of messages, more than 100 of them
 INTERRUPTED = r"interrupted at \d+ s of the mission"
 
 
@@ -106,7 +107,8 @@ def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path, numbe
 
 def test_a_run_on_the_local_bus_is_interrupted_alike(tmp_path: Path) -> None:
     with flight(tmp_path / "out", *LONG, "--bus", "local") as flying:
-        assert until(flying.is_under_way)
+        messages = flying.folder / "messages.mpk"
+        assert until(lambda: flying.is_under_way() and messages.stat().st_size > ENOUGH_BYTES)
         flying.press_ctrl_c()
         printed = flying.finish(SOON_S)
     assert_failed(flying, *printed, said=INTERRUPTED)
