@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -57,6 +58,17 @@ class HelperLooks:
 NOBODY = HelperLooks()
 
 
+class Looked(NamedTuple):
+    """What some tracks make of the width. `left`, `least`: of each cell the product of what their looks leave as far as
+    these are independent, and the least of what they leave as far as they are not; the product of both is its risk
+    (`planner.risk.residual_risk`). `seen`: the level of each bin. `tracks`: how many."""
+
+    left: FloatArray
+    least: FloatArray
+    seen: LevelArray
+    tracks: int
+
+
 @dataclass(frozen=True, order=True)
 class Worth:
     """How good tracks are, less is better: `lost_m`, the width that they see worse than asked, counts before `risk`,
@@ -90,19 +102,26 @@ class Across:
     ) -> None:
         self.step_m = max(1, math.ceil(width_m / MOST_BINS))
         self._bins = max(1, math.ceil(width_m / self.step_m))
-        self._rho, self._helpers, self._flown = rho, helpers, len(flown)
-        # What a track sees of every bin, by how far to its right the first bin lies: rows are views of one table.
+        self._rho, self._helpers = rho, helpers
+        # What a track leaves and sees, by how far to its right the first bin lies: rows are views of one table each.
         self._farthest = self._bins + math.ceil(float(curve.range_m[-1]) / self.step_m) + 1
         begin_m = np.arange(-self._farthest, self._farthest + self._bins, dtype=np.float64) * self.step_m
         cell = max(1, round(cell_m / self.step_m))
-        self._nats = sliding_window_view(_nats(curve, begin_m), self._bins)[:, ::cell]
+        missed = _missed(curve, begin_m)
+        self._left, self._least = (
+            sliding_window_view(missed**power, self._bins)[:, ::cell] for power in (1.0 - rho, rho)
+        )
         self._levels = sliding_window_view(_levels(curve, begin_m, self.step_m, r_eff_m), self._bins)
         self._begin_m = np.arange(self._bins, dtype=np.float64) * self.step_m
-        columns = [_nats(own, self._begin_m[::cell] - across_m) for across_m, own, _ in flown]
-        nobody = np.zeros(self._nats.shape[1])
-        self._sum, self._largest = np.add.reduce([nobody, *columns]), np.maximum.reduce([nobody, *columns])
-        self._seen = self._levels_of(flown)
-        self._asked = self._seen
+        columns = [_missed(own, self._begin_m[::cell] - across_m) for across_m, own, _ in flown]
+        all_left = np.ones(self._left.shape[1])
+        self._flown = Looked(
+            np.multiply.reduce([all_left, *columns]) ** (1.0 - rho),
+            np.minimum.reduce([all_left, *columns]) ** rho,
+            self._levels_of(flown),
+            len(flown),
+        )
+        self._asked = self._flown.seen
 
     def ask_for(self, tracks: Sequence[Measured]) -> None:
         """Whatever these tracks see is asked of every plan."""
@@ -110,7 +129,7 @@ class Across:
 
     def lost_m(self, tracks: Sequence[Measured]) -> float:
         """How much of what is asked is missed by the tracks flown and these."""
-        seen = np.maximum(self._seen, self._levels_of(tracks))
+        seen = np.maximum(self._flown.seen, self._levels_of(tracks))
         return float(np.count_nonzero(seen < self._asked)) * self.step_m
 
     def _levels_of(self, tracks: Sequence[Measured]) -> LevelArray:
@@ -122,36 +141,37 @@ class Across:
     def worth(self, bins: Sequence[int]) -> Worth:
         """Of the tracks flown and these."""
         alone = np.zeros((1, 0), dtype=np.intp)
-        return Worth(float(self._lost_m(bins, alone)[0]), float(self._risk(bins, alone)[0]))
+        looked = self._after(self._flown, bins)
+        return Worth(float(self._lost_m(looked, alone)[0]), float(self._risk(looked, alone)[0]))
 
     def worst30(self, bins: Sequence[int]) -> float:
         """The mean residual risk over the worst 30 % of the width after the tracks flown and these, and what helpers
         are expected to look at."""
-        total, largest = self._nats_of(bins)
-        return float(self._worst_and_mean(total[np.newaxis], largest[np.newaxis], len(bins))[0][0])
+        left, least, _, tracks = self._after(self._flown, bins)
+        return float(self._worst_and_mean((left * least)[np.newaxis], tracks)[0][0])
 
     def refined(self, bins: Sequence[int]) -> list[int]:
         """The tracks moved, one by one and several together, as long as that is better."""
         found, worth = sorted(bins), self.worth(bins)
-        moves = _moves(min(len(found), MOST_MOVED))
-        for _ in range(MOST_ROUNDS):
-            before = list(found)
-            for group, shifts in moves:
-                others = [place for index, place in enumerate(found) if index not in group]
-                moved = np.array([found[index] for index in group]) + shifts
-                best, its_worth = self._best(others, moved, worth)
-                if its_worth.is_better(worth):
-                    worth = its_worth
-                    for index, place in zip(group, moved[best].tolist(), strict=True):
-                        found[index] = place
-            if found == before:
-                break
+        movable = min(len(found), MOST_MOVED)
+        moves, fixed = _moves(movable), self._after(self._flown, found[movable:])
+        tried = in_vain = 0
+        while in_vain < len(moves) and tried < MOST_ROUNDS * len(moves):
+            group, shifts = moves[tried % len(moves)]
+            others = self._after(fixed, [found[index] for index in range(movable) if index not in group])
+            moved = np.array([found[index] for index in group]) + shifts
+            best, its_worth = self._best(others, moved, worth)
+            tried, in_vain = tried + 1, in_vain + 1
+            if its_worth.is_better(worth):
+                worth, in_vain = its_worth, 0
+                for index, place in zip(group, moved[best].tolist(), strict=True):
+                    found[index] = place
         return sorted(found)
 
     def with_one_more(self, bins: Sequence[int]) -> list[int]:
         """These and the track beside them that is worth most."""
         places = np.arange(0, self._bins + 1, COARSE)[:, np.newaxis]
-        best, _ = self._best(bins, places, Worth(math.inf, math.inf))
+        best, _ = self._best(self._after(self._flown, bins), places, Worth(math.inf, math.inf))
         return sorted([*bins, int(places[best, 0])])
 
     def with_one_less(self, bins: Sequence[int]) -> list[int]:
@@ -160,7 +180,7 @@ class Across:
         worths = [self.worth(one) for one in fewer]
         return fewer[min(range(len(fewer)), key=lambda place: (worths[place].lost_m, worths[place].risk))]
 
-    def _best(self, others: Sequence[int], tried: NDArray[np.intp], than: Worth) -> tuple[int, Worth]:
+    def _best(self, others: Looked, tried: NDArray[np.intp], than: Worth) -> tuple[int, Worth]:
         """Which row of tracks tried, shape (rows, tracks), is worth most together with the others, and how much; of
         those alone that may be better than so much."""
         risk = self._risk(others, tried)
@@ -171,50 +191,43 @@ class Across:
         best = int(np.lexsort((risk[rows], lost_m))[0])
         return int(rows[best]), Worth(float(lost_m[best]), float(risk[rows[best]]))
 
-    def _risk(self, others: Sequence[int], tried: NDArray[np.intp]) -> FloatArray:
-        """`Worth.risk` of the others together with each row of tracks tried, shape (rows,)."""
-        total, largest = (np.tile(nats, (len(tried), 1)) for nats in self._nats_of(others))
-        for column in tried.T:
-            nats = self._nats[self._places(column)]
-            total += nats
-            if self._rho:
-                np.maximum(largest, nats, out=largest)
-        worst, mean = self._worst_and_mean(total, largest, len(others) + tried.shape[1])
-        risk: FloatArray = worst + MEAN_WEIGHT * mean
-        return risk
+    def _after(self, looked: Looked, bins: Sequence[int]) -> Looked:
+        """What these tracks make of it."""
+        places = self._places(np.array(bins, dtype=np.intp))
+        least = np.minimum(looked.least, self._least[places].min(axis=0, initial=1.0)) if self._rho else looked.least
+        return Looked(
+            looked.left * self._left[places].prod(axis=0),
+            least,
+            np.maximum(looked.seen, self._levels[places].max(axis=0, initial=0)),
+            looked.tracks + len(bins),
+        )
 
-    def _lost_m(self, others: Sequence[int], tried: NDArray[np.intp]) -> FloatArray:
+    def _risk(self, others: Looked, tried: NDArray[np.intp]) -> FloatArray:
+        """`Worth.risk` of the others together with each row of tracks tried, shape (rows,)."""
+        places = self._places(tried)
+        risk = self._left[places].prod(axis=1) * others.left
+        if self._rho:
+            risk *= np.minimum(self._least[places].min(axis=1, initial=1.0), others.least)
+        worst, mean = self._worst_and_mean(risk, others.tracks + tried.shape[1])
+        together: FloatArray = worst + MEAN_WEIGHT * mean
+        return together
+
+    def _lost_m(self, others: Looked, tried: NDArray[np.intp]) -> FloatArray:
         """`Worth.lost_m` of the others together with each row of tracks tried, shape (rows,)."""
-        by_others = self._seen
-        for place in self._places(np.array(others, dtype=np.intp)).tolist():
-            by_others = np.maximum(by_others, self._levels[place])
-        seen: LevelArray = np.tile(by_others, (len(tried), 1))
-        for column in tried.T:
-            np.maximum(seen, self._levels[self._places(column)], out=seen)
+        seen = np.maximum(self._levels[self._places(tried)].max(axis=1, initial=0), others.seen)
         lost_m: FloatArray = np.count_nonzero(seen < self._asked, axis=1).astype(np.float64) * self.step_m
         return lost_m
-
-    def _nats_of(self, bins: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-        """By the tracks flown and these: the sum of nats, and the largest of them where that counts."""
-        total, largest = self._sum, self._largest
-        for place in self._places(np.array(bins, dtype=np.intp)).tolist():
-            total = total + self._nats[place]
-            if self._rho:
-                largest = np.maximum(largest, self._nats[place])
-        return total, largest
 
     def _places(self, bins: NDArray[np.intp]) -> NDArray[np.intp]:
         """The rows of the tables for tracks at these bins; who lies farther out sees nothing."""
         return np.minimum(np.maximum(self._farthest - bins, 0), 2 * self._farthest)
 
-    def _worst_and_mean(self, total: FloatArray, largest: FloatArray, ahead: int) -> tuple[FloatArray, FloatArray]:
-        """Of each row, with what helpers look at while all tracks are flown: where most is left."""
-        if self._rho:
-            total = largest + (1.0 - self._rho) * (total - largest)
-        risk = np.exp(-total)
+    def _worst_and_mean(self, risk: FloatArray, tracks: int) -> tuple[FloatArray, FloatArray]:
+        """Of each row, whose order is lost, with what helpers look at while so many tracks are flown: where most is
+        left."""
         bins = risk.shape[1]
         if self._helpers.width_m > 0.0:
-            times, rest = divmod(self._helpers.width_m * (self._flown + ahead) / (self._bins * self.step_m), 1.0)
+            times, rest = divmod(self._helpers.width_m * tracks / (self._bins * self.step_m), 1.0)
             left = (1.0 - self._helpers.p_detect) ** (1.0 - self._rho)
             risk *= left**times
             helped = round(rest * bins)
@@ -223,9 +236,10 @@ class Across:
             risk[:, bins - helped :] *= left
         worst = max(1, round(WORST_SHARE * bins))
         risk.partition(bins - worst, axis=1)
-        return risk[:, bins - worst :].mean(axis=1), risk.mean(axis=1)
+        return risk[:, bins - worst :].sum(axis=1) / worst, risk.sum(axis=1) / bins
 
 
+@lru_cache(maxsize=MOST_MOVED + 1)
 def _moves(count: int) -> list[tuple[tuple[int, ...], NDArray[np.intp]]]:
     """Ways to move so many tracks: which, and by how many bins each, shape (tries, tracks)."""
     each = np.arange(count)
@@ -242,9 +256,9 @@ def _moves(count: int) -> list[tuple[tuple[int, ...], NDArray[np.intp]]]:
     return moves
 
 
-def _nats(curve: DetectionCurve, beside_m: FloatArray) -> FloatArray:
-    """-ln(1 - P_d) at these distances from a track, less than 0 to its left."""
-    return -np.log1p(-curve.at(np.abs(beside_m)))
+def _missed(curve: DetectionCurve, beside_m: FloatArray) -> FloatArray:
+    """1 - P_d at these distances from a track, less than 0 to its left."""
+    return 1.0 - curve.at(np.abs(beside_m))
 
 
 def _levels(curve: DetectionCurve, begin_m: FloatArray, step_m: float, r_eff_m: float) -> LevelArray:
