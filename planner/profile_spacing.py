@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Protocol, runtime_checkable
 
-from planner.across import NOBODY, Across, HelperLooks, Measured
+from planner.across import MOST_MOVED, NOBODY, Across, HelperLooks, Measured
 from planner.curve import effective_range_m
 from planner.spacing import NARROWEST_M
 from planner.spacing_planners import (
@@ -177,8 +177,8 @@ def _seeing_all(across: Across, to_come: Sequence[Measured], starts: Sequence[Se
     bins = min(moved, key=across.worth)
     for push in PUSHES:
         # From where no small move is better there may be a way on for every second track.
-        pushed = across.refined([place + push[index % 2] for index, place in enumerate(bins)])
-        bins = min(bins, pushed, key=across.worth)
+        pushed = [place + push[index % 2] for index, place in enumerate(bins[:MOST_MOVED])]
+        bins = min(bins, across.refined([*pushed, *bins[MOST_MOVED:]]), key=across.worth)
     lost_m = across.worth(bins).lost_m
     if lost_m and across.lost_m(to_come) == 0.0:
         return None
