@@ -28,12 +28,13 @@ MEAN_WEIGHT = 0.01
 SHIFTS = np.array([shift for step in (1, 2, 4, 8, 16, 32) for shift in (-step, step)])
 """By how many bins tracks are moved at a time."""
 MOST_ROUNDS = 40
-"""Through all tracks. Some ten suffice for the paper's area."""
+"""Through all ways to move tracks. Up to seven are needed for the paper's area, two or three as a rule."""
 MOST_MOVED = 10
 """Of the tracks to come so many are moved, those that are flown first; there is a next time for the others."""
 COARSE = 8
 """Bins between the places tried for a track more."""
 LEAST_GAIN = 1e-6
+"""Of residual risk: what is better by less is taken as no better."""
 
 LevelArray = NDArray[np.uint8]
 
@@ -85,9 +86,10 @@ class Worth:
 class Across:
     """A width with the tracks flown over it, and what tracks to come would make of it.
 
-    `curve`, `r_eff_m`: P(y) of the tracks to come, and its r_eff; a place within it is seen better than one beyond.
-    `cell_m`: of the map. `rho`: as for `planner.risk.residual_risk`. Tracks to come lie on whole bins: `bins` are their
-    offsets in `step_m`.
+    `width_m`: > 0. `flown`: each track counts by its own P(y). `curve`, `r_eff_m`: P(y) of the tracks to come, and its
+    r_eff; a place within it is seen better than one beyond. `cell_m`: of the map. `rho`: as for
+    `planner.risk.residual_risk`. `helpers`: what they look at during each track. Tracks to come lie on whole bins:
+    `bins` are their offsets in `step_m`, the width of a bin.
     """
 
     def __init__(

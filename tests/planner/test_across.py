@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.across import Across, HelperLooks, Measured
+from planner.across import MEAN_WEIGHT, Across, HelperLooks, Measured
 from planner.types import DetectionCurve
 
 HALF = DetectionCurve(np.array([0.0, 10.0]), np.array([0.5, 0.5]))
@@ -65,6 +65,20 @@ def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:
     wide = Across(12_000.0, [], GAPPED, 40.0, 5.0)
     assert wide.step_m == 3
     assert 0.99 < wide.worst30([100]) <= 1.0
+
+
+@given(
+    flown=st.lists(st.integers(-20, 120), max_size=3),
+    bins=st.lists(st.integers(-20, 120), max_size=3),
+    rho=st.sampled_from([0.0, 0.4, 1.0]),
+)
+def test_risk_is_that_of_the_map(flown: list[int], bins: list[int], rho: float) -> None:
+    ground = Across(100.0, [Measured(float(one), GAPPED, 30.0) for one in flown], GAPPED, 30.0, 5.0, rho)
+    cells_m = np.arange(0.0, 100.0, 5.0)
+    nats = np.array([np.zeros(20), *(-np.log1p(-GAPPED.at(np.abs(cells_m - one))) for one in [*flown, *bins])])
+    risk = np.sort(np.exp(-(nats.max(axis=0) + (1 - rho) * (nats.sum(axis=0) - nats.max(axis=0)))))
+    assert ground.worst30(bins) == pytest.approx(risk[-6:].mean())
+    assert ground.worth(bins).risk == pytest.approx(risk[-6:].mean() + MEAN_WEIGHT * risk.mean())
 
 
 @given(

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.across import Across, HelperLooks, Measured
+from planner.across import MOST_MOVED, Across, HelperLooks, Measured
 from planner.curve import effective_range_m
 from planner.profile_spacing import (
     JointSpacing,
@@ -74,6 +74,13 @@ class TestThePapersExperiments:
         then = laid(ProfileSpacing(40, 130), part(first[0], planned_m=first[1:])).offsets_m
         assert worst30(first[0], *then) <= worst30(*first) + 1e-3
         assert max(abs(one - other) for one, other in zip(then, first[1:], strict=True)) <= 10
+
+    def test_of_a_wide_part_the_tracks_flown_first_are_moved(self) -> None:
+        theirs = algorithm_1(ProfileSpacing(40, 130), 4000.0, 130)
+        ours = laid(ProfileSpacing(40, 130), part(width_m=4000.0)).offsets_m
+        assert len(ours) == len(theirs)
+        assert ours[MOST_MOVED:] == pytest.approx(theirs[MOST_MOVED:], abs=0.5)
+        assert ours[:MOST_MOVED] != pytest.approx(theirs[:MOST_MOVED], abs=2)
 
     def test_it_ends_when_algorithm_1_would(self) -> None:
         assert ProfileSpacing(40, 130).lay(part(*THEIRS), TERMS) is None
