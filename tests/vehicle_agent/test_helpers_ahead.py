@@ -32,3 +32,8 @@ def test_primaries_share_helpers_and_helpers_add_up() -> None:
 
 def test_nobody_looks_where_there_is_no_helper() -> None:
     assert helper_looks([PRIMARY], PRIMARY.vehicle) == HelperLooks()
+
+
+def test_nothing_is_expected_while_one_flies_that_cannot_or_is_not_announced() -> None:
+    assert helper_looks([replace(PRIMARY, speed_mps=0.0), HELPER], PRIMARY.vehicle) == HelperLooks()
+    assert helper_looks([PRIMARY, HELPER], "nobody") == HelperLooks()
