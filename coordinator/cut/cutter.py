@@ -51,25 +51,25 @@ class Cutter:
         best, after = self._cuts(left, opened), left
         if time_m > 0:  # else nobody can be sent any more, and what is open is left as it is
             best = [one for one in best if one.counts_m2 > self._kept.least_m2(one.window)]
-            kept = self._kept
-            gained_m2, after = self._flown(left, best, flown(best))
-            most_m2 = gained_m2 * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
+            before_m2, kept = left.left_m2(), self._kept
+            after, rest_m2 = self._flown(left, best, flown(best))
+            most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
             for way in self._ways:
                 anew = self._cuts(left, way.windows(left, time_m))
-                gained_m2, after_anew = self._flown(left, anew, flown(anew))
-                gained_m2 *= 1.0 + TURNS_FOR if way is kept else 1.0
+                after_anew, rest_m2 = self._flown(left, anew, flown(anew))
+                gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
                 if gained_m2 > most_m2 or not best:
                     most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
         self.threshold = after.worst_from()
         return best
 
-    def _flown(self, ground: Ground, cuts: Sequence[Cut], shares: Mapping[int, float]) -> tuple[float, Ground]:
-        """What strips bring beyond what a metre costs at least, and the ground as they leave it."""
+    def _flown(self, ground: Ground, cuts: Sequence[Cut], shares: Mapping[int, float]) -> tuple[Ground, float]:
+        """The ground as strips leave it, and what is left of the objective with what their metres cost at least."""
         after, least_m2 = ground.copy(), 0.0
         for place, share in shares.items():
             after.fly(cuts[place].window, share)
             least_m2 += share * self._kept.least_m2(cuts[place].window)
-        return ground.left_m2() - after.left_m2() - least_m2, after
+        return after, after.left_m2() + least_m2
 
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
         """What windows bring if they are flown one after the other."""
