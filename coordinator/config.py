@@ -34,6 +34,7 @@ class CoordinatorConfig:
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
+    `across`: whether strips may run across the tracks, too.
     `priorities`: ground whose residual risk counts more, or less.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens."""
 
@@ -47,5 +48,6 @@ class CoordinatorConfig:
     deadline_s: float = math.inf
     separation_m: float = 0.0
     objective: Literal["mean", "worst30", "both", "targets"] = "both"
+    across: bool = False
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
     priorities: tuple[PriorityGround, ...] = ()

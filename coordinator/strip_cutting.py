@@ -52,7 +52,8 @@ class StripCutting:
         self._objective = OBJECTIVES[config.objective]
         area_m2 = fleet.map.grid.cell_area_m2
         least_worth = self._objective.mean * config.worth_risk * narrowest.p_detect * area_m2
-        self._cutter = Cutter(fleet.map.grid, rules, max(least_worth, LEAST_WORTH * area_m2))
+        least_worth = max(least_worth, LEAST_WORTH * area_m2)
+        self._cutter = Cutter(fleet.map.grid, rules, least_worth, across=config.across)
         self._weights = weights_over(fleet.map.grid, inside, config.priorities) * area_m2
         self._expected = expected
         self._briefing = briefing

@@ -1,7 +1,8 @@
 """Cuts as many strips as helpers have time for: the price of a metre flown is found at which they are just so many.
 
-They are cut along the tracks, where bands lie that were seen badly, and again across them, where there is often room
-for longer ones and fewer turns. Those are chosen that leave less when helpers have flown the best of them.
+They are cut along the tracks, where bands lie that were seen badly, and, where they may be, again across them, where
+there is often room for longer ones and fewer turns. Those are chosen that leave less when helpers have flown the best
+of them.
 """
 
 from __future__ import annotations
@@ -26,12 +27,14 @@ Flown = Callable[[Sequence[Cut]], Mapping[int, float]]
 class Cutter:
     """Remembers prices and heading, which hardly change from one cut to the next. `least_worth`: what a cell has to
     count for a look to be worth flying there whatever time there is, as a mean over a swath (residual risk times
-    m2)."""
+    m2). `across`: whether strips may run across the tracks, too."""
 
-    def __init__(self, grid: GridSpec, rules: CuttingRules, least_worth: float) -> None:
+    def __init__(self, grid: GridSpec, rules: CuttingRules, least_worth: float, *, across: bool = False) -> None:
         self._cell_area_m2 = grid.cell_area_m2
         least_price = least_worth * rules.swath_m / grid.cell_area_m2
-        self._ways = [OneHeading(grid, rules, least_price, across=across) for across in (False, True)]
+        self._ways = [
+            OneHeading(grid, rules, least_price, across=way) for way in ((False, True) if across else (False,))
+        ]
         self._kept = self._ways[0]
         self.threshold = 0.0
         """Residual risk from which on a cell will be of the worst, see `Ground`."""

@@ -228,6 +228,7 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
+        across=scenario.coordinator.across,
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
         strips=scenario.coordinator.strips,

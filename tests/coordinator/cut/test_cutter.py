@@ -87,29 +87,29 @@ def price(cutter: Cutter) -> float:
 class TestTime:
     @pytest.mark.parametrize("strips", [1, 3, 5])
     def test_so_many_are_cut_as_there_is_time_for_and_a_few_more_the_best_first(self, strips: int) -> None:
-        cuts = cut(Cutter(GRID, RULES, LEAST), ground(TWELVE), (strips - 0.5) * STRIP_M, (), ())
+        cuts = cut(Cutter(GRID, RULES, LEAST, across=True), ground(TWELVE), (strips - 0.5) * STRIP_M, (), ())
         assert strips + SPARE_STRIPS <= len(cuts) < 12
         assert windows(cuts) == [lane(number) for number in range(len(cuts))]
 
     @pytest.mark.parametrize("time_m", [12.5 * STRIP_M, math.inf])
     def test_where_there_is_time_for_all_all_are_cut_at_the_least_price(self, time_m: float) -> None:
-        cutter = Cutter(GRID, RULES, LEAST)
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
         assert set(windows(cut(cutter, ground(TWELVE), time_m, (), ()))) == {lane(number) for number in range(12)}
         assert price(cutter) == pytest.approx(0.1 * LOOK * 50)
 
     def test_what_is_worth_less_than_the_least_is_not_cut_whatever_time_there_is(self) -> None:
         # A strip of 300 m costs 400 m at 0.1 of a swath: what a look at 0.133 brings along it.
-        cutter = Cutter(GRID, RULES, LEAST)
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
         assert windows(cut(cutter, ground(lanes(0.13, 0.0, 0.14)), math.inf, (), ())) == [lane(2)]
 
     def test_without_time_nothing_is_cut(self) -> None:
-        assert cut(Cutter(GRID, RULES, LEAST), ground(TWELVE), 0.0, (), ()) == []
+        assert cut(Cutter(GRID, RULES, LEAST, across=True), ground(TWELVE), 0.0, (), ()) == []
 
     def test_where_nothing_is_to_be_looked_at_nothing_is_cut(self) -> None:
-        assert cut(Cutter(GRID, RULES, LEAST), ground(lanes()), math.inf, (), ()) == []
+        assert cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes()), math.inf, (), ()) == []
 
     def test_the_price_rises_where_time_is_short_and_falls_again_never_below_the_least(self) -> None:
-        cutter = Cutter(GRID, RULES, LEAST)
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
         least = price(cutter)
         cut(cutter, ground(TWELVE), 2.5 * STRIP_M, (), ())
         # Three strips are worth more than 400 m at this, and at 1.2 times as much they are not three.
@@ -123,7 +123,7 @@ class TestTime:
 
     @pytest.mark.parametrize("objective", sorted(OBJECTIVES))
     def test_the_first_cut_finds_the_price_however_far_it_lies_above_the_least(self, objective: str) -> None:
-        cutter = Cutter(GRID, RULES, 1e-3 * 25)
+        cutter = Cutter(GRID, RULES, 1e-3 * 25, across=True)
         first = cut(cutter, ground(TWELVE, objective), 1.5 * STRIP_M, (), ())
         found = price(cutter)
         assert cut(cutter, ground(TWELVE, objective), 1.5 * STRIP_M, (), ()) == first
@@ -133,7 +133,9 @@ class TestTime:
         # Five columns each of 0.6, 0.9, 0.9, 0.6: the best strip lies on the 0.9, but two beside it bring more.
         risk = lanes()
         risk[:, 10:30] = np.repeat([0.6, 0.9, 0.9, 0.6], 5)
-        one, two = (windows(cut(Cutter(GRID, RULES, LEAST), ground(risk), n * STRIP_M, (), ())) for n in (0.9, 1.9))
+        one, two = (
+            windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), n * STRIP_M, (), ())) for n in (0.9, 1.9)
+        )
         assert one[0] == Window(0, 60, 15, 25)
         assert set(two[:2]) == {Window(0, 60, 10, 20), Window(0, 60, 20, 30)}
 
@@ -142,7 +144,7 @@ class TestWhatIsTold:
     def test_what_a_strip_brings(self) -> None:
         told = ground(lanes(0.8), "both")
         told.weights[:] *= 2.0
-        (found,) = cut(Cutter(GRID, RULES, LEAST), told, math.inf, (), ())
+        (found,) = cut(Cutter(GRID, RULES, LEAST, across=True), told, math.inf, (), ())
         # 600 cells of 25 m2, of which a look removes 0.4; that counts twice, 0.7 for the mean and 0.3 / 0.3 for the
         # worst.
         assert found.removable_m2 == pytest.approx(600 * 25 * 0.4)
@@ -152,16 +154,16 @@ class TestWhatIsTold:
         told = ground(lanes(0.8, 0.8))
         told.is_seen[29:, :10] = False  # 31 rows of 60
         told.is_seen[31:, 10:] = False  # 29 rows
-        cuts = cut(Cutter(GRID, RULES, LEAST), told, math.inf, (), ())
+        cuts = cut(Cutter(GRID, RULES, LEAST, across=True), told, math.inf, (), ())
         assert {one.window: one.foreseen for one in cuts} == {lane(0): True, lane(1): False}
 
     def test_the_ground_is_left_as_it_is(self) -> None:
         told = ground(TWELVE.copy())
-        cut(Cutter(GRID, RULES, LEAST), told, math.inf, [lane(0)], [lane(1)])
+        cut(Cutter(GRID, RULES, LEAST, across=True), told, math.inf, [lane(0)], [lane(1)])
         assert (told.risk == TWELVE).all()
 
     def test_from_where_on_a_cell_is_of_the_worst_is_asked_after_what_there_is_time_for(self) -> None:
-        cutter = Cutter(GRID, RULES, LEAST)
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
         risk = lanes(0.9, 0.9, 0.9, 0.9, *[0.6] * 6, 0.5, 0.5)
         assert cutter.threshold == 0.0
         cut(cutter, ground(risk), 0.0, (), ())
@@ -180,11 +182,15 @@ class TestHeading:
 
     @pytest.mark.parametrize("across", [False, True])
     def test_strips_are_cut_as_helpers_leave_least_by_them(self, across: bool) -> None:
-        cuts = Cutter(GRID, RULES, LEAST).cut(self.ALL_HOT, 2 * STRIP_M, (), (), best_in(2 * STRIP_M, across=across))
+        cuts = Cutter(GRID, RULES, LEAST, across=True).cut(
+            self.ALL_HOT, 2 * STRIP_M, (), (), best_in(2 * STRIP_M, across=across)
+        )
         assert {one.window.across for one in cuts} == {across}
 
     def test_those_across_a_band_are_one_swath_wide_and_as_long_as_allowed(self) -> None:
-        cuts = Cutter(GRID, RULES, LEAST).cut(self.ALL_HOT, math.inf, (), (), best_in(math.inf, across=True))
+        cuts = Cutter(GRID, RULES, LEAST, across=True).cut(
+            self.ALL_HOT, math.inf, (), (), best_in(math.inf, across=True)
+        )
         pieces = {Window(row, row + 10, column, column + 60, across=True) for row in (0, 10) for column in (0, 60)}
         assert set(windows(cuts)) == pieces
 
@@ -200,7 +206,7 @@ class TestHeading:
         # Twelve strips of 100 m along, four of 300 m across: a look at all takes 27,000 m2, and a metre, with 100 m on
         # the way to each strip, costs 2.5 m2 at least. So 21,000 and 23,000 m2 are gained by flying all.
         even = 0.5 * 21 / 23
-        cutter = Cutter(GRID, RULES, LEAST)
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
         told = self.ALL_HOT
         opened = windows(cutter.cut(told, math.inf, (), (), helpers_that_fly(0.5, 0.3)))
         assert not opened[0].across
@@ -215,12 +221,14 @@ class TestClaimed:
     def test_what_is_with_a_vehicle_counts_as_flown(self) -> None:
         # What a look leaves of 0.9 is 0.45: worth one more, after 0.6 and 0.5.
         risk = lanes(0.9, 0.6, 0.5)
-        cuts = cut(Cutter(GRID, RULES, LEAST), ground(risk), 2.5 * STRIP_M, [lane(0)], ())
+        cuts = cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), 2.5 * STRIP_M, [lane(0)], ())
         assert windows(cuts) == [lane(1), lane(2), lane(0)]
         assert cuts[2].removable_m2 == pytest.approx(600 * 25 * 0.45 * LOOK)
 
     def test_what_is_claimed_in_part_is_worth_the_rest(self) -> None:
-        (found,) = cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.9)), math.inf, [Window(0, 30, 0, 10)], ())
+        (found,) = cut(
+            Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.9)), math.inf, [Window(0, 30, 0, 10)], ()
+        )
         assert found.window == lane(0)
         assert found.counts_m2 == pytest.approx(600 * 25 * (0.9 + 0.45) / 2 * LOOK)
 
@@ -230,26 +238,28 @@ class TestOpenStrips:
         risk = lanes(0.9)
         opened = Window(0, 60, 1, 11)  # a column aside: nine tenths
         risk[:, 10] = 0.89
-        assert windows(cut(Cutter(GRID, RULES, LEAST), ground(risk), math.inf, (), [opened])) == [opened]
+        assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), math.inf, (), [opened])) == [opened]
 
     def test_they_are_cut_anew_where_that_is_better(self) -> None:
         opened = Window(0, 60, 1, 11)  # brings nine tenths of what the lane does
-        assert windows(cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.9)), math.inf, (), [opened])) == [lane(0)]
+        assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.9)), math.inf, (), [opened])) == [
+            lane(0)
+        ]
 
     def test_what_they_bring_is_told_anew(self) -> None:
-        (found,) = cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.7)), math.inf, (), [lane(0)])
+        (found,) = cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.7)), math.inf, (), [lane(0)])
         assert found.window == lane(0)
         assert found.removable_m2 == pytest.approx(600 * 25 * 0.35)
 
     def test_they_do_not_stay_where_there_is_time_for_more(self) -> None:
-        cuts = cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.9, 0.89)), math.inf, (), [lane(0)])
+        cuts = cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.9, 0.89)), math.inf, (), [lane(0)])
         assert windows(cuts) == [lane(0), lane(1)]
 
     def test_they_are_dropped_where_they_pay_no_more(self) -> None:
-        assert cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.05)), math.inf, (), [lane(0)]) == []
+        assert cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.05)), math.inf, (), [lane(0)]) == []
 
     def test_cutting_again_changes_nothing(self) -> None:
-        cutter = Cutter(GRID, RULES, LEAST)
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
         first = cut(cutter, ground(TWELVE), 3.5 * STRIP_M, (), ())
         assert cut(cutter, ground(TWELVE), 3.5 * STRIP_M, (), windows(first)) == first
 
@@ -265,7 +275,7 @@ def test_each_tells_what_those_before_it_and_those_that_are_claimed_leave(
     risks: list[float], strips: float, claimed: list[int], objective: str
 ) -> None:
     left = ground(lanes(*risks), objective)
-    cutter = Cutter(GRID, RULES, LEAST)
+    cutter = Cutter(GRID, RULES, LEAST, across=True)
     cuts = cut(cutter, left, strips * STRIP_M, [lane(number) for number in claimed], ())
     for number in claimed:
         left.fly(lane(number))
