@@ -142,8 +142,7 @@ class TestInMidMission:
 
     def test_one_condition_after_the_other_with_trouble_in_between(self, brief: MakeFleet) -> None:
         def lost(heard: Heard) -> bool:
-            last = heard.last("coord/strip/*")
-            return last is not None and "lost" in getattr(last.message, "reason", "")
+            return any("lost" in getattr(one.message, "reason", "") for one in heard.messages("coord/strip/*"))
 
         fleet = brief(overrides={"coordinator.lost_after_s": 10})
         fleet.run_until(first_task, timeout_s=100)
