@@ -142,9 +142,10 @@ class TestInMidMission:
 
     def test_one_condition_after_the_other_with_trouble_in_between(self, brief: MakeFleet) -> None:
         def lost(heard: Heard) -> bool:
-            return any("lost" in getattr(one.message, "reason", "") for one in heard.messages("coord/strip/*"))
+            last = heard.last("coord/strip/*")
+            return last is not None and "lost" in getattr(last.message, "reason", "")
 
-        fleet = brief(overrides={"coordinator.lost_after_s": 10})
+        fleet = brief(overrides={"coordinator.lost_after_s": 10, "mission.separation_m": 0})
         fleet.run_until(first_task, timeout_s=100)
         offered_s = fleet.now_s
         fleet.kill("helper", at_s=offered_s + 5)
