@@ -28,7 +28,7 @@ MOST_PACKETS = 16  # that may wait to be sent; the most there may be
 MOST_MAIL = 1 << 20
 LEASE_S = 4.0  # a link of which nothing is heard for so long, not even a sign of life, is given up
 BLOCK_S = 1.0  # so long a message waits for a link that takes nothing, before that is given up
-DROP_S = 0.02  # so long what may be left out waits for room: on a busy machine it takes a while to be made
+DROP_S = 0.1  # so long what may be left out waits for room: on a busy machine it takes a while to be made
 RETRY_S = (0.2, 1.0)  # a lost link is tried again after the first of these, in the end every second one
 
 

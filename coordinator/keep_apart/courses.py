@@ -4,7 +4,7 @@ vehicles on their courses come too close to each other."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +19,7 @@ from planner.types import FloatArray
 STEP_S = 2.0
 """Courses are sampled at the whole multiples of this, so that any two are at the same times."""
 AHEAD_S = 900.0
-"""A course is laid so far ahead."""
+"""A course is laid so far beyond its paths' end; of a survey's tracks those are laid that are begun so soon."""
 ON_TRACK_M = 2.0
 
 
@@ -49,17 +49,18 @@ class Course:
         return Course(self.first, np.concatenate([waiting, self.poses]), self.arrives_s + steps * STEP_S)
 
 
-def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, paths: Iterable[DubinsPath]) -> Course:
+def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, paths: Sequence[DubinsPath]) -> Course:
     """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard."""
     first = math.ceil(start_s / STEP_S)
-    times_s = STEP_S * np.arange(first, first + math.ceil(AHEAD_S / STEP_S), dtype=np.float64)
+    lasts_s = sum(path.length_m for path in paths) / speed_mps + AHEAD_S
+    times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
     way_m: FloatArray = speed_mps * (times_s - start_s)
     parts, done, done_m, pose = [], 0, 0.0, start
     for path in paths:
         to = int(np.searchsorted(way_m, done_m + path.length_m))
         parts.append(path.poses_at(way_m[done:to] - done_m))
         pose, done, done_m = path.pose_at(path.length_m), to, done_m + path.length_m
-    circle = DubinsPath(pose, turn_radius_m, (1, 0, 0), (speed_mps * AHEAD_S, 0.0, 0.0))
+    circle = DubinsPath(pose, turn_radius_m, (1, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
     parts.append(circle.poses_at(way_m[done:] - done_m))
     return Course(first, np.concatenate(parts), start_s + done_m / speed_mps)
 

@@ -49,6 +49,18 @@ class TestCourses:
         there, at_s = laid.at(served.free_s)
         assert math.dist(there[:2], served.free_at[:2]) <= free.speed_mps * (at_s - served.free_s) + 1e-6
 
+    def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
+        one, free = strip(1, 0, 0, length_m=4000), helper(x_m=0, y_m=-100)
+        sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
+        laid = sweep_course(free.pose, 0, free.speed_mps, free.turn_radius_m, sweep)
+        crosses_s = laid.arrives_s - 60
+        assert crosses_s > 1800
+        meets = laid.at(crosses_s)[0]
+        crossing = ahead(meets.x_m - 2 * crosses_s, meets.y_m, EAST, 2, 2 * crosses_s + 200)
+        found = too_close(laid, crossing, 10, 0, crosses_s + 100)
+        assert found is not None
+        assert found.time_s == pytest.approx(crosses_s, abs=20)
+
     def test_a_track_under_way_ends_when_the_primary_says(self) -> None:
         entry = vehicle("primary", Role.SURVEY)
         tracks = (PlannedTrack(1, 0, 0, 0, 0, 400, False), PlannedTrack(2, 100, 100, 400, 100, 0, False))

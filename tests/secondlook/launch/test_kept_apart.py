@@ -38,6 +38,11 @@ class TestMissions:
         assert told["pairs_closer"] == 0
         assert told["closest"][0]["closest_m"] == pytest.approx(flight.closest[0].closest_m, abs=0.01)
 
+    @pytest.mark.parametrize("allocator", ["greedy", "nearest"])
+    def test_no_two_come_too_close_where_long_strips_cross(self, tmp_path: Path, allocator: str) -> None:
+        crossing = ("coordinator.across=true", "coordinator.max_strip_m=2000", f"coordinator.allocator={allocator}")
+        assert_kept_apart(Fleet("five-helpers", folder=tmp_path, overrides=crossing, seed=1).run())
+
     def test_they_do_where_nobody_sees_to_it(self, tmp_path: Path) -> None:
         fleet = Fleet("five-helpers", folder=tmp_path, overrides=("mission.separation_m=0",), seed=1)
         flight = fleet.run()
