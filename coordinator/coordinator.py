@@ -28,7 +28,9 @@ from planner.region import Region
 
 log = logging.getLogger("secondlook.coordinator")
 
-CUT_WITHIN_MS = 60_000  # of news by which no helper can be sent at once
+# News is cut by at once where a helper is free, or none is at a strip; else within the first of these where one that is
+# on its way may be turned round, and within the second where none is.
+TURN_WITHIN_MS, CUT_WITHIN_MS = 10_000, 120_000
 
 
 class Coordinator:
@@ -109,7 +111,7 @@ class Coordinator:
                 self._agenda.add(Item.CUT, now_ms + CUT_WITHIN_MS)
         elif isinstance(message, Hotspot) and self._cutting is not None:
             if self._cutting.hear_hotspot(received, message):
-                self._agenda.add(Item.CUT, now_ms)
+                self._cut_soon(now_ms)
         elif isinstance(message, AgentState) and vehicle is not None:
             self._hear_state(vehicle, header, message, now_ms)
         elif isinstance(message, TaskStatus) and vehicle is not None:
@@ -118,9 +120,13 @@ class Coordinator:
             self._cut_soon(now_ms)
 
     def _cut_soon(self, now_ms: int) -> None:
-        """There is news of the survey: cut at once where a helper can be sent by it, else before long."""
-        at_hand = any(one.is_idle or one.is_on_its_way for one in self.fleet.helpers)
-        self._agenda.add(Item.CUT, now_ms if at_hand else now_ms + CUT_WITHIN_MS)
+        """There is news of the survey: the sooner cut by, the sooner a helper can be sent by it."""
+        helpers = self.fleet.helpers
+        if any(one.is_idle for one in helpers) or not any(one.is_at_a_strip and not one.lost for one in helpers):
+            within_ms = 0
+        else:
+            within_ms = TURN_WITHIN_MS if any(one.is_on_its_way for one in helpers) else CUT_WITHIN_MS
+        self._agenda.add(Item.CUT, now_ms + within_ms)
 
     def _hear_state(self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int) -> None:
         was_idle, was_finished, was_lost, before = vehicle.is_idle, vehicle.is_finished, vehicle.lost, vehicle.state

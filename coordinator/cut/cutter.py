@@ -8,9 +8,10 @@ of them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 from coordinator.cut.ground import Ground
-from coordinator.cut.strips import Cut, CuttingRules, cut_windows
+from coordinator.cut.strips import Cut, CuttingRules, cells_wide, cut_windows
 from coordinator.cut.window import Window
 from planner.types import GridSpec
 
@@ -18,6 +19,7 @@ SPARE_STRIPS = 4  # so many more than helpers have time for, so that there is a 
 STEP = 1.2  # by which the price is changed until they are so many
 MOST_STEPS = 48  # more than from the least price to the highest there is
 STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be better than those that are open
+BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
 TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
 
 Flown = Callable[[Sequence[Cut]], Mapping[int, float]]
@@ -30,11 +32,12 @@ class Cutter:
     m2). `across`: whether strips may run across the tracks, too."""
 
     def __init__(self, grid: GridSpec, rules: CuttingRules, least_worth: float, *, across: bool = False) -> None:
-        self._cell_area_m2 = grid.cell_area_m2
+        self._cell_area_m2, self._shape = grid.cell_area_m2, grid.shape
+        self._block = _block(cells_wide(grid, rules.swath_m))
         least_price = least_worth * rules.swath_m / grid.cell_area_m2
-        self._ways = [
-            OneHeading(grid, rules, least_price, across=way) for way in ((False, True) if across else (False,))
-        ]
+        blocks = replace(grid, cell_m=grid.cell_m * self._block)
+        headings = (False, True) if across else (False,)
+        self._ways = [OneHeading(blocks, rules, least_price, across=way) for way in headings]
         self._kept = self._ways[0]
         self.threshold = 0.0
         """Residual risk from which on a cell will be of the worst, see `Ground`."""
@@ -48,23 +51,27 @@ class Cutter:
         `claimed`: windows that are with a vehicle. `opened`: those of the open strips, which stay where they are if
         what is cut anew is hardly better.
         """
-        left = ground.copy()
+        in_cells, left = ground.copy(), ground.in_blocks(self._block)
         for window in claimed:
-            left.fly(window)
-        best, after = self._cuts(left, opened), left
+            in_cells.fly(window)
+            left.fly(window.in_blocks(self._block))
+        best, after = self._cuts(left, [window.in_blocks(self._block) for window in opened]), left
         if time_m > 0:  # else nobody can be sent any more, and what is open is left as it is
             best = [one for one in best if one.counts_m2 > self._kept.least_m2(one.window)]
             before_m2, kept = left.left_m2(), self._kept
-            after, rest_m2 = self._flown(left, best, flown(best))
+            after, rest_m2 = self._flown(left, best, flown(self._in_cells(best)))
             most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
             for way in self._ways:
                 anew = self._cuts(left, way.windows(left, time_m))
-                after_anew, rest_m2 = self._flown(left, anew, flown(anew))
+                after_anew, rest_m2 = self._flown(left, anew, flown(self._in_cells(anew)))
                 gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
                 if gained_m2 > most_m2 or not best:
                     most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
         self.threshold = after.worst_from()
-        return best
+        return self._cuts(in_cells, [one.window for one in self._in_cells(best)])
+
+    def _in_cells(self, cuts: Sequence[Cut]) -> list[Cut]:
+        return [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in cuts]
 
     def _flown(self, ground: Ground, cuts: Sequence[Cut], shares: Mapping[int, float]) -> tuple[Ground, float]:
         """The ground as strips leave it, and what is left of the objective with what their metres cost at least."""
@@ -136,3 +143,9 @@ class OneHeading:
 
     def _metres(self, windows: Sequence[Window]) -> float:
         return sum(self._rules.metres_flown(one.cells_long * self._grid.cell_m) for one in windows)
+
+
+def _block(width: int) -> int:
+    """So many cells a side are taken together: as many as divide a swath and leave it enough blocks."""
+    sizes = (size for size in range(1, width + 1) if width % size == 0 and width // size >= BLOCKS_A_SWATH)
+    return max(sizes, default=1)

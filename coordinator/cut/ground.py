@@ -55,6 +55,22 @@ class Ground:
         one flies the other."""
         return replace(self, risk=self.risk.T, look=self.look.T, weights=self.weights.T, is_seen=self.is_seen.T)
 
+    def in_blocks(self, block: int) -> Ground:
+        """The same by blocks of so many cells a side, of which the last may have fewer: what a look removes of a block,
+        flown whole, is what it removes of its cells."""
+        weights = np.where(self.risk > 0, self.weights, 0.0)
+        weights_of, at_risk, removed, seen = (
+            _sums(one, block)
+            for one in (weights, weights * self.risk, weights * self.risk * self.look, weights * self.is_seen)
+        )
+        return replace(
+            self,
+            risk=at_risk / np.where(weights_of > 0, weights_of, 1.0),
+            look=removed / np.where(at_risk > 0, at_risk, 1.0),
+            weights=weights_of,
+            is_seen=seen > weights_of / 2,
+        )
+
     def fly(self, window: Window, share: float = 1.0) -> None:
         """A look along a window is flown, or counts as if it were; `share`: as far as that, taken alike over all of
         it."""
@@ -85,3 +101,11 @@ class Ground:
             above = np.maximum(risk - self.threshold, 0.0) - np.maximum(risk * (1.0 - look) - self.threshold, 0.0)
             worth = worth + self.objective.worst / WORST * above
         return self.weights[cells] * worth
+
+
+def _sums(values: FloatArray, block: int) -> FloatArray:
+    """Sums over blocks of cells."""
+    rows, columns = (-(-size // block) for size in values.shape)
+    padded = np.pad(values, [(0, rows * block - values.shape[0]), (0, columns * block - values.shape[1])])
+    sums: FloatArray = padded.reshape(rows, block, columns, block).sum(axis=(1, 3))
+    return sums

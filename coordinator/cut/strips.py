@@ -12,15 +12,12 @@ import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-import numpy as np
-
 from coordinator.cut.bands import TOLERANCE, side_by_side
 from coordinator.cut.ground import Ground
 from coordinator.cut.window import Window
-from planner.types import FloatArray, GridSpec, Point, Strip
+from planner.types import GridSpec, Point, Strip
 
 MOST_PASSES = 6  # of the search, each over what those before have left
-BLOCKS_A_SWATH = 10  # cells are taken together in blocks, of which at least so many make a swath
 
 
 @dataclass(frozen=True)
@@ -79,41 +76,17 @@ def cut_windows(
 def _side_by_side(grid: GridSpec, ground: Ground, rules: CuttingRules, price: float) -> list[Window]:
     """Windows up the rows that pay for themselves."""
     width = min(ground.risk.shape[1], cells_wide(grid, rules.swath_m))
-    block = _block(width)
-    worth = _in_blocks(ground.worth(), block)
-    cell_m = grid.cell_m * block
+    worth, cell_m = ground.worth(), grid.cell_m
     row_cost, fixed_cost = price * cell_m, price * rules.overhead_m
     shortest = max(1, round(rules.min_strip_m / cell_m))
     longest = max(shortest, round(rules.max_strip_m / cell_m))
     found = []
-    for band in side_by_side(worth, width // block, row_cost, fixed_cost):
+    for band in side_by_side(worth, width, row_cost, fixed_cost):
         for begin, end in _pieces(band.first_row, band.end_row, shortest, longest):
             piece = replace(band, first_row=begin, end_row=end)
             if float(worth[piece.cells].sum()) > (piece.rows * row_cost + fixed_cost) * (1 + TOLERANCE):
-                found.append(_of_cells(ground.risk.shape, piece, block))
+                found.append(piece)
     return found
-
-
-def _block(width: int) -> int:
-    """So many cells a side are taken together: as many as divide a swath and leave it enough blocks."""
-    sizes = (size for size in range(1, width + 1) if width % size == 0 and width // size >= BLOCKS_A_SWATH)
-    return max(sizes, default=1)
-
-
-def _in_blocks(worth: FloatArray, block: int) -> FloatArray:
-    """Sums over blocks of cells; the last ones may have fewer."""
-    if block == 1:
-        return worth
-    rows, columns = (-(-size // block) for size in worth.shape)
-    padded = np.pad(worth, [(0, rows * block - worth.shape[0]), (0, columns * block - worth.shape[1])])
-    sums: FloatArray = padded.reshape(rows, block, columns, block).sum(axis=(1, 3))
-    return sums
-
-
-def _of_cells(shape: tuple[int, int], window: Window, block: int) -> Window:
-    """A window of blocks as one of cells, as far as the grid goes."""
-    first_column, end_column = window.first_column * block, min(window.end_column * block, shape[1])
-    return Window(window.first_row * block, min(window.end_row * block, shape[0]), first_column, end_column)
 
 
 def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:

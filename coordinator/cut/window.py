@@ -49,6 +49,16 @@ class Window:
         """The same on the grid with rows and columns exchanged."""
         return Window(self.first_column, self.end_column, self.first_row, self.end_row, not self.across)
 
+    def in_blocks(self, block: int) -> Window:
+        """The blocks of so many cells a side that hold it."""
+        first_row, first_column = self.first_row // block, self.first_column // block
+        return Window(first_row, -(-self.end_row // block), first_column, -(-self.end_column // block), self.across)
+
+    def in_cells(self, block: int, shape: tuple[int, int]) -> Window:
+        """The cells of a window of blocks, as far as a grid of that shape goes."""
+        end_row, end_column = min(self.end_row * block, shape[0]), min(self.end_column * block, shape[1])
+        return Window(self.first_row * block, end_row, self.first_column * block, end_column, self.across)
+
     @property
     def cells_long(self) -> int:
         """Number of cells that its strip is long."""

@@ -88,9 +88,17 @@ class TestFromHotspotToTask:
     def test_a_helper_at_work_is_offered_nothing(self) -> None:
         told = with_a_helper()
         told.hotspot(ELSEWHERE, number=2)
-        told.settle()
+        told.keep_alive([PRIMARY, HELPER], 10)
         assert told.states() == {1: ACCEPTED, 2: OPEN}
         assert len(told.tasks()) == 1
+
+    def test_what_is_heard_while_all_are_at_work_is_cut_in_two_minutes(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.hotspot(ELSEWHERE, number=2)
+        told.keep_alive([PRIMARY, HELPER], 119)
+        assert told.states() == {1: UNDER_WAY}
+        told.keep_alive([PRIMARY, HELPER], 1)
+        assert told.states() == {1: UNDER_WAY, 2: OPEN}
 
     def test_a_place_that_is_being_served_is_not_cut_again(self) -> None:
         told = with_a_helper()

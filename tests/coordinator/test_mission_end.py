@@ -56,18 +56,22 @@ class TestTheEnd:
         assert len(told.node.all(MissionOver)) == 19
 
     def test_what_is_left_is_left_open_with_a_reason(self) -> None:
-        told = with_a_helper(TaskState.UNDER_WAY)
+        told = coordinator()
+        told.hotspot()
         told.hotspot(ELSEWHERE, number=2)
+        told.settle()
+        ((_, _, served),) = told.tasks()
+        told.state(HELPER, Mode.REVISIT, served)
         told.state(PRIMARY, Mode.FINISHED, at_ms=20_000)
         told.settle()
-        told.state(HELPER, Mode.REVISIT, 1)
+        told.state(HELPER, Mode.REVISIT, served)
         told.node.wait(2)
         over = next(one for one in told.node.said if isinstance(one.message, MissionOver))
         last = [one for one in told.node.said if isinstance(one.message, StripStatus)][-2:]
         assert [(one.number, one.at_ms) for one in last] == [(1, over.at_ms), (2, over.at_ms)]
         assert told.states() == {1: OPEN, 2: OPEN}
-        assert told.strips()[1].reason == f"left when the mission was over: {HELPER} has not ended it"
-        assert told.strips()[2].reason == "left when the mission was over: nobody has served it"
+        assert told.strips()[served].reason == f"left when the mission was over: {HELPER} has not ended it"
+        assert told.strips()[3 - served].reason == "left when the mission was over: nobody has served it"
 
     def test_by_the_clock_it_is_over_at_the_deadline_whether_or_not_the_survey_is(self) -> None:
         told = coordinator(deadline_s=50)

@@ -45,14 +45,14 @@ class TestHowAStripGoesOn:
     def test_done_counts_only_where_the_map_shows_it(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
         risk = looked(0.9)
-        risk[10:45] = 1.0  # 25 of 60 rows were seen
+        risk[10:46] = 1.0  # 24 of 60 rows were seen
         told.layer(HELPER, risk)
         told.state(HELPER, Mode.IDLE)
         told.status(HELPER, 1, TaskState.DONE)
         told.settle()
         assert told.states() == {1: FAILED, 2: OPEN}
-        assert told.strips()[1].reason == f"{HELPER} says done, but saw 42% of it"
-        assert told.strips()[2].length_m == 175
+        assert told.strips()[1].reason == f"{HELPER} says done, but saw 40% of it"
+        assert told.strips()[2].length_m == 180
         # Whoever has failed at a place is not offered it again; another one is.
         assert len(told.tasks()) == 1
         told.state(SECOND_HELPER, Mode.IDLE)
@@ -117,7 +117,7 @@ class TestHowAStripGoesOn:
         told.hotspot()
         told.settle()
         told.layer(PRIMARY, np.full(GRID.shape, 0.3))
-        told.keep_alive([PRIMARY], 61)
+        told.keep_alive([PRIMARY], 121)
         assert told.states() == {1: WITHDRAWN}
 
     def test_a_strip_that_moves_keeps_its_number(self) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from coordinator.cut import cutter
 from coordinator.cut.cutter import SPARE_STRIPS, Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.strips import Cut, CuttingRules
@@ -130,13 +132,13 @@ class TestTime:
         assert price(cutter) == found > 100 * 1e-3 * 50
 
     def test_where_time_is_short_two_side_by_side_are_cut_where_there_is_time_for_two(self) -> None:
-        # Five columns each of 0.6, 0.9, 0.9, 0.6: the best strip lies on the 0.9, but two beside it bring more.
+        # Ten columns of 0.9, and six and four of 0.6 beside them: the best strip lies on the 0.9, but two bring more.
         risk = lanes()
-        risk[:, 10:30] = np.repeat([0.6, 0.9, 0.9, 0.6], 5)
+        risk[:, 10:30] = np.repeat([0.6, 0.9, 0.6], [6, 10, 4])
         one, two = (
             windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), n * STRIP_M, (), ())) for n in (0.9, 1.9)
         )
-        assert one[0] == Window(0, 60, 15, 25)
+        assert one[0] == Window(0, 60, 16, 26)
         assert set(two[:2]) == {Window(0, 60, 10, 20), Window(0, 60, 20, 30)}
 
 
@@ -236,12 +238,12 @@ class TestClaimed:
 class TestOpenStrips:
     def test_they_stay_where_what_is_cut_anew_is_hardly_better(self) -> None:
         risk = lanes(0.9)
-        opened = Window(0, 60, 1, 11)  # a column aside: nine tenths
-        risk[:, 10] = 0.89
+        opened = Window(0, 60, 2, 12)  # two columns aside, on which there is hardly anything
+        risk[:, 0:2] = 0.01
         assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), math.inf, (), [opened])) == [opened]
 
     def test_they_are_cut_anew_where_that_is_better(self) -> None:
-        opened = Window(0, 60, 1, 11)  # brings nine tenths of what the lane does
+        opened = Window(0, 60, 2, 12)  # brings eight tenths of what the lane does
         assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.9)), math.inf, (), [opened])) == [
             lane(0)
         ]
@@ -284,3 +286,57 @@ def test_each_tells_what_those_before_it_and_those_that_are_claimed_leave(
         assert one.removable_m2 == pytest.approx(left.risk[one.window.cells].sum() * LOOK * 25)
         assert one.counts_m2 > LEAST / 25 * 50 * (one.window.rows * 5 + 100)  # 50 m a swath
         left.fly(one.window)
+
+
+class TestBlocks:
+    """Cells of 1 m: 40 of them make a swath, and eight by eight are taken together."""
+
+    FINE = GridSpec(SweepFrame(0, 0, 0), 1, 160, 200)
+    RULES = CuttingRules(swath_m=40, overhead_m=20, min_strip_m=16, max_strip_m=400)
+
+    def found(self, risk: FloatArray, rules: CuttingRules = RULES, time_m: float = math.inf) -> list[Window]:
+        rows, columns = risk.shape
+        told = Ground(
+            risk=risk,
+            look=np.full(risk.shape, LOOK),
+            weights=np.ones(risk.shape),
+            is_seen=np.ones(risk.shape, dtype=np.bool_),
+            objective=OBJECTIVES["mean"],
+            threshold=0.0,
+        )
+        grid = replace(self.FINE, rows=rows, columns=columns)
+        return windows(
+            Cutter(grid, rules, 1e-3).cut(told, time_m, (), (), lambda cuts: dict.fromkeys(range(len(cuts)), 1.0))
+        )
+
+    @pytest.mark.parametrize(("width", "block"), [(1, 1), (5, 1), (9, 1), (10, 2), (20, 4), (23, 1), (40, 8), (41, 1)])
+    def test_as_many_are_taken_together_as_divide_a_swath_into_five_or_more(self, width: int, block: int) -> None:
+        risk = np.zeros((4 * width, width))  # what is hot is a cell: found as the block that it is in
+        risk[2 * width + 1, 0] = 1.0
+        rules = CuttingRules(swath_m=width, overhead_m=0, min_strip_m=1, max_strip_m=400)
+        (window,) = self.found(risk, rules)
+        assert (window.rows, window.columns_wide) == (block, width)
+        assert window.first_row <= 2 * width + 1 < window.end_row
+
+    @settings(max_examples=40, deadline=None)
+    @given(
+        bands=st.lists(
+            st.tuples(st.integers(0, 3), st.integers(0, 20), st.integers(3, 10), st.sampled_from([0.6, 0.8, 1.0])),
+            max_size=4,
+            unique_by=lambda one: one[0],
+        )
+    )
+    def test_what_lies_on_blocks_is_cut_as_it_is_by_the_cell(self, bands: list[tuple[int, int, int, float]]) -> None:
+        risk = np.zeros(self.FINE.shape)
+        for place, first, rows, value in bands:
+            risk[8 * first : 8 * min(first + rows, 25), 40 * place : 40 * (place + 1)] = value
+        by_blocks = self.found(risk)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(cutter, "BLOCKS_A_SWATH", 41)  # none has so many
+            by_cells = self.found(risk)
+        assert set(by_blocks) == set(by_cells)
+
+    def test_the_last_blocks_end_where_the_grid_does(self) -> None:
+        found = self.found(np.ones((198, 158)))
+        assert {(one.first_row, one.end_row) for one in found} == {(0, 198)}
+        assert max(one.end_column for one in found) == 158

@@ -11,7 +11,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from coordinator.cut import strips
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.strips import Cut, CuttingRules, cut_windows, strip_of
 from coordinator.cut.window import Window
@@ -135,47 +134,6 @@ class TestByHand:
     def test_an_area_narrower_than_the_swath_is_cut_as_it_is(self) -> None:
         grid = GridSpec(EAST, 5, 6, 60)
         assert cut_windows(grid, ground(np.ones(grid.shape), grid), RULES, PRICE) == [Window(0, 60, 0, 6)]
-
-
-class TestBlocks:
-    """Cells of 1 m: 40 of them make a swath, and four by four are taken together."""
-
-    FINE = GridSpec(EAST, 1, 160, 200)
-    RULES = CuttingRules(swath_m=40, overhead_m=20, min_strip_m=20, max_strip_m=400)
-
-    @pytest.mark.parametrize(("width", "block"), [(1, 1), (10, 1), (19, 1), (20, 2), (23, 1), (40, 4), (41, 1)])
-    def test_as_many_are_taken_together_as_divide_a_swath_into_ten_or_more(self, width: int, block: int) -> None:
-        grid = GridSpec(EAST, 1, width, 4 * width)  # what is hot is a cell: found as the block that it is in
-        risk = np.zeros(grid.shape)
-        risk[2 * width + 1, 0] = 1.0
-        rules = CuttingRules(swath_m=width, overhead_m=0, min_strip_m=1, max_strip_m=400)
-        (window,) = cut_windows(grid, ground(risk, grid), rules, 1e-3)
-        assert (window.rows, window.columns_wide) == (block, width)
-        assert window.first_row <= 2 * width + 1 < window.end_row
-
-    @settings(max_examples=40, deadline=None)
-    @given(
-        bands=st.lists(
-            st.tuples(st.integers(0, 3), st.integers(0, 40), st.integers(5, 20), st.sampled_from([0.6, 0.8, 1.0])),
-            max_size=4,
-            unique_by=lambda one: one[0],
-        )
-    )
-    def test_what_lies_on_blocks_is_cut_as_it_is_by_the_cell(self, bands: list[tuple[int, int, int, float]]) -> None:
-        risk = np.zeros(self.FINE.shape)
-        for place, first, rows, value in bands:
-            risk[4 * first : 4 * min(first + rows, 50), 40 * place : 40 * (place + 1)] = value
-        by_blocks = cut_windows(self.FINE, ground(risk, self.FINE), self.RULES, 8.0)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(strips, "BLOCKS_A_SWATH", 41)  # none has so many
-            by_cells = cut_windows(self.FINE, ground(risk, self.FINE), self.RULES, 8.0)
-        assert set(by_blocks) == set(by_cells)
-
-    def test_the_last_blocks_end_where_the_grid_does(self) -> None:
-        grid = GridSpec(EAST, 1, 158, 198)
-        windows = cut_windows(grid, ground(np.ones(grid.shape), grid), self.RULES, 4.0)
-        assert {(one.first_row, one.end_row) for one in windows} == {(0, 198)}
-        assert max(one.end_column for one in windows) == 158
 
 
 class TestOverlap:
