@@ -48,6 +48,6 @@ class CoordinatorConfig:
     deadline_s: float = math.inf
     separation_m: float = 0.0
     objective: Literal["mean", "worst30", "both", "targets"] = "both"
-    across: bool = False
+    across: bool = True
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
     priorities: tuple[PriorityGround, ...] = ()

@@ -134,7 +134,7 @@ class Beforehand:
         waits |= any(one.state is None for one in self._fleet.helpers)
         if self.routes.routes or waits or not math.isfinite(self._briefing.expected_deadline_s()):
             return
-        self._cutting.cut(now_ms)
+        self._cutting.cut(now_ms, again=True)
         situation = self._briefing.situation(now_ms)
         routes = plan_routes(situation.strips, situation.helpers, situation.deadline_s, BEAM)
         self.routes.routes = {name: list(numbers) for name, numbers in routes.strips.items()}

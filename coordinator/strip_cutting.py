@@ -79,8 +79,9 @@ class StripCutting:
         revision = received.header.incarnation, message.revision
         return self._expected.hotspots.hear((received.vehicle, received.number), revision, message)
 
-    def cut(self, now_ms: int) -> None:
-        """Cuts anew, and opens, revises and withdraws strips by that."""
+    def cut(self, now_ms: int, *, again: bool = False) -> None:
+        """Cuts anew, and opens, revises and withdraws strips by that; `again`: also a second one on a place that is
+        worth two looks, else that is cut when the first is under way."""
         expected, ledger = self._expected.now(), self._strips.ledger
         why = partial(self._reasons.why, risk=expected.risk)
         ground = Ground(
@@ -95,7 +96,7 @@ class StripCutting:
         unmatched = ledger.in_state(StripState.OPEN)
         opened = [record.window for record in unmatched]
         time_m, flown = self._briefing.time_m(now_ms), self._flown(now_ms)
-        for cut in self._cutter.cut(ground, time_m, claimed, opened, flown):
+        for cut in self._cutter.cut(ground, time_m, claimed, opened, flown, again=again):
             alike = (record for record in unmatched if record.window.across == cut.window.across)
             same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:

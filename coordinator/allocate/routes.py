@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from coordinator.allocate.service import StripTable, expected_service, removed_m2
+from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.types import FloatArray
 
@@ -24,6 +25,9 @@ HORIZON_S = 4 * 3600.0
 """How far ahead is planned while nobody can tell when the mission ends."""
 MOST_STRIPS = 64
 """So many strips are planned with, those that bring most for the time they take."""
+SOONER_SHARE = 0.1
+"""Of what a strip brings: so much less it counts that is flown at the deadline than now, where there is time for all
+strips. What time they leave is good for other looks at the same ground."""
 LATER_SHARE = 0.5
 """Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come."""
 TOLERANCE_M2 = 1e-6
@@ -57,6 +61,7 @@ class RoutesAllocator:
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
         routes = plan_routes(situation.strips, helpers, deadline_s, self.beam)
         offers = {one.vehicle: routes.strips[one.vehicle][0] for one in situation.free if routes.strips[one.vehicle]}
+        offers |= _to_idle(situation, offers)
         for helper in helpers:
             if helper.task is not None and not helper.sweeping:
                 other = self._turned_round(situation, helpers, helper, helper.task, routes.removed_m2, deadline_s)
@@ -86,6 +91,14 @@ class RoutesAllocator:
         return route[0] if better_m2 > situation.switch_margin * worth_m2 else None
 
 
+def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, int]:
+    """What is offered to free helpers whose routes are empty, as better ones would serve all in time: what those are
+    sent to later. Nobody waits while anything is worth looking at."""
+    idle = tuple(one for one in situation.free if one.vehicle not in offers)
+    strips = tuple(one for one in situation.strips if one.strip.number not in offers.values())
+    return GreedyAllocator().assign(replace(situation, helpers=idle, strips=strips))
+
+
 def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float, beam: int) -> Routes:
     """The routes of a team from where and when each helper is free."""
     if not helpers or not strips:
@@ -102,7 +115,8 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
             break
         plans = plans.chosen(team, grown, beam)
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
-    return Routes(best_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)), team.shares(routes))
+    removed_m2, shares = team.flown(routes)
+    return Routes(removed_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)), shares)
 
 
 class _Team:
@@ -144,20 +158,31 @@ class _Team:
         self.later_m2ps = LATER_SHARE * float((self.alone_m2 / self.alone_s).min())
         self.by_rate = np.argsort(-self.alone_m2 / self.alone_s, kind="stable")
         self.rank = np.argsort(self.by_rate, kind="stable")
+        self.begins_s = min(one.free_s for one in helpers)
+        free_s = np.array([one.free_s for one in helpers])
+        has_time_for_all = float(self.alone_s.sum()) < float(np.maximum(self.until_s - free_s, 0.0).sum())
+        self.sooner_share = SOONER_SHARE if has_time_for_all else 0.0
 
-    def shares(self, routes: Sequence[Sequence[int]]) -> dict[int, float]:
-        """By number the share of each strip that is flown by the deadline; `routes`: of each helper, the strips'
-        places."""
-        found = {}
+    def counted(self, ends_s: FloatArray) -> FloatArray:
+        """As what share of what it brings a strip counts that is flown by these times."""
+        spent = (ends_s - self.begins_s) / max(1.0, self.deadline_s - self.begins_s)
+        counted: FloatArray = 1.0 - self.sooner_share * np.clip(spent, 0.0, 1.0)
+        return counted
+
+    def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, dict[int, float]]:
+        """What is removed by the deadline, and by number the share of each strip that is flown by then; `routes`: of
+        each helper, the strips' places."""
+        total_m2, shares = 0.0, {}
         for one, route in enumerate(routes):
             at, now_s = self.start, self.helpers[one].free_s
             for place in route:
                 begins_s, at = now_s + self.to_begin_s[one, at, place], self.way[one, at, place]
                 sweep_s = self.sonar_on_s[one, at]
-                share = min(1.0, max(0.0, (self.deadline_s - begins_s) / sweep_s))
-                found[self.strips[place].strip.number] = float(share)
+                share = min(1.0, max(0.0, float((self.deadline_s - begins_s) / sweep_s)))
+                shares[self.strips[place].strip.number] = share
+                total_m2 += float(self.worth_m2[one, place]) * share
                 now_s = begins_s + sweep_s + self.run_out_s[one]
-        return found
+        return total_m2, shares
 
     def _usual_way_s(self, count: int) -> float:
         """The way to the strip that is nearest, as it mostly is."""
@@ -229,6 +254,7 @@ class _Plans:
                 break
             self.free_s[plans[idle], one[idle]] = np.inf
         gained_m2 = np.where(np.isfinite(now_s), gained_m2, 0.0)
+        gained_m2 = gained_m2 * team.counted(begins_s + sweeps_s)
         total_m2 = self.removed_m2[:, np.newaxis] + gained_m2
         row, strip = divmod(int(total_m2.argmax()), len(team.strips))
         best = self._routes_with(row, int(one[row]), strip) if gained_m2[row, strip] > 0 else self.routes[row]

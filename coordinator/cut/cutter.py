@@ -19,8 +19,8 @@ SPARE_STRIPS = 4  # so many more than helpers have time for, so that there is a 
 STEP = 1.2  # by which the price is changed until they are so many
 MOST_STEPS = 48  # more than from the least price to the highest there is
 STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be better than those that are open
-BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
 TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
+BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
 
 Flown = Callable[[Sequence[Cut]], Mapping[int, float]]
 """Tells how far helpers come in time: by its place in these strips the share that they fly of each, if any."""
@@ -43,43 +43,64 @@ class Cutter:
         """Residual risk from which on a cell will be of the worst, see `Ground`."""
 
     def cut(
-        self, ground: Ground, time_m: float, claimed: Sequence[Window], opened: Sequence[Window], flown: Flown
+        self,
+        ground: Ground,
+        time_m: float,
+        claimed: Sequence[Window],
+        opened: Sequence[Window],
+        flown: Flown,
+        *,
+        again: bool = False,
     ) -> list[Cut]:
         """The strips worth flying, where helpers can fly `time_m` until the mission ends, infinite while nobody can
         tell.
 
         `claimed`: windows that are with a vehicle. `opened`: those of the open strips, which stay where they are if
-        what is cut anew is hardly better.
+        what is cut anew is hardly better. Where there is time for it places are worth several looks; of strips that lie
+        on one another by three quarters only the first is told, as its place is cut again once that is under way, or
+        all are with `again`.
         """
         in_cells, left = ground.copy(), ground.in_blocks(self._block)
         for window in claimed:
             in_cells.fly(window)
             left.fly(window.in_blocks(self._block))
-        best, after = self._cuts(left, [window.in_blocks(self._block) for window in opened]), left
+        best, after = [window.in_blocks(self._block) for window in opened], left
         if time_m > 0:  # else nobody can be sent any more, and what is open is left as it is
-            best = [one for one in best if one.counts_m2 > self._kept.least_m2(one.window)]
-            before_m2, kept = left.left_m2(), self._kept
-            after, rest_m2 = self._flown(left, best, flown(self._in_cells(best)))
-            most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
-            for way in self._ways:
-                anew = self._cuts(left, way.windows(left, time_m))
-                after_anew, rest_m2 = self._flown(left, anew, flown(self._in_cells(anew)))
-                gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
-                if gained_m2 > most_m2 or not best:
-                    most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
+            best, after = self._best(left, time_m, best, flown)
         self.threshold = after.worst_from()
-        return self._cuts(in_cells, [one.window for one in self._in_cells(best)])
+        told = list[Window]()
+        for window in best:
+            if again or not window.is_at_one_of(told):
+                told.append(window)
+        return self._cuts(in_cells, [one.in_cells(self._block, self._shape) for one in told])
+
+    def _best(self, left: Ground, time_m: float, opened: Sequence[Window], flown: Flown) -> tuple[list[Window], Ground]:
+        """The windows by which helpers leave least, those of the open strips or some cut anew, and the ground as they
+        leave it."""
+        stay = [one.window for one in self._cuts(left, opened) if one.counts_m2 > self._kept.least_m2(one.window)]
+        best, before_m2, kept = stay, left.left_m2(), self._kept
+        after, rest_m2 = self._flown(left, best, flown)
+        most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
+        for way in self._ways:
+            anew = way.windows(left, time_m)
+            after_anew, rest_m2 = self._flown(left, anew, flown)
+            gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
+            if gained_m2 > most_m2 or not best:
+                most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
+        return best, after
+
+    def _flown(self, ground: Ground, windows: Sequence[Window], flown: Flown) -> tuple[Ground, float]:
+        """The ground as helpers leave it that fly some windows by the best routes, and what is left of the objective
+        with what their metres cost at least."""
+        cuts = self._cuts(ground, windows)
+        after, least_m2 = ground.copy(), 0.0
+        for place, share in flown(self._in_cells(cuts)).items():
+            after.fly(windows[place], share)
+            least_m2 += share * self._kept.least_m2(windows[place])
+        return after, after.left_m2() + least_m2
 
     def _in_cells(self, cuts: Sequence[Cut]) -> list[Cut]:
         return [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in cuts]
-
-    def _flown(self, ground: Ground, cuts: Sequence[Cut], shares: Mapping[int, float]) -> tuple[Ground, float]:
-        """The ground as strips leave it, and what is left of the objective with what their metres cost at least."""
-        after, least_m2 = ground.copy(), 0.0
-        for place, share in shares.items():
-            after.fly(cuts[place].window, share)
-            least_m2 += share * self._kept.least_m2(cuts[place].window)
-        return after, after.left_m2() + least_m2
 
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
         """What windows bring if they are flown one after the other."""
@@ -107,25 +128,27 @@ class OneHeading:
 
     def windows(self, ground: Ground, time_m: float) -> list[Window]:
         """As many windows as there is time for, at the highest price at which they are, and behind them some to
-        spare."""
+        spare; none without time."""
+        if time_m <= 0:
+            return []
         found = self._at(ground, self.price)
         for _ in range(MOST_STEPS):
-            if self._metres(found) < time_m:
+            if self.metres(found) < time_m:
                 if self.price <= self._least_price:
                     break
                 self.price = max(self._least_price, self.price / STEP)
                 found = self._at(ground, self.price)
             else:
                 dearer = self._at(ground, self.price * STEP)
-                if self._metres(dearer) < time_m:
+                if self.metres(dearer) < time_m:
                     break
                 self.price, found = self.price * STEP, dearer
         price, left = self.price, ground.copy()
         for window in found:
             left.fly(window)
-        while self._metres(found) < self._enough_m(time_m, found) and price > self._least_price:
+        while self.metres(found) < self._enough_m(time_m, found) and price > self._least_price:
             price = max(self._least_price, price / STEP**2)
-            new = [one for one in self._at(left, price) if not one.is_at_one_of(found)]
+            new = self._at(left, price)
             for window in new:
                 left.fly(window)
             found = [*found, *new]
@@ -133,15 +156,16 @@ class OneHeading:
 
     def least_m2(self, window: Window) -> float:
         """What a strip there has to count to be worth flying whatever time there is."""
-        return self._least_price * self._metres([window])
+        return self._least_price * self.metres([window])
 
     def _enough_m(self, time_m: float, found: Sequence[Window]) -> float:
-        return time_m + SPARE_STRIPS * self._metres(found) / max(1, len(found))
+        return time_m + SPARE_STRIPS * self.metres(found) / max(1, len(found))
 
     def _at(self, ground: Ground, price: float) -> list[Window]:
         return cut_windows(self._grid, ground, self._rules, price, across=self._across)
 
-    def _metres(self, windows: Sequence[Window]) -> float:
+    def metres(self, windows: Sequence[Window]) -> float:
+        """What is flown for some windows, the ways to them included."""
         return sum(self._rules.metres_flown(one.cells_long * self._grid.cell_m) for one in windows)
 
 

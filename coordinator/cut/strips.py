@@ -56,15 +56,11 @@ def cut_windows(
     grid: GridSpec, ground: Ground, rules: CuttingRules, price: float, *, across: bool = False
 ) -> list[Window]:
     """The windows worth flying at a price for each metre flown, those first that lie side by side; all along the
-    tracks, or all across them.
-
-    No window lies by three quarters or more on another one: whether a place is worth two looks is asked when the first
-    is under way.
-    """
+    tracks, or all across them. One that lies on another is worth a look when that has been flown."""
     left, found = ground.copy(), list[Window]()
     as_cut = left.turned if across else left
     for _ in range(MOST_PASSES):
-        new = [one for one in _side_by_side(grid, as_cut, rules, price) if not one.is_at_one_of(found)]
+        new = _side_by_side(grid, as_cut, rules, price)
         if not new:
             break
         for window in new:

@@ -164,7 +164,7 @@ class Coordinator(Mapping):
     """A vehicle not heard of for so long counts as lost."""
     min_strip_m: Length = 30.0
     """Least length of a strip."""
-    max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 400.0
+    max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 2000.0
     """Largest length of a strip, at least `min_strip_m`."""
     worth_risk: OpenShare = 0.05
     """Mean residual risk, times the weight of the ground, over the helper's swath from which a further metre of strip
@@ -173,9 +173,8 @@ class Coordinator(Mapping):
     """Where second looks go: `reacting` to all that is heard; to the best routes that can be planned `beforehand`; to
     `lanes` side by side that helpers mow from the first second, along the tracks or across. The last three are what the
     first is compared with: for them `allocator` counts for nothing."""
-    across: bool = False
-    """Whether strips may run across the tracks, too, where less is left by such. With several helpers their ways cross
-    more often then, and they may come nearer to each other than `separation_m`."""
+    across: bool = True
+    """Whether strips may run across the tracks, too, where less is left by such."""
     objective: Literal["mean", "worst30", "both", "targets"] = "both"
     """What second looks are to bring down: the `mean` residual risk, that of the worst 30 % of the area (`worst30`),
     `both`, seven tenths the mean and three tenths the worst, or the share of `targets` expected to be missed. Helpers

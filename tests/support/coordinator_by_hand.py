@@ -158,6 +158,8 @@ def coordinator(
         worth_risk=0.3,
         switch_margin=0.2,
         strips=strips,
+        across=False,
+        objective="mean",
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
     run = run_info(400, 400, vehicles=vehicles)

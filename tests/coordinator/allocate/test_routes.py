@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
+from coordinator import allocate
 from coordinator.allocate.routes import BEAM, HORIZON_S, MOST_STRIPS, Routes, RoutesAllocator, plan_routes
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
@@ -137,6 +138,28 @@ class TestSeveralHelpers:
         jobs = [open_strip(strip(1, y_m=100), 3000), open_strip(strip(2, x_m=1500, y_m=400), 1500)]
         assert PLAN.assign(situation(jobs, [alpha, beta])) == {"alpha": 2}
 
+    def test_where_there_is_time_for_all_they_are_served_as_soon_as_can_be(self) -> None:
+        # Both in time, and the near one counts more: by what is removed at the deadline any order is as good.
+        near, rich = NEAR, replace(FAR, risk_m2=1100)
+        assert routes([rich, near], [helper()], 3600).strips == {"alpha": (2, 1)}
+
+    def test_a_helper_with_an_empty_route_gets_what_another_would_serve_later(self) -> None:
+        # beta sees twice as well and is free in time, so the best route leaves the only strip to it.
+        alpha = helper("alpha", p_detect=0.35)
+        beta = at_work(helper("beta", x_m=40), open_strip(strip(9, x_m=40, y_m=50)))
+        assert routes([NEAR], [alpha, beta]).strips == {"alpha": (), "beta": (2,)}
+        assert PLAN.assign(situation([NEAR], [alpha, beta])) == {"alpha": 2}
+
+    @settings(max_examples=150, deadline=None)
+    @given(told=situations())
+    def test_no_free_helper_waits_while_a_strip_is_worth_its_look(self, told: Situation) -> None:
+        offers = PLAN.assign(told)
+        left = [one for one in told.strips if one.strip.number not in offers.values()]
+        until_s = min(told.deadline_s, HORIZON_S)
+        assert all(
+            after([one], free, until_s)[0] == 0 for free in told.free if free.vehicle not in offers for one in left
+        )
+
     @settings(max_examples=150, deadline=None)
     @given(told=situations())
     def test_nobody_idles_who_could_serve_what_is_in_no_route(self, told: Situation) -> None:
@@ -186,7 +209,9 @@ class TestAgainstAllOrders:
     @given(told=situations(most_strips=4))
     def test_one_or_two_helpers_do_as_well_as_can_be_with_a_wide_beam(self, told: Situation) -> None:
         helpers, until_s = told.helpers[:2], min(told.deadline_s, HORIZON_S)
-        found = plan_routes(told.strips, helpers, until_s, 200)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(allocate.routes, "SOONER_SHARE", 0.0)
+            found = plan_routes(told.strips, helpers, until_s, 200)
         assert found.removed_m2 == pytest.approx(most_m2(told.strips, helpers, until_s), rel=0.001)
 
     @settings(max_examples=60, deadline=None)
@@ -198,7 +223,10 @@ class TestAgainstAllOrders:
             for told_of in told.helpers[:2]
         ]
         best_m2 = most_m2(told.strips, helpers, until_s)
-        assert 0.95 * best_m2 <= routes(told.strips, helpers, until_s).removed_m2 <= best_m2 + 1e-6
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(allocate.routes, "SOONER_SHARE", 0.0)
+            found = routes(told.strips, helpers, until_s)
+        assert 0.95 * best_m2 <= found.removed_m2 <= best_m2 + 1e-6
 
     @settings(max_examples=40, deadline=None)
     @given(told=situations(), data=st.data())

@@ -93,7 +93,7 @@ class TestTime:
         assert strips + SPARE_STRIPS <= len(cuts) < 12
         assert windows(cuts) == [lane(number) for number in range(len(cuts))]
 
-    @pytest.mark.parametrize("time_m", [12.5 * STRIP_M, math.inf])
+    @pytest.mark.parametrize("time_m", [40 * STRIP_M, math.inf])
     def test_where_there_is_time_for_all_all_are_cut_at_the_least_price(self, time_m: float) -> None:
         cutter = Cutter(GRID, RULES, LEAST, across=True)
         assert set(windows(cut(cutter, ground(TWELVE), time_m, (), ()))) == {lane(number) for number in range(12)}
@@ -130,6 +130,21 @@ class TestTime:
         found = price(cutter)
         assert cut(cutter, ground(TWELVE, objective), 1.5 * STRIP_M, (), ()) == first
         assert price(cutter) == found > 100 * 1e-3 * 50
+
+    def test_a_place_is_cut_once_until_it_has_had_its_look_and_again_where_all_is_to_be_planned(self) -> None:
+        told = ground(lanes(0.9))
+        assert windows(cut(Cutter(GRID, RULES, LEAST), told, math.inf)) == [lane(0)]
+        flown = best_in(math.inf)
+        many = Cutter(GRID, RULES, LEAST).cut(told, math.inf, (), (), flown, again=True)
+        # At 0.9, 0.45 and 0.225 a look is worth its 400 m, at 0.1125 it is not: they cost as much as 0.133 bring.
+        assert windows(many) == [lane(0)] * 3
+        assert [one.counts_m2 for one in many] == pytest.approx([600 * 25 * LOOK * risk for risk in (0.9, 0.45, 0.225)])
+
+    def test_the_price_is_that_of_the_last_look_that_there_is_time_for(self) -> None:
+        cutter = Cutter(GRID, RULES, 1e-3 * 25)
+        cut(cutter, ground(lanes(0.9)), 2.5 * STRIP_M)
+        of_third, step = 0.225 * LOOK * 50 * 300 / STRIP_M, 1.2
+        assert of_third / step <= price(cutter) < of_third
 
     def test_where_time_is_short_two_side_by_side_are_cut_where_there_is_time_for_two(self) -> None:
         # Ten columns of 0.9, and six and four of 0.6 beside them: the best strip lies on the 0.9, but two bring more.
@@ -198,10 +213,11 @@ class TestHeading:
 
     def test_they_turn_only_where_that_is_better_by_a_margin(self) -> None:
         def helpers_that_fly(along: float, across: float) -> Flown:
-            """So much of every strip."""
+            """So much of every strip, of those at one place of the first."""
 
             def flown(cuts: Sequence[Cut]) -> Mapping[int, float]:
-                return {place: across if one.window.across else along for place, one in enumerate(cuts)}
+                first = {one.window: place for place, one in reversed(list(enumerate(cuts)))}
+                return {place: across if window.across else along for window, place in first.items()}
 
             return flown
 
@@ -240,7 +256,7 @@ class TestOpenStrips:
         risk = lanes(0.9)
         opened = Window(0, 60, 2, 12)  # two columns aside, on which there is hardly anything
         risk[:, 0:2] = 0.01
-        assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), math.inf, (), [opened])) == [opened]
+        assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), STRIP_M, (), [opened])) == [opened]
 
     def test_they_are_cut_anew_where_that_is_better(self) -> None:
         opened = Window(0, 60, 2, 12)  # brings eight tenths of what the lane does
