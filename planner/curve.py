@@ -9,6 +9,9 @@ import numpy as np
 
 from planner.types import DetectionCurve, FloatArray
 
+NEWEST_CURVES = 4
+"""What a vehicle sees is taken to be the mean P(y) of so many tracks: a track's own has an error in common over all of
+it."""
 _TOLERANCE = 1e-9
 """Of probabilities and metres: a mean of equal numbers is not bent by the last bits of their sum."""
 

@@ -21,7 +21,7 @@ from comms.said.messages import (
 )
 from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower
-from planner.curve import RangeTally, effective_range_m, mean_curve
+from planner.curve import NEWEST_CURVES, RangeTally, effective_range_m, mean_curve
 from planner.first_plan import parts_in_order
 from planner.footprints.cells import Ahead, cells_within, settled_cells
 from planner.footprints.footprint import Reach
@@ -37,8 +37,6 @@ from vehicle_agent.helpers_ahead import helper_looks
 from vehicle_agent.part_survey import PartSurvey
 
 HOTSPOTS_EVERY_MS = 30_000
-NEWEST_CURVES = 4
-"""Tracks are laid by the mean P(y) of so many: a track's own has an error in common over all of it."""
 UNSEEN = DetectionCurve(np.array([0.0, 1.0]), np.zeros(2))
 MOST_CURVE_POINTS = 4096  # what a curve may hold on the wire
 

@@ -10,6 +10,7 @@ import numpy as np
 from comms.said.messages import Mode, Plan, PlannedTrack
 from coordinator.expect.seabed import sliding_mean
 from coordinator.vehicles import KnownVehicle
+from planner.curve import NEWEST_CURVES, mean_curve
 from planner.footprints import footprint_of
 from planner.footprints.cells import EDGE_TOLERANCE_M
 from planner.types import DetectionCurve, FloatArray, GridSpec, SweepFrame
@@ -17,8 +18,6 @@ from planner.types import DetectionCurve, FloatArray, GridSpec, SweepFrame
 ASSUMED_P_DETECT = 0.5
 """Of a pass, midway between the nadir gap and the range that tracks are spaced for, before anybody has measured any; it
 falls to 0 at both, as P(y) of side-looking sonars does."""
-NEWEST_CURVES = 4
-"""So many curves of a vehicle's tracks are averaged: a track's own has an error in common over all of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +86,7 @@ def curve_of(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> Detect
         range_m = near_m + across * (max(far_m, near_m + 1.0) - near_m)
         return DetectionCurve(range_m, ASSUMED_P_DETECT * 4.0 * across * (1.0 - across))
     newest = [measured[track] for track in sorted(measured) if track > 0][-NEWEST_CURVES:] or [measured[0]]
-    range_m = max((one.range_m for one in newest), key=len)
-    return DetectionCurve(range_m, np.mean([one.at(range_m) for one in newest], axis=0))
+    return mean_curve(newest)
 
 
 def _passed_m(track: PlannedTrack, vehicle: KnownVehicle, lead_m: float) -> float:
