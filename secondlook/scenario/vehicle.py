@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 from typing import Annotated, Literal, Self
 
@@ -28,8 +29,6 @@ from secondlook.scenario.values import (
 
 _SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
-BY_RANGE = ("adaptive", "fixed")
-"""Ways of spacing tracks that know nothing of risk."""
 RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
 """Ids of the nodes that are no vehicles."""
 
@@ -159,8 +158,11 @@ class SurveyVehicle(VehicleBase):
     @field_validator("wanted_risk")
     @classmethod
     def _check_wanted_risk(cls, wanted_risk: float | None, info: ValidationInfo) -> float | None:
-        if wanted_risk is not None and info.data.get("spacing") in BY_RANGE:
-            raise refused(f"must be left out with spacing {info.data['spacing']}; profile and joint lay tracks by risk")
+        spacing = info.data.get("spacing")
+        if wanted_risk is not None and spacing is not None:
+            maker = SPACING.maker(spacing)
+            if inspect.isclass(maker) and not hasattr(maker, "lay"):
+                raise refused(f"must be left out with spacing {spacing}; profile and joint lay tracks by risk")
         return wanted_risk
 
     @field_validator("prior_curve")

@@ -155,6 +155,14 @@ MISTAKES = {
             "profile and joint lay tracks by risk"
         ],
     ),
+    "wanted risk with a spacing planner of one's own that knows nothing of it": (
+        "range_m: 145",
+        "range_m: 145\n    spacing: stubborn_spacing:Stubborn\n    wanted_risk: 0.7",
+        [
+            "bad.yaml:14: vehicles.primary.wanted_risk: 0.7 is not allowed; must be left out with spacing "
+            "stubborn_spacing:Stubborn; profile and joint lay tracks by risk"
+        ],
+    ),
     "wanted risk above 1": (
         "range_m: 145",
         "range_m: 145\n    spacing: profile\n    wanted_risk: 1.5",
