@@ -60,7 +60,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"{missing[0]}: there is no compare.json in it; must be the --out of `secondlook compare`", file=sys.stderr
         )
         return 2
-    print(table([json.loads((folder / "compare.json").read_text()) for folder in folders]))
+    comparisons = [json.loads((folder / "compare.json").read_text()) for folder in folders]
+    firsts = [told["contenders"][0]["name"] for told in comparisons]
+    for folder, first in zip(folders, firsts, strict=True):
+        if first != firsts[0]:
+            print(f"{folder}: its first contender is {first}; must be {firsts[0]}, as in {folders[0]}", file=sys.stderr)
+            return 2
+    print(table(comparisons))
     return 0
 
 

@@ -43,3 +43,13 @@ def test_a_row_for_each_contender_of_each_comparison(tmp_path: Path, capsys: pyt
 def test_a_folder_without_a_comparison_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path)]) == 2
     assert "there is no compare.json in it" in capsys.readouterr().err
+
+
+def test_comparisons_with_others_than_the_same_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folders = [told(tmp_path, "clear"), told(tmp_path, "turns")]
+    other = tmp_path / "turns" / "compare.json"
+    other.write_text(other.read_text().replace('"plan"', '"greedy"'))
+    assert main(folders) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err == f"{folders[1]}: its first contender is greedy; must be plan, as in {folders[0]}\n"
