@@ -19,7 +19,7 @@ from planner.types import FloatArray
 STEP_S = 2.0
 """Courses are sampled at the whole multiples of this, so that any two are at the same times."""
 AHEAD_S = 900.0
-"""A course is laid so far beyond its paths' end; of a survey's tracks those are laid that are begun so soon."""
+"""A course is laid so far beyond its paths' end."""
 ON_TRACK_M = 2.0
 
 
@@ -72,7 +72,7 @@ def lying_still(pose: Pose, from_s: float) -> Course:
 
 
 def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, heard_s: float) -> Course:
-    """The course of a primary along the tracks that it has planned, from what it said at `heard_s`."""
+    """The course of a primary along all tracks that it has planned, from what it said at `heard_s`."""
     pose, radius_m = Pose(state.x_m, state.y_m, state.heading_rad), entry.turn_radius_m
     tracks = plan.tracks if plan is not None else ()
     ahead = [track for track in tracks if not track.flown] if state.mode is not Mode.FINISHED else []
@@ -85,14 +85,11 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
         flown = [track for track in tracks if track.flown]
         left_m = run_out_left_m(pass_of(flown[-1], entry).end, pose, entry.run_in_m) if flown else 0.0
         end = shifted(pose[:2], pose.heading_rad, left_m)
-    paths, here, length_m = [straight(pose, left_m, radius_m)], end, left_m
+    paths, here = [straight(pose, left_m, radius_m)], end
     for track in ahead:
         one = pass_of(track, entry)
         paths += [shortest_path(here, one.begin, radius_m), straight(one.begin, one.length_m, radius_m)]
         here = one.end
-        length_m += paths[-1].length_m + paths[-2].length_m
-        if length_m > entry.speed_mps * AHEAD_S:
-            break
     return course(pose, heard_s, entry.speed_mps, radius_m, paths)
 
 

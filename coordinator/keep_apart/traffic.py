@@ -21,9 +21,6 @@ from planner.footprints import footprint_of
 from planner.sweep import Sweep, shortest_sweep, sweeps_over
 from planner.types import Point, Strip
 
-LAID_ANEW_S = 600.0
-"""A survey's course is laid anew at the latest after this time, so that it reaches far enough ahead."""
-
 
 @dataclass(frozen=True)
 class _Sweeping:
@@ -39,7 +36,7 @@ class Traffic:
     """Courses are laid when asked for, and kept until something is heard that changes them."""
 
     def __init__(self) -> None:
-        self._surveys: dict[str, tuple[object, float, Course]] = {}
+        self._surveys: dict[str, tuple[object, int, Course]] = {}
         self._sweeps: dict[str, _Sweeping] = {}
         self._errands: dict[str, Course] = {}
         self._rests: dict[str, tuple[int, Course]] = {}
@@ -101,9 +98,10 @@ class Traffic:
         ends_ms = state.expected_end_ms if state.mode is Mode.SURVEY else 0
         told = (plan.revision if plan else 0, state.mode, state.works_on, ends_ms)
         known = self._surveys.get(name)
-        if known is None or known[0] != told or now_s - known[1] > LAID_ANEW_S:
+        # One that should have sailed its tracks, or has none yet, is where it was heard last.
+        if known is None or known[0] != told or (known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s):
             laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000)
-            known = self._surveys[name] = told, now_s, laid
+            known = self._surveys[name] = told, vehicle.heard_ms, laid
         return known[2]
 
     def _sweep(self, vehicle: KnownVehicle, strip: Strip) -> Course:

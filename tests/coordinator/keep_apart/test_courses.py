@@ -71,6 +71,19 @@ class TestCourses:
         assert on_second[:, 0] == pytest.approx(100)
         assert on_second[:, 1].min() < 10
 
+    def test_all_tracks_of_a_long_survey_are_laid(self) -> None:
+        # 6 tracks of 2000 m at 2 m/s: 6000 s and their turns; the last is flown southward at x = 250.
+        entry = replace(vehicle("primary", Role.SURVEY), speed_mps=2.0)
+        lines = [(50.0 * track, *((2000.0, 0.0) if track % 2 else (0.0, 2000.0))) for track in range(6)]
+        tracks = tuple(
+            PlannedTrack(number, x_m, x_m, begin_m, x_m, end_m, False)
+            for number, (x_m, begin_m, end_m) in enumerate(lines, 1)
+        )
+        laid = survey_course(entry, AgentState(Mode.TRANSIT, 1, 1, 0, 0, 0, 0), Plan(1, tracks, (), (), ""), 0)
+        assert laid.arrives_s > 6000
+        surveys_last = laid.poses[(np.abs(laid.poses[:, 0] - 250) < 1e-6) & (np.abs(laid.poses[:, 2] - SOUTH) < 1e-6)]
+        assert len(surveys_last) * STEP_S == pytest.approx(1000, abs=2 * STEP_S + entry.run_in_m)
+
     def test_a_primary_that_looks_ahead_is_where_its_track_is_flown_earlier(self) -> None:
         # Its swath begins 30 m ahead of it, see tests/planner/footprints/test_wedge.py.
         shape = {"footprint": "wedge", "near_m": 3.0, "far_m": 50.0, "half_angle_rad": math.pi / 4, "look_m": 10.0}
