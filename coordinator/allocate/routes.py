@@ -1,10 +1,14 @@
 """Routes to the deadline: which strips the helpers serve, as a team, and in which order, so that most is removed.
 
 A beam search over partial plans. The helper that is free first goes on, so that all plans of a beam grow in time
-together; it may also leave the rest to the others, who may be nearer, or see better. Plans are compared by what they
-have removed and what may still be: what is left of the strips, best first, each with the time that it takes by itself,
-for the time that the helpers have left. So what counts against a plan is the time that it spends on ways, not that it
-leaves a good strip for later. (Team orienteering; the estimate is the fractional knapsack.)
+together; it may also leave the rest to the others, who may be nearer, or see better. Which plans are kept is decided by
+what they have removed and what may still be: what is left of the strips, best first, each with the time that it takes
+by itself, for the time that the helpers have left. So what counts against a plan is the time that it spends on ways,
+not that it leaves a good strip for later. (Team orienteering; the estimate is the fractional knapsack.)
+
+That estimate pools the helpers' time, as if two of them could fly half a strip each, and does not see what the deadline
+will cut off. So which plan is taken is decided otherwise: each one kept on the way is gone on with to the deadline by
+what brings most a second, and of all that come of it the best is taken.
 """
 
 from __future__ import annotations
@@ -17,19 +21,19 @@ import numpy as np
 from coordinator.allocate.service import StripTable, expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
-from planner.types import FloatArray
+from planner.types import BoolArray, FloatArray
 
 BEAM = 12
 """Plans carried from one strip to the next."""
+ALIKE = 4
+"""Of so many times as many plans the most promising that differ are carried on."""
 HORIZON_S = 4 * 3600.0
 """How far ahead is planned while nobody can tell when the mission ends."""
 MOST_STRIPS = 64
 """So many strips are planned with, those that bring most for the time they take."""
-SOONER_SHARE = 0.1
-"""Of what a strip brings: so much less it counts that is flown at the deadline than now, where there is time for all
-strips. What time they leave is good for other looks at the same ground."""
 LATER_SHARE = 0.5
-"""Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come."""
+"""Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come, as other
+looks at the same ground."""
 TOLERANCE_M2 = 1e-6
 
 
@@ -104,16 +108,14 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
     if not helpers or not strips:
         return Routes(0.0, {one.vehicle: () for one in helpers}, {})
     team = _Team(strips, helpers, deadline_s)
-    best_m2 = 0.0
-    routes: tuple[tuple[int, ...], ...] = ((),) * len(helpers)
     plans = _Plans.begun(team)
-    while True:
-        grown = plans.grown(team)
-        if grown.best_m2 > best_m2 + TOLERANCE_M2:
-            best_m2, routes = grown.best_m2, grown.best
-        if not grown.rows.size:
-            break
-        plans = plans.chosen(team, grown, beam)
+    best = plans.completed(team)
+    while (plans := plans.grown(team, beam)).routes:
+        one = plans.completed(team)
+        if one.counts_m2(team)[0] > best.counts_m2(team)[0] + TOLERANCE_M2:
+            best = one
+    # Who had left the rest to others takes what those leave.
+    (routes,) = replace(best, is_done=np.zeros_like(best.is_done)).to_deadline(team).routes
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
     removed_m2, shares = team.flown(routes)
     return Routes(removed_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)), shares)
@@ -158,16 +160,6 @@ class _Team:
         self.later_m2ps = LATER_SHARE * float((self.alone_m2 / self.alone_s).min())
         self.by_rate = np.argsort(-self.alone_m2 / self.alone_s, kind="stable")
         self.rank = np.argsort(self.by_rate, kind="stable")
-        self.begins_s = min(one.free_s for one in helpers)
-        free_s = np.array([one.free_s for one in helpers])
-        has_time_for_all = float(self.alone_s.sum()) < float(np.maximum(self.until_s - free_s, 0.0).sum())
-        self.sooner_share = SOONER_SHARE if has_time_for_all else 0.0
-
-    def counted(self, ends_s: FloatArray) -> FloatArray:
-        """As what share of what it brings a strip counts that is flown by these times."""
-        spent = (ends_s - self.begins_s) / max(1.0, self.deadline_s - self.begins_s)
-        counted: FloatArray = 1.0 - self.sooner_share * np.clip(spent, 0.0, 1.0)
-        return counted
 
     def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, dict[int, float]]:
         """What is removed by the deadline, and by number the share of each strip that is flown by then; `routes`: of
@@ -204,28 +196,25 @@ def _most_promising(strips: Sequence[OpenStrip], helpers: Sequence[Helper]) -> l
 
 
 @dataclass(frozen=True, eq=False)
-class _Grown:
-    """Every plan by every strip that it may go on with: shape (plans, strips). `next`: who goes on. `rows`, `strips`:
-    the plans that go on and the strips by which they do, the most promising first; a strip beyond the last one stands
-    for none, where who is next leaves the rest to the others. `best_m2`, `best`: of the best one, its routes."""
+class _Ahead:
+    """Who goes on in every plan, `next`, shape (plans,), and by every strip, shape (plans, strips): when the sonar goes
+    on there, when the helper is free again, and what is gained by the deadline."""
 
     next: np.ndarray
     begins_s: FloatArray
+    ends_s: FloatArray
     gained_m2: FloatArray
-    rows: np.ndarray
-    strips: np.ndarray
-    best_m2: float
-    best: tuple[tuple[int, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
 class _Plans:
-    """The beam. `nodes`, `free_s`: shape (plans, helpers), where each helper is and when it is free, infinite for one
-    that finds nothing any more; `used`: shape (plans, strips); `removed_m2`: shape (plans,)."""
+    """The beam. `nodes`, `free_s`, `is_done`: shape (plans, helpers), where each helper is, when it is free, whether it
+    finds nothing any more or leaves the rest to others; `used`: shape (plans, strips); `removed_m2`: shape (plans,)."""
 
     nodes: np.ndarray
     free_s: FloatArray
-    used: np.ndarray
+    is_done: BoolArray
+    used: BoolArray
     removed_m2: FloatArray
     routes: list[tuple[tuple[int, ...], ...]]
 
@@ -235,77 +224,101 @@ class _Plans:
         helpers, strips = len(team.helpers), len(team.strips)
         free_s = np.array([[one.free_s for one in team.helpers]], dtype=np.float64)
         nodes = np.full((1, helpers), team.start)
-        return cls(nodes, free_s, np.zeros((1, strips), dtype=np.bool_), np.zeros(1), [((),) * helpers])
+        is_done, used = np.zeros((1, helpers), dtype=np.bool_), np.zeros((1, strips), dtype=np.bool_)
+        return cls(nodes, free_s, is_done, used, np.zeros(1), [((),) * helpers])
 
-    def grown(self, team: _Team) -> _Grown:
+    def ahead(self, team: _Team) -> _Ahead:
         """What each plan may go on with; a helper that finds nothing drops out, and the next one goes on."""
         plans = np.arange(len(self.removed_m2))
         for _ in team.helpers:
-            one = self.free_s.argmin(axis=1)
-            now_s = self.free_s[plans, one][:, np.newaxis]
+            one = np.where(self.is_done, np.inf, self.free_s).argmin(axis=1)
+            now_s, is_done = self.free_s[plans, one], self.is_done[plans, one]
             at = self.nodes[plans, one]
-            begins_s = now_s + team.to_begin_s[one, at]
+            begins_s = now_s[:, np.newaxis] + team.to_begin_s[one, at]
             sweeps_s = team.sonar_on_s[one[:, np.newaxis], team.way[one, at]]
             share = np.clip((team.deadline_s - begins_s) / sweeps_s, 0.0, 1.0)
             lasts = begins_s + sweeps_s <= team.lasts_s[one][:, np.newaxis]
             gained_m2 = np.where(lasts & ~self.used, team.worth_m2[one] * share, 0.0)
-            idle = (gained_m2.max(axis=1) <= 0.0) & np.isfinite(now_s[:, 0])
+            idle = (gained_m2.max(axis=1) <= 0.0) & ~is_done
             if not idle.any():
                 break
-            self.free_s[plans[idle], one[idle]] = np.inf
-        gained_m2 = np.where(np.isfinite(now_s), gained_m2, 0.0)
-        gained_m2 = gained_m2 * team.counted(begins_s + sweeps_s)
-        total_m2 = self.removed_m2[:, np.newaxis] + gained_m2
-        row, strip = divmod(int(total_m2.argmax()), len(team.strips))
-        best = self._routes_with(row, int(one[row]), strip) if gained_m2[row, strip] > 0 else self.routes[row]
-        ends_s = begins_s + sweeps_s + team.run_out_s[one][:, np.newaxis]
-        has_others = np.isfinite(self.free_s).sum(axis=1, keepdims=True) > 1
-        goes_on = np.hstack([gained_m2 > 0, has_others])
-        so_far_m2 = np.hstack([total_m2, self.removed_m2[:, np.newaxis]])
-        ranks = np.where(goes_on, so_far_m2 + self._still_m2(team, one, ends_s), -np.inf)
-        order = np.argsort(-ranks, axis=None, kind="stable")[: int(goes_on.sum())]
+            self.is_done[plans[idle], one[idle]] = True
+        gained_m2 = np.where(is_done[:, np.newaxis], 0.0, gained_m2)
+        return _Ahead(one, begins_s, begins_s + sweeps_s + team.run_out_s[one][:, np.newaxis], gained_m2)
+
+    def completed(self, team: _Team) -> _Plans:
+        """Of these plans, each gone on with to the deadline by what brings most a second, the one that counts most."""
+        plans = self.to_deadline(team)
+        return plans.chosen([int(plans.counts_m2(team).argmax())])
+
+    def to_deadline(self, team: _Team) -> _Plans:
+        """Each gone on with by what brings most a second, until nothing can be gained any more."""
+        plans, rows = self.chosen(range(len(self.routes))), np.arange(len(self.routes))
+        while True:
+            ahead = plans.ahead(team)
+            gains = ahead.gained_m2 > 0
+            if not gains.any():
+                return plans
+            now_s = plans.free_s[rows, ahead.next][:, np.newaxis]
+            spent_s = np.where(gains, np.minimum(ahead.ends_s, team.deadline_s) - now_s, 1.0)
+            strips = (ahead.gained_m2 / spent_s).argmax(axis=1)
+            served = np.flatnonzero(gains[rows, strips])
+            plans.serve(team, ahead, served, served, strips[served])
+
+    def counts_m2(self, team: _Team) -> FloatArray:
+        """What is removed, and what may be later in the time that is left to those who are done; shape (plans,)."""
+        spare_s = np.where(self.is_done, np.maximum(team.until_s - self.free_s, 0.0), 0.0)
+        counts_m2: FloatArray = self.removed_m2 + team.later_m2ps * spare_s.sum(axis=1)
+        return counts_m2
+
+    def grown(self, team: _Team, beam: int) -> _Plans:
+        """The most promising plans that go on from these by one strip; of those that serve the same strips and leave
+        helpers at the same places one. None where nothing can be gained any more."""
+        ahead = self.ahead(team)
+        has_others = (~self.is_done).sum(axis=1, keepdims=True) > 1
+        goes_on = np.hstack([ahead.gained_m2 > 0, has_others])
+        so_far_m2 = np.hstack([ahead.gained_m2, np.zeros_like(has_others)]) + self.counts_m2(team)[:, np.newaxis]
+        ranks = np.where(goes_on, so_far_m2 + self._still_m2(team, ahead), -np.inf)
+        order = np.argsort(-ranks, axis=None, kind="stable")[: min(int(goes_on.sum()), ALIKE * beam)]
         rows, strips = np.divmod(order, ranks.shape[1])
-        return _Grown(one, begins_s, gained_m2, rows, strips, float(total_m2[row, strip]), best)
+        plans = self.gone_on(team, ahead, rows, strips)
+        seen = dict[bytes, int]()
+        for row, (nodes, used, is_done) in enumerate(zip(plans.nodes, plans.used, plans.is_done, strict=True)):
+            seen.setdefault(nodes.tobytes() + used.tobytes() + is_done.tobytes(), row)
+        return plans.chosen(list(seen.values())[:beam])
 
-    def chosen(self, team: _Team, grown: _Grown, beam: int) -> _Plans:
-        """The most promising plans; of those that serve the same strips and leave helpers at the same places one."""
-        none = len(team.strips)
-        kept, seen = [], set()
-        for row, strip in zip(grown.rows.tolist(), grown.strips.tolist(), strict=True):
-            one = int(grown.next[row])
-            nodes, used, free_s = self.nodes[row].copy(), self.used[row].copy(), self.free_s[row].copy()
-            free_s[one] = np.inf
-            if strip != none:
-                nodes[one], used[strip] = team.way[one, self.nodes[row, one], strip], True
-                free_s[one] = grown.begins_s[row, strip] + team.sonar_on_s[one, nodes[one]] + team.run_out_s[one]
-            key = nodes.tobytes() + used.tobytes() + np.isfinite(free_s).tobytes()
-            if key not in seen:
-                seen.add(key)
-                kept.append((row, strip, one, nodes, used, free_s))
-                if len(kept) == beam:
-                    break
-        gained_m2 = [0.0 if strip == none else grown.gained_m2[row, strip] for row, strip, *_ in kept]
-        return _Plans(
-            nodes=np.array([nodes for *_, nodes, _, _ in kept]),
-            free_s=np.array([free_s for *_, free_s in kept]),
-            used=np.array([used for *_, used, _ in kept]),
-            removed_m2=self.removed_m2[[row for row, *_ in kept]] + gained_m2,
-            routes=[
-                self.routes[row] if strip == none else self._routes_with(row, one, strip)
-                for row, strip, one, *_ in kept
-            ],
-        )
+    def gone_on(self, team: _Team, ahead: _Ahead, rows: np.ndarray, strips: np.ndarray) -> _Plans:
+        """Some of these plans, each gone on with by a strip; by none, a number beyond the last one's, where who is next
+        leaves the rest to the others."""
+        plans, serves = self.chosen(rows.tolist()), strips < len(team.strips)
+        plans.is_done[~serves, ahead.next[rows[~serves]]] = True
+        plans.serve(team, ahead, np.flatnonzero(serves), rows[serves], strips[serves])
+        return plans
 
-    def _routes_with(self, row: int, helper: int, strip: int) -> tuple[tuple[int, ...], ...]:
-        routes = self.routes[row]
-        return (*routes[:helper], (*routes[helper], strip), *routes[helper + 1 :])
+    def serve(self, team: _Team, ahead: _Ahead, own: np.ndarray, rows: np.ndarray, strips: np.ndarray) -> None:
+        """In some of these plans, `own`, who is next serves a strip, as told of in these rows of `ahead`."""
+        one = ahead.next[rows]
+        self.nodes[own, one] = team.way[one, self.nodes[own, one], strips]
+        self.free_s[own, one] = ahead.ends_s[rows, strips]
+        self.used[own, strips] = True
+        self.removed_m2[own] += ahead.gained_m2[rows, strips]
+        for place, helper, strip in zip(own.tolist(), one.tolist(), strips.tolist(), strict=True):
+            routes = self.routes[place]
+            self.routes[place] = *routes[:helper], (*routes[helper], strip), *routes[helper + 1 :]
 
-    def _still_m2(self, team: _Team, one: np.ndarray, ends_s: FloatArray) -> FloatArray:
+    def chosen(self, rows: Sequence[int]) -> _Plans:
+        """Some of these, to be changed by themselves."""
+        places, routes = list(rows), [self.routes[row] for row in rows]
+        nodes, free_s, is_done = self.nodes[places], self.free_s[places], self.is_done[places]
+        return _Plans(nodes, free_s, is_done, self.used[places], self.removed_m2[places], routes)
+
+    def _still_m2(self, team: _Team, ahead: _Ahead) -> FloatArray:
         """What the strips that are left may bring in the time that is left, shape (plans, strips + 1), if a plan goes
         on with each, or without who is next: the best first, by themselves."""
-        left_s = np.where(np.isfinite(self.free_s), np.maximum(team.until_s - self.free_s, 0.0), 0.0)
+        one = ahead.next
+        left_s = np.where(self.is_done, 0.0, np.maximum(team.until_s - self.free_s, 0.0))
         others_s = left_s.sum(axis=1) - left_s[np.arange(len(one)), one]
-        time_s = others_s[:, np.newaxis] + np.maximum(team.until_s[one][:, np.newaxis] - ends_s, 0.0)
+        time_s = others_s[:, np.newaxis] + np.maximum(team.until_s[one][:, np.newaxis] - ahead.ends_s, 0.0)
         there = ~self.used[:, team.by_rate]
         seconds = np.cumsum(there * team.alone_s[team.by_rate], axis=1)
         worth_m2 = np.cumsum(there * team.alone_m2[team.by_rate], axis=1)

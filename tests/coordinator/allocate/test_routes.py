@@ -52,6 +52,25 @@ def most_m2(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: 
     return max(shared(owners) for owners in product(range(len(helpers) + 1), repeat=len(strips)))
 
 
+def by_rate_m2(told: Situation, until_s: float) -> float:
+    """What is removed if again and again the helper that is free first goes to the strip that brings most a second."""
+    helpers, left, total_m2 = list(told.helpers), list(told.strips), 0.0
+    while helpers:
+        one = min(helpers, key=lambda helper: helper.free_s)
+        helpers.remove(one)
+        gains = []
+        for job in left:
+            removed, behind = after([job], one, until_s)
+            if removed > 0:
+                gains.append((removed / (min(behind.free_s, until_s) - one.free_s), removed, job, behind))
+        if gains:
+            _, removed, job, behind = max(gains, key=lambda gain: gain[0])
+            total_m2 += removed
+            left.remove(job)
+            helpers.append(behind)
+    return total_m2
+
+
 class TestOneHelper:
     def test_in_the_order_of_the_way(self) -> None:
         found = routes([FAR, NEAR], [helper()])
@@ -150,6 +169,15 @@ class TestSeveralHelpers:
         assert routes([NEAR], [alpha, beta]).strips == {"alpha": (), "beta": (2,)}
         assert PLAN.assign(situation([NEAR], [alpha, beta])) == {"alpha": 2}
 
+    def test_for_what_brings_little_nothing_that_brings_much_is_cut_off_by_the_deadline(self) -> None:
+        # Two lanes of 600 s for each, and 400 s more: enough for the short strips, too, of 140 s.
+        east = math.pi / 2
+        lanes = [open_strip(strip(k, 0, 50 * k, 1200, east), 60000) for k in range(4)]
+        poor = [open_strip(strip(10 + k, 300 * k, 50 * k, 280, east), 2500) for k in range(4)]
+        team = [helper("alpha", -30, 0, east, speed_mps=2.0), helper("beta", 1230, 150, -east, speed_mps=2.0)]
+        found = routes([*lanes, *poor], team, 1680)
+        assert found.removed_m2 == pytest.approx(0.7 * (4 * 60000 + 4 * 2500))
+
     @settings(max_examples=150, deadline=None)
     @given(told=situations())
     def test_no_free_helper_waits_while_a_strip_is_worth_its_look(self, told: Situation) -> None:
@@ -210,7 +238,7 @@ class TestAgainstAllOrders:
     def test_one_or_two_helpers_do_as_well_as_can_be_with_a_wide_beam(self, told: Situation) -> None:
         helpers, until_s = told.helpers[:2], min(told.deadline_s, HORIZON_S)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(allocate.routes, "SOONER_SHARE", 0.0)
+            patch.setattr(allocate.routes, "LATER_SHARE", 0.0)
             found = plan_routes(told.strips, helpers, until_s, 200)
         assert found.removed_m2 == pytest.approx(most_m2(told.strips, helpers, until_s), rel=0.001)
 
@@ -224,9 +252,18 @@ class TestAgainstAllOrders:
         ]
         best_m2 = most_m2(told.strips, helpers, until_s)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(allocate.routes, "SOONER_SHARE", 0.0)
+            patch.setattr(allocate.routes, "LATER_SHARE", 0.0)
             found = routes(told.strips, helpers, until_s)
         assert 0.95 * best_m2 <= found.removed_m2 <= best_m2 + 1e-6
+
+    @settings(max_examples=100, deadline=None)
+    @given(told=situations())
+    def test_they_do_no_worse_than_who_is_free_first_taking_what_brings_most_a_second(self, told: Situation) -> None:
+        until_s = min(told.deadline_s, HORIZON_S)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(allocate.routes, "LATER_SHARE", 0.0)
+            found = routes(told.strips, told.helpers, until_s)
+        assert found.removed_m2 >= by_rate_m2(told, until_s) - 1e-6
 
     @settings(max_examples=40, deadline=None)
     @given(told=situations(), data=st.data())

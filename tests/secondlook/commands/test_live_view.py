@@ -73,7 +73,7 @@ def test_without_a_terminal_it_ends_with_the_mission(scenario: str) -> None:
 def test_who_watches_can_stall_or_die_and_the_mission_is_the_same(
     scenario: str, tmp_path: Path, whom: str, harm: signal.Signals
 ) -> None:
-    if whom == "viewer" and (missing := what_is_missing()) is not None:
+    if (missing := what_is_missing()) is not None:  # the viewer that watches draws its window, if nobody sees it
         if os.environ.get("SECONDLOOK_REQUIRE_ALL") == "1":
             pytest.fail(missing)
         pytest.skip(missing)
