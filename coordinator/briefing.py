@@ -95,6 +95,7 @@ class Briefing:
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
             swath_m=sees.reach.strip_width_m,
+            beside_m=sees.reach.beside_m,
             lead_m=sees.lead_m,
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,

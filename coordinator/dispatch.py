@@ -60,8 +60,10 @@ class Dispatch:
             return
         departures = right.departures(self._under_way(), now_ms / 1000)
         offers, again_s = offers_let_through(self._allocator, situation, departures)
+        free = {helper.vehicle for helper in situation.free}
         for name, number in offers:
-            right.offered(name, number, departures)
+            if name in free:
+                right.offered(name, number, departures)
         self._offer(offers, situation, now_ms)
         if math.isfinite(again_s):
             self._agenda.add(Item.ASSIGN, now_ms + round(again_s * 1000))

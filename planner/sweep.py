@@ -79,22 +79,22 @@ def sweeps_over(
     strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float, beside_m: float = 0.0, lead_m: float = 0.0
 ) -> tuple[Sweep, ...]:
     """The ways to fly the legs over a strip (see `legs_over_strip`): in sequence from the first or from the last, in
-    their directions or all turned round.
+    their directions or all turned round; where they lie beside what they cover, on either side of it.
 
     Each leg is entered and left straight for `run_in_m` >= 0, and flown `lead_m` earlier, see `pass_over`. Raises
     ValueError where the run-in, or the turn radius where there are turns, is not finite or out of its range.
     """
     if not (math.isfinite(run_in_m) and run_in_m >= 0):
         raise ValueError(f"the run-in must be finite and 0 or more, not {run_in_m} m")
-    legs = legs_over_strip(strip, swath_m, beside_m)
-    turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
-    ways = [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]
     found = []
-    for way in ways:
-        passes = tuple(pass_over(leg.start, leg.end, run_in_m, lead_m) for leg in way)
-        numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
-        follows = len(legs) == 1 and way is legs
-        found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m), follows))
+    for side_m in (beside_m, -beside_m) if beside_m else (0.0,):
+        legs = legs_over_strip(strip, swath_m, side_m)
+        turned = [replace(leg, start=leg.end, end=leg.start) for leg in legs]
+        for way in [legs, turned] if len(legs) == 1 else [legs, legs[::-1], turned, turned[::-1]]:
+            passes = tuple(pass_over(leg.start, leg.end, run_in_m, lead_m) for leg in way)
+            numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
+            follows = len(legs) == 1 and way is legs
+            found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m), follows))
     return tuple(found)
 
 

@@ -111,15 +111,10 @@ class SecondLooks:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         pose = Pose(agent.nav.x_m, agent.nav.y_m, agent.nav.heading_rad)
-        # A sensor that looks to the side can pass on either.
-        sides_m = (reach.beside_m, -reach.beside_m) if reach.beside_m else (0.0,)
-        ways = [
-            sweep
-            for side_m in sides_m
-            for sweep in sweeps_over(strip, reach.strip_width_m, config.turn_radius_m, config.run_in_m, side_m, lead_m)
-        ]
-        sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
-        ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
+        radius_m, run_in_m = config.turn_radius_m, config.run_in_m
+        ways = sweeps_over(strip, reach.strip_width_m, radius_m, run_in_m, reach.beside_m, lead_m)
+        sweep, way_m = shortest_sweep(ways, pose, radius_m)
+        ends_ms = now_ms + round((way_m + sweep.length_m - run_in_m) / config.speed_mps * 1000)
         if agent.battery(ends_ms) <= 0.0:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return

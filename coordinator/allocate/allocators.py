@@ -62,8 +62,8 @@ def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tupl
 def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -> tuple[list[tuple[str, int]], float]:
     """The allocator's offers less those that must wait, and after how many seconds to ask again, infinite for never.
 
-    A helper that would have to wait long for its strip is not to be offered it, and the allocator is asked again. One
-    that is to give its task back need not wait.
+    A helper that would have to wait long for its strip is not to be offered it, and the allocator is asked again. That
+    holds for one that is to give its task back, too: else it would circle in another's way.
     """
     strips = {one.strip.number: one for one in situation.strips}
     again_s = math.inf
@@ -73,7 +73,7 @@ def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -
         helpers = {helper.vehicle: helper for helper in situation.helpers}
         passed, long = [], {}
         for name, number in checked_offers(allocator.assign(situation), situation):
-            wait_s = 0.0 if helpers[name].task is not None else gate.wait_s(helpers[name], strips[number])
+            wait_s = gate.wait_s(helpers[name], strips[number])
             if wait_s == 0:
                 passed.append((name, number))
             elif math.isinf(wait_s):

@@ -31,7 +31,8 @@ class Service:
 
 def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
     """The ways in which a helper may fly a strip."""
-    return sweeps_over(strip, helper.swath_m, helper.turn_radius_m, helper.run_in_m, lead_m=helper.lead_m)
+    radius_m, run_in_m = helper.turn_radius_m, helper.run_in_m
+    return sweeps_over(strip, helper.swath_m, radius_m, run_in_m, helper.beside_m, helper.lead_m)
 
 
 def expected_service(one: OpenStrip, helper: Helper) -> Service:

@@ -26,8 +26,9 @@ class Helper:
     `pose`: where it is, mission frame. `free_at`, `free_s`: where and when it will be free; where it is, and now, if it
     is free. `task`: the strip that it has, None if it is free. `swath_m`: the full width that one leg covers;
     `p_detect`: its P_d there. `lasts_until_s`: when its battery is empty. `refused`: strips that it is not to be
-    offered. `sweeping`: whether it is on its task's strip already. `lead_m`: how much earlier than
-    over the ground that it sees it flies a leg. Times are seconds since the mission's start.
+    offered. `sweeping`: whether it is on its task's strip already. `beside_m`: how far beside the middle of what a leg
+    covers it flies it, on either side; `lead_m`: how much earlier than over the ground that it sees. Times are seconds
+    since the mission's start.
     """
 
     vehicle: str
@@ -43,6 +44,7 @@ class Helper:
     lasts_until_s: float
     refused: frozenset[int]
     sweeping: bool = False
+    beside_m: float = 0.0
     lead_m: float = 0.0
 
 

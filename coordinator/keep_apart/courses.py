@@ -94,11 +94,18 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
 
 
 def sweep_course(
-    pose: Pose, start_s: float, speed_mps: float, turn_radius_m: float, sweep: Sweep, *, entered: bool = False
+    pose: Pose,
+    start_s: float,
+    speed_mps: float,
+    turn_radius_m: float,
+    sweep: Sweep,
+    *,
+    entered: bool = False,
+    run_out_m: float = 0.0,
 ) -> Course:
     """The course over a strip's legs from a pose at a time; `entered`: the first leg's run-in lies behind it, the pose
-    on the leg."""
-    paths, here = [], pose
+    on the leg; `run_out_m`: what is first to be sailed straight on, see `run_out_left_m`."""
+    paths, here = [straight(pose, run_out_m, turn_radius_m)], shifted(pose[:2], pose.heading_rad, run_out_m)
     for place, (begin, end) in enumerate(sweep.passes):
         if not (entered and place == 0):
             paths.append(shortest_path(here, begin, turn_radius_m))

@@ -251,13 +251,14 @@ class Departures:
         self.in_the_way.clear()
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
-        """How long the helper has to wait before it may set out to a strip; 0 for not at all, infinite for long.
+        """How long the helper has to wait before it may set out to a strip, from what it does if it does anything; 0
+        for not at all, infinite for long.
 
         One that may set out at once is in the way of those judged after it.
         """
         name, now_s = helper.vehicle, self.now_s
-        vehicle = next(other.vehicle for other in self.fleet if other.name == name)
-        course, sweep = self._traffic.to_strip(vehicle, one.strip, now_s)
+        mine = next(other for other in self.fleet if other.name == name)
+        course, sweep = self._traffic.to_strip(mine.vehicle, mine.strip, one.strip, now_s)
         self.ways[name, one.strip.number] = one.strip, course, sweep
         begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
         self.sweeps_s[name, one.strip.number] = begins_s

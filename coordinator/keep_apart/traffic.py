@@ -15,7 +15,7 @@ from coordinator.keep_apart.courses import (
     survey_course,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle
+from coordinator.vehicles import KnownVehicle, pass_of
 from planner.dubins import Pose, shortest_path
 from planner.footprints import footprint_of
 from planner.sweep import Sweep, shortest_sweep, sweeps_over
@@ -38,6 +38,8 @@ class Traffic:
     def __init__(self) -> None:
         self._surveys: dict[str, tuple[object, int, Course]] = {}
         self._sweeps: dict[str, _Sweeping] = {}
+        self._entered: dict[str, Sweep] = {}
+        """Of each helper the sweep that it has begun last."""
         self._errands: dict[str, Course] = {}
         self._rests: dict[str, tuple[int, Course]] = {}
 
@@ -58,24 +60,28 @@ class Traffic:
             return errand
         return self._rest(vehicle)
 
-    def to_strip(self, vehicle: KnownVehicle, strip: Strip, now_s: float) -> tuple[Course, Sweep]:
-        """The course of a free helper that sets out to a strip now, and how it sweeps it."""
-        pose, start_s = self._here(vehicle, now_s)
-        entry = vehicle.entry
-        sweep = _sweep_from(pose, vehicle, strip)
-        return sweep_course(pose, start_s, entry.speed_mps, entry.turn_radius_m, sweep), sweep
+    def to_strip(self, vehicle: KnownVehicle, strip: Strip | None, other: Strip, now_s: float) -> tuple[Course, Sweep]:
+        """The course of a helper that leaves what it does and sets out to another strip now, and how it sweeps it."""
+        pose, start_s = self._here(vehicle, now_s, strip)
+        entry, run_out_m = vehicle.entry, self._run_out_m(vehicle, pose)
+        sweep = _sweep_from(pose, vehicle, other)
+        return sweep_course(pose, start_s, entry.speed_mps, entry.turn_radius_m, sweep, run_out_m=run_out_m), sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
         pose, start_s = self._here(vehicle, now_s, strip)
         entry = vehicle.entry
-        way = shortest_path(pose, _arrival(pose, place), entry.turn_radius_m)
-        return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [way])
+        run_out = straight(pose, self._run_out_m(vehicle, pose), entry.turn_radius_m)
+        end = run_out.pose_at(run_out.length_m)
+        way = shortest_path(end, _arrival(end, place), entry.turn_radius_m)
+        return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [run_out, way])
 
     def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
         """The course of a helper that leaves what it does and circles where it is."""
         pose, start_s = self._here(vehicle, now_s, strip)
-        return course(pose, start_s, vehicle.entry.speed_mps, vehicle.entry.turn_radius_m, [])
+        entry = vehicle.entry
+        run_out = straight(pose, self._run_out_m(vehicle, pose), entry.turn_radius_m)
+        return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [run_out])
 
     def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
         """A helper was sent to a strip."""
@@ -111,12 +117,14 @@ class Traffic:
         known = self._sweeps.get(entry.vehicle)
         if known is None or known.strip != strip or known.stage < stage:
             pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
-            same = known is not None and known.strip == strip and stage == 2
-            sweep = known.sweep if known and same else _sweep_from(pose, vehicle, strip)
-            laid = sweep_course(
-                pose, heard_s, entry.speed_mps, entry.turn_radius_m, sweep, entered=known is not None and same
-            )
+            entered = known is not None and known.strip == strip and stage == 2
+            sweep = known.sweep if known and entered else _sweep_from(pose, vehicle, strip)
+            run_out_m = 0.0 if entered else self._run_out_m(vehicle, pose)
+            radius_m = entry.turn_radius_m
+            laid = sweep_course(pose, heard_s, entry.speed_mps, radius_m, sweep, entered=entered, run_out_m=run_out_m)
             known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
+        if stage == 2:
+            self._entered[entry.vehicle] = known.sweep
         return known.course
 
     def _rest(self, vehicle: KnownVehicle) -> Course:
@@ -132,12 +140,18 @@ class Traffic:
             elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
                 laid = lying_still(pose, heard_s)
             else:
-                swept = self._sweeps.get(entry.vehicle)
-                left_m = run_out_left_m(swept.sweep.leave, pose, entry.run_in_m) if swept else 0.0
-                way = straight(pose, left_m, entry.turn_radius_m)
+                way = straight(pose, self._run_out_m(vehicle, pose), entry.turn_radius_m)
                 laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [way])
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
+
+    def _run_out_m(self, vehicle: KnownVehicle, pose: Pose) -> float:
+        """What a vehicle at a pose has still to sail straight on, whatever it is told, as it has just left a leg or a
+        track."""
+        entered, tracks = self._entered.get(vehicle.entry.vehicle), vehicle.plan.tracks if vehicle.plan else ()
+        ends = [one.end for one in entered.passes] if entered else []
+        ends += [pass_of(track, vehicle.entry).end for track in tracks if track.flown][-1:]
+        return max((run_out_left_m(end, pose, vehicle.entry.run_in_m) for end in ends), default=0.0)
 
 
 def _arrival(pose: Pose, place: Point) -> Pose:
@@ -148,7 +162,7 @@ def _arrival(pose: Pose, place: Point) -> Pose:
 def _sweep_from(pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
     """How a helper sweeps a strip that it sets out to from a pose."""
     entry = vehicle.entry
-    sees = footprint_of(entry.sonar)
-    width_m = sees.reach.strip_width_m
-    sweeps = sweeps_over(strip, width_m, entry.turn_radius_m, entry.run_in_m, lead_m=sees.lead_m)
-    return shortest_sweep(sweeps, pose, entry.turn_radius_m)[0]
+    sees, radius_m = footprint_of(entry.sonar), entry.turn_radius_m
+    reach = sees.reach
+    sweeps = sweeps_over(strip, reach.strip_width_m, radius_m, entry.run_in_m, reach.beside_m, sees.lead_m)
+    return shortest_sweep(sweeps, pose, radius_m)[0]

@@ -65,6 +65,12 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     table.add_row(
         "not seen", f"{risk['uncovered_share']:.2%} of the area, primary alone {alone['uncovered_share']:.2%}"
     )
+    least_m = summary["separation"]["least_m"]
+    for pair in summary["separation"]["closest"]:
+        if pair["closest_m"] < least_m:
+            one, other = pair["vehicles"]
+            told = f"{one} and {other}: {pair['closest_m']:.1f} m at {pair['t_s']:.0f} s, less than {least_m:g} m"
+            table.add_row("too close", told, style="yellow")
     table.add_row("files", str(folder))
     console = Console(soft_wrap=True, highlight=False)
     console.print(table)

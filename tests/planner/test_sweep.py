@@ -171,6 +171,12 @@ class TestShortestSweep:
         assert distance_over(Pose(0, 0, 0), [], 10) == 0
         assert distance_over(Pose(0, -50, NORTH), [pass_over((0, 0), (0, 100), 30)], 10) == pytest.approx(180)
 
+    def test_a_sonar_that_sees_to_the_side_passes_on_either(self) -> None:
+        strip = Strip(1, (0, 0), NORTH, 100, 60)
+        ways = sweeps_over(strip, 60, 10, 0, beside_m=85)
+        assert [way.entry.x_m for way in ways] == pytest.approx([85, 85, -85, -85])
+        assert [way.entry.y_m for way in ways] == pytest.approx([0, 100, 0, 100])
+
     def test_a_sonar_that_looks_ahead_flies_its_pass_earlier(self) -> None:
         begun, ended = pass_over((0, 0), (0, 100), 10, lead_m=30)
         assert begun[:2] == pytest.approx((0, -40))

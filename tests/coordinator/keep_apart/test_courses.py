@@ -49,6 +49,15 @@ class TestCourses:
         there, at_s = laid.at(served.free_s)
         assert math.dist(there[:2], served.free_at[:2]) <= free.speed_mps * (at_s - served.free_s) + 1e-6
 
+    def test_a_run_out_is_sailed_before_the_way_to_the_next_strip(self) -> None:
+        free = helper(heading_rad=EAST)
+        sweep, _ = shortest_sweep(sweeps(strip(1, 300, 100), free), free.pose, free.turn_radius_m)
+        at_once = sweep_course(free.pose, 0, 2, 6, sweep)
+        later = sweep_course(free.pose, 0, 2, 6, sweep, run_out_m=20)
+        assert later.at(10)[0] == pytest.approx((20, 0, EAST))
+        assert at_once.at(10)[0].y_m > 1
+        assert later.arrives_s == pytest.approx(at_once.arrives_s, abs=2)
+
     def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
         one, free = strip(1, 0, 0, length_m=4000), helper(x_m=0, y_m=-100)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)

@@ -73,14 +73,15 @@ class TestOffers:
         asked = situation([self.near], [helper()])
         assert offers_let_through(Insists(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
 
-    def test_a_helper_that_is_to_give_its_task_back_need_not_wait(self) -> None:
+    def test_a_helper_gives_its_task_back_only_where_the_way_to_the_other_is_clear(self) -> None:
         class TurnsRound:
             def assign(self, asked: object) -> dict[str, int]:
                 return {"alpha": 1}
 
         busy = replace(helper(), task=self.far)
         asked = situation([self.near], [busy])
-        assert offers_let_through(TurnsRound(), asked, Waits(set(), math.inf)) == ([("alpha", 1)], math.inf)
+        assert offers_let_through(TurnsRound(), asked, Waits({1}, 0)) == ([("alpha", 1)], math.inf)
+        assert offers_let_through(TurnsRound(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
 
 
 class TestDepartures:

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
+from flights import BRIEF
 from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
-from comms.said.messages import Nav, TruthPose
+from comms.said.messages import Nav, TaskState, TaskStatus, TruthPose
 from coordinator.allocate.allocators import ALLOCATORS
 from secondlook.errors import UserError
+from secondlook.launch.run_display import closing_table
 from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.testing import Fleet, assert_kept_apart, assert_no_strip_lost
 
@@ -43,7 +46,20 @@ class TestMissions:
         crossing = ("coordinator.across=true", "coordinator.max_strip_m=2000", f"coordinator.allocator={allocator}")
         assert_kept_apart(Fleet("five-helpers", folder=tmp_path, overrides=crossing, seed=1).run())
 
-    def test_they_do_where_nobody_sees_to_it(self, tmp_path: Path) -> None:
+    @pytest.mark.parametrize("seed", [1, 2, 3, 4])
+    def test_nor_does_a_primary_that_revisits(self, tmp_path: Path, seed: int) -> None:
+        # It passes beside what it sees, and each leg has a run-out of 20 m: where it is not expected it was met at
+        # 1.5 m (seed 2).
+        revisits = ("vehicles.primary.revisits=true", "mission.deadline_factor=3")
+        flight = Fleet(BRIEF, folder=tmp_path, overrides=revisits, seed=seed).run()
+        assert_kept_apart(flight)
+        told = [(one.vehicle, one.message) for one in flight.received(TaskStatus)]
+        done = {who for who, said in told if isinstance(said, TaskStatus) and said.state is TaskState.DONE}
+        assert "primary" in done
+
+    def test_they_do_where_nobody_sees_to_it_and_that_is_told(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
         fleet = Fleet("five-helpers", folder=tmp_path, overrides=("mission.separation_m=0",), seed=1)
         flight = fleet.run()
         assert_kept_apart(flight)
@@ -51,6 +67,11 @@ class TestMissions:
             assert_kept_apart(flight, 12)
         with pytest.raises(UserError, match="separation_m: nan is not allowed"):
             assert_kept_apart(flight, math.nan)
+        told = dict(flight.summary)
+        closing_table(told, tmp_path)
+        assert "too close" not in capsys.readouterr().out
+        closing_table(told | {"separation": told["separation"] | {"least_m": 12}}, tmp_path)
+        assert re.search(r"too close +\w+ and \w+: \d+\.\d m at \d+ s, less than 12 m", capsys.readouterr().out)
 
 
 class TestTheFigure:
