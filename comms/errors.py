@@ -2,6 +2,17 @@
 
 from __future__ import annotations
 
+LONGEST_TOLD = 500  # characters of a sentence of others'
+
+
+def one_line(text: str, most: int = LONGEST_TOLD) -> str:
+    """What others have sent, as it may be printed: on one line, as nobody's but its own, without anything that a
+    terminal would obey. Characters that cannot be printed are escaped as in Python, what is longer than `most` cut."""
+    shown = text[: most + 1]
+    if not shown.isprintable():
+        shown = "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in shown)
+    return shown if len(shown) <= most else f"{shown[:most]}..."
+
 
 class NodeError(Exception):
     """A node has broken the rules of the house or raised."""

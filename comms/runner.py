@@ -11,12 +11,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from comms.errors import NodeError
+from comms.errors import NodeError, one_line
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
 from comms.said.messages import Message
 from comms.said.routing import Route, Routing
 from comms.said.wire import WireError
+
+MOST_TOLD = 1000  # senders and reasons: strangers may make up any number of senders
 
 log = logging.getLogger("secondlook.comms")
 
@@ -25,7 +27,7 @@ def failure_of(node_id: str, error: Exception, *, at_ms: int | None = None) -> N
     """What is said of a node that has raised; where it did goes to the log."""
     log.error("%s has failed", node_id, exc_info=error)
     when = "" if at_ms is None else f" at {at_ms / 1000:.3f} s"
-    return NodeError(" ".join(f"{node_id} has failed{when}: {type(error).__name__}: {error}".split()))
+    return NodeError(one_line(" ".join(f"{node_id} has failed{when}: {type(error).__name__}: {error}".split())))
 
 
 class Outgoing(NamedTuple):
@@ -122,9 +124,9 @@ class Intake:
     def drop(self, reason: str, sender: str, detail: str) -> None:
         """Counts what is not taken, and says why once for each sender and reason."""
         self.dropped[reason] += 1
-        if (sender, reason) not in self._told:
+        if (sender, reason) not in self._told and len(self._told) < MOST_TOLD:
             self._told.add((sender, reason))
-            log.warning("dropped a message from %s: %s: %s (said once)", sender, reason, detail)
+            log.warning("dropped a message from %s: %s: %s (said once)", one_line(sender), reason, one_line(detail))
 
 
 class GuardedNode:

@@ -5,6 +5,7 @@ Each drive has words of its own (`comms.lockstep.words`, `comms.wall.words`); th
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from comms.errors import WordsError
@@ -12,6 +13,9 @@ from comms.result import LastWord
 from comms.runner import SenderDigest
 from comms.said import codec
 from comms.said.wire import WireError
+
+LARGEST_COUNT = 2**53  # so that the sum of any number of processes' counts can be packed again
+LONGEST_NAME = 100  # characters, of what is counted
 
 
 def pack(*words: Any) -> bytes:
@@ -44,7 +48,7 @@ def unpack_last_word(words: list[Any]) -> LastWord:
                 all(types_of(one) == [str, int, int, str] for one in senders)
                 and are_counts(messages)
                 and are_counts(dropped)
-                and all(type(name) is str and {float}.issuperset(types_of(ms)) for name, ms in latencies_ms.items())
+                and are_latencies(latencies_ms)
             ):
                 return LastWord([SenderDigest(*one) for one in senders], messages, dropped, latencies_ms)
     raise WordsError("a last word that is none")
@@ -56,5 +60,17 @@ def types_of(values: Any) -> list[type]:
 
 
 def are_counts(table: dict[Any, Any]) -> bool:
-    """Whether a table holds whole numbers by name."""
-    return all(type(name) is str and type(count) is int for name, count in table.items())
+    """Whether a table holds whole numbers, from 0 to 2**53, by name."""
+    return all(_is_name(name) and type(count) is int and 0 <= count <= LARGEST_COUNT for name, count in table.items())
+
+
+def are_latencies(table: dict[Any, Any]) -> bool:
+    """Whether a table holds lists of milliseconds by name."""
+    return all(
+        _is_name(name) and {float}.issuperset(types_of(times)) and all(map(math.isfinite, times))
+        for name, times in table.items()
+    )
+
+
+def _is_name(name: Any) -> bool:
+    return type(name) is str and len(name) <= LONGEST_NAME

@@ -9,7 +9,7 @@ from typing import Any
 
 import zenoh
 
-from comms.errors import FleetError, HostLostError, WordsError
+from comms.errors import FleetError, HostLostError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
 from comms.lockstep.clock import Grant, LockstepClock, Round, result_of
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
@@ -216,7 +216,7 @@ class Hub:
         try:
             self._hear_words(host, unpack(payload))
         except (WordsError, ValueError) as error:
-            raise FleetError(f"{host} has said what makes no sense to the clock: {error}") from error
+            raise FleetError(f"{host} has said what makes no sense to the clock: {one_line(str(error))}") from error
 
     def _hear_words(self, host: str, words: list[Any]) -> None:
         match words:
@@ -236,7 +236,7 @@ class Hub:
                 self._last_words[host] = unpack_last_word(words)
                 self._say(host, pack("goodbye"))
             case ["failed", str(sentence)]:
-                raise FleetError(sentence)
+                raise FleetError(one_line(sentence))
             case _:
                 raise WordsError(f"{words[0][:20]!r}")
 

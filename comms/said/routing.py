@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from comms.said.announcement import Role
-from comms.said.topics import TOPICS, Reach, Topic, topic_of
+from comms.said.topics import TOPICS, Keep, Reach, Topic, topic_of
 from comms.said.wire import IDENTIFIER
+
+MOST_ROUTES = 100_000  # that are remembered by their key
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +53,14 @@ class Routing:
             raise ValueError("two nodes have the same id")
         self._routes: dict[str, Route] = {}
         self._routes_of: dict[tuple[Topic, str], Route] = {}
+        self._kept_by: dict[str, set[str]] = {}
         for topic in TOPICS:
             for vehicle in {v for node in roster for v in node.vehicles} if topic.has_vehicle else {""}:
                 writers = self._who(topic, topic.writers, vehicle)
                 if len(writers) > 1:
                     raise ValueError(f"{topic.name} of {vehicle or 'the fleet'} has two writers: {', '.join(writers)}")
+                if writers and topic.keep is not Keep.NOTHING:
+                    self._kept_by.setdefault(writers[0], set()).add(topic.expression(vehicle))
 
     @cached_property
     def audiences(self) -> frozenset[tuple[str, ...]]:
@@ -70,6 +75,8 @@ class Routing:
         except KeyError:
             found = self._find(key)
             if found is not None:  # keys that lead nowhere are not kept: anyone may think of any number of them
+                if len(self._routes) >= MOST_ROUTES:  # of those that lead somewhere a vehicle may, too
+                    self._routes.clear()
                 self._routes[key] = found
             return found
 
@@ -80,6 +87,11 @@ class Routing:
     def publications(self, node_id: str) -> tuple[str, ...]:
         """Key expressions, below the run id, of all that a node may write."""
         return self._expressions(node_id, writing=True)
+
+    def kept_by(self, node_id: str) -> frozenset[str]:
+        """Key expressions, below the run id, of what a node says and keeps for others: one for each topic and, where
+        its keys name a vehicle, each vehicle. None for who is not of the fleet."""
+        return frozenset(self._kept_by.get(node_id, ()))
 
     def _find(self, key: str) -> Route | None:
         found = topic_of(key)

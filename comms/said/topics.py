@@ -90,8 +90,10 @@ class Topic:
     def regex(self) -> re.Pattern[str]:
         """Matches the topic's keys; group `vehicle` where the key names one."""
         chunk = re.escape(self.pattern)
-        chunk = chunk.replace(r"\{vehicle\}", r"(?P<vehicle>[a-z0-9_-]+)")
-        chunk = chunk.replace(r"\{number\}", r"(?P<number>[0-9]+)").replace(r"\{tile\}", r"(?P<tile>[a-z0-9_-]+)")
+        chunk = chunk.replace(r"\{vehicle\}", r"(?P<vehicle>[a-z0-9_-]{1,40})")
+        # A number that is a message's `Count` as well, and written in one way only: else one would have several keys.
+        chunk = chunk.replace(r"\{number\}", r"(?P<number>0|[1-9][0-9]{0,8})")
+        chunk = chunk.replace(r"\{tile\}", r"(?P<tile>[a-z0-9_-]{1,40})")
         return re.compile(chunk)
 
     def vehicle_of(self, key: str) -> str:

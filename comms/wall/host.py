@@ -11,7 +11,7 @@ from typing import Any
 
 import zenoh
 
-from comms.errors import Interrupted, NodeError, RefusedError, WordsError
+from comms.errors import Interrupted, NodeError, RefusedError, WordsError, one_line
 from comms.keys import RunKeys
 from comms.node import Received
 from comms.result import BusResult
@@ -213,7 +213,7 @@ class WallHost:
                     self._welcomed = True
                     self._hello_at_s = 0.0
             case ["refused", self._instance, str(sentence)]:  # not for another process of the same name
-                raise RefusedError(f"refused by the router: {sentence}")
+                raise RefusedError(f"refused by the router: {one_line(sentence)}")
             case ["finish", *_]:
                 self._result = unpack_finish(words)
                 self._finish_by_s = self._finish_by_s or time.monotonic() + COMPLETE_WITHIN_S

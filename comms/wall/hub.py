@@ -8,7 +8,7 @@ from typing import Any
 
 import zenoh
 
-from comms.errors import FleetError, HostLostError, WordsError
+from comms.errors import FleetError, HostLostError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
 from comms.node import Received
 from comms.result import BusResult, LastWord
@@ -136,7 +136,7 @@ class WallHub:
             if self._strict:
                 self._find_silent(now_s)
         for notice in self._clock.notices:
-            self._notice(notice)
+            self._notice(one_line(notice))
         self._clock.notices.clear()
 
     def _send_time(self, now_s: float) -> None:
@@ -177,8 +177,8 @@ class WallHub:
                     self._clock.done(host, unpack_last_word(words))
                 case ["failed", str(sentence)]:
                     if self._strict:
-                        raise FleetError(sentence)
-                    self._notice(sentence)
+                        raise FleetError(one_line(sentence))
+                    self._notice(one_line(sentence))
         except WordsError as error:
             self._post.intake.drop("senseless words", host, str(error))
 

@@ -24,6 +24,7 @@ from comms.words import unpack
 
 WORDS = "clock/"  # what the keys of words begin with, below the run id
 BEAT = f"{WORDS}beat/"
+MOST_WORDS_BYTES = 1 << 17  # some four times the beat of a world with a hundred vehicles
 AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time is dropped
 
 
@@ -44,6 +45,7 @@ class WallPost:
     def __init__(self, line: WallLine, keys: RunKeys, routing: Routing) -> None:
         self.line = line
         self.intake = Intake(routing)
+        self._routing = routing
         self._keys = keys
         self._heard = HeardMessages()
         self._beats: dict[str, Beat] = {}
@@ -111,11 +113,13 @@ class WallPost:
 
     def _receive_words(self, key: str, payload: bytes) -> list[Item]:
         try:
+            if len(payload) > MOST_WORDS_BYTES:
+                raise WordsError(f"{len(payload)} bytes")
             words = unpack(payload)
             if not key.startswith(BEAT):
                 return [Words(key, words)]
             sender = key.removeprefix(BEAT)
-            self._beats[sender] = unpack_beat(words)
+            self._beats[sender] = unpack_beat(words, sender, self._routing)
         except WordsError as error:
             self.intake.drop("senseless words", key, str(error))
             return []

@@ -6,12 +6,18 @@ Clock to all: the time signal. Node to all: its beat, with the tallies of what i
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
 from comms.errors import WordsError
 from comms.result import BusResult, Ending
-from comms.words import are_counts, pack
+from comms.said.codec import LARGEST_INCARNATION
+from comms.said.routing import Routing
+from comms.said.wire import LARGEST_MS
+from comms.words import are_counts, are_latencies, pack
+
+LONGEST_ID = 64  # characters, of what a hello is told apart by
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +54,8 @@ def unpack_hello(words: list[Any]) -> Hello:
     """The `hello` of a host; raises WordsError."""
     match words:
         case ["hello", str(instance), int(schema), str(sha), bool(welcomed), None | int() as now_ms]:
-            return Hello(instance, schema, sha, welcomed, now_ms)
+            if max(len(instance), len(sha)) <= LONGEST_ID and _is_time(now_ms):
+                return Hello(instance, schema, sha, welcomed, now_ms)
     raise WordsError("a hello that is none")
 
 
@@ -61,8 +68,9 @@ def pack_time(now_ms: int | None, factor: float, *, taken_up: bool) -> bytes:
 def unpack_time(words: list[Any]) -> tuple[int | None, float, bool]:
     """The three words of a time signal; raises WordsError."""
     match words:
-        case ["time", None | int() as now_ms, float(factor), bool(taken_up)] if factor > 0:
-            return now_ms, factor, taken_up
+        case ["time", None | int() as now_ms, float(factor), bool(taken_up)]:
+            if _is_time(now_ms) and 0 < factor < math.inf:
+                return now_ms, factor, taken_up
     raise WordsError("a time signal that is none")
 
 
@@ -71,11 +79,17 @@ def pack_beat(beat: Beat) -> bytes:
     return pack("beat", beat.incarnation, beat.tallies)
 
 
-def unpack_beat(words: list[Any]) -> Beat:
-    """The `beat` of a node; raises WordsError."""
+def unpack_beat(words: list[Any], node_id: str, routing: Routing) -> Beat:
+    """The `beat` of a node; raises WordsError, also where it tells of what that node does not keep: a tally's key goes
+    into a query to its sender, and its number is bounded by what there is to keep."""
     match words:
-        case ["beat", int(incarnation), dict(tallies)] if are_counts(tallies):
-            return Beat(incarnation, tallies)
+        case ["beat", int(incarnation), dict(tallies)]:
+            if node_id not in routing.nodes:
+                raise WordsError("a beat of nobody in the fleet")
+            if not tallies.keys() <= routing.kept_by(node_id):
+                raise WordsError("a beat with a tally of what its sender does not keep")
+            if are_counts(tallies) and 0 <= incarnation <= LARGEST_INCARNATION:
+                return Beat(incarnation, tallies)
     raise WordsError("a beat that is none")
 
 
@@ -90,6 +104,11 @@ def unpack_finish(words: list[Any]) -> BusResult:
     """The result in a `finish`; raises WordsError."""
     match words:
         case ["finish", str(ending), int(mission_ms), dict(messages), dict(dropped), dict(latencies_ms)]:
-            if ending in [one.value for one in Ending]:
+            counted = are_counts(messages) and are_counts(dropped) and are_latencies(latencies_ms)
+            if counted and _is_time(mission_ms) and ending in [one.value for one in Ending]:
                 return BusResult(Ending(ending), mission_ms, None, None, messages, dropped, latencies_ms)
     raise WordsError("an end that is none")
+
+
+def _is_time(now_ms: int | None) -> bool:
+    return now_ms is None or 0 <= now_ms <= LARGEST_MS

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from comms.drive import Drive, Setup
+from comms.errors import one_line
 from comms.keys import HostSpec
 from secondlook.fleet.nodes import NodeSpec
 from secondlook.launch.verdict import Fate
@@ -150,7 +151,7 @@ class ChildProcess:
         if code < 0:
             return Fate(code, f"was killed by {signal.Signals(-code).name}")
         lines = self._log.read_text(errors="replace").strip().splitlines() if code else []
-        return Fate(code, f"has ended with exit code {code}", lines[-1] if lines else "")
+        return Fate(code, f"has ended with exit code {code}", one_line(lines[-1]) if lines else "")
 
     def kill(self) -> None:
         """Kills it and waits for its end."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 
 import msgpack
 import pytest
@@ -43,7 +44,7 @@ some_last_words = st.builds(
     st.lists(st.builds(SenderDigest, names, counts, counts, names)),
     st.dictionaries(names, counts),
     st.dictionaries(names, counts),
-    st.dictionaries(names, st.lists(st.floats(allow_nan=False))),
+    st.dictionaries(names, st.lists(st.floats(allow_nan=False, allow_infinity=False))),
 )
 
 
@@ -98,6 +99,10 @@ def test_an_answer_with_a_part_of_the_wrong_kind_is_refused(rest: list[object]) 
         [[["alpha", 0, "1", "sha"]], {}, {}],
         [["alpha"], {}, {}],
         [[], {"malformed": "1"}, {}],
+        [[], {"malformed": -1}, {}, {}],
+        [[], {"malformed": 2**53 + 1}, {}, {}],
+        [[], {"m" * 101: 1}, {}, {}],
+        [[], {}, {}, {"strip_to_task": [math.nan]}],
         [[], {}, {"strip_to_task": [1]}],
         [[], {}, {"strip_to_task": 1.0}],
         [[], [], {}],

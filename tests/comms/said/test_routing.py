@@ -105,6 +105,8 @@ def test_expressions_cover_exactly_the_keys_of_a_node(node_id: str) -> None:
     [
         "", "run/", "/run", "runs", "veh/alpha", "veh//nav", "veh/alpha/nav/1", "veh/delta/nav", "veh/*/nav", "veh/**",
         "veh/ALPHA/nav", "agent/alpha/hotspot/-1", "agent/alpha/hotspot/1a", "agent/alpha/hotspot/\u0661",
+        "agent/alpha/hotspot/01", "agent/alpha/hotspot/1000000000", f"agent/alpha/contact/{'9' * 5000}",
+        f"agent/alpha/coverage/{'0' * 41}",
         "agent/alpha/coverage/*", "world/truth/look/delta", "clock/to/alpha", "secondlook/v1/x/run", "run\n",
     ],
 )  # fmt: skip
@@ -118,6 +120,33 @@ def test_a_route_is_looked_up_once_and_keys_that_lead_nowhere_are_not_kept() -> 
     for number in range(100):
         fresh.route(f"nowhere/{number}")
     assert len(fresh._routes) == 1
+
+
+def test_of_keys_that_one_vehicle_may_think_of_few_are_remembered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("comms.said.routing.MOST_ROUTES", 10)
+    fresh = Routing(ROSTER)
+    for number in range(100):
+        assert fresh.route(f"agent/alpha/coverage/{number}") is not None
+        assert len(fresh._routes) <= 10
+
+
+@pytest.mark.parametrize(
+    ("node_id", "expressions"),
+    [
+        ("clock", {"run"}),
+        ("coordinator", {"coord/strip/*", "coord/task/beta/*", "coord/mission_over"}),
+        ("observer", set()),
+        ("nobody", set()),
+        ("beta", {"agent/beta/maneuver", "agent/beta/state", "agent/beta/coverage/*", "agent/beta/contact/*",
+                  "agent/beta/task_status/*"}),
+    ],
+)  # fmt: skip
+def test_what_a_node_keeps_is_what_it_says_of_each_vehicle(node_id: str, expressions: set[str]) -> None:
+    assert routing.kept_by(node_id) >= expressions
+    assert all(zenoh.KeyExpr(one) for one in routing.kept_by(node_id))
+    assert not routing.kept_by(node_id) & {"veh/alpha/look"}
+    if node_id not in ("coordinator",):
+        assert routing.kept_by(node_id) == expressions
 
 
 @pytest.mark.parametrize(

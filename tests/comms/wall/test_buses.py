@@ -15,6 +15,7 @@ from comms.result import BusResult, Ending
 from comms.said.announcement import ClockMode, RunInfo
 from comms.said.codec import Header, encode
 from comms.session import open_client, put
+from comms.words import pack
 
 LATER_MS = 5_000  # of mission time: 50 ms
 
@@ -140,6 +141,36 @@ def test_a_message_far_ahead_of_time_is_dropped_and_counted() -> None:
     heard = [entry[3] for entry in coordinator.log if entry[1] == "agent/alpha/state"]
     assert heard == [100]
     assert result.dropped["ahead of time"] >= 1
+
+
+def test_a_beat_that_tells_of_strange_keys_harms_nobody() -> None:
+    """Alpha's process says a beat that makes no key expressions; who hears it has dropped it when alpha speaks next."""
+    endpoints: list[str] = []
+
+    def meddle(now_ms: int) -> Step:
+        with open_client(endpoints[0], "alpha", password("alpha")) as session:
+            for key in ("//", "", "$"):
+                put(session, WALL_KEYS.beat("alpha"), pack("beat", 0, {key: 7}))
+            put(session, WALL_KEYS.topic("agent/alpha/state"), encode(Header("alpha", 0, 0, now_ms), state()))
+        return Step()
+
+    coordinator = Scripted(hears=lambda received, now_ms: says(say_over()) if received.vehicle else None)
+    nodes = {"world": Scripted(starts=meddle), "coordinator": coordinator}
+    result = on_zenoh_by_wall(nodes, Notes(), before=endpoints.append)
+    assert result.ending is Ending.OVER
+    assert result.dropped["senseless words"] >= 3
+
+
+def test_why_a_process_has_failed_is_told_on_one_line() -> None:
+    def meddle(now_ms: int) -> Step:
+        with open_client(endpoints[0], "alpha", password("alpha")) as session:
+            put(session, WALL_KEYS.from_host("alpha"), pack("failed", "oops\n\x1b[2Jrouter: all is well"))
+        return Step()
+
+    endpoints: list[str] = []
+    with pytest.raises(FleetError) as failure:
+        on_zenoh_by_wall({"world": Scripted(starts=meddle)}, Notes(), before=endpoints.append)
+    assert str(failure.value) == r"oops\n\x1b[2Jrouter: all is well"
 
 
 def test_a_burst_of_states_loses_none_on_a_healthy_link(bus: Callable[..., BusResult]) -> None:

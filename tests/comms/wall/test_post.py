@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
+import pytest
 from by_wall import ROUTING, WALL_KEYS
 from fleets import say_state
 
@@ -13,6 +14,7 @@ from comms.node import Publication, Received
 from comms.runner import Outgoing, Stamp
 from comms.said.messages import Contact
 from comms.said.topics import CONTACT, STATE
+from comms.session import open_hub
 from comms.wall.journal import Journal
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
@@ -131,6 +133,29 @@ def test_words_are_passed_on_and_senseless_ones_dropped() -> None:
     for payload in (b"\xc1", pack("beat", "no number", {}), pack("beat", 0, {"state": "many"})):
         assert post.receive(Mail("clock/beat/alpha", payload), list) == []
     assert post.intake.dropped == {"senseless words": 3}
+
+
+@pytest.mark.parametrize("key", ["//", "", "$", "agent/beta/state", "**"])
+def test_a_beat_with_a_tally_of_what_is_not_its_senders_to_keep_is_dropped_and_said_once(
+    key: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    with open_hub({"alpha": "secret"}, None)[0] as session:
+        line = WallLine(session, WALL_KEYS, expressions=["agent/*/state", "clock/beat/*"])
+        post = WallPost(line, WALL_KEYS, ROUTING)
+        for _ in range(3):
+            assert post.receive(Mail("clock/beat/alpha", pack("beat", 0, {STATES: 1, key: 1})), list) == []
+    assert post.intake.dropped == {"senseless words": 3}
+    assert len(caplog.messages) == 1
+    assert post.is_complete
+
+
+def test_words_without_end_are_dropped_before_they_are_read() -> None:
+    post = post_over(FakeLine())
+    tallies = {f"agent/alpha/coverage/{number}": 1 for number in range(100_000)}
+    for payload in (pack("beat", 0, tallies), pack("hello", "x" * 200_000)):
+        assert post.receive(Mail("clock/beat/alpha", payload), list) == []
+        assert post.receive(Mail("clock/from/alpha", payload), list) == []
+    assert post.intake.dropped == {"senseless words": 4}
 
 
 def test_a_message_up_to_five_seconds_ahead_is_in_time() -> None:
