@@ -5,6 +5,7 @@ from __future__ import annotations
 from comms.node import Publication
 from comms.said.messages import MissionOver, StripStatus, Task, TaskAction
 from comms.said.topics import MISSION_OVER, STRIP, TASK
+from comms.said.wire import shortened
 from coordinator.ledger import StripRecord
 from planner.types import Strip
 
@@ -29,8 +30,8 @@ class Outbox:
             width_m=strip.width_m,
             removable_m2=record.cut.removable_m2,
             vehicle=record.vehicle,
-            reason=record.reason[:200],
-            why=record.cut.why[:200],
+            reason=shortened(record.reason),
+            why=shortened(record.cut.why),
             foreseen=record.cut.foreseen,
         )
         self._waiting.append(Publication(STRIP.key(number=strip.number), message))

@@ -371,6 +371,14 @@ class AtMost:
     count: int
 
 
+LONGEST_TEXT = 200  # bytes in UTF-8
+
+
+def shortened(text: str) -> str:
+    """As much of a text's beginning as fits a message's `Text`."""
+    return text.encode(errors="replace")[:LONGEST_TEXT].decode(errors="ignore")
+
+
 Metres = Annotated[float, Scaled("m", 100, -1e7, 1e7)]
 Radians = Annotated[float, Scaled("rad", 1_000_000, -7.0, 7.0)]
 MetresPerSecond = Annotated[float, Scaled("m/s", 1000, 0.0, 100.0)]
@@ -382,7 +390,7 @@ YesNo = Annotated[bool, Flag()]
 Identifier = Annotated[str, Words(40, IDENTIFIER)]
 OptionalIdentifier = Annotated[str, Words(40, re.compile(r"[a-z0-9_-]*"))]
 Digest = Annotated[str, Words(64, re.compile(r"[0-9a-f]{64}"))]
-Text = Annotated[str, Words(200)]
+Text = Annotated[str, Words(LONGEST_TEXT)]
 ProbabilityCurve = Annotated[NDArray[np.float64], Packed(1, "<u2", 4096, 10_000, 0.999)]
 ProbabilityLook = Annotated[NDArray[np.float64], Packed(3, "<u2", 65_536, 10_000, 0.999)]
 Levels = Annotated[NDArray[np.uint8], Packed(2, "u1", 1024)]

@@ -33,6 +33,15 @@ TAKE, GIVE_BACK = TaskAction.TAKE, TaskAction.GIVE_BACK
 DUE_S = 175 * 1.5 + 60
 
 
+@pytest.mark.parametrize("letter", ["x", "\u00fc", "\u6df1", "\U0001f30a"])
+def test_a_reason_as_long_as_a_message_may_hold_is_told_as_far_as_it_fits(letter: str) -> None:
+    told, longest = with_a_helper(), letter * (200 // len(letter.encode()))
+    told.status(HELPER, 1, TaskState.FAILED, longest)
+    told.settle()
+    assert told.states()[1] is FAILED
+    assert told.strips()[1].reason.startswith(f"{HELPER} failed: {letter * 40}")
+
+
 class TestOneThatAcceptsAndNeverMoves:
     def test_it_is_to_give_the_strip_back_well_after_its_end_was_due_and_another_gets_it(self) -> None:
         told = with_a_helper(vehicles=TWO_HELPERS)
