@@ -1,7 +1,15 @@
-"""A message's payload: header and body as one positional MessagePack array behind the schema version."""
+"""A message's payload: header and body as one positional MessagePack array behind schema version and checksum.
+
+The array's parts: schema version, checksum, sender, incarnation, sequence number, send time, body. The checksum is the
+CRC-32 (as of zlib) of all bytes behind it, always as a MessagePack uint 32: so it lies at one place, and what is
+checked is what was received, before anything else is read. A CRC-32 notices every change of up to 32 bits in a row, in
+less time than other sums take; it is against damage, not against forgery.
+"""
 
 from __future__ import annotations
 
+import struct
+import zlib
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -21,8 +29,10 @@ def unpack(packed: bytes) -> Any:
         raise WireError(f"not MessagePack: {error}") from None
 
 
-SCHEMA_VERSION = 1
-HEADER_FIELDS = 6
+SCHEMA_VERSION = 2
+PARTS = 7
+_START = (0x90 + PARTS, SCHEMA_VERSION, 0xCE)  # an array of so many parts, a small number, a uint 32
+_HEAD = struct.Struct(">3BI")
 LARGEST_INCARNATION = 2**16 - 1
 LARGEST_SEQUENCE = 2**32 - 1
 CLOCK = "clock"  # the clock's id as a sender
@@ -71,7 +81,13 @@ def message_of(body: Any, message_type: type[Message]) -> Message:
 def packed(header: Header, body: list[Any]) -> bytes:
     """The payload of a header and a body; raises WireError where the header does not fit."""
     _check(*header)
-    return pack([SCHEMA_VERSION, *header, body])
+    return sealed([*header, body])
+
+
+def sealed(parts: list[Any]) -> bytes:
+    """The payload of the parts behind version and checksum, whatever they are."""
+    rest = pack(parts)[1:]  # without the head of an array of its own
+    return _HEAD.pack(*_START, zlib.crc32(rest)) + rest
 
 
 def header_of(payload: bytes) -> Header:
@@ -80,12 +96,12 @@ def header_of(payload: bytes) -> Header:
 
 
 def _fields(payload: bytes) -> tuple[Header, Any]:
-    fields = unpack(payload)
-    if type(fields) is not list or len(fields) != HEADER_FIELDS:
-        raise WireError(f"not a list of {HEADER_FIELDS} parts")
-    version, sender, incarnation, sequence, sent_ms, body = fields
-    if type(version) is not int or version != SCHEMA_VERSION:
-        raise WireError(f"of another schema version than {SCHEMA_VERSION}")
+    head = _HEAD.unpack_from(payload) if len(payload) >= _HEAD.size else ()
+    if head[:3] != _START:
+        raise WireError(f"not a list of {PARTS} parts of schema version {SCHEMA_VERSION} with a checksum")
+    if zlib.crc32(payload[_HEAD.size :]) != head[3]:
+        raise WireError("the checksum does not fit")
+    _, _, sender, incarnation, sequence, sent_ms, body = unpack(payload)
     _check(sender, incarnation, sequence, sent_ms)
     return Header(sender, incarnation, sequence, sent_ms), body
 

@@ -160,7 +160,8 @@ STRIP = Topic(
     crosses_water=False,
 )  # fmt: skip
 TASK = Topic(
-    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _HELPERS_OWN | _WATCHERS, 64, 0.1,
+    # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
+    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _HELPERS_OWN | _WATCHERS, 68, 0.1,
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 TASK_STATUS = Topic(

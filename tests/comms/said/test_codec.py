@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Callable
 from dataclasses import MISSING, fields, is_dataclass, replace
 from typing import Any, get_type_hints
@@ -16,7 +17,7 @@ from largest_message import MESSAGE_TYPES, headers, largest_message
 from same_message import assert_same
 
 from comms.said.announcement import RosterVehicle
-from comms.said.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, SCHEMA_VERSION, Header, decode, encode
+from comms.said.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, SCHEMA_VERSION, Header, decode, encode, sealed
 from comms.said.messages import (
     AgentState,
     CoverageTile,
@@ -174,10 +175,37 @@ def test_a_field_that_does_not_fit_is_named_also_where_the_last_are_missing(wron
         codec.decode([*wire[:9], wrong])
 
 
-def test_a_payload_is_a_positional_array_behind_the_schema_version() -> None:
-    assert msgpack.unpackb(encode(HEADER, NAV)) == [
-        SCHEMA_VERSION, "alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0],
+def test_a_payload_is_a_positional_array_behind_schema_version_and_checksum() -> None:
+    payload = encode(HEADER, NAV)
+    assert msgpack.unpackb(payload) == [
+        SCHEMA_VERSION, zlib.crc32(payload[7:]), "alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0],
     ]  # fmt: skip
+    assert payload[7:] == msgpack.packb(["alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0]])[1:]
+
+
+@by_type
+@settings(max_examples=25)
+@given(data=st.data())
+def test_a_payload_of_which_some_bytes_in_a_row_are_changed_is_refused(
+    message_type: type[Any], data: st.DataObject
+) -> None:
+    sent = encode(HEADER, data.draw(any_message(message_type)))
+    where = data.draw(st.integers(0, len(sent) - 1))
+    damage = data.draw(st.binary(min_size=1, max_size=4).filter(any))
+    changed = bytes(one ^ damage[at - where] if 0 <= at - where < len(damage) else one for at, one in enumerate(sent))
+    if changed == sent:  # all that is not 0 would have struck behind the end
+        return
+    with pytest.raises(WireError):
+        decode(changed, message_type)
+
+
+def test_a_payload_with_any_one_byte_changed_inside_an_array_is_refused() -> None:
+    sent = encode(HEADER, CURVE)
+    array = sent.index((1000).to_bytes(2, "little"))
+    for at in range(array, array + 4):
+        for value in set(range(256)) - {sent[at]}:
+            with pytest.raises(WireError, match=r"^the checksum does not fit$"):
+                decode(sent[:at] + bytes([value]) + sent[at + 1 :], Curve)
 
 
 @by_type
@@ -208,6 +236,9 @@ def test_a_payload_with_a_part_replaced_is_refused_or_is_a_message(
     message_type: type[Any], data: st.DataObject
 ) -> None:
     parts = msgpack.unpackb(encode(HEADER, data.draw(any_message(message_type))))
+    sealed_parts = parts[2:]
+    _replace_one(sealed_parts, data)
+    _decodes_or_is_refused(sealed(sealed_parts), message_type)
     _replace_one(parts, data)
     _decodes_or_is_refused(msgpack.packb(parts), message_type)
 
@@ -222,6 +253,11 @@ def _replace_one(parts: list[Any], data: st.DataObject) -> None:
         del parts[where]
 
 
+def _sealed_bytes(rest: bytes) -> bytes:
+    """What looks like a payload as far as the checksum, which fits."""
+    return encode(HEADER, NAV)[:3] + zlib.crc32(rest).to_bytes(4, "big") + rest
+
+
 @pytest.mark.parametrize(
     "payload",
     [
@@ -229,18 +265,32 @@ def _replace_one(parts: list[Any], data: st.DataObject) -> None:
         b"\xdd\xff\xff\xff\xff",  # an array that claims 4 billion entries
         b"\xc6\xff\xff\xff\xff",  # bytes that claim 4 GiB
         b"\x91" * 200_000 + b"\xc0",  # nested 200,000 deep
-        msgpack.packb([SCHEMA_VERSION, "alpha", 0, 3, 4500, None])[:-1] + b"\x91" * 900 + b"\xc0",
-        b"\x96" + b"\x91" * 900 + b"\xc0" * 6,
-        encode(HEADER, NAV) + b"\x00",
+        _sealed_bytes(msgpack.packb(["alpha", 0, 3, 4500, None])[1:-1] + b"\x91" * 900 + b"\xc0"),
+        b"\x97" + b"\x91" * 900 + b"\xc0" * 7,
+        _sealed_bytes(msgpack.packb(["alpha", 0, 3, 4500])[1:] + b"\xdd\xff\xff\xff\xff"),
+        _sealed_bytes(encode(HEADER, NAV)[7:] + b"\x00"),
+        _sealed_bytes(b""),
+        encode(HEADER, NAV)[:7],
     ],
-    ids=["empty", "huge array", "huge bytes", "too deep", "deep body", "deep version", "trailing byte"],
+    ids=[
+        "empty",
+        "huge array",
+        "huge bytes",
+        "too deep",
+        "deep body",
+        "deep version",
+        "huge body",
+        "trailing byte",
+        "nothing sealed",
+        "nothing behind the checksum",
+    ],
 )
 def test_payloads_made_to_hurt_are_refused(payload: bytes) -> None:
     for message_type in MESSAGE_TYPES:
         assert not _decodes_or_is_refused(payload, message_type)
 
 
-@pytest.mark.parametrize("version", [0, 2, True, 1.0, "1", None])
+@pytest.mark.parametrize("version", [0, 1, 3, True, 1.0, "1", None])
 def test_another_schema_version_is_refused(version: object) -> None:
     parts = msgpack.unpackb(encode(HEADER, NAV))
     with pytest.raises(WireError, match="schema version"):
@@ -270,7 +320,7 @@ def test_a_header_that_does_not_fit_is_neither_sent_nor_taken(header: Header) ->
     body = msgpack.unpackb(encode(HEADER, NAV))[-1]
     with pytest.raises(WireError):
         decode(
-            msgpack.packb([SCHEMA_VERSION, header.sender, header.incarnation, header.sequence, header.sent_ms, body]),
+            sealed([header.sender, header.incarnation, header.sequence, header.sent_ms, body]),
             Nav,
         )
 
@@ -364,15 +414,17 @@ def test_the_largest_message_is_within_its_topics_limit(topic: Topic) -> None:
 
 
 @given(data=st.data(), header=headers)
-def test_a_task_never_takes_more_than_64_bytes(data: st.DataObject, header: Header) -> None:
+def test_a_task_of_the_first_49_days_never_takes_more_than_64_bytes(data: st.DataObject, header: Header) -> None:
     message = data.draw(st.one_of(st.just(largest_message(Task, tile_cells=0)), any_message(Task)))
-    assert len(encode(header._replace(sender="coordinator"), message)) <= 64
+    header = header._replace(sender="coordinator", sent_ms=header.sent_ms % 2**32)
+    assert len(encode(header, message)) <= 64
 
 
 def test_the_largest_task_and_a_full_tile_over_water_have_the_size_worked_out_by_hand() -> None:
-    # Array and version 2, sender 1 + 11, incarnation 3, sequence 5, send time 9; array 1, action 1, six numbers 30.
+    # Array and version 2, checksum 5, sender 1 + 11, incarnation 3, sequence 5, send time 9; array 1, action 1, six
+    # numbers 30.
     task = largest_message(Task, tile_cells=0)
-    assert len(encode(LONGEST_HEADER._replace(sender="coordinator"), task)) == 63
+    assert len(encode(LONGEST_HEADER._replace(sender="coordinator"), task)) == 68
     # Levels of 400 bytes each with 1 + 1 + 1 + 3 before them, the mask of 50 with 1 + 1 + 1 + 2, three numbers, header.
     tile = largest_message(CoverageTile, tile_cells=20)
-    assert len(encode(LONGEST_HEADER, tile)) == 2 * 406 + 55 + 1 + 15 + 2 + 42 + 3 + 5 + 9
+    assert len(encode(LONGEST_HEADER, tile)) == 2 * 406 + 55 + 1 + 15 + 2 + 5 + 42 + 3 + 5 + 9

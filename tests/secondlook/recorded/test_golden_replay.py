@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from comms.said.codec import decode, encode
+from comms.said.codec import SCHEMA_VERSION, decode, encode
 from comms.said.topics import topic_of
 from secondlook.cli import app
 from secondlook.recorded.mission_files import read_messages
@@ -53,7 +53,7 @@ def test_it_is_small_and_has_all_there_is_to_decide(golden: Path) -> None:
 @pytest.mark.parametrize("node", NODES)
 def test_every_node_decides_the_same_again(golden: Path, node: str) -> None:
     code, output = replay(golden, node, TOLERANCE)
-    said = sum(msgpack.unpackb(payload)[1] == node for _, payload in read_messages(golden / "messages.mpk"))
+    said = sum(msgpack.unpackb(payload)[2] == node for _, payload in read_messages(golden / "messages.mpk"))
     assert said > 20
     assert (code, output) == (0, f"{node}: all {said} messages are said again, numbers within 1e-06\n")
 
@@ -67,7 +67,7 @@ def changed(golden: Path, folder: Path, key: str, change: Callable[[Any], Any]) 
     header, message = decode(entries[place][1], found[0].message)
     entries[place] = (key, encode(header, change(message)))
     packed = b"".join(msgpack.packb(list(entry)) for entry in entries)
-    (folder / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", 1]) + packed)
+    (folder / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", SCHEMA_VERSION]) + packed)
     for name in ("scenario.yaml", "summary.json"):
         (folder / name).write_bytes((golden / name).read_bytes())
     return folder

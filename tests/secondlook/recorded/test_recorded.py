@@ -25,7 +25,7 @@ from hypothesis.extra.numpy import arrays
 import secondlook
 from comms.node import Received
 from comms.said.announcement import RunInfo
-from comms.said.codec import Header
+from comms.said.codec import SCHEMA_VERSION, Header
 from comms.said.messages import AgentState, Message, Mode, Plan, PlannedTrack, StripState, StripStatus
 from comms.said.topics import PLAN, STATE, STRIP, Topic
 from planner.risk import risk_statistics
@@ -81,7 +81,7 @@ def test_keys_that_no_message_can_have_are_refused(mission: RecordedMission, bri
         UserError, match=r"^no key is like 'agent/h/[*]'; there are run, .*, and the vehicles primary, help"
     ):
         mission.messages("agent/h/*")
-    (brief_copy / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", 1]))
+    (brief_copy / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", SCHEMA_VERSION]))
     assert list(secondlook.load(brief_copy).messages("agent/h/*")) == []  # who may be there nobody has said
 
 
@@ -263,7 +263,7 @@ def test_a_run_that_was_cut_off_is_read_as_far_as_it_came(brief_copy: Path) -> N
     assert 0 < len(list(mission.messages())) < whole
     assert mission.said(Plan)
     assert mission.risk().statistics.cells == mission.risk(0).statistics.cells
-    messages.write_bytes(msgpack.packb(["secondlook-messages", 1]))
+    messages.write_bytes(msgpack.packb(["secondlook-messages", SCHEMA_VERSION]))
     mission = secondlook.load(brief_copy)
     assert not mission.has_begun
     assert mission.end_s == 0

@@ -9,7 +9,7 @@ import msgpack
 import pytest
 from typer.testing import CliRunner
 
-from comms.said.codec import decode, encode
+from comms.said.codec import SCHEMA_VERSION, decode, encode
 from comms.said.messages import StripStatus
 from secondlook.cli import app
 from secondlook.errors import UserError
@@ -17,6 +17,7 @@ from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import load_scenario
 
+HEAD = msgpack.packb(["secondlook-messages", SCHEMA_VERSION])
 BAY = """
 name: bay
 area: {polygon_m: [[0, 0], [300, 0], [300, 100], [0, 100]]}
@@ -57,7 +58,7 @@ def test_every_node_says_the_same_again(run: Path, node: str) -> None:
 
 def decode_sender(payload: bytes) -> str:
     """The sender named in a payload's header."""
-    return str(msgpack.unpackb(payload)[1])
+    return str(msgpack.unpackb(payload)[2])
 
 
 def rewrite(run: Path, folder: Path, change: object) -> Path:
@@ -67,8 +68,7 @@ def rewrite(run: Path, folder: Path, change: object) -> Path:
     entries = read_messages(run / "messages.mpk")
     changed = change(entries)  # type: ignore[operator]
     packed = b"".join(msgpack.packb([key, payload]) for key, payload in changed)
-    head = msgpack.packb(["secondlook-messages", 1])
-    (copy / "messages.mpk").write_bytes(head + packed)
+    (copy / "messages.mpk").write_bytes(HEAD + packed)
     return copy
 
 
@@ -114,9 +114,9 @@ def test_a_recording_that_was_cut_off_is_replayed_as_far_as_it_goes(run: Path, t
         (None, "No such file or directory; must be the messages.mpk of a recorded run"),
         (b"", "is not a file of messages"),
         (b"hello", "is not a file of messages"),
-        (msgpack.packb(["secondlook-messages", 999]), "holds messages of schema version 999; must be version 1"),
-        (msgpack.packb(["secondlook-messages", 1]) + msgpack.packb([1, 2]), "message 1 is not a key and a payload"),
-        (msgpack.packb(["secondlook-messages", 1]) + b"\xc1", "cannot be read behind message 0"),
+        (msgpack.packb(["secondlook-messages", 999]), "holds messages of schema version 999; must be version 2"),
+        (HEAD + msgpack.packb([1, 2]), "message 1 is not a key and a payload"),
+        (HEAD + b"\xc1", "cannot be read behind message 0"),
     ],
 )
 def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes | None, sentence: str) -> None:
