@@ -26,6 +26,8 @@ LARGEST_MESSAGE_BYTES = 4 << 20
 PACKET_BYTES = 8 << 10  # each has its memory cleared before it is received, however little comes
 MOST_PACKETS = 16  # that may wait to be sent; the most there may be
 MOST_MAIL = 1 << 20
+MOST_AT_THE_DOOR = 1000  # connections that have not proved yet who they are; each is a file to the system
+AT_THE_DOOR_S = 3.0  # so long they may take: whoever is of the fleet tries again, for longer than this
 LEASE_S = 4.0  # a link of which nothing is heard for so long, not even a sign of life, is given up
 BLOCK_S = 1.0  # so long a message waits for a link that takes nothing, before that is given up
 DROP_S = 0.1  # so long what may be left out waits for room: on a busy machine it takes a while to be made
@@ -192,13 +194,9 @@ def _on_one_host(
 def _on_several_hosts(
     mode: str, certificates: Certificates | None, *, listen: Iterable[str] = (), connect: Iterable[str] = ()
 ) -> dict[str, Any]:
-    first_s, most_s = RETRY_S
     settings: dict[str, Any] = _basic(mode, listen, connect) | {
         "scouting/gossip/enabled": False,
         "scouting/delay": 0,
-        "connect/retry": {
-            "period_init_ms": round(first_s * 1000), "period_max_ms": round(most_s * 1000), "period_increase_factor": 2,
-        },
         "transport/link/tx/lease": round(LEASE_S * 1000),
         "transport/link/tx/queue/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
         "transport/link/tx/queue/congestion_control/block/wait_before_close": round(BLOCK_S * 1e6),
@@ -218,16 +216,22 @@ def _on_several_hosts(
 
 
 def _basic(mode: str, listen: Iterable[str], connect: Iterable[str]) -> dict[str, Any]:
+    first_s, most_s = RETRY_S
     router = {"scouting/delay": 0, "adminspace": {"enabled": True, "permissions": {"read": True, "write": False}}}
     return {
         "mode": mode,
         "scouting/multicast/enabled": False,
         "listen/endpoints": list(listen),  # always: a router listens on all interfaces by default
         "connect/endpoints": list(connect),
+        "connect/retry": {
+            "period_init_ms": round(first_s * 1000), "period_max_ms": round(most_s * 1000), "period_increase_factor": 2,
+        },
         "transport/shared_memory/enabled": False,  # a killed process would leave segments behind
         "transport/link/rx/max_message_size": LARGEST_MESSAGE_BYTES,
+        "transport/unicast/accept_pending": MOST_AT_THE_DOOR,
+        "transport/unicast/accept_timeout": round(AT_THE_DOOR_S * 1000),
         **(router if mode == "router" else {}),
-    }
+    }  # fmt: skip
 
 
 def _config(settings: Mapping[str, Any], access_control: dict[str, Any] | None = None) -> zenoh.Config:
