@@ -6,6 +6,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import sys
+import threading
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -101,6 +102,7 @@ class Intake:
         self.dropped: Counter[str] = Counter()
         self._routing = routing
         self._told: set[tuple[str, str]] = set()
+        self._lock = threading.Lock()
 
     def open(self, key: str, payload: bytes) -> Received | None:
         """The message, or None where it does not fit."""
@@ -122,10 +124,13 @@ class Intake:
         return Received(key, route.topic, route.vehicle, header, message, payload)
 
     def drop(self, reason: str, sender: str, detail: str) -> None:
-        """Counts what is not taken, and says why once for each sender and reason."""
-        self.dropped[reason] += 1
-        if (sender, reason) not in self._told and len(self._told) < MOST_TOLD:
-            self._told.add((sender, reason))
+        """Counts what is not taken, and says why once for each sender and reason. Any thread may call it."""
+        with self._lock:
+            self.dropped[reason] += 1
+            is_news = (sender, reason) not in self._told and len(self._told) < MOST_TOLD
+            if is_news:
+                self._told.add((sender, reason))
+        if is_news:
             log.warning("dropped a message from %s: %s: %s (said once)", one_line(sender), reason, one_line(detail))
 
 

@@ -58,7 +58,9 @@ class Topic:
     `pattern`: the key below the run id; `{vehicle}`, `{number}` and `{tile}` stand for one chunk each.
     `delay_ms`: from sending to delivery in lockstep, >= 1. `wakes`: whether a message that is due lets its reader act;
     if not it waits until the reader acts for another reason. `max_bytes`: a larger payload is refused.
-    `rate_hz`: the most that one writer is expected to publish on average, over all its keys of the topic.
+    `rate_hz`: the most that its writer publishes on average, for one vehicle where the key names one, over all such
+    keys. `burst`: the most that it may publish beyond that at once. By the wall clock both are held where a message
+    arrives, the rate with some leeway (`comms.wall.gate`).
     """
 
     name: str
@@ -72,6 +74,7 @@ class Topic:
     crosses_water: bool
     delay_ms: int = 1
     wakes: bool = True
+    burst: int = 2000
 
     def key(self, *, vehicle: str = "", number: int = 0, tile: str = "") -> str:
         """The key below the run id."""
@@ -145,7 +148,7 @@ CURVE = Topic(
 )  # fmt: skip
 COVERAGE = Topic(
     "coverage", "agent/{vehicle}/coverage/{tile}", CoverageTile, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 1_000, 2.0,
-    Keep.LATEST, crosses_water=True,
+    Keep.LATEST, crosses_water=True, burst=20_000,  # at the mission's end each tile is said up to 8 times
 )  # fmt: skip
 CONTACT = Topic(
     "contact", "agent/{vehicle}/contact/{number}", Contact, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 200, 0.2,
@@ -170,7 +173,7 @@ TASK_STATUS = Topic(
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
-    dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _WATCHERS, 400, 0.001, Keep.LATEST,
+    dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _WATCHERS, 400, 0.1, Keep.LATEST,
     crosses_water=True,
 )  # fmt: skip
 TRUTH_TARGETS = Topic(

@@ -15,9 +15,11 @@ from comms.errors import Interrupted, NodeError, RefusedError, WordsError, one_l
 from comms.keys import RunKeys
 from comms.node import Received
 from comms.result import BusResult
+from comms.runner import Intake
 from comms.said.codec import LARGEST_INCARNATION, SCHEMA_VERSION
 from comms.said.routing import Routing
 from comms.wall.clock import MissionTime
+from comms.wall.gate import Gate
 from comms.wall.line import WallLine
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import Seat
@@ -74,11 +76,17 @@ class WallHost:
         self._clock_heard_s = time.monotonic()
         self._clock_is_heard = True
         self._to_me = f"clock/to/{host}"
+        intake = Intake(routing)
+        self._gate = Gate(routing, intake)
         # Last comes what the clock tells to this host: when that arrives the hub knows of all the rest.
         self._line = WallLine(
-            session, keys, expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me], keeps=seat.keeps
+            session,
+            keys,
+            self._gate,
+            expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me],
+            keeps=seat.keeps,
         )
-        self._post = WallPost(self._line, keys, routing)
+        self._post = WallPost(self._line, keys, routing, intake)
         # Before the first hello: whoever the clock has heard of is missed when it ends, however soon that is.
         self._token = session.liveliness().declare_token(keys.life(host, self._instance))
 
@@ -194,6 +202,7 @@ class WallHost:
         if not self._welcomed:  # nobody acts who may yet be refused
             return
         first = not self._time.known
+        self._gate.factor = factor
         self._time.hear(now_ms, factor, time.monotonic())
         if first:
             # Who was there before the start is the first of its name; later ones are told apart by when they came. The

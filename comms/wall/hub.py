@@ -12,13 +12,14 @@ from comms.errors import FleetError, HostLostError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
 from comms.node import Received
 from comms.result import BusResult, LastWord
-from comms.runner import Stamp
+from comms.runner import Intake, Stamp
 from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN
 from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S
 from comms.wall.clock import Phase, WallClock
+from comms.wall.gate import Gate
 from comms.wall.host import BEAT_EVERY_S
 from comms.wall.journal import Journal
 from comms.wall.line import Life, WallLine
@@ -68,14 +69,18 @@ class WallHub:
         self._time_at_s = self._beat_at_s = self._alive_at_s = 0.0
         self._under_way = False
         self._seat_closed = False
+        intake = Intake(routing)
+        gate = Gate(routing, intake)
+        gate.factor = factor
         self._line = WallLine(
             session,
             keys,
+            gate,
             expressions=[*seat.reads, MISSION_OVER.expression(), "clock/beat/*", f"{FROM}*"],
             keeps=[*seat.keeps, RUN.expression()],
             watches_lives=True,
         )
-        self._post = WallPost(self._line, keys, routing)
+        self._post = WallPost(self._line, keys, routing, intake)
 
     def interrupt(self) -> None:
         """From another thread or a signal's handler: `run` raises Interrupted."""

@@ -7,6 +7,7 @@ where the link is too slow for all. Whoever misses something that is kept asks i
 from __future__ import annotations
 
 import queue
+import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -17,16 +18,19 @@ from comms.keys import RunKeys
 from comms.runner import Outgoing
 from comms.said.topics import Keep
 from comms.session import subscribe
+from comms.wall.gate import Gate
 
 ANSWER_WITHIN_S = 5.0
 
 
 @dataclass(frozen=True, slots=True)
 class Mail:
-    """What has arrived under a key (below the run id): a message or the clock's words."""
+    """What has arrived under a key (below the run id): a message or the clock's words. `sender`: as the gate knows
+    it."""
 
     key: str
     payload: bytes
+    sender: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,14 +65,15 @@ Event = Mail | Asked | Answered | Life
 class WallLine:
     """Speaks and hears for a process over an open session.
 
-    `expressions`: below the run id, what it subscribes to. `keeps`: key expressions of what it keeps for others.
-    `watches_lives`: it is told who comes and goes.
+    `gate`: what it takes of what arrives. `expressions`: below the run id, what it subscribes to. `keeps`: key
+    expressions of what it keeps for others. `watches_lives`: it is told who comes and goes.
     """
 
     def __init__(
         self,
         session: zenoh.Session,
         keys: RunKeys,
+        gate: Gate,
         *,
         expressions: Iterable[str],
         keeps: Iterable[str] = (),
@@ -76,6 +81,7 @@ class WallLine:
     ) -> None:
         self._session = session
         self._keys = keys
+        self._gate = gate
         self._queue: queue.SimpleQueue[Event | None] = queue.SimpleQueue()
         self._reads = [zenoh.KeyExpr(keys.topic(one)) for one in expressions]
         self._held = [
@@ -93,8 +99,13 @@ class WallLine:
             event = self._queue.get(timeout=max(0.0, timeout_s))
         except queue.Empty:
             return None
-        if event is None:
-            raise Interrupted
+        match event:
+            case None:
+                raise Interrupted
+            case Mail(_, payload, sender):
+                self._gate.has_turn(sender, len(payload))
+            case Asked():
+                self._gate.has_asked()
         return event
 
     def interrupt(self) -> None:
@@ -124,7 +135,7 @@ class WallLine:
             nonlocal answers
             if reply.ok is not None:
                 answers += 1
-                self._on_mail(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+                self._on_mail(str(reply.ok.key_expr), reply.ok.payload.to_bytes(), asked_for=True)
 
         def on_end() -> None:
             self._queue.put(Answered(sender, expression, tally, answers))
@@ -153,11 +164,18 @@ class WallLine:
         # message would take a place of its own in a short queue, and a burst would lose some on a healthy link.
         self._session.put(key, payload, congestion_control=control, priority=zenoh.Priority.DATA, express=False)
 
-    def _on_mail(self, key: str, payload: bytes) -> None:
-        self._queue.put(Mail(key.removeprefix(self._keys.root), payload))
+    def _on_mail(self, key: str, payload: bytes, *, asked_for: bool = False) -> None:
+        below = key.removeprefix(self._keys.root)
+        sender = self._gate.lets_in(below, len(payload), time.monotonic(), asked_for=asked_for)
+        if sender is not None:
+            self._queue.put(Mail(below, payload, sender))
 
     def _on_query(self, query: zenoh.Query) -> None:
-        self._queue.put(Asked(query))
+        if self._gate.lets_ask():
+            self._queue.put(Asked(query))
+        else:
+            with query:  # ends it, without an answer
+                pass
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         _, host, instance = str(sample.key_expr).rsplit("/", 2)

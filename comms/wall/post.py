@@ -17,12 +17,12 @@ from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake, Outgoing
 from comms.said.routing import Routing
+from comms.wall.gate import WORDS
 from comms.wall.journal import HeardMessages, Journal
 from comms.wall.line import Answered, Asked, Event, Life, Mail, WallLine
 from comms.wall.words import Beat, pack_beat, unpack_beat
 from comms.words import unpack
 
-WORDS = "clock/"  # what the keys of words begin with, below the run id
 BEAT = f"{WORDS}beat/"
 MOST_WORDS_BYTES = 1 << 17  # some four times the beat of a world with a hundred vehicles
 AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time is dropped
@@ -40,11 +40,11 @@ Item = Received | Words | Life
 
 
 class WallPost:
-    """The post of the nodes of one process over its line."""
+    """The post of the nodes of one process over its line. `intake`: opens what the line lets in."""
 
-    def __init__(self, line: WallLine, keys: RunKeys, routing: Routing) -> None:
+    def __init__(self, line: WallLine, keys: RunKeys, routing: Routing, intake: Intake) -> None:
         self.line = line
-        self.intake = Intake(routing)
+        self.intake = intake
         self._routing = routing
         self._keys = keys
         self._heard = HeardMessages()

@@ -173,6 +173,28 @@ def test_why_a_process_has_failed_is_told_on_one_line() -> None:
     assert str(failure.value) == r"oops\n\x1b[2Jrouter: all is well"
 
 
+def test_a_node_that_floods_its_own_key_is_heard_no_more_than_it_may_say() -> None:
+    def meddle(now_ms: int) -> Step:
+        with open_client(endpoints[0], "beta", password("beta")) as session:
+            for sequence in range(10_000):
+                payload = encode(Header("beta", 0, sequence, now_ms), state(works_on=sequence))
+                put(session, WALL_KEYS.topic("agent/beta/state"), payload)
+        return says(say_nav("alpha"))
+
+    def hears(received: Received, now_ms: int) -> Step | None:
+        return says(say_over()) if received.vehicle == "alpha" else None
+
+    endpoints: list[str] = []
+    coordinator = Scripted(hears=hears)
+    alpha = Scripted(hears=lambda received, now_ms: says(say_state("alpha")) if received.vehicle else None)
+    nodes = {"world": Scripted(starts=meddle), "alpha": alpha, "coordinator": coordinator}
+    result = on_zenoh_by_wall(nodes, Notes(), before=endpoints.append, time_limit_ms=3_600_000)
+    assert result.ending is Ending.OVER
+    assert result.dropped["more than its sender may say"] > 1000
+    heard = sum(entry[1] == "agent/beta/state" for entry in coordinator.log)
+    assert 2000 <= heard <= 10_000 - 500
+
+
 def test_a_burst_of_states_loses_none_on_a_healthy_link(bus: Callable[..., BusResult]) -> None:
     burst = [say_status("alpha", number) for number in range(200)]
     notes = Notes()

@@ -11,10 +11,11 @@ from by_wall import ROUTING, WALL_KEYS
 from fleets import say_state
 
 from comms.node import Publication, Received
-from comms.runner import Outgoing, Stamp
+from comms.runner import Intake, Outgoing, Stamp
 from comms.said.messages import Contact
 from comms.said.topics import CONTACT, STATE
 from comms.session import open_hub
+from comms.wall.gate import Gate
 from comms.wall.journal import Journal
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
@@ -70,7 +71,7 @@ def mail(sent: Outgoing) -> Mail:
 
 
 def post_over(line: FakeLine) -> WallPost:
-    return WallPost(cast(WallLine, line), WALL_KEYS, ROUTING)
+    return WallPost(cast(WallLine, line), WALL_KEYS, ROUTING, Intake(ROUTING))
 
 
 def sequences(post: WallPost, *events: Event) -> list[int]:
@@ -140,8 +141,9 @@ def test_a_beat_with_a_tally_of_what_is_not_its_senders_to_keep_is_dropped_and_s
     key: str, caplog: pytest.LogCaptureFixture
 ) -> None:
     with open_hub({"alpha": "secret"}, None)[0] as session:
-        line = WallLine(session, WALL_KEYS, expressions=["agent/*/state", "clock/beat/*"])
-        post = WallPost(line, WALL_KEYS, ROUTING)
+        intake = Intake(ROUTING)
+        line = WallLine(session, WALL_KEYS, Gate(ROUTING, intake), expressions=["agent/*/state", "clock/beat/*"])
+        post = WallPost(line, WALL_KEYS, ROUTING, intake)
         for _ in range(3):
             assert post.receive(Mail("clock/beat/alpha", pack("beat", 0, {STATES: 1, key: 1})), list) == []
     assert post.intake.dropped == {"senseless words": 3}
