@@ -4,10 +4,10 @@ it, and handled in order when the clock grants it. No I/O."""
 from __future__ import annotations
 
 import bisect
-from collections import Counter
 from collections.abc import Iterable, Mapping
 
 from comms.kept import Kept
+from comms.lockstep.arrivals import Arrivals
 from comms.lockstep.clock import Grant
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.node import Node, Received
@@ -17,17 +17,12 @@ from comms.said.routing import Route, Routing
 LOST = "lost by a fault"
 
 
-def has_all(arrived: Counter[str], expected: Mapping[str, int]) -> bool:
-    """Whether as many messages of each sender have arrived as are expected."""
-    return all(arrived[sender] >= count for sender, count in expected.items())
-
-
 class LockstepNode:
     """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
 
     def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
         self.node_id = node_id
-        self.arrived: Counter[str] = Counter()
+        self.arrived = Arrivals(node_id)
         self._node = GuardedNode(node_id, node, routing, incarnation)
         self._node.wake_ms = 0
         self._mail: dict[int, list[Received]] = {}
@@ -103,7 +98,7 @@ class NodeGroup:
     def receive(self, key: str, payload: bytes) -> Received | None:
         """Takes one message from the transport: counted before faults strike and before it is validated.
 
-        Returns it as it was sent; None where it is for nobody here or does not fit.
+        Returns it as it was sent; None where it is for nobody here or does not fit. Raises NodeError for a flood.
         """
         route = self._routing.route(key)
         if route is None:
@@ -112,7 +107,7 @@ class NodeGroup:
         if not readers:
             return None
         for runner in readers:
-            runner.arrived[route.writer] += 1
+            runner.arrived.add(route.writer, len(payload))
         received = self.intake.open(key, payload)
         if received is not None:
             self._hand_out(received, readers)
@@ -141,15 +136,16 @@ class NodeGroup:
 
     def has_all(self, grants: list[Grant]) -> bool:
         """Whether all the mail that the clock expects for these grants has arrived."""
-        return all(has_all(self.runners[grant.node_id].arrived, grant.expected) for grant in grants)
+        return all(self.runners[grant.node_id].arrived.has_all(grant.expected) for grant in grants)
 
     def missing(self, grants: list[Grant]) -> str:
         """In words, what has not arrived."""
+        arrived = {grant.node_id: self.runners[grant.node_id].arrived.counts for grant in grants}
         return "; ".join(
-            f"{grant.node_id} has {self.runners[grant.node_id].arrived[sender]} of {count} messages from {sender}"
+            f"{grant.node_id} has {arrived[grant.node_id][sender]} of {count} messages from {sender}"
             for grant in grants
             for sender, count in grant.expected.items()
-            if self.runners[grant.node_id].arrived[sender] < count
+            if arrived[grant.node_id][sender] < count
         )
 
     def digests(self) -> list[SenderDigest]:
@@ -176,16 +172,17 @@ class JoinerMail:
     """What was said so far of all that a node may read, kept for when it joins; `arrived` counts it by sender."""
 
     def __init__(self, node_id: str, routing: Routing) -> None:
-        self.arrived: Counter[str] = Counter()
+        self.arrived = Arrivals(node_id)
         self._node_id = node_id
         self._routing = routing
         self._kept = Kept()
 
     def add(self, key: str, payload: bytes) -> None:
-        """Takes note of a message; messages of one key come in the order in which they were sent."""
+        """Takes note of a message; those of one key come in the order in which they were sent. Raises NodeError for a
+        flood."""
         route = self._routing.route(key)
         if route is not None and self._node_id in route.readers:
-            self.arrived[route.writer] += 1
+            self.arrived.add(route.writer, len(payload))
             self._kept.add(route.topic, key, payload)
 
     def messages(self) -> list[tuple[str, bytes]]:

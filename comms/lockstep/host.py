@@ -6,7 +6,6 @@ import bisect
 import contextlib
 import queue
 import time
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -14,9 +13,10 @@ import zenoh
 
 from comms.errors import Interrupted, NodeError
 from comms.keys import HostSpec, RunKeys
+from comms.lockstep.arrivals import Arrivals
 from comms.lockstep.clock import Grant, Sent
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.group import NodeGroup, has_all
+from comms.lockstep.group import NodeGroup
 from comms.lockstep.parcels import publish, unpacked
 from comms.lockstep.words import pack_answers, unpack_grants
 from comms.node import Listener, Node, Received
@@ -111,7 +111,7 @@ class ServedNodes:
         self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
 
     def receive(self, key: str, payload: bytes) -> None:
-        """A message has come, under its key below the run id."""
+        """A message has come, under its key below the run id. Raises NodeError for a flood."""
         received = self.group.receive(key, payload)
         if received is not None and self.group.holds(self._coordinators):
             self._latency.arrived(received, time.perf_counter())
@@ -119,6 +119,7 @@ class ServedNodes:
     def act(self, grants: Iterable[Grant], now_ms: int) -> Iterator[tuple[str, int | None, list[Outgoing]]]:
         """Lets each granted node act and sends what it publishes: of each its wake-up and that. Raises NodeError."""
         for grant in grants:
+            self.group.runners[grant.node_id].arrived.are_told(grant.expected)
             wake_ms, outgoing = self.group.runners[grant.node_id].act(now_ms, start=grant.start)
             if grant.node_id in self._coordinators:
                 self._latency.sending(outgoing, time.perf_counter())
@@ -153,6 +154,13 @@ class NodeHost:
 
     def run(self) -> None:
         """Serves to the end of the run."""
+        try:
+            self._serve()
+        except NodeError as error:
+            self._line.say(pack("failed", str(error)))
+            raise
+
+    def _serve(self) -> None:
         line, group = self._line, self._nodes.group
         line.shake_hands()
         granted: tuple[int, list[Grant]] | None = None
@@ -174,14 +182,10 @@ class NodeHost:
                 granted = None
 
     def _act(self, now_ms: int, grants: list[Grant]) -> None:
-        try:
-            answers = [
-                (node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing])
-                for node_id, wake_ms, outgoing in self._nodes.act(grants, now_ms)
-            ]
-        except NodeError as error:
-            self._line.say(pack("failed", str(error)))
-            raise
+        answers = [
+            (node_id, wake_ms, [Sent(one.key, one.size) for one in outgoing])
+            for node_id, wake_ms, outgoing in self._nodes.act(grants, now_ms)
+        ]
         self._line.say(pack_answers(answers))
 
 
@@ -199,7 +203,7 @@ class ListenerHost:
         self._listener = GuardedListener(node_id, listener)
         self._routing = routing
         self._intake = Intake(routing)
-        self._arrived: Counter[str] = Counter()
+        self._arrived = Arrivals(node_id)
         self._held: list[Received] = []
         senders = [node.node_id for node in routing.roster if not node.listens_only]
         # Keys and no expressions: which of these a message fits is looked up anew for each that comes.
@@ -242,8 +246,9 @@ class ListenerHost:
             self._open_mail()
             if words[:1] in (["mark"], ["finish"]):
                 mark = words
-            if mark is None or not has_all(self._arrived, mark[3]):
+            if mark is None or not self._arrived.has_all(mark[3]):
                 continue
+            self._arrived.are_told(mark[3])
             self._release(up_to_ms=mark[2])
             if mark[0] == "finish":
                 return
@@ -264,7 +269,7 @@ class ListenerHost:
                 if route is None or route.writer != sender or route.watchers != watchers:
                     self._intake.drop("not for here", sender, f"{below[:100]!r} under {key}")
                     continue
-                self._arrived[sender] += 1  # also if it does not fit: it is not to be waited for
+                self._arrived.add(sender, len(payload))  # also if it does not fit: it is not to be waited for
                 received = self._intake.open(below, payload)
                 if received is not None:
                     self._held.append(received)

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import queue
+import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import zenoh
 
-from comms.errors import FleetError, HostLostError, WordsError, one_line
+from comms.errors import FleetError, HostLostError, NodeError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
+from comms.lockstep.arrivals import OVERHEAD_BYTES
 from comms.lockstep.clock import Grant, LockstepClock, Round, result_of
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, Faults
-from comms.lockstep.group import JoinerMail, has_all
+from comms.lockstep.group import JoinerMail
 from comms.lockstep.host import ServedNodes
 from comms.lockstep.pacing import MOST_BEHIND_BYTES, Pacing
 from comms.lockstep.parcels import publish
@@ -28,6 +30,8 @@ from comms.said.routing import Routing
 from comms.said.topics import RUN
 from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S, put, subscribe
 from comms.words import pack, unpack, unpack_last_word
+
+MOST_WAITING_BYTES = 128 << 20  # in the hub's queue; a round has far less
 
 
 class Hub:
@@ -77,6 +81,9 @@ class Hub:
         self._listeners = {node: host for node, host in self._host_of.items() if node in listening}
         self._pacing = Pacing(self._clock, self._listeners, most_behind_bytes)
         self._queue: queue.SimpleQueue[tuple[str, str, bytes]] = queue.SimpleQueue()
+        self._waiting_bytes = 0
+        self._waiting = threading.Lock()
+        self._flooded_under = ""
         self._ready: set[str] = set()
         self._asked: dict[str, set[str]] = {}
         self._last_words: dict[str, LastWord] = {}
@@ -149,7 +156,7 @@ class Hub:
         self._change(Change.JOIN, host)
         self._wait(lambda: host in self._ready, lambda: _no("start", {host}))
         kept, said = self._kept[node_id], self._clock.said_to_joiners[node_id]
-        self._wait(lambda: has_all(kept.arrived, said), lambda: f"mail is missing that was kept for {node_id}")
+        self._wait(lambda: kept.arrived.has_all(said), lambda: f"mail is missing that was kept for {node_id}")
         self._say(host, pack("kept", node_id, kept.messages(), self._clock.now_ms + JOINER_DELAY_MS))
 
     def _say(self, host: str, words: bytes) -> None:
@@ -181,7 +188,7 @@ class Hub:
         heard_at_s = time.monotonic()
         while not done():
             try:
-                kind, key, payload = self._queue.get(timeout=min(SIGN_OF_LIFE_EVERY_S, self._patience_s))
+                event = self._queue.get(timeout=min(SIGN_OF_LIFE_EVERY_S, self._patience_s))
             except queue.Empty:
                 if time.monotonic() - heard_at_s >= self._patience_s:
                     at_s = self._clock.now_ms / 1000
@@ -190,7 +197,7 @@ class Hub:
                     ) from None
             else:
                 heard_at_s = time.monotonic()
-                self._handle(kind, key, payload)
+                self._handle(*event)
             self._show_life()
 
     def _show_life(self) -> None:
@@ -200,11 +207,13 @@ class Hub:
             self._alive(self._clock.now_ms)
 
     def _handle(self, kind: str, key: str, payload: bytes) -> None:
+        with self._waiting:
+            self._waiting_bytes -= len(payload) + OVERHEAD_BYTES
+        if self._flooded_under:
+            most = f"more than {MOST_WAITING_BYTES >> 20} MB wait"
+            raise FleetError(f"the hub is flooded, last under {one_line(self._flooded_under)}: {most}")
         if kind == "mail":
-            below = key.removeprefix(self._keys.root)
-            for kept in self._kept.values():
-                kept.add(below, payload)
-            self._nodes.receive(below, payload)
+            self._take(key.removeprefix(self._keys.root), payload)
             return
         host = key.rsplit("/", 1)[1]
         if host not in self._hosts:
@@ -217,6 +226,16 @@ class Hub:
             self._hear_words(host, unpack(payload))
         except (WordsError, ValueError) as error:
             raise FleetError(f"{host} has said what makes no sense to the clock: {one_line(str(error))}") from error
+
+    def _take(self, key: str, payload: bytes) -> None:
+        """Takes a message, for nodes here and for those that are to join."""
+        try:
+            for joiner, kept in self._kept.items():
+                kept.arrived.are_told(self._clock.said_to_joiners[joiner])
+                kept.add(key, payload)
+            self._nodes.receive(key, payload)
+        except NodeError as error:
+            raise FleetError(str(error)) from error
 
     def _hear_words(self, host: str, words: list[Any]) -> None:
         match words:
@@ -241,14 +260,23 @@ class Hub:
                 raise WordsError(f"{words[0][:20]!r}")
 
     def _on_mail(self, key: str, payload: bytes) -> None:
-        self._queue.put(("mail", key, payload))
+        self._put("mail", key, payload)
 
     def _on_words(self, key: str, payload: bytes) -> None:
-        self._queue.put(("words", key, payload))
+        self._put("words", key, payload)
+
+    def _put(self, kind: str, key: str, payload: bytes) -> None:
+        """Lets wait what has come. Nothing may be left out in lockstep: where it is too much the run is at its end."""
+        with self._waiting:
+            if self._waiting_bytes > MOST_WAITING_BYTES:
+                self._flooded_under = key.removeprefix(self._keys.root)
+                return
+            self._waiting_bytes += len(payload) + OVERHEAD_BYTES
+        self._queue.put((kind, key, payload))
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.DELETE:  # not `is`: each look at it makes a new one
-            self._queue.put(("gone", str(sample.key_expr), b""))
+            self._put("gone", str(sample.key_expr), b"")
 
 
 def _no(what: str, hosts: Any) -> str:

@@ -15,6 +15,7 @@ import zenoh
 from fleets import EACH_ALONE, KEYS, ROSTER, Notes, Scripted, nav, password, says, state
 from flights import until
 
+from comms.errors import NodeError
 from comms.keys import HostSpec
 from comms.lockstep.clock import Grant
 from comms.lockstep.host import ListenerHost, NodeHost
@@ -242,3 +243,52 @@ def test_what_two_expressions_include_comes_once(hub: HubByHand) -> None:
         assert list(mailbox.fetch()) == [("toy/a/one", b"0"), ("toy/a/one", b"1"), ("toy/a/one", b"2")]
         assert list(mailbox.fetch()) == []
         del listens
+
+
+def _failing(host: ListenerHost) -> None:
+    with contextlib.suppress(NodeError):
+        host.run()
+
+
+@pytest.fixture
+def little_room(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("comms.lockstep.arrivals.MOST_AHEAD_BYTES", 50_000)
+
+
+@pytest.mark.usefixtures("little_room")
+def test_a_node_that_is_flooded_ends_and_names_who_floods_it(hub: HubByHand) -> None:
+    failures: list[str] = []
+
+    def serve() -> None:
+        try:
+            host.run()
+        except NodeError as error:
+            failures.append(str(error))
+
+    with open_client(hub.endpoint, "alpha", password("alpha")) as session:
+        host = NodeHost(session, KEYS, HostSpec("alpha", ("alpha",)), {"alpha": Scripted()}, WATCHED)
+        running = Aside.run(serve)
+        hub.welcomes("alpha")
+        for one in positions(200):
+            hub.sends(one)
+        sentence = hub.hears("failed")[1]
+        running.end()
+    assert str(sentence).startswith("world floods alpha: ")
+    assert failures == [sentence]
+
+
+@pytest.mark.usefixtures("little_room")
+def test_a_listener_that_is_flooded_ends_and_keeps_what_it_had_in_order(hub: HubByHand) -> None:
+    notes, (first, *rest) = Notes(), positions(200)
+    with open_client(hub.endpoint, "observer", password("observer")) as session:
+        host = ListenerHost(session, KEYS, "observer", "observer", notes, WATCHED)
+        running = Aside.run(lambda: _failing(host))
+        hub.welcomes("observer")
+        hub.sends_parcels(first)
+        hub.say("observer", "mark", 1, 0, {"world": 1})
+        hub.hears("ack")
+        hub.sends_parcels(*rest)
+        assert str(hub.hears("failed")[1]).startswith("world floods observer: ")
+        running.end()
+    assert [one.header.sequence for one in notes.heard] == [0]
+    assert notes.closed == 1

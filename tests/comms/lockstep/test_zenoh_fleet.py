@@ -27,6 +27,9 @@ from fleets import (
 from comms.errors import FleetError, HostLostError, NodeError
 from comms.keys import HostSpec
 from comms.node import Received, Step
+from comms.said.codec import Header, encode
+from comms.said.messages import Maneuver, ManeuverKind
+from comms.said.topics import MANEUVER
 from comms.session import open_client, put
 from comms.words import pack
 
@@ -214,3 +217,34 @@ def test_words_without_sense_end_the_run_with_a_sentence_that_names_the_host(wor
             over_zenoh({"world": world}, Notes(), before=connect, time_limit_ms=20_000)
     finally:
         said_by_beta[0].close()
+
+
+@pytest.mark.parametrize(
+    ("bound", "sentence"),
+    [
+        ("comms.lockstep.arrivals.MOST_AHEAD_BYTES", r"^beta floods world: \d+ messages have come of which the clock "),
+        ("comms.lockstep.hub.MOST_WAITING_BYTES", r"^the hub is flooded, last under agent/beta/maneuver: more than "),
+    ],
+)
+def test_who_floods_the_hub_ends_the_run_with_a_sentence(
+    monkeypatch: pytest.MonkeyPatch, bound: str, sentence: str
+) -> None:
+    monkeypatch.setattr(bound, 50_000)
+    maneuver = Maneuver(1, ManeuverKind.HOLD, 0, 0, 0, 0, 0)
+
+    def flood(now_ms: int) -> Step:
+        for sequence in range(1000):
+            payload = encode(Header("beta", 0, sequence, 2**40), maneuver)
+            put(flooding[0], KEYS.topic(MANEUVER.key(vehicle="beta")), payload)
+        return Step(wake_ms=now_ms + 1)
+
+    def connect(endpoint: str) -> None:
+        flooding.append(open_client(endpoint, "beta", password("beta")))
+
+    flooding: list[Any] = []
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=1000), wakes=flood)
+    try:
+        with pytest.raises(FleetError, match=sentence):
+            over_zenoh({"world": world}, Notes(), before=connect, time_limit_ms=20_000)
+    finally:
+        flooding[0].close()
