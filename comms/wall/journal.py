@@ -16,6 +16,7 @@ from comms.runner import Outgoing
 from comms.said.codec import Header
 from comms.said.topics import Keep, Topic
 
+MOST_HEARD = 100_000  # events of a sender, and keys of which it has the latest, that a receiver remembers
 MOST_TRIES = 3  # to get what a tally tells of, where answers come but something is still missing
 
 
@@ -62,6 +63,15 @@ class HeardMessages:
         gain = self._gain(sender, topic, received.key, header)
         sender.sums[topic.expression(received.vehicle)] += gain
         return gain > 0
+
+    def has_room(self, received: Received) -> bool:
+        """Whether there is room to remember a message: no mission says as much as there is room for."""
+        sender = self._senders.get(received.header.sender)
+        if sender is None or sender.incarnation != received.header.incarnation or received.topic.keep is Keep.NOTHING:
+            return True
+        if received.topic.keep is Keep.EVENTS:
+            return len(sender.events[received.topic.name]) < MOST_HEARD
+        return len(sender.latest) < MOST_HEARD or received.key in sender.latest
 
     def missing(self, name: str, incarnation: int, tallies: dict[str, int]) -> list[str]:
         """The key expressions of a sender under which something is missing, going by its tallies."""

@@ -17,7 +17,7 @@ from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake, Outgoing
 from comms.said.routing import Routing
-from comms.wall.gate import WORDS
+from comms.wall.gate import FLOOD, WORDS
 from comms.wall.journal import HeardMessages, Journal
 from comms.wall.line import Answered, Asked, Event, Life, Mail, WallLine
 from comms.wall.words import Beat, pack_beat, unpack_beat
@@ -25,6 +25,7 @@ from comms.words import unpack
 
 BEAT = f"{WORDS}beat/"
 MOST_WORDS_BYTES = 1 << 17  # some four times the beat of a world with a hundred vehicles
+MOST_HELD = 50_000  # messages of a sender, until all that it was asked for has come
 AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time is dropped
 
 
@@ -96,12 +97,19 @@ class WallPost:
 
     def _receive_message(self, key: str, payload: bytes) -> list[Item]:
         received = self.intake.open(key, payload)
-        if received is None or not self._heard.add(received):
+        if received is None:
             return []
-        if received.header.sender in self._asked:
-            self._held.setdefault(received.header.sender, []).append(received)
+        sender = received.header.sender
+        held = self._held.setdefault(sender, []) if sender in self._asked else None
+        if not self._heard.has_room(received) or (held is not None and len(held) >= MOST_HELD):
+            self.intake.drop(FLOOD, sender, key)
             return []
-        return [received]
+        if not self._heard.add(received):
+            return []
+        if held is None:
+            return [received]
+        held.append(received)
+        return []
 
     def _end_asking(self, sender: str, expression: str) -> list[Item]:
         asked = self._asked[sender]

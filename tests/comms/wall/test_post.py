@@ -15,7 +15,7 @@ from comms.runner import Intake, Outgoing, Stamp
 from comms.said.messages import Contact
 from comms.said.topics import CONTACT, STATE
 from comms.session import open_hub
-from comms.wall.gate import Gate
+from comms.wall.gate import FLOOD, Gate
 from comms.wall.journal import Journal
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
@@ -158,6 +158,24 @@ def test_words_without_end_are_dropped_before_they_are_read() -> None:
         assert post.receive(Mail("clock/beat/alpha", payload), list) == []
         assert post.receive(Mail("clock/from/alpha", payload), list) == []
     assert post.intake.dropped == {"senseless words": 4}
+
+
+def test_answers_without_end_are_dropped_where_there_is_no_room_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A sender answers with more than it may ever have said; what it says live has a rate besides."""
+    monkeypatch.setattr("comms.wall.post.MOST_HELD", 10)
+    monkeypatch.setattr("comms.wall.journal.MOST_HEARD", 20)
+    line, alpha = FakeLine(), Alpha()
+    post = post_over(line)
+    alpha.say(contact(0))
+    assert sequences(post, alpha.beat()) == []
+    answers = [mail(alpha.say(contact(number))) for number in range(1, 40)]
+    assert sequences(post, *answers[:15]) == []
+    assert sequences(post, Answered("alpha", CONTACTS, 1, 15)) == list(range(1, 11))
+    assert post.intake.dropped == {FLOOD: 5}
+    assert sequences(post, *answers[15:]) == list(range(16, 26))
+    assert post.intake.dropped == {FLOOD: 5 + 14}
+    states = [mail(alpha.say(say_state("alpha", number))) for number in range(40)]
+    assert len(sequences(post, *states)) == 40
 
 
 def test_a_message_up_to_five_seconds_ahead_is_in_time() -> None:
