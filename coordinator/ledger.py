@@ -1,4 +1,5 @@
-"""The ledger of strips: each has one state at a time, and each change a reason. Nothing is ever removed."""
+"""The ledger of strips: each has one state at a time and at most one vehicle, each vehicle at most one strip, and each
+change a reason. Nothing is ever removed. What would break that is refused with an error: it is a mistake of ours."""
 
 from __future__ import annotations
 
@@ -51,6 +52,7 @@ class Ledger:
         self._first_number = first_number
         self._records: dict[int, StripRecord] = {}
         self._by_state: dict[StripState, set[int]] = {state: set() for state in StripState}
+        self._with: dict[str, int] = {}  # the strip of each vehicle that has one
 
     def __iter__(self) -> Iterator[StripRecord]:
         return iter(self._records.values())
@@ -58,6 +60,11 @@ class Ledger:
     def get(self, number: int) -> StripRecord | None:
         """A strip's record, None for a number that was never given."""
         return self._records.get(number)
+
+    def strip_of(self, vehicle: str) -> StripRecord | None:
+        """The strip that is with a vehicle; None where it has none."""
+        number = self._with.get(vehicle)
+        return None if number is None else self._records[number]
 
     @property
     def next_number(self) -> int:
@@ -82,16 +89,34 @@ class Ledger:
         record.strip, record.cut = strip, cut
         record.revision += 1
 
-    def move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> bool:
-        """Moves a strip to a state; returns False, and changes nothing, where its present state does not allow it."""
-        if state not in _ALLOWED[record.state]:
-            return False
-        self._by_state[record.state].discard(record.strip.number)
-        self._by_state[state].add(record.strip.number)
+    def move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
+        """Moves a strip to a state. `vehicle`: who it is then with, or who has ended it.
+
+        Raises ValueError, and changes nothing, where its present state does not lead there, where it would be with
+        nobody or with two, and where its vehicle has another strip.
+        """
+        self._check(record, state, vehicle)
+        number = record.strip.number
+        self._by_state[record.state].discard(number)
+        self._by_state[state].add(number)
+        if record.state in WITH_A_VEHICLE:
+            del self._with[record.vehicle]
+        if state in WITH_A_VEHICLE:
+            self._with[vehicle] = number
         record.state, record.since_ms, record.reason = state, now_ms, reason
         record.vehicle = vehicle if state in WITH_A_VEHICLE or state in ENDED else ""
         record.revision += 1
-        return True
+
+    def _check(self, record: StripRecord, state: StripState, vehicle: str) -> None:
+        what = f"strip {record.strip.number} cannot become {state.value}"
+        if state not in _ALLOWED[record.state]:
+            raise ValueError(f"{what}: it is {record.state.value}")
+        if state in WITH_A_VEHICLE and not vehicle:
+            raise ValueError(f"{what} with nobody")
+        if record.state in WITH_A_VEHICLE and vehicle and vehicle != record.vehicle:
+            raise ValueError(f"{what} by {vehicle}: it is with {record.vehicle}")
+        if state in WITH_A_VEHICLE and self._with.get(vehicle, record.strip.number) != record.strip.number:
+            raise ValueError(f"{what} with {vehicle}, which has strip {self._with[vehicle]}")
 
     def leave(self, record: StripRecord, now_ms: int, reason: str) -> None:
         """Leaves a strip that has not ended open for good, with nobody."""

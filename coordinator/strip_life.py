@@ -100,7 +100,7 @@ class StripLife:
         """
         if vehicle.is_at_a_strip:
             if vehicle.tells_news_of(state.works_on, header):
-                self._hear_at_work(state.works_on, vehicle, now_ms, under_way=state.mode is Mode.REVISIT)
+                self._hear_at_work(state.works_on, vehicle, header, now_ms, under_way=state.mode is Mode.REVISIT)
         elif was_idle and vehicle.is_idle:
             self._hear_no_work(vehicle, header, now_ms)
 
@@ -110,7 +110,8 @@ class StripLife:
             return
         vehicle.unanswered = 0
         if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
-            self._hear_at_work(status.strip, vehicle, now_ms, under_way=status.state is TaskState.UNDER_WAY)
+            under_way = status.state is TaskState.UNDER_WAY
+            self._hear_at_work(status.strip, vehicle, header, now_ms, under_way=under_way)
             return
         record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
         if record is None or record.vehicle != name or record.state not in WITH_A_VEHICLE:
@@ -172,12 +173,14 @@ class StripLife:
             self.ledger.leave(record, now_ms, f"left when the mission was over: {who}")
             self._outbox.add_strip(record)
 
-    def _hear_at_work(self, number: int, vehicle: KnownVehicle, now_ms: int, *, under_way: bool) -> None:
+    def _hear_at_work(
+        self, number: int, vehicle: KnownVehicle, header: Header, now_ms: int, *, under_way: bool
+    ) -> None:
         """A vehicle says that it is at a strip.
 
-        Where the strip is not with it, because it counted as lost, it gets the strip back, as it was, if nobody else
-        has it. Else the vehicle is to give it back, so that no two are at one place: also where it was asked to before,
-        and where the strip is of a coordinator that is no more.
+        Where the strip is not with it, because it counted as lost or answered late, it gets the strip back, as it was,
+        if nobody else has it. Else the vehicle is to give it back, so that no two are at one place: also where it was
+        asked to before, and where the strip is of a coordinator that is no more.
         """
         record, name = self.ledger.get(number), vehicle.entry.vehicle
         if record is None:
@@ -186,20 +189,36 @@ class StripLife:
             return
         offer = vehicle.offers.get(number)
         if record.state is StripState.OPEN and offer is not None and vehicle.asked_back != number:
+            if not self._leaves_its_other(vehicle, number, header, now_ms):
+                return
             if record.strip != offer.strip:
                 self.ledger.revise(record, offer.strip, offer.cut)
                 self._outbox.add_strip(record)
                 self._agenda.add(Item.CUT, now_ms)
             vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + LATE_MS))
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
-        if record.vehicle == name and record.state in WITH_A_VEHICLE:
-            vehicle.unanswered = 0
-            if under_way:
-                self._move(record, StripState.UNDER_WAY, now_ms, "under way", name)
-            else:
-                self._move(record, StripState.ACCEPTED, now_ms, "accepted", name)
-        else:
+        if record.vehicle != name or record.state not in WITH_A_VEHICLE:
             self.ask_back(record.strip, vehicle)
+            return
+        vehicle.unanswered = 0
+        if under_way and record.state is not StripState.UNDER_WAY:
+            self._move(record, StripState.UNDER_WAY, now_ms, "under way", name)
+        elif record.state is StripState.OFFERED:
+            self._move(record, StripState.ACCEPTED, now_ms, "accepted", name)
+
+    def _leaves_its_other(self, vehicle: KnownVehicle, number: int, header: Header, now_ms: int) -> bool:
+        """Opens again what a vehicle has beside the strip that it says it is at, as it can be at one alone.
+
+        Returns False, and opens nothing, where it has since said that it is at the other: what it says now is old.
+        """
+        name = vehicle.entry.vehicle
+        other = self.ledger.strip_of(name)
+        if other is not None:
+            if other.state is not StripState.OFFERED and vehicle.has_told_since(header, other.strip.number):
+                return False
+            self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
+            self._agenda.add(Item.ASSIGN, now_ms)
+        return True
 
     def _hear_no_work(self, vehicle: KnownVehicle, header: Header, now_ms: int) -> None:
         """A vehicle says once more that it has no work: its last word on a strip that it still has here was lost."""
@@ -239,5 +258,5 @@ class StripLife:
         return vehicle, vehicle.offers[record.strip.number]
 
     def _move(self, record: StripRecord, state: StripState, now_ms: int, reason: str, vehicle: str = "") -> None:
-        if self.ledger.move(record, state, now_ms, reason, vehicle):
-            self._outbox.add_strip(record)
+        self.ledger.move(record, state, now_ms, reason, vehicle)
+        self._outbox.add_strip(record)

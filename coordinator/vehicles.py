@@ -221,6 +221,10 @@ class KnownVehicle:
         self._task_orders[strip] = order
         return True
 
+    def has_told_since(self, header: Header, strip: int) -> bool:
+        """Whether it has said something of a strip after it sent a message."""
+        return self._task_orders.get(strip, _NONE_YET) > (header.incarnation, header.sequence)
+
     def is_not_for_it(self, record: StripRecord) -> bool:
         """Whether it has refused this strip as it is, or failed at its place."""
         return record.strip.number in self.refused - self.gave_way or record.window.is_at_one_of(self.failed_at)

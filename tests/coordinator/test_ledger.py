@@ -52,22 +52,64 @@ def opened(ledger: Ledger) -> StripRecord:
     return ledger.open(strip(ledger.next_number), CUT, 5, "badly seen")
 
 
+def told(record: StripRecord) -> tuple[StripState, int, str, int, str]:
+    return record.state, record.revision, record.vehicle, record.since_ms, record.reason
+
+
 @pytest.mark.parametrize(("before", "after"), list(product(StripState, StripState)))
 def test_every_change_is_allowed_or_leaves_everything_as_it_is(before: StripState, after: StripState) -> None:
     ledger = Ledger()
     record = opened(ledger)
     for state in WAYS_TO[before]:
-        assert ledger.move(record, state, 10, "on the way", "alpha")
-    was = (record.state, record.revision, record.vehicle, record.since_ms, record.reason)
+        ledger.move(record, state, 10, "on the way", "alpha")
+    was = told(record)
     assert was[0] is before
-    moved = ledger.move(record, after, 20, "because", "beta")
-    assert moved is ((before, after) in ALLOWED)
-    if moved:
-        vehicle = "" if after is OPEN else "beta"
-        assert (record.state, record.revision, record.vehicle) == (after, was[1] + 1, vehicle)
-        assert (record.since_ms, record.reason) == (20, "because")
+    if (before, after) in ALLOWED:
+        ledger.move(record, after, 20, "because", "alpha")
+        assert told(record) == (after, was[1] + 1, "" if after is OPEN else "alpha", 20, "because")
     else:
-        assert (record.state, record.revision, record.vehicle, record.since_ms, record.reason) == was
+        with pytest.raises(ValueError, match=f"strip 1 cannot become {after.value}: it is {before.value}"):
+            ledger.move(record, after, 20, "because", "alpha")
+        assert told(record) == was
+
+
+def test_a_vehicle_has_one_strip_at_most() -> None:
+    ledger = Ledger()
+    one, other = opened(ledger), opened(ledger)
+    ledger.move(one, OFFERED, 10, "", "alpha")
+    was = told(other)
+    with pytest.raises(ValueError, match="strip 2 cannot become offered with alpha, which has strip 1"):
+        ledger.move(other, OFFERED, 20, "", "alpha")
+    assert told(other) == was
+    assert ledger.strip_of("alpha") is one
+    ledger.move(other, OFFERED, 20, "", "beta")
+    ledger.move(one, ACCEPTED, 30, "", "alpha")
+    assert (ledger.strip_of("alpha"), ledger.strip_of("beta")) == (one, other)
+    ledger.move(one, DONE, 40, "", "alpha")
+    ledger.leave(other, 40, "")
+    assert (ledger.strip_of("alpha"), ledger.strip_of("beta")) == (None, None)
+    ledger.move(other, OFFERED, 50, "", "alpha")
+    assert ledger.strip_of("alpha") is other
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "vehicle", "why"),
+    [
+        ([], OFFERED, "", "offered with nobody"),
+        ([OFFERED], ACCEPTED, "", "accepted with nobody"),
+        ([OFFERED], ACCEPTED, "beta", "accepted by beta: it is with alpha"),
+        ([OFFERED, UNDER_WAY], DONE, "beta", "done by beta: it is with alpha"),
+    ],
+)
+def test_a_strip_is_with_one_vehicle(before: list[StripState], after: StripState, vehicle: str, why: str) -> None:
+    ledger = Ledger()
+    record = opened(ledger)
+    for state in before:
+        ledger.move(record, state, 10, "", "alpha")
+    was = told(record)
+    with pytest.raises(ValueError, match=f"strip 1 cannot become {why}"):
+        ledger.move(record, after, 20, "", vehicle)
+    assert told(record) == was
 
 
 def test_the_kinds_of_states_share_none_and_leave_out_open() -> None:
@@ -131,13 +173,24 @@ def test_a_revised_strip_keeps_its_number() -> None:
         ledger.revise(record, strip(2), CUT)
 
 
-@given(st.lists(st.sampled_from(StripState), max_size=30))
-def test_a_strip_with_a_vehicle_names_it_and_the_end_is_the_end(states: list[StripState]) -> None:
+@given(
+    st.lists(st.tuples(st.sampled_from([1, 2, 3]), st.sampled_from(StripState), st.sampled_from(["", "alpha", "beta"])))
+)
+def test_whatever_is_asked_of_it_the_books_are_in_order(moves: list[tuple[int, StripState, str]]) -> None:
     ledger = Ledger()
-    record = opened(ledger)
-    for at_ms, state in enumerate(states):
-        ended = record.state in ENDED
-        moved = ledger.move(record, state, at_ms, "", "alpha")
-        assert not (ended and moved)
-        assert (record.vehicle == "alpha") if record.state in WITH_A_VEHICLE else True
-        assert record.vehicle == "" or record.state is not OPEN
+    records = [opened(ledger) for _ in range(3)]
+    for at_ms, (number, state, vehicle) in enumerate(moves):
+        record = records[number - 1]
+        was = told(record)
+        try:
+            ledger.move(record, state, at_ms, "", vehicle)
+        except ValueError:
+            assert told(record) == was
+        else:
+            assert was[0] not in ENDED
+        at_work = [one for one in records if one.state in WITH_A_VEHICLE]
+        assert all(one.vehicle for one in at_work)
+        assert len({one.vehicle for one in at_work}) == len(at_work)
+        for name in ("alpha", "beta"):
+            assert ledger.strip_of(name) is next((one for one in at_work if one.vehicle == name), None)
+        assert not any(one.vehicle for one in records if one.state is OPEN)

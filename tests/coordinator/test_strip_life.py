@@ -8,6 +8,7 @@ from by_hand import HELPER, PRIMARY, SECOND_HELPER
 from coordinator_by_hand import (
     ACCEPTED,
     DONE,
+    ELSEWHERE,
     FAILED,
     GRID,
     OFFERED,
@@ -15,10 +16,12 @@ from coordinator_by_hand import (
     TWO_HELPERS,
     UNDER_WAY,
     WITHDRAWN,
+    Told,
     coordinator,
     looked,
     with_a_helper,
 )
+from one_node import received
 
 from comms.said.messages import (
     Mode,
@@ -26,7 +29,60 @@ from comms.said.messages import (
     StripStatus,
     TaskAction,
     TaskState,
+    TaskStatus,
 )
+from coordinator.allocate.situation import Situation
+
+
+class InTurn:
+    """Offers the helper these strips, one each time."""
+
+    def __init__(self, *numbers: int) -> None:
+        self.numbers = list(numbers)
+
+    def assign(self, situation: Situation) -> dict[str, int]:
+        return {HELPER: self.numbers.pop(0)} if self.numbers else {}
+
+
+def with_a_late_answer() -> Told:
+    """Strip 1 was offered to the helper, which has not answered; it was offered strip 2 then."""
+    told = coordinator(allocator=InTurn(1, 2))
+    told.hotspot()
+    told.hotspot(ELSEWHERE, number=2)
+    told.settle()
+    told.node.wait(10)
+    assert told.states() == {1: OPEN, 2: OFFERED}
+    return told
+
+
+class TestALateAnswer:
+    @pytest.mark.parametrize("by_state", [False, True])
+    def test_who_was_offered_another_strip_meanwhile_has_the_one_that_it_is_at(self, by_state: bool) -> None:
+        told = with_a_late_answer()
+        if by_state:
+            told.state(HELPER, Mode.TRANSIT, 1)
+        else:
+            told.status(HELPER, 1, TaskState.ACCEPTED)
+        assert told.states() == {1: ACCEPTED, 2: OPEN}
+        assert told.strips()[2].reason == f"{HELPER} is at strip 1"
+        told.status(HELPER, 2, TaskState.REFUSED, "at work on strip 1")
+        told.settle()
+        assert told.states() == {1: ACCEPTED, 2: OPEN}
+        assert told.tasks() == [(HELPER, TaskAction.TAKE, 1), (HELPER, TaskAction.TAKE, 2)]
+
+    def test_its_newest_word_counts_where_it_was_at_both(self) -> None:
+        told = with_a_late_answer()
+        told.status(HELPER, 1, TaskState.ACCEPTED)
+        told.status(HELPER, 2, TaskState.ACCEPTED)  # its last word on the first was lost
+        assert told.states() == {1: OPEN, 2: ACCEPTED}
+
+    def test_an_old_word_on_the_one_does_not_count_after_a_newer_on_the_other(self) -> None:
+        told = with_a_late_answer()
+        old = received(f"agent/{HELPER}/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0, 0, ""), sequence=900)
+        told.node.hear(f"agent/{HELPER}/task_status/2", TaskStatus(2, TaskState.ACCEPTED, 0, 0, ""), sequence=901)
+        told.node.hear_again(old)
+        assert told.states() == {1: OPEN, 2: ACCEPTED}
+        assert len(told.tasks()) == 2
 
 
 class TestHowAStripGoesOn:

@@ -222,6 +222,15 @@ def check_of_last(flight: Flight) -> None:
 
 
 class TestBadLinks:
+    def test_whose_answers_come_too_late_has_one_strip_at_a_time(self, tmp_path: Path) -> None:
+        fleet = Fleet("two-helpers", folder=tmp_path)
+        fleet.delay("coord/task/**", by_s=12)
+        flight = fleet.run()
+        assert any(one.message.reason.endswith("is at it after all") for one in flight.said(StripStatus))
+        assert_one_strip_at_a_time(flight)
+        assert_no_strip_lost(flight)
+        assert_no_strip_served_twice(flight)
+
     @pytest.mark.parametrize("name", ["tellaro", "patchy"])
     def test_of_a_fifth_of_all_words_lost_maps_converge_and_all_finish(self, tmp_path: Path, name: str) -> None:
         fleet = Fleet(name, folder=tmp_path)
