@@ -1,13 +1,16 @@
 """The fleet's map: every vehicle's newest tiles, joined.
 
-Sums add and maxima take the maximum over vehicles; of one vehicle's tiles the newest (incarnation, version) wins. So
-joining is commutative, associative and idempotent: lost, repeated, late and reordered tiles converge to one map.
+A vehicle that is started anew begins a layer of its own, so that its layer is that of all its starts, each known by its
+incarnation: their looks are looks as any others. Sums add and maxima take the maximum over starts and over vehicles; of
+one start's tiles the newest version wins. So joining is commutative, associative and idempotent: lost, repeated, late
+and reordered tiles converge to one map.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from typing import Protocol
 
 import numpy as np
@@ -18,18 +21,91 @@ from planner.tiles import tile_shape
 from planner.types import BoolArray, FloatArray, GridSpec
 
 PARTS = 16  # of a level: half of one is less than a thousandth of the residual risk
+MOST_STARTS = 8  # that are told apart, of each tile
+CLOSED = 2**31  # a version above all that are told: nothing newer is taken
+
+Place = tuple[int, int]
+"""A tile's first row and column."""
 
 
 @dataclass
 class VehicleLayer:
-    """What one vehicle has published: levels, settled cells and of which cells it has told, all of grid shape, and the
-    version of each tile."""
+    """What one vehicle has published, over all its starts: levels, settled cells and of which cells it has told, all of
+    grid shape; sums of its starts saturate as those of one do.
+
+    `versions`: of each tile, by incarnation, the newest version that has come. Memory does not grow with each start:
+    of a tile of which more than MOST_STARTS starts have told, the oldest are held as one, whose version is CLOSED.
+    What one of those has told counts on, and what comes of it later is not taken.
+    """
 
     sum_levels: LevelArray
     largest_levels: LevelArray
     settled: BoolArray
     told: BoolArray
-    versions: dict[tuple[int, int], tuple[int, int]] = field(default_factory=dict)
+    versions: dict[Place, dict[int, int]] = field(default_factory=dict)
+    _apart: dict[Place, dict[int, _Told]] = field(default_factory=dict)  # where more than one start has told
+
+    @classmethod
+    def empty(cls, grid: GridSpec) -> VehicleLayer:
+        """That of a vehicle that has told of nothing yet."""
+        return cls(
+            sum_levels=np.zeros(grid.shape, dtype=np.uint8),
+            largest_levels=np.zeros(grid.shape, dtype=np.uint8),
+            settled=np.zeros(grid.shape, dtype=np.bool_),
+            told=np.zeros(grid.shape, dtype=np.bool_),
+        )
+
+    def take(self, place: Place, window: tuple[slice, slice], incarnation: int, tile: ToldTile) -> bool:
+        """Takes a start's tile, whose cells are the window's; returns whether it was news."""
+        versions = self.versions.setdefault(place, {})
+        oldest = min(versions, default=incarnation)
+        if tile.version <= versions.get(incarnation, -1) or (incarnation < oldest and versions[oldest] == CLOSED):
+            return False
+        told = _Told(tile.sum_levels, tile.largest_levels, tile.settled)
+        if versions.keys() - {incarnation}:
+            told = self._with_other_starts(place, window, incarnation, told)
+        versions[incarnation] = tile.version
+        if len(versions) > MOST_STARTS:
+            self._hold_oldest_as_one(place)
+        self.sum_levels[window] = told.sum_levels
+        self.largest_levels[window] = told.largest_levels
+        self.settled[window] = told.settled
+        self.told[window] = True
+        return True
+
+    def _with_other_starts(self, place: Place, window: tuple[slice, slice], incarnation: int, told: _Told) -> _Told:
+        """What a start has told, now, joined with what the others have."""
+        apart = self._apart.get(place)
+        if apart is None:  # so far one alone has told of it
+            (other,) = self.versions[place]
+            before = _Told(self.sum_levels[window], self.largest_levels[window], self.settled[window])
+            apart = self._apart[place] = {other: before.copy()}
+        apart[incarnation] = told.copy()
+        return reduce(_Told.joined, apart.values())
+
+    def _hold_oldest_as_one(self, place: Place) -> None:
+        versions, apart = self.versions[place], self._apart[place]
+        oldest, second = sorted(versions)[:2]
+        apart[second] = apart.pop(oldest).joined(apart[second])
+        del versions[oldest]
+        versions[second] = CLOSED
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What a start of a vehicle, or several together, have told of a tile."""
+
+    sum_levels: LevelArray
+    largest_levels: LevelArray
+    settled: BoolArray
+
+    def copy(self) -> _Told:
+        return _Told(self.sum_levels.copy(), self.largest_levels.copy(), self.settled.copy())
+
+    def joined(self, other: _Told) -> _Told:
+        sums = np.minimum(self.sum_levels.astype(np.uint16) + other.sum_levels, MOST_LEVELS).astype(np.uint8)
+        largest = np.maximum(self.largest_levels, other.largest_levels)
+        return _Told(sums, largest, self.settled | other.settled)
 
 
 class ToldTile(Protocol):
@@ -70,7 +146,7 @@ class FleetMap:
         self.changes = 0
         self._unseen: LevelArray = np.broadcast_to(np.uint8(0), grid.shape)  # takes no memory
         self._risk: FloatArray | None = None  # that of a large map is only held where it is asked for
-        self._changed: dict[tuple[int, int], tuple[slice, slice]] = {}  # windows of tiles that _risk does not tell yet
+        self._changed: dict[Place, tuple[slice, slice]] = {}  # windows of tiles that _risk does not tell yet
 
     @property
     def risk(self) -> FloatArray:
@@ -96,23 +172,10 @@ class FleetMap:
             raise ValueError(f"the tile at {place[0]}, {place[1]} has {shape} cells, not {told}")
         layer = self.layers.get(vehicle)
         if layer is None:
-            layer = self.layers[vehicle] = VehicleLayer(
-                sum_levels=np.zeros(self.grid.shape, dtype=np.uint8),
-                largest_levels=np.zeros(self.grid.shape, dtype=np.uint8),
-                settled=np.zeros(self.grid.shape, dtype=np.bool_),
-                told=np.zeros(self.grid.shape, dtype=np.bool_),
-            )
-        version = (incarnation, tile.version)
-        known = layer.versions.get(place)
-        if known is not None and version <= known:
-            return False
-        layer.versions[place] = version
+            layer = self.layers[vehicle] = VehicleLayer.empty(self.grid)
         window = (slice(place[0], place[0] + rows), slice(place[1], place[1] + columns))
-        layer.sum_levels[window] = tile.sum_levels
-        layer.largest_levels[window] = tile.largest_levels
-        layer.settled[window] = tile.settled
-        if known is None:
-            layer.told[window] = True
+        if not layer.take(place, window, incarnation, tile):
+            return False
         self._changed[place] = window
         self.changes += 1
         return True

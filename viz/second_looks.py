@@ -37,12 +37,12 @@ class SecondLooks:
 
     def on_hotspot(self, received: Received, hotspot: Hotspot) -> None:
         """Draws the outline, with its number and its mean risk."""
-        self._note(received, hotspot.state, partial(self._draw_hotspot, received, hotspot))
+        self._note(_hotspot_path(received), received, hotspot.state, partial(self._draw_hotspot, received, hotspot))
 
     def on_strip(self, received: Received, strip: StripStatus) -> None:
         """Draws the strip in the colour of its state, an open one that is foreseen in one of its own, with its id, what
         it may remove and why it is there; faint once it is done."""
-        self._note(received, strip.state, partial(self._draw_strip, received, strip))
+        self._note(received.key, received, strip.state, partial(self._draw_strip, received, strip))
 
     def advance(self, time_ms: int) -> None:
         """Draws what was held back if its minute is over."""
@@ -55,9 +55,9 @@ class SecondLooks:
             draw()
         self._held.clear()
 
-    def _note(self, received: Received, state: HotspotState | StripState, draw: Callable[[], None]) -> None:
+    def _note(self, key: str, received: Received, state: HotspotState | StripState, draw: Callable[[], None]) -> None:
         """Draws what a message says, or holds it back if it tells no new state and what it is of changes often."""
-        key, time_ms = received.key, received.header.sent_ms
+        time_ms = received.header.sent_ms
         before = self._states.get(key)
         self._states[key] = state
         if before is not state or state not in CHANGES_OFTEN:
@@ -70,7 +70,7 @@ class SecondLooks:
             self._pace.note(time_ms)
 
     def _draw_hotspot(self, received: Received, hotspot: Hotspot) -> None:
-        path = f"{paths.HOTSPOTS}/{received.vehicle}/{received.number}"
+        path = _hotspot_path(received)
         if hotspot.state is HotspotState.WITHDRAWN:
             self._canvas.put(received.header.sent_ms, path, rr.Clear(recursive=False))
             return
@@ -109,6 +109,12 @@ class SecondLooks:
                 labels=f"{number}: {strip.removable_m2:.0f} m²" if told else str(number),  # its colour tells its state
             )
             self._canvas.put(time_ms, f"{path}/label", label, *([_label_style(shows, strip.state)] if restyled else []))
+
+
+def _hotspot_path(received: Received) -> str:
+    """Each start of a vehicle numbers its own."""
+    start = received.header.incarnation
+    return f"{paths.HOTSPOTS}/{received.vehicle}/{f'{start}-' if start else ''}{received.number}"
 
 
 # How things look is made once and put beside each outline: to make it anew takes longer than to draw it.

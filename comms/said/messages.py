@@ -199,10 +199,11 @@ class Curve:
 
 @dataclass(frozen=True, slots=True)
 class CoverageTile:
-    """One tile of a vehicle's own layer, whole.
+    """One tile of a vehicle's own layer since it was started, whole.
 
     `sum_levels` and `largest_levels`: sum and largest single look of -ln(1 - P_d), in steps of 0.02, shape
-    (rows, columns) of the tile at `first_row`, `first_column` of the grid. The newest (incarnation, version) wins.
+    (rows, columns) of the tile at `first_row`, `first_column` of the grid. The newest version of each incarnation
+    counts.
     """
 
     version: Count

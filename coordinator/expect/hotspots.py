@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from comms.said.messages import Hotspot, HotspotState
+from planner.fleet_map import MOST_STARTS
 from planner.region import points_inside
 from planner.types import BoolArray, FloatArray, GridSpec
 
@@ -18,32 +19,45 @@ Revision = tuple[int, int]
 
 @dataclass(frozen=True)
 class _Standing:
-    revision: Revision
+    revision: int
     mean_risk: float
     window: tuple[slice, slice]
     cells: BoolArray
 
 
 class Hotspots:
-    """Hears hotspots as they come; of one hotspot's revisions the newest counts."""
+    """Hears hotspots as they come; of one hotspot's revisions the newest counts.
+
+    Each start of a vehicle numbers its hotspots anew, and takes none away that one before has told. Memory does not
+    grow with each start: those of all but the newest MOST_STARTS stay as they are then, whatever comes of them later.
+    """
 
     def __init__(self, grid: GridSpec, inside: BoolArray) -> None:
         self._grid = grid
         self._inside = inside
-        self._hotspots: dict[Place, _Standing] = {}
+        self._starts: dict[str, dict[int, dict[int, _Standing]]] = {}  # by vehicle, incarnation and number
+        self._closed: dict[str, int] = {}  # of each vehicle the newest incarnation that nothing is heard of any more
         self._is_new = False
         self._hot: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
         self._told_risk: FloatArray = np.zeros(grid.shape)
+        self._risk_of_closed: FloatArray = np.zeros(grid.shape)
+        self._hot_of_closed: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
 
     def hear(self, place: Place, revision: Revision, message: Hotspot) -> bool:
         """Hears a hotspot's newest word; returns whether it was news."""
-        known = self._hotspots.get(place)
-        if known is not None and revision <= known.revision:
+        (vehicle, number), (incarnation, its_revision) = place, revision
+        starts = self._starts.setdefault(vehicle, {})
+        known = starts.get(incarnation, {}).get(number)
+        if incarnation <= self._closed.get(vehicle, -1) or (known is not None and its_revision <= known.revision):
             return False
         window, cells = (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
         if message.state is HotspotState.ACTIVE and len(message.outline) >= 3:
             window, cells = self._cells_within([(corner.x_m, corner.y_m) for corner in message.outline])
-        self._hotspots[place] = _Standing(revision, message.mean_risk, window, cells)
+        starts.setdefault(incarnation, {})[number] = _Standing(its_revision, message.mean_risk, window, cells)
+        if len(starts) > MOST_STARTS:
+            oldest = self._closed[vehicle] = min(starts)
+            for one in starts.pop(oldest).values():
+                _draw(one, self._hot_of_closed, self._risk_of_closed)
         self._is_new = True
         return True
 
@@ -56,11 +70,12 @@ class Hotspots:
     def _draw(self) -> None:
         """Draws all hotspots afresh: which cells they hold, and the worst mean told of each cell."""
         self._is_new = False
-        self._hot[:] = False
-        self._told_risk[:] = 0.0
-        for one in self._hotspots.values():
-            self._hot[one.window] |= one.cells
-            np.maximum(self._told_risk[one.window], one.mean_risk, out=self._told_risk[one.window], where=one.cells)
+        self._hot[:] = self._hot_of_closed
+        self._told_risk[:] = self._risk_of_closed
+        for starts in self._starts.values():
+            for hotspots in starts.values():
+                for one in hotspots.values():
+                    _draw(one, self._hot, self._told_risk)
 
     def _cells_within(self, outline: list[tuple[float, float]]) -> tuple[tuple[slice, slice], BoolArray]:
         """The cells inside the area whose centres lie in an outline, and the window of the grid that they fill."""
@@ -72,6 +87,11 @@ class Hotspots:
             return (slice(0, 0), slice(0, 0)), np.zeros((0, 0), dtype=np.bool_)
         within = points_inside(across, along, grid.across_m[columns], grid.along_m[rows])
         return (rows, columns), within & self._inside[rows, columns]
+
+
+def _draw(one: _Standing, hot: BoolArray, told_risk: FloatArray) -> None:
+    hot[one.window] |= one.cells
+    np.maximum(told_risk[one.window], one.mean_risk, out=told_risk[one.window], where=one.cells)
 
 
 def _from_first_to_last(centres_m: FloatArray, corners_m: FloatArray) -> slice:

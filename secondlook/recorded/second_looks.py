@@ -17,7 +17,8 @@ from planner.types import Strip
 class HotspotRecord:
     """A hotspot as its vehicle last published it.
 
-    `found_s`, `changed_s`: when it was first and last published. `polygon`: its outline, mission frame.
+    `found_s`, `changed_s`: when it was first and last published. `polygon`: its outline, mission frame. `incarnation`:
+    which start of the vehicle has found it; each numbers its own.
     """
 
     vehicle: str
@@ -28,15 +29,17 @@ class HotspotRecord:
     found_s: float
     changed_s: float
     polygon: shapely.Polygon
+    incarnation: int = 0
 
 
 def hotspots(published: Iterable[Received[Hotspot]]) -> list[HotspotRecord]:
     """Every hotspot that was ever published, in the order of finding."""
-    first: dict[str, float] = {}
-    last: dict[str, Received[Hotspot]] = {}
+    first: dict[tuple[str, int], float] = {}
+    last: dict[tuple[str, int], Received[Hotspot]] = {}
     for one in published:
-        first.setdefault(one.key, one.t_s)
-        last[one.key] = one
+        hotspot = one.key, one.header.incarnation
+        first.setdefault(hotspot, one.t_s)
+        last[hotspot] = one
     return [
         HotspotRecord(
             said.vehicle,
@@ -44,11 +47,12 @@ def hotspots(published: Iterable[Received[Hotspot]]) -> list[HotspotRecord]:
             said.message.state,
             said.message.mean_risk,
             said.message.cells,
-            first[key],
+            first[hotspot],
             said.t_s,
             shapely.Polygon([(corner.x_m, corner.y_m) for corner in said.message.outline]),
+            said.header.incarnation,
         )
-        for key, said in last.items()
+        for hotspot, said in last.items()
     ]
 
 

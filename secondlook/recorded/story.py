@@ -106,7 +106,7 @@ class Story:
         return news
 
     def _note_hotspot(self, received: Received, hotspot: Hotspot) -> None:
-        if not self._is_news(received.key, hotspot.state):
+        if not self._is_news((received.key, received.header.incarnation), hotspot.state):
             return
         news = self._hotspots.setdefault(received.header.sender, _HotspotNews(received.header.sent_ms))
         number = received.number

@@ -102,18 +102,21 @@ def _has_all(flight: Flight, reader: str, has: FleetMap, published: FleetMap) ->
     """The reader's newest tiles are those that were published last."""
     problems = []
     for vehicle, layer in published.layers.items():
-        versions = has.layers[vehicle].versions if vehicle in has.layers else {}
+        has_versions = has.layers[vehicle].versions if vehicle in has.layers else {}
         for place, newest in layer.versions.items():
-            if versions.get(place) != newest:
+            for incarnation, version in newest.items():
+                has_version = has_versions.get(place, {}).get(incarnation)
+                if has_version == version:
+                    continue
                 missed = next(
                     one
                     for one in flight.said(CoverageTile, f"agent/{vehicle}/**")
                     if (one.message.first_row, one.message.first_column) == place
-                    and (one.header.incarnation, one.message.version) == newest
+                    and (one.header.incarnation, one.message.version) == (incarnation, version)
                 )
-                instead = f"in version {versions[place][1]}" if place in versions else "not at all"
+                instead = "not at all" if has_version is None else f"in version {has_version}"
                 problems.append(
-                    f"{reader} has {missed.key} {instead}: version {newest[1]}, the last, was sent at"
+                    f"{reader} has {missed.key} {instead}: version {version}, the last, was sent at"
                     f" {missed.t_s:.3f} s and did not reach it"
                 )
     if not problems and not np.array_equal(has.risk, published.risk):

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.fleet_map import FleetMap
+from planner.fleet_map import MOST_STARTS, FleetMap
 from planner.risk import LevelArray
 from planner.types import BoolArray, GridSpec, SweepFrame
 
@@ -82,20 +82,25 @@ def published(draw: st.DrawFn) -> list[TileNews]:
 
 
 def newest(told: list[TileNews]) -> list[TileNews]:
-    best: dict[tuple[str, tuple[int, int, int, int]], TileNews] = {}
+    """Of each start of a vehicle, and each tile, the newest."""
+    best: dict[tuple[str, int, tuple[int, int, int, int]], TileNews] = {}
     for news in sorted(told, key=lambda news: news.version):
-        best[news.vehicle, news.place] = news
+        best[news.vehicle, news.version[0], news.place] = news
     return list(best.values())
 
 
 def joined(told: list[TileNews], rho: float) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """The map from scratch, cell by cell as the formula says it."""
+    """The map from scratch, cell by cell as the formula says it; a vehicle's sum is at most 255."""
     sums, largest = np.zeros(GRID.shape), np.zeros(GRID.shape)
-    for news in newest(told):
-        row, column, rows, columns = news.place
-        window = np.s_[row : row + rows, column : column + columns]
-        sums[window] += news.sum_levels
-        largest[window] = np.maximum(largest[window], news.largest_levels)
+    for vehicle in {news.vehicle for news in told}:
+        its_sums = np.zeros(GRID.shape)
+        for news in newest(told):
+            if news.vehicle == vehicle:
+                row, column, rows, columns = news.place
+                window = np.s_[row : row + rows, column : column + columns]
+                its_sums[window] += news.sum_levels
+                largest[window] = np.maximum(largest[window], news.largest_levels)
+        sums += np.minimum(its_sums, 255)
     return np.exp(-0.02 * (largest + (1 - rho) * (sums - largest)))
 
 
@@ -177,12 +182,43 @@ def test_sums_add_and_maxima_take_the_maximum() -> None:
     assert fleet.risk[0, 20] == 1.0
 
 
-def test_a_restarted_vehicle_starts_its_layer_anew() -> None:
-    fleet = FleetMap(GRID)
+def test_the_looks_of_a_vehicle_that_is_started_anew_count_beside_those_before() -> None:
+    fleet = FleetMap(GRID, rho=0.5)
     tile("alpha", (0, 9), PLACES[0], 50).give(fleet)
     assert tile("alpha", (1, 0), PLACES[0], 10).give(fleet)
-    assert fleet.risk[0, 0] == pytest.approx(math.exp(-0.2))
-    assert not tile("alpha", (0, 10), PLACES[0], 99).give(fleet)
+    assert fleet.risk[0, 0] == pytest.approx(math.exp(-0.02 * (50 + 0.5 * 10)))
+    assert tile("alpha", (0, 10), PLACES[0], 60).give(fleet)  # late
+    assert not tile("alpha", (0, 9), PLACES[0], 50).give(fleet)
+    assert tile("alpha", (1, 1), PLACES[0], 20).give(fleet)
+    assert fleet.risk[0, 0] == pytest.approx(math.exp(-0.02 * (60 + 0.5 * 20)))
+    assert fleet.layers["alpha"].sum_levels[0, 0] == 80
+    tile("alpha", (2, 1), PLACES[0], 250).give(fleet)
+    assert fleet.layers["alpha"].sum_levels[0, 0] == 255
+
+
+def test_what_one_start_has_settled_stays_settled() -> None:
+    fleet = FleetMap(GRID)
+    tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
+    tile("alpha", (1, 1), PLACES[0], 0).give(fleet)
+    assert np.count_nonzero(fleet.settled_by(["alpha"])) == 400
+
+
+@given(st.permutations(range(MOST_STARTS)))
+def test_many_starts_in_any_order_end_in_one_map_and_take_no_more_memory(order: list[int]) -> None:
+    fleet = FleetMap(GRID)
+    for incarnation in order:
+        tile("alpha", (incarnation, 1), PLACES[0], incarnation + 1).give(fleet)
+    layer = fleet.layers["alpha"]
+    assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1))
+    for incarnation in range(MOST_STARTS, 3 * MOST_STARTS):
+        assert tile("alpha", (incarnation, 1), PLACES[0], 1).give(fleet)
+        assert len(layer.versions[0, 0]) == MOST_STARTS
+    assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1)) + 2 * MOST_STARTS
+    # Nothing more is taken of what is held as one; of the others it is.
+    for incarnation in range(2 * MOST_STARTS + 1):
+        assert not tile("alpha", (incarnation, 2), PLACES[0], 200).give(fleet)
+    assert tile("alpha", (2 * MOST_STARTS + 1, 2), PLACES[0], 3).give(fleet)
+    assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1)) + 2 * MOST_STARTS + 2
 
 
 def test_layers_can_be_told_apart() -> None:

@@ -8,6 +8,7 @@ from coordinator_by_hand import ELSEWHERE, GRID, HOT, HOT_CELLS, box
 
 from comms.said.messages import Hotspot, HotspotState
 from coordinator.expect.hotspots import Hotspots
+from planner.fleet_map import MOST_STARTS
 
 Box = tuple[float, float, float, float]
 ELSEWHERE_CELLS = np.s_[10:70, 60:70]
@@ -50,8 +51,26 @@ def test_of_revisions_the_newest_counts_whenever_it_comes(hotspots: Hotspots) ->
     assert not hotspots.hear(("p", 1), (0, 2), hotspot(ELSEWHERE, 0.7))
     assert not hotspots.hear(("p", 1), (0, 1), hotspot(ELSEWHERE, 0.7))
     assert (drawn(hotspots) == told((HOT_CELLS, 0.5))).all()
-    assert hotspots.hear(("p", 1), (1, 1), hotspot(ELSEWHERE, 0.7))  # its sender has started anew
-    assert (drawn(hotspots) == told((ELSEWHERE_CELLS, 0.7))).all()
+
+
+def test_whoever_is_started_anew_takes_none_of_its_hotspots_away(hotspots: Hotspots) -> None:
+    hotspots.hear(("p", 1), (0, 2), hotspot(HOT, 0.5))
+    assert hotspots.hear(("p", 1), (1, 1), hotspot(ELSEWHERE, 0.7))
+    both = told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.7))
+    assert (drawn(hotspots) == both).all()
+    assert hotspots.hear(("p", 1), (0, 3), hotspot(HOT, 0.6))  # a late word of the start before
+    assert hotspots.hear(("p", 1), (1, 2), hotspot(None))
+    assert (drawn(hotspots) == told((HOT_CELLS, 0.6))).all()
+
+
+def test_of_many_starts_the_oldest_stay_as_they_are(hotspots: Hotspots) -> None:
+    hotspots.hear(("p", 1), (0, 1), hotspot(HOT, 0.5))
+    for incarnation in range(1, MOST_STARTS + 1):
+        hotspots.hear(("p", 1), (incarnation, 1), hotspot(ELSEWHERE, 0.7))
+    assert not hotspots.hear(("p", 1), (0, 2), hotspot(None))
+    assert hotspots.hear(("p", 1), (1, 2), hotspot(ELSEWHERE, 0.8))
+    assert hotspots.hear(("q", 1), (0, 1), hotspot(None))
+    assert (drawn(hotspots) == told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.8))).all()
 
 
 def test_one_that_is_withdrawn_holds_nothing(hotspots: Hotspots) -> None:

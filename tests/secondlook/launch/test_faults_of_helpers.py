@@ -152,6 +152,27 @@ class TestBadHelpers:
         assert_maps_converged(flight)
 
 
+class TestAHelperThatIsStartedAnew:
+    def test_what_it_has_seen_before_counts_on(self, tmp_path: Path) -> None:
+        fleet = Fleet("tellaro", folder=tmp_path)
+
+        def first_done(heard: Heard) -> bool:
+            last = heard.last("coord/strip/*")
+            return last is not None and isinstance(last.message, StripStatus) and last.message.state is DONE
+
+        before = fleet.run_until(first_done, timeout_s=3000)
+        fleet.kill("helper")
+        fleet.join("helper", at_s=fleet.now_s + 15)
+        flight = fleet.run()
+        seen = before.risk_map.layers["helper"]
+        after = flight.risk_map.layers["helper"]
+        assert (after.sum_levels >= seen.sum_levels).all()
+        assert (after.largest_levels >= seen.largest_levels).all()
+        assert any(len(starts) > 1 for starts in after.versions.values())
+        assert flight.summary["risk"]["mean"] < 0.35  # 0.332 where it is not killed
+        assert_maps_converged(flight)
+
+
 class TestStripsThatAreNone:
     def test_a_helper_refuses_them_and_takes_the_next(self, slow: MakeFleet) -> None:
         fleet = slow(helpers=1)

@@ -129,13 +129,13 @@ class TestRisk:
         assert alone["mean"] == pytest.approx((4 * HALF + 6) / 10)
         assert alone["uncovered_share"] == pytest.approx(0.6)
 
-    def test_the_newest_tile_wins_however_they_come(self) -> None:
+    def test_the_newest_tile_of_each_start_counts_however_they_come(self) -> None:
         stream = begun()
         stream.tile(1, PRIMARY, [[50] * 5] * 2, version=9)
         stream.tile(2, PRIMARY, [[10] * 5] * 2, version=8)
         assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-1))
         stream.tile(3, PRIMARY, [[20] * 5] * 2, version=1, incarnation=1)
-        assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-0.4))
+        assert stream.metrics.summary()["risk"]["mean"] == pytest.approx(math.exp(-1.4))
 
     def test_risk_at_holds_what_was_sent_until_then(self) -> None:
         stream = begun()
