@@ -12,6 +12,7 @@ class Item(Enum):
     CUT = auto()
     ASSIGN = auto()
     KEEP_APART = auto()
+    ASK_AGAIN = auto()
     SAY_OVER = auto()
 
 

@@ -103,21 +103,29 @@ class Coordinator:
 
     def _hear(self, received: Received, now_ms: int) -> None:
         message, header, vehicle = received.message, received.header, self.fleet.vehicles.get(received.vehicle)
-        if self._end.over is not None:
+        is_over = self._end.over is not None  # then what is asked for is still taken in, and nothing is done by it
+        if isinstance(message, CoverageTile):
+            if self.fleet.hear_tile(received, message) and not is_over:
+                self._agenda.add(Item.CUT, now_ms + CUT_WITHIN_MS)
+        elif isinstance(message, Hotspot):
+            if self._hear_hotspot(received, message) and not is_over:
+                self._cut_soon(now_ms)
+        elif is_over:
             if isinstance(message, AgentState) and vehicle is not None:
                 vehicle.hear_state(header, message, now_ms)
-        elif isinstance(message, CoverageTile):
-            if self.fleet.hear_tile(received, message):
-                self._agenda.add(Item.CUT, now_ms + CUT_WITHIN_MS)
-        elif isinstance(message, Hotspot) and self._cutting is not None:
-            if self._cutting.hear_hotspot(received, message):
-                self._cut_soon(now_ms)
         elif isinstance(message, AgentState) and vehicle is not None:
             self._hear_state(vehicle, header, message, now_ms)
         elif isinstance(message, TaskStatus) and vehicle is not None:
             self._strips.hear_status(vehicle, header, message, now_ms)
         elif isinstance(message, Plan | Curve) and vehicle is not None and vehicle.hear_survey(header, message):
             self._cut_soon(now_ms)
+
+    def _hear_hotspot(self, received: Received, hotspot: Hotspot) -> bool:
+        """Hears a hotspot's newest word; returns whether there is something to cut by it."""
+        vehicle = self.fleet.vehicles.get(received.vehicle)
+        if vehicle is not None:
+            vehicle.arrivals.note_hotspot(received.header.incarnation, received.key, hotspot.revision)
+        return self._cutting is not None and self._cutting.hear_hotspot(received, hotspot)
 
     def _cut_soon(self, now_ms: int) -> None:
         """There is news of the survey: the sooner cut by, the sooner a helper can be sent by it."""

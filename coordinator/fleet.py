@@ -47,16 +47,20 @@ class KnownFleet:
     def hear_tile(self, received: Received, tile: CoverageTile) -> bool:
         """Joins a tile to the map; returns whether it was news. One that does not fit the grid is dropped."""
         name, incarnation = received.vehicle, received.header.incarnation
+        if name in self.vehicles:
+            self.vehicles[name].arrivals.note_tile(incarnation, received.key, tile.version)
         try:
-            news = self.map.join(name, incarnation, tile)
+            return self.map.join(name, incarnation, tile)
         except ValueError as error:
             if name not in self._complained_of:
                 self._complained_of.add(name)
                 log.warning("dropped a message from %s: %s (said once)", name, error)
             return False
-        if name in self.vehicles:
-            self.vehicles[name].note_tile(incarnation, tile.version)
-        return news
+
+    def lacking(self, now_ms: int) -> list[KnownVehicle]:
+        """Those of whose tiles and hotspots something has not arrived, but for who is silent for so long that it is not
+        waited for."""
+        return [one for one in self.vehicles.values() if now_ms - one.heard_ms < self._given_up_after_ms and one.lacks]
 
     def levels(self, name: str, window: Window) -> LevelArray:
         """What a vehicle's own layer tells of a window's cells: the sum over its looks."""

@@ -1,22 +1,27 @@
-"""When the mission is over, and saying so again to those who may not have heard it."""
+"""When the mission is over: asking for what has not arrived by then, and saying so again to those who may not have
+heard it."""
 
 from __future__ import annotations
 
 import math
 
-from comms.said.messages import MissionOver
+from comms.said.messages import MissionOver, TaskAction
 from coordinator.agenda import Agenda, Item
 from coordinator.config import CoordinatorConfig
 from coordinator.fleet import KnownFleet
 from coordinator.outbox import Outbox
 from coordinator.strip_life import StripLife
+from coordinator.vehicles import KnownVehicle
+from planner.types import Strip
 
+ASK_AFTER_MS, ASK_EVERY_MS = 1000, 10_000  # what is under way may take a little longer than the state that tells of it
 SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
 
 class MissionEnd:
-    """The mission is over when every primary has finished and no strip is left, at the latest at the deadline, by the
-    last primary's end or by the clock. `over`: what was said of that, None until then."""
+    """The mission is over when every primary has finished, all of which states tell has arrived and was cut by, and no
+    strip is left, at the latest at the deadline, by the last primary's end or by the clock. `over`: what was said of
+    that, None until then."""
 
     def __init__(
         self, config: CoordinatorConfig, fleet: KnownFleet, strips: StripLife, agenda: Agenda, outbox: Outbox
@@ -30,9 +35,12 @@ class MissionEnd:
         self._outbox = outbox
 
     def find(self, now_ms: int) -> None:
-        """Finds whether the mission is over, and says so."""
+        """Finds whether the mission is over, and says so; asks for what has not arrived when every primary has
+        finished."""
         left, surveying = self._strips.unended, self._fleet.surveying
-        if not left and not surveying:
+        lacking = [] if surveying else self._fleet.lacking(now_ms)
+        self._ask(lacking, now_ms)
+        if not left and not surveying and not lacking and not self._cut_is_left(now_ms):
             reason = "every primary has finished and no strip is left"
         elif now_ms >= self._deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
@@ -46,12 +54,34 @@ class MissionEnd:
         self._outbox.add_over(self.over)
         self._agenda.add(Item.SAY_OVER, now_ms + SAY_AGAIN_AFTER_MS[0])
 
+    def _ask(self, lacking: list[KnownVehicle], now_ms: int) -> None:
+        """Asks those of whom something has not arrived to tell it again, until all has; then it is cut by."""
+        due_ms = self._agenda.deadline_ms(Item.ASK_AGAIN)
+        if not lacking:
+            if due_ms is not None:
+                self._agenda.strike(Item.ASK_AGAIN, due_ms)
+                self._agenda.add(Item.CUT, now_ms)
+        elif due_ms is None:
+            self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_AFTER_MS)
+        elif self._agenda.strike(Item.ASK_AGAIN, now_ms):
+            self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_EVERY_MS)
+            for one in lacking:
+                if not one.lost:
+                    self._outbox.add_task(TaskAction.TELL_AGAIN, one.entry.vehicle, Strip(0, (0.0, 0.0), 0.0, 0.0, 0.0))
+
+    def _cut_is_left(self, now_ms: int) -> bool:
+        """Whether there is news that was not cut by; if so that is done at once."""
+        is_left = self._agenda.deadline_ms(Item.CUT) is not None
+        if is_left:
+            self._agenda.add(Item.CUT, now_ms)
+        return is_left
+
     def say_again(self, now_ms: int) -> None:
-        """Says again that the mission is over, where a vehicle has not answered, or some of its tiles were lost: the
-        answer to that are its tiles, too."""
+        """Says again that the mission is over, where a vehicle has not answered, or something of it has not arrived:
+        the answer to that are its tiles and hotspots, too."""
         vehicles = self._fleet.vehicles.values()
         unheard = any(one.heard_ms <= self._over_ms or not one.is_finished for one in vehicles)
-        if self.over is not None and (unheard or any(one.has_missed_tiles for one in vehicles)):
+        if self.over is not None and (unheard or any(one.lacks for one in vehicles)):
             self._outbox.add_over(self.over)
             to_come = (self._over_ms + after_ms for after_ms in SAY_AGAIN_AFTER_MS)
             again_ms = next((again_ms for again_ms in to_come if again_ms > now_ms), None)

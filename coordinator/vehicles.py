@@ -11,6 +11,7 @@ from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Curve, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import Service
+from coordinator.arrivals import Arrivals
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
@@ -83,7 +84,8 @@ class KnownVehicle:
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
     has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and
-    `curves`: P(y) by track, 0 for that of earlier missions, for a primary.
+    `curves`: P(y) by track, 0 for that of earlier missions, for a primary. `arrivals`: what has come of its tiles and
+    hotspots.
     """
 
     entry: RosterVehicle
@@ -100,13 +102,12 @@ class KnownVehicle:
     unanswered: int = 0
     plan: Plan | None = None
     curves: dict[int, DetectionCurve] = field(default_factory=dict)
+    arrivals: Arrivals = field(default_factory=Arrivals)
     _plan_order: Order = _NONE_YET
     _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
-    _tiles_of: int = 0
-    _tile_versions: set[int] = field(default_factory=set)
 
     @property
     def is_idle(self) -> bool:
@@ -194,17 +195,10 @@ class KnownVehicle:
         if was_trusted and not self.is_trusted:
             log.warning("%s is offered nothing more: %s", self.entry.vehicle, why)
 
-    def note_tile(self, incarnation: int, version: int) -> None:
-        """Notes that a tile of it has come."""
-        if incarnation > self._tiles_of:
-            self._tiles_of, self._tile_versions = incarnation, set()
-        if incarnation == self._tiles_of:
-            self._tile_versions.add(version)
-
     @property
-    def has_missed_tiles(self) -> bool:
-        """Whether tiles were lost on the way: an agent counts its versions from 1."""
-        return len(self._tile_versions) < max(self._tile_versions, default=0)
+    def lacks(self) -> bool:
+        """Whether something has not arrived of the tiles and hotspots of which its newest state tells."""
+        return self.state is not None and self.arrivals.lack(self._state_order[0], self.state)
 
     @property
     def expected_end_ms(self) -> int | None:

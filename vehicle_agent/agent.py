@@ -19,6 +19,7 @@ from comms.said.messages import (
     Mode,
     Nav,
     Task,
+    TaskAction,
 )
 from comms.said.topics import CONTACT, MANEUVER, STATE
 from planner.footprints.footprint import Footprint
@@ -91,7 +92,7 @@ class Agent:
                     self.on_maneuver(message, now_ms)
             elif isinstance(message, Task):
                 if self._is_for_now(received.header):
-                    self.on_task(message, now_ms)
+                    self._hear_task(message, now_ms)
             elif isinstance(message, MissionOver):
                 self._over = True
                 self._wake_ms = None
@@ -99,6 +100,7 @@ class Agent:
                 self.report(now_ms)
         elif self.coverage is not None and isinstance(message, MissionOver):  # said again: of the answer some was lost
             self._outbox.extend(self.coverage.all_again())
+            self.tell_again()
             self.report_state(now_ms)
         return self._step()
 
@@ -126,6 +128,13 @@ class Agent:
 
     def on_task(self, task: Task, now_ms: int) -> None:
         """The coordinator offers a strip or wants it back."""
+
+    def hotspots_told(self) -> int:
+        """The tally of the newest revisions of all hotspots that were told; 0 for an agent that finds none."""
+        return 0
+
+    def tell_again(self) -> None:
+        """Something of what was told has not arrived; tiles are said again without this."""
 
     def on_over(self, now_ms: int) -> None:
         """The mission is over; the last report follows."""
@@ -164,6 +173,7 @@ class Agent:
         """Publishes the state alone, once the vehicle has said where it is."""
         if self.nav is None:
             return
+        assert self.coverage is not None
         message = AgentState(
             mode=self.mode,
             works_on=self.works_on,
@@ -172,6 +182,8 @@ class Agent:
             x_m=self.nav.x_m,
             y_m=self.nav.y_m,
             heading_rad=self.nav.heading_rad,
+            tiles_told=self.coverage.told(),
+            hotspots_told=self.hotspots_told(),
         )
         self.publish(STATE.key(vehicle=self.vehicle), message)
 
@@ -184,6 +196,15 @@ class Agent:
         self.nav = nav
         if first and self.coverage is not None and not self._over:
             self.report_state(now_ms)
+
+    def _hear_task(self, task: Task, now_ms: int) -> None:
+        if task.action is TaskAction.TELL_AGAIN:
+            assert self.coverage is not None
+            self._outbox.extend(self.coverage.again())
+            self.tell_again()
+            self.report_state(now_ms)
+        else:
+            self.on_task(task, now_ms)
 
     def _is_for_now(self, header: Header) -> bool:
         """Whether a task is for who is here now, and newer than all that were; takes note of it."""

@@ -6,12 +6,14 @@ import numpy as np
 
 from comms.node import Publication
 from comms.said.messages import CoverageTile, Look
+from comms.said.tally import tally
 from comms.said.topics import COVERAGE
 from planner.footprints.cells import look_on_grid
 from planner.risk import RiskLayer
 from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within
 from planner.types import BoolArray, GridSpec, Strip
 
+MOST_AGAIN = 200  # tiles that are said again at one time, as somebody asks
 OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is lost, 3 of 1,000,000 tiles stay unheard
 
 
@@ -72,6 +74,15 @@ class CoverageLayer:
             return []
         tile, _ = min(self._said.items(), key=lambda said: said[1][::-1])
         return [self._say(tile)]
+
+    def told(self) -> int:
+        """The tally of the newest versions of all tiles that were said."""
+        return tally(version for version, _ in self._said.values())
+
+    def again(self) -> list[Publication]:
+        """Tiles as they were said last, as some have not arrived: up to MOST_AGAIN of those said the fewest times, the
+        oldest first."""
+        return [self._say(tile) for tile in sorted(self._said, key=lambda tile: self._said[tile][::-1])[:MOST_AGAIN]]
 
     def again_at(self, strip: Strip) -> list[Publication]:
         """The tiles about a strip, as they were said last."""

@@ -19,6 +19,7 @@ from comms.said.messages import (
     Plan,
     PlannedTrack,
 )
+from comms.said.tally import tally
 from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower
 from planner.curve import NEWEST_CURVES, RangeTally, effective_range_m, mean_curve
@@ -64,7 +65,7 @@ class SurveyAgent(Agent):
         self._looked_to_m: float | None = None  # along the track under way, in the grid's frame
         self._plan_revision = 0
         self._hotspots: HotspotMap
-        self._hotspot_revisions: dict[int, int] = {}
+        self._hotspots_said: dict[int, Hotspot] = {}
         self._hotspots_due_ms = 0
         self._new_looks = False
 
@@ -123,6 +124,15 @@ class SurveyAgent(Agent):
         if self.mode is not Mode.FINISHED:
             self._finish()
         self._find_hotspots(now_ms)
+
+    def hotspots_told(self) -> int:
+        """See `Agent`."""
+        return tally(one.revision for one in self._hotspots_said.values())
+
+    def tell_again(self) -> None:
+        """Says of each hotspot the last word again."""
+        for number, hotspot in self._hotspots_said.items():
+            self.publish(HOTSPOT.key(vehicle=self.vehicle, number=number), hotspot)
 
     def report(self, now_ms: int) -> None:
         """Looks for hotspots every 30 s, before the tiles go out, so that both tell the same."""
@@ -347,7 +357,8 @@ class SurveyAgent(Agent):
         growing: bool,
         merged_into: int,
     ) -> None:
-        revision = self._hotspot_revisions.get(number, 0) + 1
-        self._hotspot_revisions[number] = revision
+        before = self._hotspots_said.get(number)
+        revision = 1 if before is None else before.revision + 1
         message = Hotspot(revision, state, outline, mean_risk, cells, growing, merged_into)
+        self._hotspots_said[number] = message
         self.publish(HOTSPOT.key(vehicle=self.vehicle, number=number), message)

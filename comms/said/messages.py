@@ -148,7 +148,9 @@ class Mode(enum.Enum):
 @dataclass(frozen=True, slots=True)
 class AgentState:
     """An agent's state: on change and every 10 s. `works_on` is the track or strip number, 0 for none; `battery` the
-    share of endurance left; `expected_end_ms` when it will be free or finished, 0 if not known."""
+    share of endurance left; `expected_end_ms` when it will be free or finished, 0 if not known. `tiles_told`,
+    `hotspots_told`: the tallies (`comms.said.tally`) of its tiles' newest versions and its hotspots' newest revisions;
+    0 where it has told none since it was started, or keeps no count."""
 
     mode: Mode
     works_on: Count
@@ -157,6 +159,8 @@ class AgentState:
     x_m: Metres
     y_m: Metres
     heading_rad: Radians
+    tiles_told: Count = 0
+    hotspots_told: Count = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,8 +206,7 @@ class CoverageTile:
     """One tile of a vehicle's own layer since it was started, whole.
 
     `sum_levels` and `largest_levels`: sum and largest single look of -ln(1 - P_d), in steps of 0.02, shape
-    (rows, columns) of the tile at `first_row`, `first_column` of the grid. The newest version of each incarnation
-    counts.
+    (rows, columns) of the tile at `first_row`, `first_column` of the grid. Of an incarnation the newest version counts.
     """
 
     version: Count
@@ -284,16 +287,18 @@ class StripStatus:
 
 
 class TaskAction(enum.Enum):
-    """What a task message asks. To stand aside is to go to its start point and wait there, without a strip."""
+    """What a task message asks. To stand aside is to go to its start point and wait there, without a strip; to tell
+    again is to say its tiles and hotspots once more, as some have not arrived."""
 
     TAKE = "take"
     GIVE_BACK = "give_back"
     STAND_ASIDE = "stand_aside"
+    TELL_AGAIN = "tell_again"
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """The coordinator's word to one vehicle: take this strip, give it back, or stand aside. It suffices by itself."""
+    """The coordinator's word to one vehicle. It suffices by itself."""
 
     action: TaskAction
     strip: Count

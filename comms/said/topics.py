@@ -164,7 +164,7 @@ STRIP = Topic(
 )  # fmt: skip
 TASK = Topic(
     # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
-    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _HELPERS_OWN | _WATCHERS, 68, 0.1,
+    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _WATCHERS, 68, 0.1,
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 TASK_STATUS = Topic(

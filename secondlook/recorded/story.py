@@ -89,6 +89,8 @@ class Story:
                 return self._strip(received, strip)
             case Task(action=TaskAction.STAND_ASIDE):
                 return f"{received.vehicle}, stand aside", False
+            case Task(action=TaskAction.TELL_AGAIN):
+                return f"{received.vehicle}, tell again: not all has arrived", False
             case Task() as task:
                 what = "take" if task.action is TaskAction.TAKE else "give back"
                 return f"{received.vehicle}, {what} strip {task.strip}", False

@@ -9,17 +9,23 @@ from coordinator_by_hand import (
     DONE,
     ELSEWHERE,
     GRID,
+    HOT_CELLS,
     OFFERED,
     OPEN,
+    Told,
     coordinator,
     looked,
     with_a_helper,
 )
 
 from comms.said.announcement import Role
-from comms.said.messages import MissionOver, Mode, StripStatus, TaskState
+from comms.said.messages import MissionOver, Mode, StripStatus, Task, TaskAction, TaskState
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator
+from coordinator.coordinator import Coordinator
+from planner.tiles import tiles
+
+ALL_TILES = sum(range(1, len(tiles(GRID)) + 1))  # what a state tells of all of them in their first version
 
 
 class TestTheEnd:
@@ -43,17 +49,36 @@ class TestTheEnd:
         times_ms = [one.at_ms - over_ms for one in told.node.said if isinstance(one.message, MissionOver)]
         assert times_ms == [0, *range(10, 100, 10), *range(1000, 10_000, 1000)]
 
-    def test_it_says_so_again_where_tiles_were_lost(self) -> None:
+    @pytest.mark.parametrize("missing", [0, 1])
+    def test_it_says_so_again_where_tiles_have_not_arrived(self, missing: int) -> None:
         told = coordinator()
-        told.layer(PRIMARY, np.full(GRID.shape, 0.3))
-        told.version += 1  # one that does not arrive
-        told.layer(PRIMARY, np.full(GRID.shape, 0.3))
         told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
         told.settle()
-        for name in (PRIMARY, HELPER):
-            told.state(name, Mode.FINISHED)
+        told.node.wait_until(told.node.now_ms + 5)
+        told.state(PRIMARY, Mode.FINISHED)
+        told.layer(HELPER, np.full(GRID.shape, 0.3))
+        told.state(HELPER, Mode.FINISHED, tiles_told=ALL_TILES + missing)
         told.node.wait(60)
-        assert len(told.node.all(MissionOver)) == 19
+        assert len(told.node.all(MissionOver)) == (19 if missing else 1)
+
+    def test_what_comes_after_the_end_is_taken_in(self) -> None:
+        told = coordinator()
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        told.settle()
+        told.node.wait_until(told.node.now_ms + 5)
+        assert told.node.all(MissionOver)
+        told.state(HELPER, Mode.FINISHED, tiles_told=ALL_TILES)
+        told.state(PRIMARY, Mode.FINISHED, hotspots_told=1)
+        told.node.wait(2)
+        overs = len(told.node.all(MissionOver))
+        told.layer(HELPER, np.full(GRID.shape, 0.3))
+        told.hotspot()
+        told.node.wait(60)
+        assert len(told.node.all(MissionOver)) == overs  # it has all, and asks no more
+        assert told.strips() == {}
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        assert (node.fleet.map.layers[HELPER].sum_levels == 60).all()
 
     def test_what_is_left_is_left_open_with_a_reason(self) -> None:
         told = coordinator()
@@ -179,3 +204,58 @@ class TestTheEnd:
         told = coordinator((vehicle(HELPER, Role.REVISIT),))
         told.node.wait(1)
         assert told.node.all(MissionOver)
+
+
+class TestWhatHasNotArrived:
+    """Tiles and hotspots of which a state tells."""
+
+    def told_of_more(self) -> Told:
+        """The primary has finished, and has told more than what has come: 1 s later it is asked for it."""
+        told = coordinator()
+        told.keep_alive([PRIMARY, HELPER], 1000)
+        told.state(PRIMARY, Mode.FINISHED, tiles_told=ALL_TILES, hotspots_told=2)
+        told.settle()
+        return told
+
+    def test_the_mission_goes_on_and_it_is_asked_for(self) -> None:
+        told = self.told_of_more()
+        began_ms = told.node.now_ms
+        told.keep_alive([PRIMARY, HELPER], 25)
+        asked_ms = [one.at_ms - began_ms for one in told.node.said if isinstance(one.message, Task)]
+        assert asked_ms == [1000, 11_000, 21_000]
+        assert set(told.tasks()) == {(PRIMARY, TaskAction.TELL_AGAIN, 0)}
+        assert told.node.all(MissionOver) == []
+
+    @pytest.mark.parametrize("is_badly_seen", [False, True])
+    def test_when_it_has_come_it_is_cut_by_before_it_is_over(self, is_badly_seen: bool) -> None:
+        told = self.told_of_more()
+        told.keep_alive([PRIMARY, HELPER], 5)
+        risk = np.full(GRID.shape, 0.1)
+        if is_badly_seen:
+            risk[HOT_CELLS] = 0.9
+        told.layer(PRIMARY, risk)
+        told.settle()
+        assert (told.strips(), told.node.all(MissionOver)) == ({}, [])
+        told.hotspot(None, revision=2)
+        told.node.wait_until(told.node.now_ms + 2)
+        assert told.states() == ({1: OFFERED} if is_badly_seen else {})
+        assert bool(told.node.all(MissionOver)) is not is_badly_seen
+
+    def test_at_the_deadline_it_is_not_waited_for_any_more(self) -> None:
+        told = self.told_of_more()
+        deadline_ms = round(1.05 * told.node.now_ms)
+        told.keep_alive([PRIMARY, HELPER], 60)
+        over = next(one for one in told.node.said if isinstance(one.message, MissionOver))
+        assert abs(over.at_ms - deadline_ms) < 10
+
+    def test_who_is_silent_for_five_minutes_is_not_waited_for(self) -> None:
+        told = coordinator()
+        told.keep_alive([PRIMARY, HELPER], 10_000)
+        told.state(HELPER, Mode.IDLE, tiles_told=ALL_TILES)
+        told.state(PRIMARY, Mode.FINISHED)
+        told.settle()
+        told.keep_alive([PRIMARY], 299)
+        assert told.node.all(MissionOver) == []
+        told.keep_alive([PRIMARY], 20)
+        assert len(told.node.all(MissionOver)) > 0
+        assert told.node.now_ms < 1.05 * 10_000_000

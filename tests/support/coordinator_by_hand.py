@@ -72,9 +72,20 @@ class Told:
         message = Hotspot(revision, state, outline, mean_risk, 600, growing, 0)
         self.node.hear(f"agent/{PRIMARY}/hotspot/{number}", message, incarnation=incarnation)
 
-    def state(self, name: str, mode: Mode, works_on: int = 0, at_ms: int | None = None, battery: float = 1.0) -> None:
+    def state(
+        self,
+        name: str,
+        mode: Mode,
+        works_on: int = 0,
+        at_ms: int | None = None,
+        battery: float = 1.0,
+        *,
+        tiles_told: int = 0,
+        hotspots_told: int = 0,
+    ) -> None:
         """An agent's state; helpers are at (122.5, 0) and head north."""
-        message = AgentState(mode, works_on, battery, 0, 122.5 if name != SECOND_HELPER else 322.5, 0, 0)
+        x_m = 122.5 if name != SECOND_HELPER else 322.5
+        message = AgentState(mode, works_on, battery, 0, x_m, 0, 0, tiles_told, hotspots_told)
         self.node.hear(f"agent/{name}/state", message, at_ms=at_ms)
 
     def status(self, name: str, strip: int, state: TaskState, reason: str = "", at_ms: int | None = None) -> None:

@@ -41,6 +41,8 @@ from comms.said.messages import (
     MissionOver,
     Mode,
     Plan,
+    Task,
+    TaskAction,
 )
 from planner.fleet_map import FleetMap
 from planner.footprints.side import SideLooking
@@ -628,6 +630,38 @@ class TestTiles:
         standing = {one.key: one.message.version for one in agent.said if isinstance(one.message, CoverageTile)}
         said = Counter(tile.version for tile in agent.all(CoverageTile))
         assert {said[version] for version in standing.values()} == {8}
+
+    def test_a_state_tells_what_was_told_of_tiles_and_hotspots_so_far(self, experiment_1: OneNode) -> None:
+        tiles: dict[str, int] = {}
+        hotspots: dict[str, int] = {}
+        for one in experiment_1.said:
+            if isinstance(one.message, CoverageTile):
+                tiles[one.key] = one.message.version
+            elif isinstance(one.message, Hotspot):
+                hotspots[one.key] = one.message.revision
+            elif isinstance(one.message, AgentState):
+                told = one.message.tiles_told, one.message.hotspots_told
+                assert told == (sum(tiles.values()), sum(hotspots.values()))
+        assert tiles
+        assert hotspots
+
+    def test_who_is_asked_to_tell_again_says_tiles_and_hotspots_as_they_were(self) -> None:
+        agent = on_its_way()
+        fly_all(agent, SEES_TO_130_M)
+        newest = {one.key: one.message for one in agent.said if isinstance(one.message, CoverageTile | Hotspot)}
+        state = agent.last(AgentState)
+        key, ask = f"coord/task/{PRIMARY}/1", Task(TaskAction.TELL_AGAIN, 0, 0, 0, 0, 0, 0)
+        for _ in range(10):  # as often as it is asked
+            said = agent.hear(key, ask)
+            assert isinstance(said[-1].message, AgentState)
+            assert said[-1].message.tiles_told == state.tiles_told
+            assert {one.key for one in said[:-1]} == newest.keys()
+            for one in said[:-1]:
+                before = newest[one.key]
+                if isinstance(one.message, CoverageTile) and isinstance(before, CoverageTile):
+                    assert one.message.version == before.version
+                else:
+                    assert one.message == before
 
     def test_the_last_ones_go_out_before_the_agent_says_that_it_has_finished(self, experiment_1: OneNode) -> None:
         kinds = [type(one.message) for one in experiment_1.said]

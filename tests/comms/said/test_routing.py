@@ -37,7 +37,7 @@ EXPECTED: dict[str, tuple[dict[str, str], dict[str, set[str]]]] = {
     "contact": (AGENTS, {name: {"coordinator"} for name in VEHICLES}),
     "hotspot": ({"alpha": "alpha"}, {"alpha": {"coordinator"}}),
     "strip": ({"": "coordinator"}, {"": set()}),
-    "task": (dict.fromkeys(VEHICLES, "coordinator"), {"alpha": set(), "beta": {"beta"}, "gamma": {"gamma"}}),
+    "task": (dict.fromkeys(VEHICLES, "coordinator"), {name: {name} for name in VEHICLES}),
     "task_status": ({"beta": "beta", "gamma": "gamma"}, {"beta": {"coordinator"}, "gamma": {"coordinator"}}),
     "mission_over": ({"": "coordinator"}, {"": {"world", "alpha", "beta", "gamma"}}),
     "truth_targets": ({"": "world"}, {"": set()}),

@@ -252,6 +252,20 @@ class TestBadLinks:
         assert_no_strip_lost(flight)
         assert_no_strip_served_twice(flight)
 
+    def test_who_was_cut_off_while_finishing_is_asked_for_what_has_not_arrived(self, tmp_path: Path) -> None:
+        fleet = Fleet(BRIEF, overrides={"mission.deadline_factor": 4}, folder=tmp_path)
+        fleet.cut_off("primary", from_s=0, for_s=110)
+        flight = fleet.run()
+        asked = [one for one in flight.said(Task) if one.message.action is TaskAction.TELL_AGAIN]
+        assert {one.vehicle for one in asked} == {"primary"}
+        assert [round(one.t_s) for one in asked] == [111]
+        (over,) = {round(one.t_s) for one in flight.said(MissionOver)}
+        assert over == 440  # 4 times the time at which it is heard that the primary has finished
+        assert flight.summary["hotspots"]["revisited"] > 10
+        assert flight.summary["risk"]["mean"] < 0.1  # 0.553 where the mission ends at once
+        check(flight)
+        assert_maps_converged(flight)
+
     @pytest.mark.parametrize("name", ["tellaro", "patchy"])
     def test_of_a_fifth_of_all_words_lost_maps_converge_and_all_finish(self, tmp_path: Path, name: str) -> None:
         fleet = Fleet(name, folder=tmp_path)
