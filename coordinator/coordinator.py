@@ -34,7 +34,10 @@ TURN_WITHIN_MS, CUT_WITHIN_MS = 10_000, 120_000
 
 
 class Coordinator:
-    """See the module. All it knows of the fleet it has from the run's announcement and from the agents."""
+    """See the module. All it knows of the fleet it has from the run's announcement and from the agents.
+
+    `has_begun`: whether that announcement has come; from then on there are `fleet` and `ledger`.
+    """
 
     fleet: KnownFleet  # this and what follows: since the run's announcement
     _strips: StripLife
@@ -47,9 +50,14 @@ class Coordinator:
         self._first_number = 1
         self._agenda = Agenda()
         self._outbox = Outbox()
-        self._has_begun = False
+        self.has_begun = False
         self._cutting: StripCutting | None = None  # where there are helpers
         self._fixed: Beforehand | Lanes | None = None  # where second looks do not react to what is seen
+
+    @property
+    def ledger(self) -> Ledger:
+        """The strips; to be read."""
+        return self._strips.ledger
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
@@ -58,7 +66,7 @@ class Coordinator:
 
     def on_message(self, received: Received, now_ms: int) -> Step:
         """Hears what the agents say; what follows from it is decided at a wake-up of its own, 1 ms later."""
-        if self._has_begun:
+        if self.has_begun:
             self._hear(received, now_ms)
         elif isinstance(received.message, RunInfo):
             self._begin(received.message, now_ms)
@@ -66,7 +74,7 @@ class Coordinator:
 
     def on_wake(self, now_ms: int) -> Step:
         """Finds who is lost and what is late, does what is due, and finds whether the mission is over."""
-        if self._has_begun and self._end.over is None:
+        if self.has_begun and self._end.over is None:
             self._strips.find_overdue(self.fleet.find_lost(now_ms), now_ms)
             if self._agenda.strike(Item.CUT, now_ms):
                 self._cut(now_ms)
@@ -99,7 +107,7 @@ class Coordinator:
                 self._fixed = Lanes(inside, fleet, strips, across=config.strips == "lanes_across")
         allocator = config.allocator if self._fixed is None else self._fixed.routes
         self._dispatch = Dispatch(config, allocator, fleet, inside, strips, agenda, outbox)
-        self._has_begun = True
+        self.has_begun = True
 
     def _hear(self, received: Received, now_ms: int) -> None:
         message, header, vehicle = received.message, received.header, self.fleet.vehicles.get(received.vehicle)
@@ -166,7 +174,7 @@ class Coordinator:
         return Step(self._outbox.empty(), self._next_wake_ms(now_ms))
 
     def _next_wake_ms(self, now_ms: int) -> int | None:
-        if not self._has_begun:
+        if not self.has_begun:
             return None
         if self._end.over is not None:
             return self._agenda.deadline_ms(Item.SAY_OVER)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +16,7 @@ import shapely
 from comms.drive import Drive, Setup
 from comms.errors import NodeError, RunawayError
 from comms.lockstep.drive import Lockstep
+from comms.node import Node
 from comms.result import BusResult, Ending
 from comms.said.announcement import Role
 from comms.said.routing import Routing
@@ -50,6 +52,7 @@ def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = Non
 log = logging.getLogger("secondlook.mission")
 
 Bus = Literal["zenoh", "local"]
+Made = Callable[[str, Node], None]
 LOGS = "logs"
 
 
@@ -60,7 +63,8 @@ class RunOptions:
     `secondlook.fleet.nodes.hosts_of_run`. `record`: with recording and messages.mpk. `progress`: told the figures as
     the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
     `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped` it ends
-    the run early, which is no failure. `patience_s`: wall time after which a node that does not answer is given up."""
+    the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this process,
+    again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -70,6 +74,7 @@ class RunOptions:
     progress: Progress | None = None
     live_pipe: Path | None = None
     watch: Watch | None = None
+    made: Made | None = None
     patience_s: float = PATIENCE_S
 
 
@@ -150,7 +155,10 @@ class _Run:
         setup = Setup("local", fleet.roster, fleet.run_info, fleet.time_limit_ms, patience_s)
         try:
             with Watchdog(patience_s) as watchdog:
-                makers = {node_id: partial(_make, node_id, spec, watchdog) for node_id, spec in specs.items()}
+                makers = {
+                    node_id: partial(_make, node_id, spec, watchdog, self._options.made)
+                    for node_id, spec in specs.items()
+                }
                 return self._options.drive.run_local(setup, makers, listeners)
         except NoReturn as error:
             log.error("%s; it was at", error, exc_info=error)
@@ -170,8 +178,11 @@ class _Run:
             return processes.run()
 
 
-def _make(node_id: str, spec: NodeSpec, watchdog: Watchdog) -> WatchedNode:
-    return WatchedNode(node_id, make_node(node_id, spec), watchdog)
+def _make(node_id: str, spec: NodeSpec, watchdog: Watchdog, made: Made | None) -> WatchedNode:
+    node = make_node(node_id, spec)
+    if made is not None:
+        made(node_id, node)
+    return WatchedNode(node_id, node, watchdog)
 
 
 def not_over(result: BusResult, scenario: Scenario) -> str:

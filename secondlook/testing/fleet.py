@@ -7,12 +7,13 @@ import json
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
 
 from comms.lockstep.drive import Lockstep
-from comms.node import Received
+from comms.node import Node, Received
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
@@ -22,6 +23,7 @@ from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.recorded.observer import RunStopped
 from secondlook.scenario import Scenario, load_scenario, make_scenario
 from secondlook.testing.flight import Flight, Heard
+from secondlook.testing.inside import Inside
 from secondlook.testing.trouble import Trouble
 
 ScenarioSource = str | os.PathLike[str] | Scenario | Mapping[str, Any]
@@ -176,6 +178,7 @@ class Fleet(Trouble):
         folder.mkdir(parents=True)
         self._heard = watch.heard
         faults, events = self.faults, self.events
+        nodes: dict[str, Node] = {}
         options = RunOptions(
             folder,
             bus,
@@ -183,13 +186,17 @@ class Fleet(Trouble):
             record=self._record,
             drive=Lockstep(faults, events),
             watch=watch.hear,
+            made=nodes.__setitem__,
             patience_s=self._patience_s,
         )
         summary = run_mission(self.scenario, options)
         if watch.error is not None:
             raise watch.error
         watch.check_all_repeated()
-        return Flight(self.scenario, bus, folder, watch.heard, summary, self.routing, faults, events), watch.holds
+        flight = Flight(self.scenario, bus, folder, watch.heard, summary, self.routing, faults, events)
+        if bus == "local" and flight.digest is not None:  # else nodes may have said more than was heard
+            flight = replace(flight, inside=Inside(nodes))
+        return flight, watch.holds
 
 
 class _Watch:

@@ -19,6 +19,7 @@ from comms.said.topics import MISSION_OVER
 from secondlook.launch.mission import Bus
 from secondlook.recorded.mission import Mission, chosen_keys
 from secondlook.scenario import Scenario
+from secondlook.testing.inside import Inside
 
 
 class Heard(Sequence[Received]):
@@ -85,7 +86,7 @@ class Heard(Sequence[Received]):
 class Flight(Mission):
     """`heard`: every message but the clock's control words, in the order of sending. `summary`: summary.json's content.
     `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`: what went
-    wrong on purpose."""
+    wrong on purpose. `inside`: what the nodes held in the end; None over Zenoh, and before a mission's end."""
 
     scenario: Scenario
     bus: Bus
@@ -95,6 +96,7 @@ class Flight(Mission):
     routing: Routing
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
+    inside: Inside | None = None
 
     @cached_property
     def end_s(self) -> float:

@@ -1,4 +1,5 @@
-"""What must hold of strips and of those who serve them, from the messages of a flight."""
+"""What must hold of strips and of those who serve them, from the messages of a flight and from the books that its
+coordinator held in the end."""
 
 from __future__ import annotations
 
@@ -30,6 +31,9 @@ def assert_no_strip_lost(flight: Flight) -> None:
     as it is, and at the end each is done, failed, withdrawn, open, or with a vehicle that is at it. Of a coordinator
     that was started anew only what it has published itself counts.
 
+    On the local bus the books that the coordinator itself holds in the end say what it has said of each strip; over
+    Zenoh they are known by what it has said alone.
+
     Open ones are left only where the deadline has ended the mission. A strip that is with a vehicle counts as lost when
     that vehicle has not said for `coordinator.lost_after_s` and 10 s more that it is at it.
     """
@@ -53,7 +57,7 @@ def assert_no_strip_lost(flight: Flight) -> None:
             problems.append(f"strip {number} {was}, and is {status.state.value} {at}")
         strips[number] = one
     problems += [word for last in strips.values() if (word := _lost(flight, last))]
-    problems += _left_too_early(flight, strips)
+    problems += _left_too_early(flight, strips) + _books_differ(flight)
     fail_if(problems, "strips are lost")
 
 
@@ -97,6 +101,25 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
         for number, last in strips.items()
         if last.message.state not in ENDED
     ]
+
+
+def _books_differ(flight: Flight) -> list[str]:
+    """Where the books that the coordinator holds in the end are not what it has said since its last start."""
+    its_lives = lives(flight, "coordinator")
+    held = None if flight.inside is None else flight.inside.strips("coordinator")
+    if held is None or not its_lives:
+        return []
+    said = {one.number: one for one in flight.said(StripStatus) if one.header.incarnation == its_lives[-1].incarnation}
+    problems = [f"strip {number} is in the books, and was never told" for number in held.keys() - said.keys()]
+    for number, one in said.items():
+        told = one.message.state, one.message.revision, one.message.vehicle
+        record = held.get(number)
+        if record is None or (record.state, record.revision, record.vehicle) != told:
+            now = f"{record.state.value} in revision {record.revision}" if record else "not in the books"
+            problems.append(
+                f"strip {number} was told to be {told[0].value} in revision {told[1]} at {_s(one)} s, and is {now}"
+            )
+    return problems
 
 
 @dataclass(frozen=True)
@@ -153,7 +176,11 @@ def assert_no_strip_served_twice(flight: Flight) -> None:
 
 
 def assert_one_strip_at_a_time(flight: Flight) -> None:
-    """No vehicle has two strips by the coordinator's books, and none that is with a vehicle is without its name."""
+    """No vehicle has two strips by the coordinator's books, and none that is with a vehicle is without its name.
+
+    The books at any time are what the coordinator has said of them. That they are, in the end, what it holds is looked
+    at on the local bus, and cannot be over Zenoh.
+    """
     __tracebackhide__ = True
     problems = []
     strip_of: dict[str, int] = {}
@@ -173,7 +200,7 @@ def assert_one_strip_at_a_time(flight: Flight) -> None:
             problems.append(f"{what} with {status.vehicle} at {_s(one)} s, which has strip {other} as well")
         else:
             strip_of[status.vehicle] = number
-    fail_if(problems, "vehicles have two strips")
+    fail_if(problems + _books_differ(flight), "vehicles have two strips")
 
 
 def assert_never_assigned_to_lost(flight: Flight) -> None:
