@@ -17,8 +17,17 @@ from comms.said.wire import (
     Milliseconds,
     Probability,
     Radians,
+    Whole,
 )
 from planner.types import GridSpec, Point, SonarShape, SweepFrame
+
+LONGEST_NAME = 40
+"""Characters of a scenario's name, as of any identifier."""
+LARGEST_SEED = 2**32 - 1
+MOST_CORNERS = 1000
+MOST_HOLES = 20
+MOST_HOLE_CORNERS = 50
+"""Of each hole: more would not fit a message, with as many holes as there may be."""
 
 
 class Role(enum.Enum):
@@ -114,7 +123,7 @@ class Grid:
 class Hole:
     """What is left out of an area: a hole's outline."""
 
-    outline: Annotated[tuple[Vertex, ...], AtMost(50)]
+    outline: Annotated[tuple[Vertex, ...], AtMost(MOST_HOLE_CORNERS)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +137,13 @@ class RunInfo:
     schema: Count
     scenario: Identifier
     scenario_sha256: Digest
-    seed: Count
+    seed: Annotated[int, Whole(0, LARGEST_SEED)]
     mode: ClockMode
-    area: Annotated[tuple[Vertex, ...], AtMost(500)]
+    area: Annotated[tuple[Vertex, ...], AtMost(MOST_CORNERS)]
     grid: Grid
     rho: Probability
     vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(100)]
-    holes: Annotated[tuple[Hole, ...], AtMost(20)] = ()
+    holes: Annotated[tuple[Hole, ...], AtMost(MOST_HOLES)] = ()
 
     @property
     def outline(self) -> tuple[Point, ...]:

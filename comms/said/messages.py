@@ -31,6 +31,9 @@ from comms.said.wire import (
 )
 from planner.types import LookGeometry, Strip
 
+MOST_TRACKS = 2000
+"""Of one vehicle's plan."""
+
 
 @dataclass(frozen=True, slots=True)
 class Nav:
@@ -183,9 +186,9 @@ class Plan:
     may still be laid elsewhere."""
 
     revision: Count
-    tracks: Annotated[tuple[PlannedTrack, ...], AtMost(2000)]
-    r_adpt_m: Annotated[tuple[Count, ...], AtMost(2000)]
-    r_eff_m: Annotated[tuple[Count, ...], AtMost(2000)]
+    tracks: Annotated[tuple[PlannedTrack, ...], AtMost(MOST_TRACKS)]
+    r_adpt_m: Annotated[tuple[Count, ...], AtMost(MOST_TRACKS)]
+    r_eff_m: Annotated[tuple[Count, ...], AtMost(MOST_TRACKS)]
     note: Text
     tentative: Count = 0
 

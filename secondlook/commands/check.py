@@ -17,10 +17,11 @@ def check(scenario: Annotated[str, typer.Argument(help="A bundled scenario's nam
     battery is too small for that."""
     valid = load_scenario(scenario)
     build_fleet(valid, record=False)
+    surveys = planned_surveys(valid)
     across_m, along_m = valid.area.extent_m
     vehicles = ", ".join(f"{key} ({vehicle.role})" for key, vehicle in valid.vehicles.items())
     typer.echo(f"{scenario}: valid; {across_m:g} m by {along_m:g} m, {vehicles}")
-    for survey in planned_surveys(valid):
+    for survey in surveys:
         typer.echo(survey.sentence)
         if survey.warning:
             sys.stderr.write(f"{survey.warning}\n")

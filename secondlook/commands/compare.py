@@ -15,6 +15,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from comms.said.announcement import LARGEST_SEED
 from secondlook.compare.flights import Contender, Flown, contenders, fly_all
 from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
@@ -26,7 +27,6 @@ from secondlook.scenario import load_scenario
 
 FAILED = 1
 MOST_SEEDS = 10_000
-LAST_SEED = 2**32 - 1  # that a scenario may have
 WIDEST = 500  # characters
 
 
@@ -41,7 +41,7 @@ def compare(
     ] = "",
     seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="How many seeds each flies with.")] = 10,
     first_seed: Annotated[
-        int, typer.Option(min=0, max=LAST_SEED - MOST_SEEDS, help="The first of them; the others follow.")
+        int, typer.Option(min=0, max=LARGEST_SEED - MOST_SEEDS, help="The first of them; the others follow.")
     ] = 1,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")

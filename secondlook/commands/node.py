@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from comms.said.announcement import LARGEST_SEED
 from comms.session import Certificates
 from secondlook.commands.run import check_factor
 from secondlook.errors import UserError
@@ -78,7 +79,7 @@ Listen = Annotated[
 Run = Annotated[
     str | None, typer.Option(metavar="ID", help="The run's name, part of all keys; the scenario's if left out.")
 ]
-Seed = Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Of everything random, the same everywhere.")]
+Seed = Annotated[int | None, typer.Option(min=0, max=LARGEST_SEED, help="Of everything random, the same everywhere.")]
 Set = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario, everywhere.")
 ]

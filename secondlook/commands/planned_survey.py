@@ -11,6 +11,7 @@ from typing import Any
 import shapely
 from shapely.geometry.base import BaseGeometry
 
+from comms.said.messages import MOST_TRACKS
 from planner.area import SurveyArea
 from planner.dubins import Pose
 from planner.first_plan import FirstPlan
@@ -18,6 +19,7 @@ from planner.footprints import footprint_of
 from planner.footprints.cells import seen_cells
 from planner.sweep import distance_over, pass_over
 from planner.types import Point, Track
+from secondlook.errors import UserError
 from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
 from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
@@ -59,7 +61,8 @@ class PlannedSurvey:
 
 
 def planned_surveys(scenario: Scenario) -> list[PlannedSurvey]:
-    """Of all survey vehicles, in the scenario's order. Raises UserError where a spacing planner of the user's fails."""
+    """Of all survey vehicles, in the scenario's order. Raises UserError where a spacing planner of the user's fails,
+    and for a plan that no message can hold."""
     heading_rad = track_heading_rad(scenario)
     return [_planned(scenario, name, vehicle, heading_rad) for name, vehicle in scenario.survey_vehicles.items()]
 
@@ -67,6 +70,11 @@ def planned_surveys(scenario: Scenario) -> list[PlannedSurvey]:
 def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad: float) -> PlannedSurvey:
     plan = plan_for(scenario, name, heading_rad)
     tracks = plan.all_tracks
+    if len(tracks) > MOST_TRACKS:
+        raise UserError(
+            f"vehicles.{name}.range_m: {vehicle.told_range_m:g} is not allowed; must be larger, or the area smaller, "
+            f"as its survey has {len(tracks)} tracks, more than {MOST_TRACKS}"
+        )
     region = region_for(scenario, vehicle, heading_rad)
     grid = region.about(heading_rad).grid(scenario.area.cell_m)
     inside = region.inside(grid)

@@ -15,6 +15,7 @@ from typing import Annotated
 import typer
 
 from comms.lockstep.drive import Lockstep
+from comms.said.announcement import LARGEST_SEED
 from comms.wall.drive import ByWallClock
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, check_bodies, run_mission
@@ -119,7 +120,7 @@ Web = Annotated[
 def run(
     scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")] = "tellaro",
     out: Out = None,
-    seed: Annotated[int | None, typer.Option(min=0, max=2**32 - 1, help="Another seed than the scenario's.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=LARGEST_SEED, help="Another seed than the scenario's.")] = None,
     bus: Annotated[BusName, typer.Option(help="Real processes over Zenoh, or all in this process.")] = BusName.zenoh,
     processes: Processes = None,
     real_time: RealTime = None,

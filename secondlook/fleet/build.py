@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import shapely
 
 from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex
-from comms.said.codec import SCHEMA_VERSION, Header, encode
+from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode
 from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of
@@ -91,7 +91,6 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
         holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
     )
     Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
-    encode(Header(CLOCK, 0, 0, 0), run_info)  # refuses what could not be announced
     roster = _roster_of(scenario, record=record)
     specs = {name: _agent_spec(name, vehicle) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)

@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag,
 from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates, get_parts
 from shapely.geometry.base import BaseGeometry
 
+from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
 from planner.types import PriorityGround, SweepFrame
 from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapping, check_pair, refused
 
@@ -18,7 +19,8 @@ LARGEST_GRID_CELLS = 20_000_000
 SMALLEST_PRIORITY_M2 = 1.0
 
 Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(check_pair), Field(strict=False)]
-Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=1000)]
+Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
+HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
 
 
 def _check_outline(corners: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -70,7 +72,7 @@ class Area(Mapping):
 
     polygon_m: Outline
     """The corners in order, each once; convex or not."""
-    holes_m: Annotated[tuple[Corners, ...], Field(strict=False, max_length=20)] = ()
+    holes_m: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] = ()
     """The corners of each piece that lies in it and is not surveyed."""
     track_heading_deg: TrackHeading = 0.0
     """Compass heading of the tracks, or `auto` for the one that needs the fewest."""

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
+from comms.said.announcement import LARGEST_SEED, LONGEST_NAME
 from secondlook.scenario.area import Area
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
@@ -194,11 +195,11 @@ class Coordinator(Mapping):
 class Scenario(Mapping):
     """One mission."""
 
-    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=64)]
+    name: Annotated[str, Field(pattern=r"^[a-z0-9_-]+$", max_length=LONGEST_NAME)]
     """a-z, 0-9, `_` and `-`."""
     description: Annotated[str, Field(max_length=1000)] = ""
     """For people."""
-    seed: Annotated[int, Field(ge=0, lt=2**32)] = 0
+    seed: Annotated[int, Field(ge=0, le=LARGEST_SEED)] = 0
     """Of everything random in the mission."""
     area: Area
     """What is surveyed."""

@@ -9,6 +9,7 @@ import pytest
 
 from planner.spacing import track_offsets
 from secondlook import cli
+from secondlook.scenario import load_scenario
 
 SecondLook = Callable[..., tuple[int | str | None, str, str]]
 
@@ -183,6 +184,21 @@ def test_check_tells_what_a_plan_cannot_cover(secondlook: SecondLook, monkeypatc
     share = re.search(r"6 tracks .* up to 145 m (\d\.\d\d)% is not covered", out)
     assert share is not None
     assert 5 < float(share[1]) < 9
+
+
+def test_a_survey_of_more_tracks_than_can_be_told_is_refused(
+    secondlook: SecondLook, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    overrides = ["area.polygon_m=[[0, 0], [8000, 0], [8000, 400], [0, 400]]", "vehicles.primary.range_m=2"]
+    mission = load_scenario("tellaro", [*overrides, "vehicles.primary.nadir_gap_m=0"])
+    (tmp_path / "many.yaml").write_text(mission.to_yaml())
+    monkeypatch.chdir(tmp_path)
+    expected = (
+        "vehicles.primary.range_m: 2 is not allowed; must be larger, or the area smaller, as its survey has 2667 "
+        "tracks, more than 2000\n"
+    )
+    for command in ("check", "plan"):
+        assert secondlook(command, "many.yaml") == (2, "", expected)
 
 
 def test_check_tells_all_mistakes_without_a_traceback(

@@ -269,6 +269,14 @@ MISTAKES = {
             "must not touch each other"
         ],
     ),
+    "hole with more corners than can be announced": (
+        POLYGON,
+        POLYGON + f"\n  holes_m: [{[[10 + index, 10 + index**2] for index in range(51)]}]",
+        [
+            "bad.yaml:4: area.holes_m[0]: [[10, 10], [11, 11], [12, 14], [13, 19], [14, 26], [15, 3... is not "
+            "allowed; must have at most 50 entries"
+        ],
+    ),
     "hole with crossing sides": (
         POLYGON,
         POLYGON + "\n  holes_m: [[[10, 10], [20, 20], [20, 10], [10, 20]]]",
@@ -552,6 +560,16 @@ MISTAKES = {
         "name: trial",
         "name: trial\nseed: -1",
         ["bad.yaml:2: seed: -1 is not allowed; must be at least 0"],
+    ),
+    "seed beyond the largest": (
+        "name: trial",
+        "name: trial\nseed: 4294967296",
+        ["bad.yaml:2: seed: 4294967296 is not allowed; must be at most 4294967295"],
+    ),
+    "a name longer than can be announced": (
+        "name: trial",
+        f"name: {'n' * 41}",
+        [f'bad.yaml:1: name: "{"n" * 41}" is not allowed; must have at most 40 characters'],
     ),
     "a number of 5000 digits": (
         "name: trial",
