@@ -18,6 +18,20 @@ class NodeError(Exception):
     """A node has broken the rules of the house or raised."""
 
 
+class Stop(BaseException):
+    """Ends a run from within a call of a node or a listener that has not failed; no Exception, so that few handlers
+    swallow it."""
+
+
+NO_FAILURES = (KeyboardInterrupt, Stop)
+"""What a call of a part may raise that is no failure of that part; all else is one, also `SystemExit`."""
+
+
+def in_words(error: BaseException) -> str:
+    """An error's type and text, see `one_line`."""
+    return one_line(" ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":"))
+
+
 class FleetError(Exception):
     """A process of the fleet has failed or fallen silent."""
 

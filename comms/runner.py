@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from comms.errors import NodeError, one_line
+from comms.errors import NO_FAILURES, NodeError, in_words
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
 from comms.said.messages import Message
@@ -24,11 +24,11 @@ MOST_TOLD = 1000  # senders and reasons: strangers may make up any number of sen
 log = logging.getLogger("secondlook.comms")
 
 
-def failure_of(node_id: str, error: Exception, *, at_ms: int | None = None) -> NodeError:
+def failure_of(node_id: str, error: BaseException, *, at_ms: int | None = None) -> NodeError:
     """What is said of a node that has raised; where it did goes to the log."""
     log.error("%s has failed", node_id, exc_info=error)
     when = "" if at_ms is None else f" at {at_ms / 1000:.3f} s"
-    return NodeError(one_line(" ".join(f"{node_id} has failed{when}: {type(error).__name__}: {error}".split())))
+    return NodeError(f"{node_id} has failed{when}: {in_words(error)}")
 
 
 class Outgoing(NamedTuple):
@@ -161,9 +161,9 @@ class GuardedNode:
                 self._note(self._node.on_message(received, now_ms), published)
             if wake and self.is_due(now_ms):
                 self._note(self._node.on_wake(now_ms), published)
-        except NodeError:
+        except (NodeError, *NO_FAILURES):
             raise
-        except Exception as error:
+        except BaseException as error:
             raise failure_of(self.node_id, error, at_ms=now_ms) from error
         return [self.stamp(one.key, one.message, now_ms) for one in published]
 

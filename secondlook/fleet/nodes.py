@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
+from comms.errors import NO_FAILURES
 from comms.keys import HostSpec
 from comms.runner import failure_of
 from comms.said.announcement import Role
@@ -81,7 +82,9 @@ def make_node(node_id: str, spec: NodeSpec) -> Any:
     """The node itself; raises NodeError where it cannot be made."""
     try:
         return spec.make()
-    except Exception as error:
+    except NO_FAILURES:
+        raise
+    except BaseException as error:
         raise failure_of(node_id, error) from error
 
 

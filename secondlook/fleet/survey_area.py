@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from comms.errors import NO_FAILURES, in_words
 from planner.first_plan import FirstPlan, best_heading, first_plan
 from planner.profile_spacing import SpacingTerms, known_before
 from planner.region import Region
@@ -53,7 +54,9 @@ def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
     terms = SpacingTerms(scenario.area.cell_m, scenario.mission.rho, vehicle.wanted_risk, looks)
     try:
         return first_plan(region, heading_rad, *sonar, spacing, known, terms)
-    except Exception as error:
+    except NO_FAILURES:
+        raise
+    except BaseException as error:
         if vehicle.spacing in SPACING.ours:
             raise
-        raise UserError(f"{vehicle.spacing} has failed to lay tracks: {type(error).__name__}: {error}") from error
+        raise UserError(f"{vehicle.spacing} has failed to lay tracks: {in_words(error)}") from error

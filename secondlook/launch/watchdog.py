@@ -13,6 +13,7 @@ import threading
 import time
 from types import FrameType
 
+from comms.errors import Stop
 from comms.node import Node, Received, Step
 
 GRACE_S = 5.0  # for a call to heed its interruption, before the process is ended
@@ -20,8 +21,8 @@ _LOOKS = 20  # within the patience
 _FAILED = 1  # exit code
 
 
-class NoReturn(BaseException):
-    """Raised in a call that takes too long; the text is one sentence. No Exception, so that few handlers swallow it."""
+class NoReturn(Stop):
+    """Raised in a call that takes too long; the text is one sentence."""
 
 
 class Watchdog:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from comms.errors import Stop
 from comms.node import Received
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import MissionFiles
@@ -18,7 +19,7 @@ Progress = Callable[[Metrics], None]
 Watch = Callable[[Received], None]
 
 
-class RunStopped(BaseException):
+class RunStopped(Stop):
     """Raised by a watch that has seen enough, to end the run early; not an error."""
 
 

@@ -11,6 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from comms.errors import NO_FAILURES, in_words
 from coordinator.allocate.allocators import ALLOCATORS
 from planner.profile_spacing import JointSpacing, ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
@@ -91,8 +92,10 @@ def _import(module: str, name: str) -> Any:
         return getattr(import_module(module), name)
     except AttributeError:
         raise PlugInError(f"must be importable; {module} has no {name}") from None
-    except Exception as error:
-        raise PlugInError(f"must be importable; {type(error).__name__}: {error}") from error
+    except NO_FAILURES:
+        raise
+    except BaseException as error:
+        raise PlugInError(f"must be importable; {in_words(error)}") from error
 
 
 ALLOCATOR = PlugInKind(
@@ -125,5 +128,7 @@ def made(kind: PlugInKind, text: str, **arguments: object) -> Any:
         return kind.maker(text)(**arguments)
     except PlugInError as error:
         raise UserError(f"{text}: {error}") from error
-    except Exception as error:
-        raise UserError(f"{text} cannot be made: {type(error).__name__}: {error}") from error
+    except NO_FAILURES:
+        raise
+    except BaseException as error:
+        raise UserError(f"{text} cannot be made: {in_words(error)}") from error

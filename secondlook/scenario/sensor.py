@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
+from comms.errors import NO_FAILURES, in_words
 from planner.types import DetectionCurve, SonarShape
 from secondlook.scenario import bundled
 from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
@@ -75,8 +76,10 @@ def _bundled(value: object) -> object:
         made = CURVE.maker(value)()
     except PlugInError as error:
         raise refused(str(error)) from error
-    except Exception as error:
-        raise refused(f"must make a DetectionCurve; {type(error).__name__}: {error}") from error
+    except NO_FAILURES:
+        raise
+    except BaseException as error:
+        raise refused(f"must make a DetectionCurve; {in_words(error)}") from error
     if not isinstance(made, DetectionCurve):
         raise refused(f"must make a DetectionCurve; it makes a {type(made).__name__}")
     return {"range_m": np.asarray(made.range_m).tolist(), "p_detect": np.asarray(made.p_detect).tolist()}

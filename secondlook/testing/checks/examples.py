@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from hypothesis.errors import Flaky
 
+from comms.errors import NO_FAILURES, in_words
 from secondlook.launch.watchdog import NoReturn, Watchdog
 from secondlook.scenario.plug_ins import PlugInError, PlugInKind
 
@@ -106,8 +107,10 @@ class Checked:
         self.watchdog.begin(f"{self.name}, {what},")
         try:
             return call()
-        except Exception as error:
-            raise AssertionError(f"{self.name} has failed, {what}: {type(error).__name__}: {error}") from error
+        except NO_FAILURES:
+            raise
+        except BaseException as error:
+            raise AssertionError(f"{self.name} has failed, {what}: {in_words(error)}") from error
         finally:
             self.watchdog.end()
 

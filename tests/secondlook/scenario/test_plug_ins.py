@@ -72,6 +72,30 @@ def tent():
 def not_a_curve():
     return 7
 
+class Quits:
+    def assign(self, situation):
+        raise SystemExit
+
+class Leaves(Idle):
+    def assign(self, situation):
+        raise GeneratorExit("no more")
+
+class NeverMade(Idle):
+    def __init__(self):
+        raise SystemExit(0)
+
+class QuitsPlanning(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        raise SystemExit
+
+class QuitsAtStart(SurveyAgent):
+    def start(self, now_ms):
+        raise SystemExit(0)
+
+class AgentNeverMade(SurveyAgent):
+    def __init__(self, config):
+        raise SystemExit(0)
+
 fine = "words"
 """
 
@@ -93,6 +117,7 @@ vehicles:
 def folder(tmp_path: Path) -> Path:
     """A user's folder: a module of parts and a scenario."""
     (tmp_path / "own.py").write_text(OWN)
+    (tmp_path / "quits.py").write_text("raise SystemExit(0)")
     (tmp_path / "bay.yaml").write_text(BAY)
     return tmp_path
 
@@ -169,6 +194,54 @@ def test_what_cannot_be_used_is_refused_before_anything_flies(folder: Path, sett
     assert error.startswith(f'--set {setting}: {key}: "{value}" is not allowed; {allowed}')
     assert error.count("\n") == 1
     assert not (folder / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        (
+            "coordinator.allocator=quits:X",
+            'coordinator.allocator: "quits:X" is not allowed; must be importable; SystemExit: 0',
+        ),
+        (
+            "vehicles.primary.prior_curve=quits:X",
+            'vehicles.primary.prior_curve: "quits:X" is not allowed; must be importable; SystemExit: 0',
+        ),
+        (
+            "vehicles.primary.prior_curve=sys:exit",
+            'vehicles.primary.prior_curve: "sys:exit" is not allowed; must make a DetectionCurve; SystemExit',
+        ),
+    ],
+)
+def test_a_part_that_exits_before_anything_flies_is_refused(folder: Path, setting: str, sentence: str) -> None:
+    code, _, error = run(folder, setting)
+    assert (code, error) == (2, f"--set {setting}: {sentence}\n")
+    assert not (folder / "runs").exists()
+
+
+def test_a_part_that_exits_when_it_is_made_is_refused(folder: Path) -> None:
+    code, _, error = run(folder, "coordinator.allocator=own:NeverMade")
+    assert (code, error) == (2, "own:NeverMade cannot be made: SystemExit: 0\n")
+
+
+@pytest.mark.parametrize("bus", ["local", "zenoh"])
+@pytest.mark.parametrize(
+    ("setting", "sentence"),
+    [
+        ("coordinator.allocator=own:Quits", r"coordinator has failed at \d+\.\d+ s: SystemExit"),
+        ("coordinator.allocator=own:Leaves", r"coordinator has failed at \d+\.\d+ s: GeneratorExit: no more"),
+        ("vehicles.primary.spacing=own:QuitsPlanning", r"primary has failed at 0\.001 s: SystemExit"),
+        ("vehicles.primary.agent=own:QuitsAtStart", r"primary has failed at 0\.000 s: SystemExit: 0"),
+        ("vehicles.primary.agent=own:AgentNeverMade", "primary has failed: SystemExit: 0"),
+    ],
+)
+def test_a_part_that_exits_has_failed(folder: Path, setting: str, sentence: str, bus: str) -> None:
+    code, _, error = run(folder, setting, bus=bus)
+    assert code == 1
+    told = re.search(rf"^({sentence}); what was recorded is in (.*)$", error, re.MULTILINE)
+    assert told, error
+    summary = json.loads((folder / told[2] / "summary.json").read_text())
+    assert (summary["ending"], summary["failure"]) == ("failed", told[1])
 
 
 @pytest.mark.parametrize("bus", ["local", "zenoh"])
