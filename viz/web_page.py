@@ -30,7 +30,8 @@ TIMEOUT_S = 30.0
 class WebPage:
     """Serves what the viewer's web server at `viewer` has, on 127.0.0.1 and a port that the system picks.
 
-    `address`: for the browser; the page shows what the server at `url` has. It ends with `close` or this process.
+    `address`: for the browser; the page shows what the server at `url` has. Who asks for it by another name is refused
+    (421). It ends with `close` or this process.
     """
 
     def __init__(self, viewer: str, url: str) -> None:
@@ -53,6 +54,12 @@ class _Server(ThreadingHTTPServer):
         """Says nothing of a browser that has hung up."""
 
 
+def _own_hosts(port: int) -> list[list[str]]:
+    """The Host headers of those that ask this page by its own address. A page of somebody else's, whose name is made to
+    lead here (DNS rebinding), says another, and could read what is served."""
+    return [[f"{name}:{port}"] for name in ("127.0.0.1", "localhost")]
+
+
 def _handler(viewer: str) -> type[BaseHTTPRequestHandler]:
     # The viewer is on this machine: no proxy of the user's is asked for it.
     direct = urllib.request.build_opener(urllib.request.ProxyHandler({}))
@@ -61,6 +68,9 @@ def _handler(viewer: str) -> type[BaseHTTPRequestHandler]:
         def do_GET(self) -> None:
             if not self.path.startswith("/"):
                 self.send_error(400)
+                return
+            if self.headers.get_all("Host") not in _own_hosts(self.connection.getsockname()[1]):
+                self.send_error(421)
                 return
             try:
                 with direct.open(f"{viewer}{self.path}", timeout=TIMEOUT_S) as answer:

@@ -84,6 +84,30 @@ def test_the_page_comes_without_links_elsewhere_and_with_a_policy(page: WebPage)
     assert int(answer.headers["Content-Length"]) == len(body)
 
 
+@pytest.mark.parametrize("host", ["example.org", "example.org:{port}", "127.0.0.1", "127.0.0.1:1", "", None])
+def test_who_asks_by_another_name_is_refused(page: WebPage, host: str | None) -> None:
+    place = urlsplit(page.address)
+    assert status(place.port, None if host is None else host.format(port=place.port)) == 421
+
+
+@pytest.mark.parametrize("name", ["127.0.0.1", "localhost"])
+def test_who_asks_by_its_own_name_is_answered(page: WebPage, name: str) -> None:
+    port = urlsplit(page.address).port
+    assert status(port, f"{name}:{port}") == 200
+
+
+def status(port: int | None, host: str | None) -> int:
+    """What the page answers to who asks for it by this name; None: by no name."""
+    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    connection.putrequest("GET", "/", skip_host=True)
+    if host is not None:
+        connection.putheader("Host", host)
+    connection.endheaders()
+    answer = connection.getresponse().status
+    connection.close()
+    return answer
+
+
 def test_a_viewer_that_is_gone_is_told_and_a_closed_page_is_gone() -> None:
     page = WebPage("http://127.0.0.1:9", "")
     with pytest.raises(HTTPError, match="502"):
