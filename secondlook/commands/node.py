@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
@@ -21,6 +22,8 @@ from secondlook.scenario import Scenario, load_scenario
 
 _FORM = re.compile(r"(?P<protocol>tcp|tls)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})")
 LARGEST_PORT = 65_535
+OF_OTHERS = 0o066
+"""The bits of a file's mode by which its group and others may read or write it."""
 
 
 def check_endpoint(option: str, endpoint: str, *, insecure: bool, any_port: bool = False) -> None:
@@ -41,7 +44,8 @@ def check_endpoint(option: str, endpoint: str, *, insecure: bool, any_port: bool
 def certificates(endpoints: list[str], authority: Path | None, certificate: Path | None, key: Path | None) -> (
     Certificates | None
 ):  # fmt: skip
-    """The certificates for these endpoints, None where no tls is among them; UserError where they do not fit."""
+    """The certificates for these endpoints, None where no tls is among them; UserError where they do not fit. Tells on
+    standard error of a key that is not its owner's alone."""
     given = {"--tls-ca": authority, "--tls-cert": certificate, "--tls-key": key}
     if not any(endpoint.startswith("tls/") for endpoint in endpoints):
         useless = next((option for option, path in given.items() if path is not None), None)
@@ -58,6 +62,12 @@ def certificates(endpoints: list[str], authority: Path | None, certificate: Path
     assert authority is not None
     assert certificate is not None
     assert key is not None
+    mode = key.stat().st_mode
+    if mode & OF_OTHERS:
+        sys.stderr.write(
+            f"--tls-key {key}: others than its owner may read or change it (mode {mode & 0o777:o}), and so take part "
+            f"in its name; chmod 600 {key} keeps them from it\n"
+        )
     return Certificates(authority, certificate, key)
 
 

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from comms.session import Certificates
 from planner.spacing import track_offsets
 from secondlook import cli
+from secondlook.commands.node import certificates
 from secondlook.scenario import load_scenario
 
 SecondLook = Callable[..., tuple[int | str | None, str, str]]
@@ -271,3 +273,18 @@ def test_a_cell_is_the_scenarios(secondlook: SecondLook, tmp_path: Path) -> None
     )
     assert (code, err) == (0, "")
     assert "cell_m: 10" in (tmp_path / "scenario.yaml").read_text()
+
+
+@pytest.mark.parametrize("mode", [0o600, 0o400, 0o640, 0o604, 0o644, 0o602])
+def test_a_key_that_others_may_read_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], mode: int) -> None:
+    files = [tmp_path / name for name in ("ca.pem", "helper.pem", "helper.key")]
+    for one in files:
+        one.write_text("")
+        one.chmod(0o644)
+    files[2].chmod(mode)
+    assert certificates(["tls/192.0.2.1:7447"], *files) == Certificates(*files)
+    told = (
+        f"--tls-key {files[2]}: others than its owner may read or change it (mode {mode:o}), and so take part in its "
+        f"name; chmod 600 {files[2]} keeps them from it\n"
+    )
+    assert capsys.readouterr() == ("", "" if mode in (0o600, 0o400) else told)
