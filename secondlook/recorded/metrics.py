@@ -16,11 +16,13 @@ from comms.said.messages import (
     AgentState,
     CoverageTile,
     Look,
+    MissionOver,
     Mode,
     Nav,
     Plan,
     StripState,
     StripStatus,
+    Task,
     TruthLook,
     TruthPose,
     TruthTargets,
@@ -70,8 +72,8 @@ class StripFigures:
 
 @dataclass
 class Metrics:
-    """Hears the messages in order; may be asked at any time. `coordinators`: the newest incarnation that has told of
-    strips; what those before have left counts as withdrawn."""
+    """Hears the messages in order; may be asked at any time. `coordinators`: the newest incarnation that has said
+    anything; what those before have left counts as withdrawn."""
 
     now_ms: int = 0
     run: RunInfo | None = None
@@ -112,8 +114,10 @@ class Metrics:
                 vehicle.finished_ms = received.header.sent_ms
                 if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
                     vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))
-        elif isinstance(message, StripStatus):
-            self._hear_strip(received, message)
+        elif isinstance(message, StripStatus | Task | MissionOver):
+            self._hear_coordinator(received.header.incarnation)
+            if isinstance(message, StripStatus):
+                self._hear_strip(received, message)
         elif isinstance(message, TruthTargets):
             self.targets = message
         elif isinstance(message, TruthLook):
@@ -234,12 +238,14 @@ class Metrics:
         except ValueError:
             self.misfits += 1
 
-    def _hear_strip(self, received: Received, status: StripStatus) -> None:
-        if received.header.incarnation > self.coordinators:  # it was started anew, and cuts strips of its own
-            self.coordinators = received.header.incarnation
+    def _hear_coordinator(self, incarnation: int) -> None:
+        if incarnation > self.coordinators:  # it was started anew, and cuts strips of its own, or none
+            self.coordinators = incarnation
             for left in self.strips.values():
                 if left.status.state in _STILL_OPEN:
                     left.status = replace(left.status, state=StripState.WITHDRAWN, vehicle="", reason=CUT_ANEW)
+
+    def _hear_strip(self, received: Received, status: StripStatus) -> None:
         number = received.number
         strip = self.strips.get(number)
         if strip is None:

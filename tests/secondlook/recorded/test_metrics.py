@@ -19,6 +19,7 @@ from comms.said.messages import (
     Maneuver,
     ManeuverKind,
     Message,
+    MissionOver,
     Mode,
     Plan,
     PlannedTrack,
@@ -257,3 +258,11 @@ class TestStrips:
         assert figures["published"] == len({number for number, _ in changes})
         assert sum(figures[name] for name in ("revisited", "open", "withdrawn", "failed")) == figures["published"]
         assert (figures["first_published_s"] is None) is (not changes)
+
+    def test_a_coordinator_started_anew_that_cuts_no_strip_closes_the_books_of_the_one_before(self) -> None:
+        stream = begun()
+        stream.strip(10, 1, StripState.DONE)
+        stream.strip(20, 2, StripState.OPEN)
+        stream.say(30, "coord/mission_over", MissionOver("survey over"), incarnation=1)
+        figures = stream.metrics.summary()["hotspots"]
+        assert (figures["revisited"], figures["open"], figures["withdrawn"]) == (1, 0, 1)
