@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 LONGEST_TOLD = 500  # characters of a sentence of others'
 
 
@@ -16,6 +18,13 @@ def one_line(text: str, most: int = LONGEST_TOLD) -> str:
 
 class NodeError(Exception):
     """A node has broken the rules of the house or raised."""
+
+
+class FileError(NodeError):
+    """A listener's file that cannot be written, as the disk is full, say."""
+
+    def __init__(self, path: Path, error: OSError) -> None:
+        super().__init__(f"{path}: {error.strerror or error}; must be a file that can be written")
 
 
 class Stop(BaseException):

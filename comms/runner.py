@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from comms.errors import NO_FAILURES, NodeError, in_words
+from comms.errors import NO_FAILURES, NodeError, in_words, one_line
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
 from comms.said.messages import Message
@@ -188,6 +188,8 @@ class GuardedListener:
         """Passes one message on."""
         try:
             self._listener.on_message(received)
+        except NodeError:
+            raise
         except Exception as error:
             raise failure_of(self._node_id, error, at_ms=received.header.sent_ms) from error
 
@@ -195,6 +197,8 @@ class GuardedListener:
         """Closes the listener."""
         try:
             self._listener.close()
+        except NodeError:
+            raise
         except Exception as error:
             raise failure_of(self._node_id, error) from error
 

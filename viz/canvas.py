@@ -14,6 +14,7 @@ import rerun.blueprint as rrb
 
 from viz.live_feed import LiveFeed, new_stream
 from viz.paths import TIMELINE
+from viz.recording_file import RecordingFile
 
 
 class Pace:
@@ -50,7 +51,7 @@ class Pace:
 
 Build = Callable[[Sequence[Any]], Iterable[rr.ComponentColumn]]
 
-TOGETHER_S = 4.0  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
+TOGETHER_S = 0.8  # of the wall clock; each piece of the file costs some 2 kB, so an entity's rows go together
 LIVE_EVERY_S = 0.25  # of the wall clock; how long a live view waits for columns
 
 
@@ -78,14 +79,12 @@ class Column:
 
 
 class _Sheet:
-    """One stream of the recording, and when columns are sent to it: once so much simulated time, and so much of the
-    wall clock, has passed since they were last."""
+    """One stream of the recording, and when columns are sent to it: once so much of the wall clock has passed since
+    they were last."""
 
-    def __init__(self, stream: rr.RecordingStream, piece_ms: int, every_s: float) -> None:
+    def __init__(self, stream: rr.RecordingStream, every_s: float) -> None:
         self.stream = stream
-        self._piece_ms = piece_ms
         self._every_s = every_s
-        self._sent_ms = 0
         self._sent_s = time.monotonic()
         self._drawn_ms: int | None = None
 
@@ -95,10 +94,10 @@ class _Sheet:
             self.stream.set_time(TIMELINE, duration=time_ms / 1000)
         self.stream.log(path, parts[0], *parts[1:])
 
-    def is_due(self, time_ms: int) -> bool:
-        if abs(time_ms - self._sent_ms) < self._piece_ms or time.monotonic() - self._sent_s < self._every_s:
+    def is_due(self) -> bool:
+        if time.monotonic() - self._sent_s < self._every_s:
             return False
-        self._sent_ms, self._sent_s = time_ms, time.monotonic()
+        self._sent_s = time.monotonic()
         return True
 
 
@@ -107,18 +106,18 @@ class Canvas:
 
     Its only timeline is the simulated time. It is drawn on by one thread.
 
-    `piece_ms`: how much simulated time the columns hold back for the file, and TOGETHER_S of the wall clock at least;
-    so much is lost if the process is killed.
+    What is drawn within TOGETHER_S of the wall clock is held back for the file; so much is lost if the process is
+    killed. Raises FileError where the file cannot be written.
     """
 
-    def __init__(self, path: Path, recording_id: str, piece_ms: int, live_pipe: Path | None) -> None:
+    def __init__(self, path: Path, recording_id: str, live_pipe: Path | None) -> None:
         file = new_stream(recording_id, rr.ChunkBatcherConfig(flush_tick=TOGETHER_S))
-        file.save(path)
+        self._file = RecordingFile(path, file)
         self._live = LiveFeed(live_pipe, recording_id) if live_pipe else None
         # Two streams of one id: in one stream, a viewer that stalls would hold up the file too.
-        self._sheets = [_Sheet(file, piece_ms, TOGETHER_S)]
+        self._sheets = [_Sheet(file, TOGETHER_S)]
         if self._live is not None:
-            self._sheets.append(_Sheet(self._live.stream, 0, LIVE_EVERY_S))
+            self._sheets.append(_Sheet(self._live.stream, LIVE_EVERY_S))
         # A name from the start: without any entry the file would not get the footer that completes it.
         for sheet in self._sheets:
             sheet.stream.send_recording_name(recording_id)
@@ -147,10 +146,11 @@ class Canvas:
             self._columns[path] = Column(path, build, self._sheets)
         return self._columns[path]
 
-    def advance(self, time_ms: int) -> None:
-        """Sends the columns where a whole piece is held."""
+    def advance(self) -> None:
+        """Sends the columns where it is time for that."""
         for sheet in self._sheets:
-            if sheet.is_due(time_ms):
+            if sheet.is_due():
+                self._file.check()
                 self._send(sheet)
 
     def close(self) -> None:
@@ -162,6 +162,7 @@ class Canvas:
         file.disconnect()
         if self._live is not None:
             self._live.close()
+        self._file.close()
 
     def _send(self, sheet: _Sheet) -> None:
         for column in self._columns.values():

@@ -46,7 +46,7 @@ class Recorder:
 
     def __init__(self, config: RecorderConfig) -> None:
         recording_id = config.recording_id or config.path.absolute().parent.name
-        self._canvas = Canvas(config.path, recording_id, round(config.piece_s * 1000), config.live_pipe)
+        self._canvas = Canvas(config.path, recording_id, config.live_pipe)
         self._config = config
         self._mission: _Mission | None = None
         self._early: list[Received] = []
@@ -115,7 +115,7 @@ class _Mission:
         self._second_looks.advance(time_ms)
         self._table.advance(time_ms)
         self._put_lines(self._story.rest(before_ms=time_ms))
-        self._canvas.advance(time_ms)
+        self._canvas.advance()
 
     def finish(self) -> None:
         self._map.finish()

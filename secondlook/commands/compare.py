@@ -21,6 +21,7 @@ from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
 from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
+from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import load_scenario
@@ -130,8 +131,8 @@ def _prepare(folder: Path) -> None:
 
 def _write(content: str, flown: Flown, title: str, folder: Path) -> None:
     try:
-        (folder / "compare.json").write_text(content + "\n", encoding="utf-8")
+        write_whole(folder / "compare.json", content + "\n")
         # Only who draws needs matplotlib.
         import_module("secondlook.compare.plot").draw(flown, title, folder / "risk.png")
-    except OSError as error:
-        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+    except CannotWriteError as error:
+        raise UserError(f"--out {error}") from error

@@ -10,6 +10,7 @@ import typer
 
 from secondlook import load
 from secondlook.errors import UserError
+from secondlook.files import CannotWriteError, write_whole
 from secondlook.recorded import GeographicOrigin, to_geojson
 
 
@@ -31,6 +32,6 @@ def geojson(
         typer.echo(text)
         return
     try:
-        out.write_text(f"{text}\n", encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"--out {out}: {error.strerror}; must be a file that can be written") from error
+        write_whole(out, f"{text}\n")
+    except CannotWriteError as error:
+        raise UserError(f"--out {error}") from error

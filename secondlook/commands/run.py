@@ -155,23 +155,26 @@ def run(
                 failure = str(error)
             else:
                 failure = ""
-        if not (no_record or no_report):
-            _report(folder)
+        unreported = "" if no_record or no_report else _report(folder)
         if failure:
             sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
-        elif as_json:
+        elif unreported:
+            sys.stderr.write(f"{unreported}\n")
+        if not failure and as_json:
             typer.echo(json.dumps(summary, indent=2))
-        else:
+        elif not failure:
             closing_table(summary, folder)
-    if failure:
+    if failure or unreported:
         raise typer.Exit(MISSION_FAILED)
 
 
-def _report(folder: Path) -> None:
+def _report(folder: Path) -> str:
+    """Writes the report; why it cannot be, or nothing."""
     try:
         write_report(folder)
-    except UserError as error:  # the mission is what counts
-        sys.stderr.write(f"{error}\n")
+    except UserError as error:
+        return str(error)
+    return ""
 
 
 def check_factor(option: str, factor: float) -> None:

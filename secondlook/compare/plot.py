@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from planner.types import FloatArray
 from secondlook.compare.flights import Flown, Result, Risk
+from secondlook.files import whole_file
 
 BAND_PERCENT = (10.0, 90.0)
 POINTS = 400
@@ -42,7 +43,8 @@ def draw(flown: Flown, title: str, path: Path) -> None:
         axes.grid(alpha=0.3)
     figure.axes[0].legend(frameon=False, fontsize="small")
     figure.suptitle(f"{title}: median, and band from 10 to 90 % of the seeds", fontsize="medium")
-    figure.savefig(path, dpi=150)
+    with whole_file(path) as file:
+        figure.savefig(file, format="png", dpi=150)
 
 
 def _lines(results: Sequence[Result], attribute: str) -> tuple[FloatArray, FloatArray]:

@@ -22,6 +22,7 @@ from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
+from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
@@ -81,16 +82,16 @@ class RunOptions:
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """Runs the mission and returns summary.json's content.
 
-    Raises UserError for a scenario with bodies that are not simulated, and ValueError, also before anything flies, for
-    events that do not fit the fleet. Raises RunFailedError, in one sentence, when a node fails or dies, when the
-    mission is not over by its time limit, and when the run is interrupted; what was recorded until then is readable,
-    and summary.json tells how it ended.
+    Raises UserError for a scenario with bodies that are not simulated and a folder that cannot be written, and
+    ValueError, also before anything flies, for events that do not fit the fleet. Raises RunFailedError, in one
+    sentence, when a node fails or dies, when a file cannot be written, when the mission is not over by its time limit,
+    and when the run is interrupted; what was recorded until then is readable, and summary.json tells how it ended.
     """
     began_s = time.perf_counter()
     check_bodies(scenario)
     fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode)
     options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
-    (options.folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
+    write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
     run = _Run(scenario, fleet, observer, options)
     result, failure = None, None
@@ -118,7 +119,10 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
         failure=failure,
         factor=options.drive.factor,
     )
-    (options.folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    try:
+        write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n")
+    except CannotWriteError as error:
+        failure = failure or str(error)
     if failure is not None:
         raise RunFailedError(failure)
     return summary

@@ -10,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from secondlook.errors import UserError
+from secondlook.files import CannotWriteError
 
 
 def run_folder(out: Path | None, name: str) -> Path:
@@ -36,12 +37,20 @@ def run_folder(out: Path | None, name: str) -> Path:
     return out
 
 
+class _LogFile(logging.FileHandler):
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - its name there
+        """Says nothing where the disk is full: of that the run's other files tell, in a sentence."""
+
+
 @contextmanager
 def log_to_file(path: Path) -> Iterator[None]:
     """Within it warnings and errors go to the file, which is made when there is one to write; its folder is taken away
     again if it stays empty."""
-    path.parent.mkdir(exist_ok=True)
-    handler = logging.FileHandler(path, delay=True, encoding="utf-8")
+    try:
+        path.parent.mkdir(exist_ok=True)
+    except OSError as error:
+        raise CannotWriteError(path.parent, error) from error
+    handler = _LogFile(path, delay=True, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(name)s: %(message)s"))
     handler.setLevel(logging.WARNING)
     root = logging.getLogger()

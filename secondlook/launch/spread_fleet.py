@@ -21,6 +21,7 @@ from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.seats import ListenerSeat, NodeSeat, Seat
 from secondlook.errors import UserError
+from secondlook.files import write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import (
     OBSERVER,
@@ -120,7 +121,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     _log_to_stderr()
     began_s = time.perf_counter()
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
-    (folder / "scenario.yaml").write_text(scenario.to_yaml(), encoding="utf-8")
+    write_whole(folder / "scenario.yaml", scenario.to_yaml())
     observer = Observer(folder, with_messages=True)
     recorder = node_spec(Role.RECORDER, recorder_config(scenario, folder / "mission.rrd"))
     outcome = _Outcome()
@@ -141,11 +142,11 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
         failure=failure,
         factor=outcome.factor,
     )
-    (folder / "summary.json").write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     try:
+        write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
         write_report(folder)
-    except UserError as error:  # the mission is what counts
-        _say(RECORDER, str(error))
+    except UserError as error:
+        failure = failure or str(error)
     if failure is not None:
         _say(RECORDER, f"{failure}; what was recorded is in {folder}")
         return FAILED

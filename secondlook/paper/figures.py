@@ -13,6 +13,7 @@ from matplotlib.patches import Rectangle
 from planner.risk import NATS_PER_LEVEL
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner
 from planner.types import FloatArray
+from secondlook.files import whole_file
 from secondlook.paper.fit import Mixture
 from secondlook.paper.measured import MeasuredMission, scenario_of
 from secondlook.paper.published import published_sonar
@@ -39,7 +40,8 @@ def draw_all(missions: Sequence[MeasuredMission], folder: Path) -> list[Path]:
     files = []
     for name, figure in figures.items():
         files.append(folder / f"{name}.png")
-        figure.savefig(files[-1], dpi=DPI)
+        with whole_file(files[-1]) as file:
+            figure.savefig(file, format="png", dpi=DPI)
     return files
 
 

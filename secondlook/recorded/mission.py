@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import os
 from abc import ABC, abstractmethod
@@ -40,6 +41,8 @@ from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
 from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord, activities, paths, tracks
+
+log = logging.getLogger("secondlook.recorded")
 
 T = TypeVar("T")
 M = TypeVar("M", bound=Message)
@@ -261,7 +264,8 @@ def chosen_keys(keys: str, vehicles: tuple[str, ...], topics: tuple[Topic, ...] 
 def load_run(run: str | os.PathLike[str]) -> RecordedMission:
     """The mission of a run's folder, of one that failed or was cut off as far as it came.
 
-    Summary and scenario are empty mappings where their files are missing. Raises UserError, in one sentence, for what
+    Summary and scenario are empty mappings where their files are missing or empty, or the summary is cut short; of the
+    latter, and of messages that are cut off, the log tells. Raises UserError, in one sentence, for what
     is not the folder of a recorded run.
     """
     folder = Path(run)
@@ -280,11 +284,19 @@ def load_run(run: str | os.PathLike[str]) -> RecordedMission:
 
 def _mapping(path: Path, parse: Any) -> Mapping[str, Any]:
     try:
-        content = parse(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8", errors="replace")
     except FileNotFoundError:
         return {}
     except OSError as error:
         raise UserError(f"{path}: cannot be read: {error.strerror}") from error
+    if not text.strip():
+        log.warning("%s: is empty, as if it were not there", path)
+        return {}
+    try:
+        content = parse(text)
+    except json.JSONDecodeError:
+        log.warning("%s: is cut short, as if it were not there", path)
+        return {}
     except (ValueError, yaml.YAMLError) as error:
         raise UserError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(content, dict):

@@ -10,6 +10,7 @@ import numpy as np
 
 from comms.errors import Stop
 from comms.node import Received
+from secondlook.files import whole_file
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import MissionFiles
 
@@ -24,7 +25,7 @@ class RunStopped(Stop):
 
 
 class Observer:
-    """A listener that writes messages.mpk, events.jsonl and at the end risk.npz into `folder`.
+    """A listener that writes messages.mpk, events.jsonl and at the end risk.npz into `folder`. Raises CannotWriteError.
 
     `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds. `watch` is told each
     message, last of all, and may raise RunStopped.
@@ -54,9 +55,11 @@ class Observer:
 
     def close(self) -> None:
         """Writes what is held; also after an interrupted run."""
-        self._files.close()
-        self.metrics.close()
-        self._write_risk()
+        try:
+            self._files.close()
+        finally:
+            self.metrics.close()
+            self._write_risk()
 
     def _write_risk(self) -> None:
         """risk.npz: the fleet's residual risk, each vehicle's layer in levels, and where the cells are."""
@@ -69,14 +72,15 @@ class Observer:
             for vehicle, layer in fleet.layers.items()
             for name, levels in (("sum_levels", layer.sum_levels), ("largest_levels", layer.largest_levels))
         }
-        np.savez_compressed(
-            self._folder / "risk.npz",
-            allow_pickle=False,
-            risk=fleet.risk,
-            inside=self.metrics.inside,
-            across_m=grid.across_m,
-            along_m=grid.along_m,
-            origin_m=np.array([grid.frame.origin_x_m, grid.frame.origin_y_m]),
-            heading_rad=np.array(grid.frame.heading_rad),
-            **layers,
-        )
+        with whole_file(self._folder / "risk.npz") as file:
+            np.savez_compressed(
+                file,
+                allow_pickle=False,
+                risk=fleet.risk,
+                inside=self.metrics.inside,
+                across_m=grid.across_m,
+                along_m=grid.along_m,
+                origin_m=np.array([grid.frame.origin_x_m, grid.frame.origin_y_m]),
+                heading_rad=np.array(grid.frame.heading_rad),
+                **layers,
+            )

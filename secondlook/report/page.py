@@ -19,7 +19,7 @@ from markupsafe import Markup
 
 from comms.said.messages import StripState
 from planner.footprints import footprint_of
-from secondlook.errors import UserError
+from secondlook.files import write_whole
 from secondlook.recorded import RecordedMission, RiskMap, StripRecord, load_run
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
@@ -181,8 +181,5 @@ def write_report(run: str | os.PathLike[str]) -> Path:
     mission = load_run(run)
     path = mission.folder / REPORT
     page = report_page(mission)
-    try:
-        path.write_text(page, encoding="utf-8")
-    except OSError as error:
-        raise UserError(f"{path}: {error.strerror}; must be a file that can be written") from error
+    write_whole(path, page)
     return path

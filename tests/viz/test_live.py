@@ -216,7 +216,7 @@ def recorded_live(
     pipe, shown = tmp_path / "pipe", tmp_path / "shown.rrd"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
-    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", Story, live_pipe=pipe, piece_s=60.0))
+    recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", Story, live_pipe=pipe))
     for received in stream:
         recorder.on_message(received)
 

@@ -1,0 +1,101 @@
+"""How files are written: small ones whole or not at all, streams so that they are readable as far as they go."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from comms.errors import FileError
+from secondlook.errors import UserError
+
+FLUSH_EVERY_S = 0.5  # of the wall clock
+
+
+class CannotWriteError(UserError, FileError):
+    """A file that cannot be written; it ends a command with exit code 2, and a mission in flight with 1."""
+
+
+@contextmanager
+def whole_file(path: Path) -> Iterator[BinaryIO]:
+    """A file to write, which takes its place, and that of one that is there, when all is written: whoever reads it
+    finds the old one or the new one, also after a crash. Raises CannotWriteError."""
+    there = path.resolve()  # what a link leads to is written, and the link stays
+    beside = there.with_name(f".{there.name}.{os.getpid()}.part")
+    try:
+        if there.exists() and not there.is_file():  # a pipe or a terminal: nothing can take its place
+            with there.open("wb") as file:
+                yield file
+            return
+        try:
+            with beside.open("wb") as file:
+                yield file
+                file.flush()
+                os.fsync(file.fileno())
+            beside.replace(there)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                beside.unlink()
+            raise
+    except OSError as error:
+        raise CannotWriteError(path, error) from error
+
+
+def write_whole(path: Path, content: str) -> None:
+    """Writes a text as a file, whole or not at all; see `whole_file`. Raises CannotWriteError."""
+    with whole_file(path) as file:
+        file.write(content.encode())
+
+
+class GrowingFile:
+    """A file to which is written again and again. What was written is with the system half a second later, and so
+    survives this process, also where nothing more comes.
+
+    Raises CannotWriteError; nothing is written any more after that.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._error: OSError | None = None
+        try:
+            self._file = io.BufferedWriter(io.FileIO(path, "w"))
+        except OSError as error:
+            raise CannotWriteError(path, error) from error
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._flush_regularly, name=f"flush {path.name}", daemon=True)
+        self._thread.start()
+
+    def write(self, content: bytes) -> None:
+        """Appends to it."""
+        self._check()
+        try:
+            self._file.write(content)
+        except OSError as error:
+            self._error = error
+            self._check()
+
+    def close(self) -> None:
+        """Ends it; raises what could not be told before."""
+        self._closing.set()
+        self._thread.join()
+        try:
+            self._file.close()
+        except OSError as error:
+            self._error = self._error or error
+        self._check()
+
+    def _check(self) -> None:
+        if self._error is not None:
+            raise CannotWriteError(self._path, self._error) from self._error
+
+    def _flush_regularly(self) -> None:
+        while self._error is None and not self._closing.wait(FLUSH_EVERY_S):
+            try:
+                self._file.flush()
+            except OSError as error:
+                self._error = error

@@ -1,0 +1,135 @@
+"""What a run leaves on disk when it is killed, and when the disk is full."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from flights import BRIEF, events, flight, until
+
+import secondlook
+from secondlook.cli import main as secondlook_main
+from secondlook.errors import UserError
+from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
+from tests.viz.recordings import rows
+from viz.recording_viewer import repair
+
+FACTOR = 10
+LOST_S = 1.0  # of the wall clock, at most
+SLACK_S = 1.0  # for a machine that has other things to do
+
+
+def told_s(folder: Path) -> float:
+    """Up to when the mission is on disk by now."""
+    try:
+        return secondlook.load(folder).end_s
+    except UserError:  # not there yet
+        return 0.0
+
+
+@pytest.mark.parametrize("bus", ["local", "zenoh"])
+def test_a_killed_launcher_leaves_all_but_the_last_second(tmp_path: Path, bus: str) -> None:
+    with flight(tmp_path / "out", "--real-time", str(FACTOR), "--bus", bus) as flying:
+        assert until(lambda: told_s(flying.folder) > 5)
+        began_s, then_s = time.monotonic(), told_s(flying.folder)
+        assert until(lambda: time.monotonic() - began_s > 4)
+        flying.process.send_signal(signal.SIGKILL)
+        killed_s = then_s + FACTOR * (time.monotonic() - began_s)
+        flying.process.wait()
+        assert until(lambda: not flying.children())
+    mission = secondlook.load(flying.folder)
+    assert mission.summary == {}
+    assert mission.scenario["name"] == "brief"
+    lost = FACTOR * (LOST_S + SLACK_S)
+    assert mission.end_s >= killed_s - lost
+    written = [one for one in mission.messages() if one.topic not in NOT_FOR_PEOPLE]
+    assert len(events(flying.folder)) >= sum(one.t_s < mission.end_s - FACTOR * LOST_S for one in written)
+    repair(flying.folder / "mission.rrd", tmp_path / "whole.rrd")
+    drawn_ms = rows(tmp_path / "whole.rrd", "/fleet/primary", "Transform3D:translation")[-1][0]
+    assert drawn_ms / 1000 >= killed_s - lost
+
+
+def run_with_room_for(most_bytes: int, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A run where, as on a full disk, a write fails that would make a file larger, and part of it is written."""
+    return subprocess.run(
+        [Path(sys.executable).with_name("secondlook"), "run", BRIEF, "--out", folder, *arguments],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes)),
+    )
+
+
+@pytest.mark.parametrize("bus", ["local", "zenoh"])
+@pytest.mark.parametrize("most_bytes", [3_000, 20_001, 60_000, 100_003])
+def test_a_full_disk_ends_the_run_in_one_sentence(tmp_path: Path, most_bytes: int, bus: str) -> None:
+    folder = tmp_path / "out"
+    done = run_with_room_for(most_bytes, folder, "--bus", bus, "--no-report")
+    assert (done.returncode, done.stdout) == (1, "")
+    (sentence,) = done.stderr.splitlines()
+    path, _, what = sentence.partition(": ")
+    assert Path(path).parent == folder
+    assert what == f"File too large; must be a file that can be written; what was recorded is in {folder}"
+    mission = secondlook.load(folder)
+    assert mission.has_begun
+    assert (mission.summary["ending"], mission.summary["failure"]) == ("failed", sentence.partition("; what was")[0])
+    assert events(folder)
+    assert not list(folder.glob(".*"))
+
+
+def test_a_disk_that_is_full_from_the_start_is_told_before_anything_flies(tmp_path: Path) -> None:
+    done = run_with_room_for(100, tmp_path / "out", "--bus", "local")
+    scenario = tmp_path / "out" / "scenario.yaml"
+    assert (done.returncode, done.stderr) == (2, f"{scenario}: File too large; must be a file that can be written\n")
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_summary_that_cannot_be_written_fails_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    replaced = Path.replace
+
+    def full_for_the_summary(part: Path, whole: Path) -> Path:
+        if whole.name == "summary.json":
+            raise OSError(28, os.strerror(28))
+        return replaced(part, whole)
+
+    monkeypatch.setattr(Path, "replace", full_for_the_summary)
+    folder = tmp_path / "out"
+    monkeypatch.setattr(
+        "sys.argv", ["secondlook", "run", str(BRIEF), "--out", str(folder), "--bus", "local", "--no-record"]
+    )
+    with pytest.raises(SystemExit) as stopped:
+        secondlook_main()
+    assert stopped.value.code == 1
+    said = f"{folder / 'summary.json'}: No space left on device; must be a file that can be written; what was recorded"
+    assert said in capsys.readouterr().err
+    assert sorted(one.name for one in folder.iterdir()) == ["events.jsonl", "risk.npz", "scenario.yaml"]
+
+
+def test_a_report_that_cannot_be_written_is_no_success(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    replaced = Path.replace
+
+    def full_for_the_report(part: Path, whole: Path) -> Path:
+        if whole.name == "report.html":
+            raise OSError(28, os.strerror(28))
+        return replaced(part, whole)
+
+    monkeypatch.setattr(Path, "replace", full_for_the_report)
+    monkeypatch.setattr("sys.argv", ["secondlook", "run", str(BRIEF), "--out", str(folder), "--bus", "local"])
+    with pytest.raises(SystemExit) as stopped:
+        secondlook_main()
+    said = f"{folder / 'report.html'}: No space left on device; must be a file that can be written\n"
+    assert (stopped.value.code, capsys.readouterr().err) == (1, said)
+    assert json.loads((folder / "summary.json").read_text())["ending"] == "over"
