@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from comms.errors import NO_FAILURES
+from comms.errors import NO_FAILURES, NodeError
 from comms.keys import HostSpec
 from comms.runner import failure_of
 from comms.said.announcement import Role
@@ -82,7 +82,7 @@ def make_node(node_id: str, spec: NodeSpec) -> Any:
     """The node itself; raises NodeError where it cannot be made."""
     try:
         return spec.make()
-    except NO_FAILURES:
+    except (NodeError, *NO_FAILURES):
         raise
     except BaseException as error:
         raise failure_of(node_id, error) from error

@@ -17,7 +17,10 @@ from flights import BRIEF, events, flight, until
 import secondlook
 from secondlook.cli import main as secondlook_main
 from secondlook.errors import UserError
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.processes import RunFailedError
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
+from secondlook.scenario import load_scenario
 from tests.viz.recordings import rows
 from viz.recording_viewer import repair
 
@@ -90,6 +93,13 @@ def test_a_disk_that_is_full_from_the_start_is_told_before_anything_flies(tmp_pa
     scenario = tmp_path / "out" / "scenario.yaml"
     assert (done.returncode, done.stderr) == (2, f"{scenario}: File too large; must be a file that can be written\n")
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_recording_that_cannot_be_written_at_all_is_named(tmp_path: Path) -> None:
+    (tmp_path / "mission.rrd").mkdir()
+    told = rf"^{tmp_path}/mission\.rrd: Is a directory; must be a file that can be written$"
+    with pytest.raises(RunFailedError, match=told):
+        run_mission(load_scenario(BRIEF), RunOptions(tmp_path, bus="local"))
 
 
 def test_a_summary_that_cannot_be_written_fails_the_run(
