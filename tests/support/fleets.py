@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from comms.errors import FleetError, NodeError
+from comms.errors import FleetError, NodeError, Stop
 from comms.keys import HostSpec, RunKeys
 from comms.lockstep.access import access_rules
 from comms.lockstep.events import Change, NodeEvent, timeline
@@ -218,7 +218,7 @@ def over_zenoh(
 
     def serve(plan: HostSpec) -> None:
         with (
-            contextlib.suppress(NodeError, SystemExit),  # the hub is told of the one and notices the other
+            contextlib.suppress(NodeError, Stop),  # the hub is told of the one and notices the other
             open_client(endpoint, plan.host, password(plan.host)) as session,
         ):
             if plan.host == "observer":

@@ -24,7 +24,7 @@ from fleets import (
     says,
 )
 
-from comms.errors import FleetError, HostLostError, NodeError
+from comms.errors import FleetError, HostLostError, NodeError, Stop
 from comms.keys import HostSpec
 from comms.node import Received, Step
 from comms.said.codec import Header, encode
@@ -122,7 +122,7 @@ def test_hosts_that_do_not_come_are_given_up_and_named() -> None:
 
 def test_a_host_that_dies_is_named_at_once() -> None:
     def die(now_ms: int) -> Step:
-        raise SystemExit
+        raise Stop
 
     beta = Scripted(starts=lambda now_ms: Step(wake_ms=1500), wakes=die)
     plans = (HostSpec("both", ("beta", "coordinator")), HostSpec("alpha", ("alpha",)), EACH_ALONE[-1])

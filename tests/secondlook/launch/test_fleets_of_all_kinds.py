@@ -75,8 +75,10 @@ class TestAPrimaryThatRevisits:
         assert summary["risk_primary_alone"] == other.summary["risk"]
 
     def test_strips_are_as_wide_as_one_side_of_its_swath(self, alone: Flown) -> None:
-        # From the nadir gap of 20 m to 70 m.
-        assert {strip.width_m for _, strip in alone.all(StripStatus)} == {50}
+        # From the nadir gap of 20 m to 70 m; at the area's edge, where a block of two cells has but one, 5 m less.
+        widths_m = {strip.width_m for _, strip in alone.all(StripStatus)}
+        assert 50 in widths_m
+        assert widths_m <= {45, 50}
 
     def test_over_zenoh_it_is_the_same_mission(self, alone: Flown, tmp_path: Path) -> None:
         options = RunOptions(tmp_path, "zenoh", 2, record=False)
