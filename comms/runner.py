@@ -19,6 +19,7 @@ from comms.said.messages import Message
 from comms.said.routing import Route, Routing
 from comms.said.wire import WireError
 
+OVERHEAD_BYTES = 500  # that a message takes while it waits to be opened, beside its payload
 MOST_TOLD = 1000  # senders and reasons: strangers may make up any number of senders
 
 log = logging.getLogger("secondlook.comms")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 
 from comms.said.messages import TaskAction
@@ -15,9 +16,9 @@ from coordinator.config import CoordinatorConfig
 from coordinator.fleet import KnownFleet
 from coordinator.keep_apart.right_of_way import Instruction, RightOfWay, Underway
 from coordinator.ledger import WITH_A_VEHICLE
-from coordinator.outbox import Outbox
+from coordinator.outbox import NO_STRIP, Outbox
 from coordinator.strip_life import StripLife
-from planner.types import BoolArray, GridSpec, Point, Strip
+from planner.types import BoolArray, GridSpec, Point
 
 
 class Dispatch:
@@ -92,7 +93,7 @@ class Dispatch:
                 vehicle.gave_way.add(one.gives_back.number)
                 self._strips.ask_back(one.gives_back, vehicle)
             if one.place is not None:
-                self._outbox.add_task(TaskAction.STAND_ASIDE, one.name, Strip(0, one.place, 0.0, 0.0, 0.0))
+                self._outbox.add_task(TaskAction.STAND_ASIDE, one.name, replace(NO_STRIP, start=one.place))
 
     def _under_way(self) -> list[Underway]:
         strips = {record.vehicle: record.strip for record in self._strips.ledger.in_state(*WITH_A_VEHICLE)}

@@ -12,7 +12,6 @@ from coordinator.fleet import KnownFleet
 from coordinator.outbox import Outbox
 from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
-from planner.types import Strip
 
 ASK_AFTER_MS, ASK_EVERY_MS = 1000, 10_000  # what is under way may take a little longer than the state that tells of it
 SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
@@ -67,7 +66,7 @@ class MissionEnd:
             self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_EVERY_MS)
             for one in lacking:
                 if not one.lost:
-                    self._outbox.add_task(TaskAction.TELL_AGAIN, one.entry.vehicle, Strip(0, (0.0, 0.0), 0.0, 0.0, 0.0))
+                    self._outbox.add_task(TaskAction.TELL_AGAIN, one.entry.vehicle)
 
     def _cut_is_left(self, now_ms: int) -> bool:
         """Whether there is news that was not cut by; if so that is done at once."""

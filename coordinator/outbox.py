@@ -9,6 +9,8 @@ from comms.said.wire import shortened
 from coordinator.ledger import StripRecord
 from planner.types import Strip
 
+NO_STRIP = Strip(0, (0.0, 0.0), 0.0, 0.0, 0.0)
+
 
 class Outbox:
     """Keeps what is to be published until the node's step, in order. Tasks are numbered from 1."""
@@ -36,8 +38,8 @@ class Outbox:
         )
         self._waiting.append(Publication(STRIP.key(number=strip.number), message))
 
-    def add_task(self, action: TaskAction, vehicle: str, strip: Strip) -> None:
-        """Tells a vehicle to do something with a strip, or at its start."""
+    def add_task(self, action: TaskAction, vehicle: str, strip: Strip = NO_STRIP) -> None:
+        """Tells a vehicle to do something with a strip, or at its start, or by itself."""
         self._tasks += 1
         task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
         self._waiting.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))

@@ -17,7 +17,7 @@ from coordinator.cut.strips import Cut
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.outbox import Outbox
+from coordinator.outbox import NO_STRIP, Outbox
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.risk import MOST_LEVELS
 from planner.types import BoolArray, Strip
@@ -185,7 +185,7 @@ class StripLife:
         record, name = self.ledger.get(number), vehicle.entry.vehicle
         if record is None:
             if number > 0:
-                self._outbox.add_task(TaskAction.GIVE_BACK, name, Strip(number, (0.0, 0.0), 0.0, 0.0, 0.0))
+                self._outbox.add_task(TaskAction.GIVE_BACK, name, replace(NO_STRIP, number=number))
             return
         offer = vehicle.offers.get(number)
         if record.state is StripState.OPEN and offer is not None and vehicle.asked_back != number:

@@ -10,6 +10,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from planner.dubins import Pose, shortest_path
+from planner.footprints.footprint import Footprint
 from planner.types import Point, Strip, SweepFrame, Track
 
 LENGTH_TOLERANCE_M = 1e-6
@@ -96,6 +97,12 @@ def sweeps_over(
             follows = len(legs) == 1 and way is legs
             found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m), follows))
     return tuple(found)
+
+
+def sweeps_by(sees: Footprint, strip: Strip, turn_radius_m: float, run_in_m: float) -> tuple[Sweep, ...]:
+    """The ways in which a vehicle with such a sonar may fly the legs over a strip, see `sweeps_over`."""
+    reach = sees.reach
+    return sweeps_over(strip, reach.strip_width_m, turn_radius_m, run_in_m, reach.beside_m, sees.lead_m)
 
 
 def shortest_sweep(sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float) -> tuple[Sweep, float]:

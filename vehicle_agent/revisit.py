@@ -10,7 +10,7 @@ from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task,
 from comms.said.topics import TASK_STATUS
 from planner.dubins import Pose
 from planner.region import share_within
-from planner.sweep import shortest_sweep, sweeps_over
+from planner.sweep import shortest_sweep, sweeps_by
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
@@ -93,7 +93,6 @@ class SecondLooks:
 
     def _consider(self, strip: Strip, now_ms: int) -> None:
         agent, config = self._agent, self.config
-        reach, lead_m = agent.footprint.reach, agent.footprint.lead_m
         if self.strip is not None:
             self._tell(strip.number, TaskState.REFUSED, 0, f"at work on strip {self.strip.number}")
             return
@@ -106,15 +105,16 @@ class SecondLooks:
         if not agent.region.meets(strip):
             self._tell(strip.number, TaskState.REFUSED, 0, "it lies outside the area")
             return
-        least_ms = round((strip.length_m + strip.width_m - reach.strip_width_m) / config.speed_mps * 1000)
+        least_ms = round(
+            (strip.length_m + strip.width_m - agent.footprint.reach.strip_width_m) / config.speed_mps * 1000
+        )
         if agent.battery(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         pose = Pose(agent.nav.x_m, agent.nav.y_m, agent.nav.heading_rad)
-        radius_m, run_in_m = config.turn_radius_m, config.run_in_m
-        ways = sweeps_over(strip, reach.strip_width_m, radius_m, run_in_m, reach.beside_m, lead_m)
-        sweep, way_m = shortest_sweep(ways, pose, radius_m)
-        ends_ms = now_ms + round((way_m + sweep.length_m - run_in_m) / config.speed_mps * 1000)
+        ways = sweeps_by(agent.footprint, strip, config.turn_radius_m, config.run_in_m)
+        sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
+        ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
         if agent.battery(ends_ms) <= 0.0:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return

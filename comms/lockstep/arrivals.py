@@ -10,9 +10,9 @@ from collections import Counter, deque
 from collections.abc import Mapping
 
 from comms.errors import NodeError
+from comms.runner import OVERHEAD_BYTES
 
 MOST_AHEAD_BYTES = 64 << 20  # of one sender; a round has far less, and listeners are held within 4 MB
-OVERHEAD_BYTES = 500  # that a message takes while it waits, beside its payload
 
 
 class Arrivals:

@@ -12,7 +12,6 @@ import zenoh
 
 from comms.errors import FleetError, HostLostError, NodeError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
-from comms.lockstep.arrivals import OVERHEAD_BYTES
 from comms.lockstep.clock import Grant, LockstepClock, Round, result_of
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
 from comms.lockstep.faults import NO_FAULTS, Faults
@@ -23,7 +22,7 @@ from comms.lockstep.parcels import publish
 from comms.lockstep.words import pack_grants, unpack_answers
 from comms.node import Node
 from comms.result import BusResult, LastWord
-from comms.runner import Stamp
+from comms.runner import OVERHEAD_BYTES, Stamp
 from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
 from comms.said.routing import Routing

@@ -7,7 +7,7 @@ import threading
 from collections import Counter
 from dataclasses import dataclass
 
-from comms.runner import Intake
+from comms.runner import OVERHEAD_BYTES, Intake
 from comms.said.routing import Routing
 
 FLOOD = "more than its sender may say"
@@ -17,7 +17,6 @@ LEEWAY = 2.0  # times a topic's rate
 STALL_S = 30.0  # wall time for which a process may have been held up, and then gets all at once
 WORDS_HZ, WORDS_BURST = 100.0, 1000  # of the words of one sender, in wall time; there are some 10 a second at most
 MOST_WAITING_BYTES = 32 << 20  # of one sender
-OVERHEAD_BYTES = 500  # that a message takes while it waits, beside its payload
 MOST_QUESTIONS = 1000  # that may wait, of all senders: who is not answered asks again
 
 

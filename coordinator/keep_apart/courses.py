@@ -82,8 +82,7 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
         left_m = max(0.0, state.expected_end_ms / 1000 - heard_s) * entry.speed_mps + entry.run_in_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
-        flown = [track for track in tracks if track.flown]
-        left_m = run_out_left_m(pass_of(flown[-1], entry).end, pose, entry.run_in_m) if flown else 0.0
+        left_m = survey_run_out_left_m(entry, plan, pose)
         end = shifted(pose[:2], pose.heading_rad, left_m)
     paths, here = [straight(pose, left_m, radius_m)], end
     for track in ahead:
@@ -127,6 +126,12 @@ def run_out_left_m(end: Pose, pose: Pose, run_in_m: float) -> float:
     ahead_m, beside_m = dx_m * sin + dy_m * cos, dx_m * cos - dy_m * sin
     on_it = abs(beside_m) <= ON_TRACK_M and 0 < ahead_m <= run_in_m + ON_TRACK_M
     return ahead_m if on_it and math.cos(pose.heading_rad - end.heading_rad) > 0.99 else 0.0
+
+
+def survey_run_out_left_m(entry: RosterVehicle, plan: Plan | None, pose: Pose) -> float:
+    """The same of the run-out behind the last track that a primary has flown."""
+    flown = [track for track in plan.tracks if track.flown] if plan is not None else []
+    return run_out_left_m(pass_of(flown[-1], entry).end, pose, entry.run_in_m) if flown else 0.0
 
 
 NO_NEARER_M = 1.0

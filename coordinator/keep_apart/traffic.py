@@ -13,12 +13,13 @@ from coordinator.keep_apart.courses import (
     run_out_left_m,
     straight,
     survey_course,
+    survey_run_out_left_m,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle, pass_of
-from planner.dubins import Pose, shortest_path
+from coordinator.vehicles import KnownVehicle
+from planner.dubins import DubinsPath, Pose, shortest_path
 from planner.footprints import footprint_of
-from planner.sweep import Sweep, shortest_sweep, sweeps_over
+from planner.sweep import Sweep, shortest_sweep, sweeps_by
 from planner.types import Point, Strip
 
 
@@ -70,8 +71,7 @@ class Traffic:
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
         pose, start_s = self._here(vehicle, now_s, strip)
-        entry = vehicle.entry
-        run_out = straight(pose, self._run_out_m(vehicle, pose), entry.turn_radius_m)
+        entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
         way = shortest_path(end, _arrival(end, place), entry.turn_radius_m)
         return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [run_out, way])
@@ -79,8 +79,7 @@ class Traffic:
     def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
         """The course of a helper that leaves what it does and circles where it is."""
         pose, start_s = self._here(vehicle, now_s, strip)
-        entry = vehicle.entry
-        run_out = straight(pose, self._run_out_m(vehicle, pose), entry.turn_radius_m)
+        entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
         return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [run_out])
 
     def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
@@ -140,18 +139,19 @@ class Traffic:
             elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
                 laid = lying_still(pose, heard_s)
             else:
-                way = straight(pose, self._run_out_m(vehicle, pose), entry.turn_radius_m)
-                laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [way])
+                laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [self._run_out(vehicle, pose)])
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
+
+    def _run_out(self, vehicle: KnownVehicle, pose: Pose) -> DubinsPath:
+        return straight(pose, self._run_out_m(vehicle, pose), vehicle.entry.turn_radius_m)
 
     def _run_out_m(self, vehicle: KnownVehicle, pose: Pose) -> float:
         """What a vehicle at a pose has still to sail straight on, whatever it is told, as it has just left a leg or a
         track."""
-        entered, tracks = self._entered.get(vehicle.entry.vehicle), vehicle.plan.tracks if vehicle.plan else ()
-        ends = [one.end for one in entered.passes] if entered else []
-        ends += [pass_of(track, vehicle.entry).end for track in tracks if track.flown][-1:]
-        return max((run_out_left_m(end, pose, vehicle.entry.run_in_m) for end in ends), default=0.0)
+        entry, entered = vehicle.entry, self._entered.get(vehicle.entry.vehicle)
+        lefts_m = [run_out_left_m(leg.end, pose, entry.run_in_m) for leg in entered.passes] if entered else []
+        return max(*lefts_m, 0.0, survey_run_out_left_m(entry, vehicle.plan, pose))
 
 
 def _arrival(pose: Pose, place: Point) -> Pose:
@@ -162,7 +162,5 @@ def _arrival(pose: Pose, place: Point) -> Pose:
 def _sweep_from(pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
     """How a helper sweeps a strip that it sets out to from a pose."""
     entry = vehicle.entry
-    sees, radius_m = footprint_of(entry.sonar), entry.turn_radius_m
-    reach = sees.reach
-    sweeps = sweeps_over(strip, reach.strip_width_m, radius_m, entry.run_in_m, reach.beside_m, sees.lead_m)
-    return shortest_sweep(sweeps, pose, radius_m)[0]
+    sweeps = sweeps_by(footprint_of(entry.sonar), strip, entry.turn_radius_m, entry.run_in_m)
+    return shortest_sweep(sweeps, pose, entry.turn_radius_m)[0]

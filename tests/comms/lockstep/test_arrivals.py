@@ -7,7 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from comms.errors import NodeError
-from comms.lockstep.arrivals import MOST_AHEAD_BYTES, OVERHEAD_BYTES, Arrivals
+from comms.lockstep.arrivals import MOST_AHEAD_BYTES, Arrivals
+from comms.runner import OVERHEAD_BYTES
 
 LARGE = 1 << 20
 MOST = MOST_AHEAD_BYTES // (LARGE + OVERHEAD_BYTES)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -182,6 +183,24 @@ def test_what_a_node_raises_is_not_hidden_by_a_listener_that_cannot_be_closed() 
     assert notes.closed == 1
 
 
+def fly_while_beta(says: Callable[[Any], None]) -> None:
+    """Flies the toy fleet while a second session of beta's says something, from 1 s on in each round of the world's."""
+
+    def act(now_ms: int) -> Step:
+        says(sessions[0])
+        return Step(wake_ms=now_ms + 1)
+
+    def connect(endpoint: str) -> None:
+        sessions.append(open_client(endpoint, "beta", password("beta")))
+
+    sessions: list[Any] = []
+    world = Scripted(starts=lambda now_ms: Step(wake_ms=1000), wakes=act)
+    try:
+        over_zenoh({"world": world}, Notes(), before=connect, time_limit_ms=20_000)
+    finally:
+        sessions[0].close()
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -203,20 +222,8 @@ def test_what_a_node_raises_is_not_hidden_by_a_listener_that_cannot_be_closed() 
     ids=repr,
 )
 def test_words_without_sense_end_the_run_with_a_sentence_that_names_the_host(words: bytes) -> None:
-    def say_nonsense(now_ms: int) -> Step:
-        put(said_by_beta[0], KEYS.from_host("beta"), words)
-        return Step(wake_ms=now_ms + 1)
-
-    def connect(endpoint: str) -> None:
-        said_by_beta.append(open_client(endpoint, "beta", password("beta")))
-
-    said_by_beta: list[Any] = []
-    world = Scripted(starts=lambda now_ms: Step(wake_ms=1000), wakes=say_nonsense)
-    try:
-        with pytest.raises(FleetError, match=r"^beta has said what makes no sense to the clock: "):
-            over_zenoh({"world": world}, Notes(), before=connect, time_limit_ms=20_000)
-    finally:
-        said_by_beta[0].close()
+    with pytest.raises(FleetError, match=r"^beta has said what makes no sense to the clock: "):
+        fly_while_beta(lambda beta: put(beta, KEYS.from_host("beta"), words))
 
 
 @pytest.mark.parametrize(
@@ -232,19 +239,10 @@ def test_who_floods_the_hub_ends_the_run_with_a_sentence(
     monkeypatch.setattr(bound, 50_000)
     maneuver = Maneuver(1, ManeuverKind.HOLD, 0, 0, 0, 0, 0)
 
-    def flood(now_ms: int) -> Step:
+    def flood(beta: Any) -> None:
         for sequence in range(1000):
             payload = encode(Header("beta", 0, sequence, 2**40), maneuver)
-            put(flooding[0], KEYS.topic(MANEUVER.key(vehicle="beta")), payload)
-        return Step(wake_ms=now_ms + 1)
+            put(beta, KEYS.topic(MANEUVER.key(vehicle="beta")), payload)
 
-    def connect(endpoint: str) -> None:
-        flooding.append(open_client(endpoint, "beta", password("beta")))
-
-    flooding: list[Any] = []
-    world = Scripted(starts=lambda now_ms: Step(wake_ms=1000), wakes=flood)
-    try:
-        with pytest.raises(FleetError, match=sentence):
-            over_zenoh({"world": world}, Notes(), before=connect, time_limit_ms=20_000)
-    finally:
-        flooding[0].close()
+    with pytest.raises(FleetError, match=sentence):
+        fly_while_beta(flood)

@@ -7,9 +7,9 @@ import logging
 import pytest
 from by_wall import ROUTING
 
-from comms.runner import Intake
+from comms.runner import OVERHEAD_BYTES, Intake
 from comms.said.topics import TOPICS, Topic
-from comms.wall.gate import FLOOD, LEEWAY, MOST_QUESTIONS, MOST_WAITING_BYTES, NOBODY, OVERHEAD_BYTES, STALL_S, Gate
+from comms.wall.gate import FLOOD, LEEWAY, MOST_QUESTIONS, MOST_WAITING_BYTES, NOBODY, STALL_S, Gate
 
 STATE_OF_ALPHA, STATE_OF_BETA, PLAN = "agent/alpha/state", "agent/beta/state", "agent/alpha/plan"
 

@@ -102,17 +102,22 @@ def test_a_recording_that_cannot_be_written_at_all_is_named(tmp_path: Path) -> N
         run_mission(load_scenario(BRIEF), RunOptions(tmp_path, bus="local"))
 
 
-def test_a_summary_that_cannot_be_written_fails_the_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def leave_no_room_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disk is full when a file of this name is to take its place."""
     replaced = Path.replace
 
-    def full_for_the_summary(part: Path, whole: Path) -> Path:
-        if whole.name == "summary.json":
+    def replace_but_one(part: Path, whole: Path) -> Path:
+        if whole.name == name:
             raise OSError(28, os.strerror(28))
         return replaced(part, whole)
 
-    monkeypatch.setattr(Path, "replace", full_for_the_summary)
+    monkeypatch.setattr(Path, "replace", replace_but_one)
+
+
+def test_a_summary_that_cannot_be_written_fails_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    leave_no_room_for("summary.json", monkeypatch)
     folder = tmp_path / "out"
     monkeypatch.setattr(
         "sys.argv", ["secondlook", "run", str(BRIEF), "--out", str(folder), "--bus", "local", "--no-record"]
@@ -129,14 +134,7 @@ def test_a_report_that_cannot_be_written_is_no_success(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"
-    replaced = Path.replace
-
-    def full_for_the_report(part: Path, whole: Path) -> Path:
-        if whole.name == "report.html":
-            raise OSError(28, os.strerror(28))
-        return replaced(part, whole)
-
-    monkeypatch.setattr(Path, "replace", full_for_the_report)
+    leave_no_room_for("report.html", monkeypatch)
     monkeypatch.setattr("sys.argv", ["secondlook", "run", str(BRIEF), "--out", str(folder), "--bus", "local"])
     with pytest.raises(SystemExit) as stopped:
         secondlook_main()
