@@ -1,0 +1,78 @@
+"""Where vehicles are expected that are told something new: a run-out is sailed to its end first, whatever it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from by_hand import vehicle
+from situations import strip
+
+from comms.said.announcement import Role
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
+from coordinator.allocate.service import Service
+from coordinator.cut.strips import Cut
+from coordinator.cut.window import Window
+from coordinator.keep_apart.courses import Course
+from coordinator.keep_apart.traffic import Traffic
+from coordinator.vehicles import KnownVehicle, Offer
+from planner.dubins import Pose
+
+SERVED, OTHER = strip(7, 0, 20, length_m=100), strip(8, 60, 20, length_m=100)
+NORTH = 0.0
+
+Told = Callable[[Traffic, KnownVehicle], Course | None]
+TOLD: dict[str, Told] = {
+    "another strip": lambda traffic, one: traffic.to_strip(one, None, OTHER, 0.0)[0],
+    "a strip for a better one": lambda traffic, one: traffic.to_strip(one, OTHER, strip(9, -60, 20), 0.0)[0],
+    "a strip": lambda traffic, one: traffic.course(one, OTHER, 0.0),
+    "to stand aside": lambda traffic, one: traffic.aside(one, None, (60.0, 0.0), 0.0),
+    "to hold": lambda traffic, one: traffic.holding(one, None, 0.0),
+    "nothing": lambda traffic, one: traffic.course(one, None, 0.0),
+}
+
+
+def at(one: KnownVehicle, mode: Mode, y_m: float, works_on: int = 0) -> KnownVehicle:
+    """The same vehicle, as heard now: on its way northwards."""
+    one.state = AgentState(mode, works_on, 1, 0, 0.0, y_m, NORTH)
+    return one
+
+
+def helper() -> KnownVehicle:
+    """One that was offered a strip: else it has not been under way, and lies still."""
+    service, nothing = Service(30, 80, Pose(0, 125, NORTH), 82), np.zeros((20, 10), dtype=np.uint8)
+    offer = Offer(SERVED, Cut(Window(0, 20, 0, 10), 1000, 1000), service, 200_000, nothing)
+    return KnownVehicle(vehicle("helper", Role.REVISIT), 0, offers={SERVED.number: offer})
+
+
+@pytest.mark.parametrize("told", TOLD.values(), ids=TOLD)
+def test_a_helper_sails_the_run_out_of_the_leg_that_it_has_flown(told: Told) -> None:
+    # 5 m at 2 m/s from 120 m on; then it turns, or circles.
+    traffic, one = Traffic(), helper()
+    traffic.course(at(one, Mode.TRANSIT, 0, 7), SERVED, 0.0)
+    traffic.course(at(one, Mode.REVISIT, 20, 7), SERVED, 0.0)
+    course = told(traffic, at(one, Mode.IDLE, 120))
+    assert course is not None
+    assert course.at(2.0)[0] == pytest.approx((0, 124, NORTH))
+    assert math.cos(course.at(6.0)[0].heading_rad) < 0.99
+
+
+@pytest.mark.parametrize("told", TOLD.values(), ids=TOLD)
+def test_a_helper_that_is_on_no_leg_does_at_once_as_it_is_told(told: Told) -> None:
+    course = told(Traffic(), at(helper(), Mode.IDLE, 120))
+    assert course is not None
+    assert course.at(2.0)[0].heading_rad != pytest.approx(NORTH, abs=0.1)
+
+
+@pytest.mark.parametrize("told", TOLD.values(), ids=TOLD)
+def test_a_primary_that_revisits_sails_the_run_out_of_its_last_track(told: Told) -> None:
+    # 20 m at 1.5 m/s from 300 m on.
+    plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 300, True),), (), (), "")
+    entry = replace(vehicle("primary", Role.SURVEY), role=Role.SURVEY_REVISIT)
+    primary = at(KnownVehicle(entry, 0, plan=plan, finished_ms=0), Mode.FINISHED, 300)
+    course = told(Traffic(), primary)
+    assert course is not None
+    assert course.at(12.0)[0] == pytest.approx((0, 318, NORTH))
