@@ -23,7 +23,7 @@ class Briefing:
         self._p_detect = p_detect
         self._ledger = ledger
         self._vehicles = fleet.vehicles
-        self._primaries = fleet.primaries.values()
+        self._primaries = fleet.primaries
 
     def situation(self, now_ms: int) -> Situation:
         """What is decided on now."""
@@ -43,7 +43,7 @@ class Briefing:
 
     def expected_deadline_s(self) -> float:
         """When the mission is expected to be over at the latest; infinite while nobody can tell."""
-        ends_ms = [one.expected_end_ms for one in self._primaries]
+        ends_ms = [one.expected_end_ms for one in self._primaries.values()]
         known_ms = [end_ms for end_ms in ends_ms if end_ms is not None]
         if not known_ms or len(known_ms) < len(ends_ms):
             return self._config.deadline_s

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -48,8 +49,7 @@ class SimulatedVehicle:
             speed_mps=config.speed_mps,
             turn_radius_m=config.turn_radius_m,
         )
-        self._to_come: Iterator[tuple[int, Event]] = iter(())
-        self._next: tuple[int, Event] | None = None
+        self._to_come: deque[tuple[int, Event]] = deque()
 
     def offset_at(self, now_ms: int) -> Point:
         """How far the true position lies east and north of the believed one."""
@@ -90,21 +90,21 @@ class SimulatedVehicle:
         match maneuver.kind:
             case ManeuverKind.HOLD:
                 self._motion.hold(now_ms)
-                self._to_come = iter(())
+                self._to_come = deque()
             case ManeuverKind.GOTO:
                 ends_ms = self._motion.go_to(end, None if start == end else bearing_rad(start, end), now_ms)
-                self._to_come = iter([(ends_ms, ManeuverStatus(maneuver.number, ManeuverState.DONE, ends_ms, ""))])
+                done = ManeuverStatus(maneuver.number, ManeuverState.DONE, ends_ms, "")
+                self._to_come = deque([(ends_ms, done)])
             case ManeuverKind.FOLLOW:
                 track = self._motion.follow(start, end, maneuver.run_in_m, now_ms)
                 ends_ms = track.time_ms(track.length_m)
-                self._to_come = self._on_track(maneuver, track, bearing_rad(start, end))
-        self._next = next(self._to_come, None)
+                self._to_come = deque(self._on_track(maneuver, track, bearing_rad(start, end)))
         return ManeuverStatus(maneuver.number, ManeuverState.ACCEPTED, ends_ms, "")
 
     @property
     def next_event_ms(self) -> int | None:
         """When `pop_event` has something next, None for never."""
-        return None if self._next is None else self._next[0]
+        return self._to_come[0][0] if self._to_come else None
 
     def pop_event(self) -> Event:
         """The next event, once its time has come.
@@ -112,11 +112,9 @@ class SimulatedVehicle:
         Raises:
             LookupError: there is none.
         """
-        if self._next is None:
+        if not self._to_come:
             raise LookupError("nothing is to come")
-        _, event = self._next
-        self._next = next(self._to_come, None)
-        return event
+        return self._to_come.popleft()[1]
 
     def _on_track(self, maneuver: Maneuver, track: FollowedTrack, heading_rad: float) -> Iterator[tuple[int, Event]]:
         sensor = self.config.sensor
