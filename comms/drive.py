@@ -7,14 +7,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Protocol
 
 import zenoh
 
 from comms.keys import HostSpec, RunKeys
+from comms.memory.store import Identity, Store
 from comms.node import Listener, Node
 from comms.result import BusResult
 from comms.said.announcement import ClockMode, RunInfo
+from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode, Routing
 from comms.session import PATIENCE_S
 
@@ -22,13 +26,14 @@ from comms.session import PATIENCE_S
 @dataclass(frozen=True)
 class Setup:
     """What every process of a run is told alike. `run`: its id, part of all keys. `patience_s`: wall time after which
-    someone who should say something and does not is given up."""
+    someone who should say something and does not is given up. `state`: the folder for the memories of nodes."""
 
     run: str
     roster: tuple[RosterNode, ...]
     run_info: RunInfo
     time_limit_ms: int
     patience_s: float = PATIENCE_S
+    state: Path = Path("state")
 
     @property
     def keys(self) -> RunKeys:
@@ -38,6 +43,23 @@ class Setup:
     def routing(self) -> Routing:
         """Who writes and reads what."""
         return Routing(self.roster)
+
+    def store_of(self, node_id: str, name: str) -> Store:
+        """The memory of a node, in a file of that name. Raises StoreRefusedError."""
+        return Store(self.state, name, identity_of(node_id, self.run, self.run_info))
+
+
+def identity_of(node_id: str, run: str, info: RunInfo) -> Identity:
+    """Whose memory a node's is, in a run that is announced like this."""
+    return Identity(
+        node=node_id,
+        run=run,
+        scenario=info.scenario_sha256,
+        seed=str(info.seed),
+        clock=info.mode.value,
+        version=version("secondlook"),
+        schema=str(SCHEMA_VERSION),
+    )
 
 
 class Host(Protocol):

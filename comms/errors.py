@@ -70,5 +70,9 @@ class WordsError(Exception):
     """Words between clock and processes that make no sense."""
 
 
+class StoreRefusedError(Exception):
+    """A node's memory that cannot be taken up, or not be written; the text names the file."""
+
+
 class Interrupted(Exception):  # noqa: N818 - not an error: someone has asked for an early end
     """The run ends early; what was received so far is kept."""

@@ -7,7 +7,9 @@ message than the sender, so that both sums are equal just where it has everythin
 
 from __future__ import annotations
 
-from collections import defaultdict
+import copy
+from collections import Counter, defaultdict
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from comms.kept import Kept
@@ -21,16 +23,19 @@ MOST_TRIES = 3  # to get what a tally tells of, where answers come but something
 
 
 class Journal:
-    """What one sender has said, as far as the topic table says that it is kept."""
+    """What one incarnation of a sender has said, as far as the topic table says that it is kept; `tallies`: of each key
+    expression; `said`: how many messages of each topic, also of those that are not kept."""
 
-    def __init__(self) -> None:
+    def __init__(self, incarnation: int = 0) -> None:
+        self.incarnation = incarnation
         self.kept = Kept()
         self.tallies: dict[str, int] = {}
-        """The tally of each key expression."""
+        self.said: Counter[str] = Counter()
 
     def add(self, sent: Outgoing) -> None:
         """The sender's next message: each has to be told, also those that are not kept."""
         topic = sent.route.topic
+        self.said[topic.name] += 1
         gain = self.kept.add(topic, sent.key, sent.payload)
         if gain:
             expression = topic.expression(topic.vehicle_of(sent.key))
@@ -63,6 +68,24 @@ class HeardMessages:
         gain = self._gain(sender, topic, received.key, header)
         sender.sums[topic.expression(received.vehicle)] += gain
         return gain > 0
+
+    @classmethod
+    def joined(cls, parts: Iterable[HeardMessages]) -> HeardMessages:
+        """A copy of what is in all of them, no sender being in two."""
+        joined = cls()
+        for part in parts:
+            joined._senders |= copy.deepcopy(part._senders)
+        return joined
+
+    def has(self, received: Received) -> bool:
+        """Whether a message that is kept has come, or one in its place that is as new or newer."""
+        header, topic = received.header, received.topic
+        sender = self._senders.get(header.sender)
+        if sender is None or sender.incarnation != header.incarnation:
+            return False
+        if topic.keep is Keep.EVENTS:
+            return header.sequence in sender.events[topic.name]
+        return header.sequence <= sender.latest.get(received.key, -1)
 
     def has_room(self, received: Received) -> bool:
         """Whether there is room to remember a message: no mission says as much as there is room for."""

@@ -12,13 +12,15 @@ from comms.said.topics import KEY_ROOT
 class HostSpec:
     """A process, called a host, and the nodes it holds. Its id is also its user name at the hub.
 
-    `incarnation`: which of the nodes' starts it is for, from 0. `joins`: it is let in only when its node joins.
+    `incarnation`: which of the nodes' starts anew it is for, from 0. `joins`: it is let in only when its node joins.
+    `lasts`: its node keeps its memory in a file, and goes on by what is in that.
     """
 
     host: str
     nodes: tuple[str, ...]
     incarnation: int = 0
     joins: bool = False
+    lasts: bool = False
 
 
 @dataclass(frozen=True)

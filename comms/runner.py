@@ -54,7 +54,8 @@ class Outgoing(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class SenderDigest:
-    """What one incarnation of a sender has said: how many messages, and the SHA-256 over them in order."""
+    """What one incarnation of a sender has said: how many messages, and the SHA-256 over them in order. Of one that
+    goes on after it was away there is one more, over what it has said since, with the count of all."""
 
     sender: str
     incarnation: int
@@ -63,13 +64,14 @@ class SenderDigest:
 
 
 class Stamp:
-    """Numbers and hashes what one sender publishes."""
+    """Numbers and hashes what one sender publishes. `count`: how much it has published before; the hash is over what
+    follows."""
 
-    def __init__(self, sender: str, routing: Routing, incarnation: int = 0) -> None:
+    def __init__(self, sender: str, routing: Routing, incarnation: int = 0, count: int = 0) -> None:
         self.sender = sender
         self._routing = routing
         self._incarnation = incarnation
-        self._count = 0
+        self._count = count
         self._hash = hashlib.sha256()
 
     def __call__(self, key: str, message: Message, now_ms: int) -> Outgoing:

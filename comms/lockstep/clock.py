@@ -16,7 +16,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple, Protocol
 
 from comms.errors import RunawayError
-from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent, absent_at_start, timeline
+from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent, absent_at_start, lasting, timeline
 from comms.result import BusResult, Ending, LastWord, summed_up
 from comms.runner import fleet_digest
 from comms.said.routing import Routing
@@ -74,6 +74,7 @@ class LockstepClock:
 
     Ask for `next_round`, carry out its grants, report each node with `answer`, and so on until there is none.
     `routing` names the nodes; those that only listen are never waited for, but counted (`watched`, `watched_bytes`).
+    `lasting`: the nodes that come back with their memory.
     `said_to_joiners` counts by sender all that a node with a planned `Join` may read, also while it is absent.
     Raises ValueError for events that do not fit, see `comms.lockstep.events.timeline`.
     """
@@ -88,7 +89,9 @@ class LockstepClock:
         self._time_limit_ms = time_limit_ms
         self._events = tuple(events)
         self._happenings = list(reversed(timeline(self._events, routing)))
+        self.lasting = {node_id for node_id, _ in lasting(self._happenings)}
         self._absent = absent_at_start(self._events)
+        self._asleep: dict[str, int | None] = {}
         self._frozen: set[str] = set()
         self._held: set[str] = set()
         self.said_to_joiners: dict[str, Counter[str]] = {
@@ -208,6 +211,7 @@ class LockstepClock:
             match one.change:
                 case Change.KILL:
                     self._absent.add(one.node_id)
+                    self._asleep[one.node_id] = self._wakes[one.node_id]
                     self._wakes[one.node_id] = None
                 case Change.FREEZE:
                     self._frozen.add(one.node_id)
@@ -215,12 +219,20 @@ class LockstepClock:
                     self._frozen.remove(one.node_id)
                 case Change.JOIN:
                     self._absent.remove(one.node_id)
-                    self._to_start.add(one.node_id)
-                    self._wakes[one.node_id] = now_ms
+                    self._wakes[one.node_id] = self._wake_of(one)
                     self._sent_to[one.node_id].clear()
                     self._grown[one.node_id].clear()
                     self._make_due([one.node_id], now_ms + JOINER_DELAY_MS)  # what was kept for it
         return tuple(found)
+
+    def _wake_of(self, joiner: Happening) -> int | None:
+        """When a node that joins is woken first. One with its memory hears before that what it has missed: it is not
+        to find others silent that it has not listened to."""
+        if not joiner.memory:
+            self._to_start.add(joiner.node_id)
+            return joiner.at_ms
+        wake_ms = self._asleep[joiner.node_id]
+        return None if wake_ms is None else max(wake_ms, joiner.at_ms + JOINER_DELAY_MS)
 
     def _receivers(self, now_ms: int) -> set[str]:
         """Those who have mail that is due; what is due to one who is frozen is held until it is thawed."""

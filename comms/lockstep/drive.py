@@ -12,7 +12,7 @@ import zenoh
 from comms.drive import Host, ListeningHost, Setup
 from comms.keys import HostSpec
 from comms.lockstep.access import access_rules
-from comms.lockstep.events import Change, NodeEvent, timeline
+from comms.lockstep.events import Change, NodeEvent, lasting, timeline
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.host import ListenerHost, NodeHost
 from comms.lockstep.hub import Hub
@@ -36,14 +36,20 @@ class Lockstep:
     def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:
         """One for each node to which something is to happen, and one more for each time that it joins."""
         happenings = timeline(self.events, routing)
-        joins = {(one.node_id, one.incarnation) for one in happenings if one.change is Change.JOIN}
-        there = sorted({one.node_id for one in happenings if (one.node_id, 0) not in joins})
+        joins = {(one.node_id, one.start, one.incarnation) for one in happenings if one.change is Change.JOIN}
+        there = sorted({one.node_id for one in happenings if (one.node_id, 0, 0) not in joins})
+        lasts = lasting(happenings)
         return (
-            *(HostSpec(node_id, (node_id,)) for node_id in there),
+            *(HostSpec(node_id, (node_id,), lasts=(node_id, 0) in lasts) for node_id in there),
             *(
-                # No id has a `.`, so that no two hosts have one name.
-                HostSpec(f"{node_id}.{incarnation}" if incarnation else node_id, (node_id,), incarnation, joins=True)
-                for node_id, incarnation in sorted(joins)
+                HostSpec(
+                    _numbered(node_id, start),
+                    (node_id,),
+                    incarnation,
+                    joins=True,
+                    lasts=(node_id, incarnation) in lasts,
+                )
+                for node_id, start, incarnation in sorted(joins)
             ),
         )
 
@@ -93,10 +99,18 @@ class Lockstep:
 
     def acting(self, session: zenoh.Session, setup: Setup, spec: HostSpec, nodes: Mapping[str, Node]) -> Host:
         """See `comms.drive.Drive`."""
-        return NodeHost(session, setup.keys, spec, nodes, setup.routing(), self.faults)
+        stores = {}
+        if spec.lasts:
+            stores = {node_id: setup.store_of(node_id, _numbered(node_id, spec.incarnation)) for node_id in nodes}
+        return NodeHost(session, setup.keys, spec, nodes, setup.routing(), self.faults, stores)
 
     def listening(
         self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener
     ) -> ListeningHost:
         """See `comms.drive.Drive`."""
         return ListenerHost(session, setup.keys, host, node_id, listener, setup.routing())
+
+
+def _numbered(node_id: str, number: int) -> str:
+    """No id has a `.`, so that no two hosts, and no two files, have one name."""
+    return f"{node_id}.{number}" if number else node_id

@@ -35,13 +35,16 @@ class Freeze:
 
 @dataclass(frozen=True)
 class Join:
-    """The node is absent until `at_ms`; or it comes back then, started anew, after a `Kill`.
+    """The node is absent until `at_ms`; or, after a `Kill`, it comes back then: started anew or, with `memory`, as it
+    was.
 
-    What it missed it is given as the topic table says: the latest message of a key, all of them, or none.
+    What it missed it is given as the topic table says: the latest message of a key, all of them, or none. To one that
+    was started anew it is news from the mission's start on.
     """
 
     node_id: str
     at_ms: int
+    memory: bool = False
 
 
 NodeEvent = Kill | Freeze | Join
@@ -58,12 +61,20 @@ class Change(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Happening:
-    """One change of one node at one time. `incarnation`: which of the node's starts it concerns, from 0."""
+    """One change of one node at one time. `incarnation`: which of the node's starts anew it concerns, from 0. `start`:
+    which of all its starts, those with memory counted, too. `memory`: of a join, whether it comes back as it was."""
 
     at_ms: int
     change: Change
     node_id: str
     incarnation: int
+    start: int = 0
+    memory: bool = False
+
+
+def lasting(happenings: Iterable[Happening]) -> set[tuple[str, int]]:
+    """The nodes, by id and incarnation, that come back with their memory."""
+    return {(one.node_id, one.incarnation) for one in happenings if one.memory}
 
 
 def absent_at_start(events: Iterable[NodeEvent]) -> set[str]:
@@ -95,7 +106,7 @@ def _timeline_of(node_id: str, events: list[NodeEvent], routing: Routing) -> lis
     if node is None or node.role in UNTOUCHABLE:
         raise ValueError(f"{node_id!r} cannot be killed, frozen or joined; must be one of {', '.join(able)}")
     found: list[Happening] = []
-    present, incarnation, last_ms = not isinstance(events[0], Join), 0, 0
+    present, incarnation, start, last_ms = not isinstance(events[0], Join), 0, 0, 0
     for event in events:
         if event.at_ms <= last_ms:
             raise ValueError(f"{node_id}: an event at {event.at_ms} ms is not allowed; must be after {last_ms} ms")
@@ -111,11 +122,16 @@ def _timeline_of(node_id: str, events: list[NodeEvent], routing: Routing) -> lis
                 last_ms = event.until_ms
             case Join():
                 fits, change, wanted = not present, Change.JOIN, "absent"
-                incarnation += any(one.change is Change.KILL for one in found)
+                was_there = any(one.change is Change.KILL for one in found)
+                if event.memory and not was_there:
+                    raise ValueError(f"{node_id}: join with memory at {event.at_ms} ms is not allowed; it has none yet")
+                start += was_there
+                incarnation += was_there and not event.memory
                 present = True
         if not fits:
             raise ValueError(f"{node_id}: {change.value} at {event.at_ms} ms is not allowed; it must be {wanted} then")
-        found.append(Happening(event.at_ms, change, node_id, incarnation))
+        memory = isinstance(event, Join) and event.memory
+        found.append(Happening(event.at_ms, change, node_id, incarnation, start, memory))
         if isinstance(event, Freeze):
-            found.append(Happening(event.until_ms, Change.THAW, node_id, incarnation))
+            found.append(Happening(event.until_ms, Change.THAW, node_id, incarnation, start))
     return found

@@ -4,12 +4,15 @@ it, and handled in order when the clock grants it. No I/O."""
 from __future__ import annotations
 
 import bisect
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from types import MappingProxyType
 
 from comms.kept import Kept
 from comms.lockstep.arrivals import Arrivals
 from comms.lockstep.clock import Grant
 from comms.lockstep.faults import NO_FAULTS, Faults
+from comms.memory.lasting import LastingNode
+from comms.memory.store import Store
 from comms.node import Node, Received
 from comms.runner import GuardedNode, Intake, Outgoing, SenderDigest
 from comms.said.routing import Route, Routing
@@ -20,11 +23,10 @@ LOST = "lost by a fault"
 class LockstepNode:
     """One node with its mailbox: `deliver` its mail, then let it `act` when the clock grants it a time."""
 
-    def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
-        self.node_id = node_id
-        self.arrived = Arrivals(node_id)
-        self._node = GuardedNode(node_id, node, routing, incarnation)
-        self._node.wake_ms = 0
+    def __init__(self, node: GuardedNode) -> None:
+        self.node_id = node.node_id
+        self.node = node
+        self.arrived = Arrivals(node.node_id)
         self._mail: dict[int, list[Received]] = {}
         self._late_ms: list[int] = []
 
@@ -45,7 +47,7 @@ class LockstepNode:
 
         Returns when to act next and what the node publishes. Raises NodeError.
         """
-        node = self._node
+        node = self.node
         outgoing = node.act(now_ms, () if start else self._due_mail(now_ms), start=start, wake=not start)
         node.check_wake(now_ms)
         next_ms = node.wake_ms
@@ -56,7 +58,7 @@ class LockstepNode:
 
     def digest(self) -> SenderDigest:
         """What the node has said so far."""
-        return self._node.stamp.digest()
+        return self.node.stamp.digest()
 
     def _due_mail(self, now_ms: int) -> list[Received]:
         times = [due for due in self._mail if due <= now_ms]
@@ -70,26 +72,51 @@ class LockstepNode:
 
 
 class NodeGroup:
-    """Runners for the nodes of one process, keyed by node id. `faults` strike what they are sent."""
+    """Runners for the nodes of one process, keyed by node id. `faults` strike what they are sent. `lasting`: nodes that
+    may go on after they were away; `stores`: where such a node keeps its memory, if not in this process."""
 
     def __init__(
-        self, nodes: Mapping[str, Node], routing: Routing, faults: Faults = NO_FAULTS, incarnation: int = 0
+        self,
+        nodes: Mapping[str, Node],
+        routing: Routing,
+        faults: Faults = NO_FAULTS,
+        incarnation: int = 0,
+        *,
+        lasting: Collection[str] = (),
+        stores: Mapping[str, Store] = MappingProxyType({}),
     ) -> None:
         self.intake = Intake(routing)
         self.runners: dict[str, LockstepNode] = {}
         self._routing = routing
         self._faults = faults
+        self._lasting = {*lasting, *stores}
+        self._stores = stores
+        self._asleep: dict[str, LastingNode] = {}
         self._departed: list[SenderDigest] = []
         for node_id, node in nodes.items():
             self.join(node_id, node, incarnation)
 
     def join(self, node_id: str, node: Node, incarnation: int) -> None:
         """From now on the node is here."""
-        self.runners[node_id] = LockstepNode(node_id, node, self._routing, incarnation)
+        guarded = (
+            LastingNode(node_id, node, self._routing, incarnation, self._stores.get(node_id))
+            if node_id in self._lasting
+            else GuardedNode(node_id, node, self._routing, incarnation)
+        )
+        self.runners[node_id] = LockstepNode(guarded)
 
     def leave(self, node_id: str) -> None:
-        """From now on the node is not here any more; what it has said counts."""
-        self._departed.append(self.runners.pop(node_id).digest())
+        """From now on the node is not here any more, and its mail is lost; what it has said counts."""
+        runner = self.runners.pop(node_id)
+        self._departed.append(runner.digest())
+        if isinstance(runner.node, LastingNode):
+            self._asleep[node_id] = runner.node
+
+    def come_back(self, node_id: str) -> None:
+        """A lasting node that has left goes on from now on."""
+        node = self._asleep.pop(node_id)
+        node.go_on()
+        self.runners[node_id] = LockstepNode(node)
 
     def holds(self, node_ids: set[str]) -> bool:
         """Whether one of these nodes is here."""
@@ -128,11 +155,14 @@ class NodeGroup:
                 runner.deliver(received)
 
     def give_kept(self, node_id: str, messages: Iterable[tuple[str, bytes]], due_ms: int) -> None:
-        """What was kept for a node that joins."""
+        """What was kept for a node that joins; one that goes on is given what it has not handled."""
+        runner = self.runners[node_id]
         for key, payload in messages:
             received = self.intake.open(key, payload)
-            if received is not None:
-                self.runners[node_id].deliver(received, due_ms)
+            if received is not None and not (
+                isinstance(runner.node, LastingNode) and runner.node.handled.has(received)
+            ):
+                runner.deliver(received, due_ms)
 
     def has_all(self, grants: list[Grant]) -> bool:
         """Whether all the mail that the clock expects for these grants has arrived."""

@@ -7,6 +7,7 @@ import contextlib
 import queue
 import time
 from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import zenoh
@@ -19,6 +20,7 @@ from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import NodeGroup
 from comms.lockstep.parcels import publish, unpacked
 from comms.lockstep.words import pack_answers, unpack_grants
+from comms.memory.store import Store
 from comms.node import Listener, Node, Received
 from comms.result import STRIP_TO_TASK, LastWord, StripLatency
 from comms.runner import GuardedListener, Intake, Outgoing, close_all
@@ -103,8 +105,9 @@ class ServedNodes:
         routing: Routing,
         faults: Faults,
         incarnation: int = 0,
+        stores: Mapping[str, Store] = MappingProxyType({}),
     ) -> None:
-        self.group = NodeGroup(nodes, routing, faults, incarnation)
+        self.group = NodeGroup(nodes, routing, faults, incarnation, stores=stores)
         self._session = session
         self._keys = keys
         self._latency = StripLatency()
@@ -135,7 +138,8 @@ class ServedNodes:
 class NodeHost:
     """Lets the nodes of a host act as the clock grants, until the run is finished.
 
-    `run` tells the hub of a node that fails, and raises NodeError.
+    `stores`: where nodes keep their memory, by their ids. `run` tells the hub of a node that fails, and raises
+    NodeError. StoreRefusedError tells of a store by which a node cannot go on.
     """
 
     def __init__(
@@ -146,8 +150,9 @@ class NodeHost:
         nodes: Mapping[str, Node],
         routing: Routing,
         faults: Faults = NO_FAULTS,
+        stores: Mapping[str, Store] = MappingProxyType({}),
     ) -> None:
-        self._nodes = ServedNodes(session, keys, nodes, routing, faults, spec.incarnation)
+        self._nodes = ServedNodes(session, keys, nodes, routing, faults, spec.incarnation, stores)
         expressions = [keys.topic(one) for node_id in nodes for one in routing.subscriptions(node_id)]
         self._root = keys.root
         self._line = _Line(session, keys, spec.host, expressions)

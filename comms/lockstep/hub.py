@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -73,7 +74,10 @@ class Hub:
         self._kept = {node_id: JoinerMail(node_id, routing) for node_id in self._clock.said_to_joiners}
         listening = {node.node_id for node in routing.roster if node.listens_only}
         self._host_of = {node: spec.host for spec in hosts for node in spec.nodes if not spec.joins}
-        self._joining = {(node, spec.incarnation): spec.host for spec in hosts for node in spec.nodes if spec.joins}
+        self._joining: dict[str, deque[str]] = {}
+        for spec in hosts:  # those of one node in the order in which it joins
+            for node in spec.nodes if spec.joins else ():
+                self._joining.setdefault(node, deque()).append(spec.host)
         self._hosts = {spec.host for spec in hosts if not spec.joins}
         self._killed: set[str] = set()
         self._frozen: set[str] = set()
@@ -133,7 +137,7 @@ class Hub:
         node_id = happening.node_id
         match happening.change:
             case Change.JOIN:
-                self._let_in(node_id, happening.incarnation)
+                self._let_in(node_id)
             case Change.KILL:
                 host = self._host_of[node_id]
                 self._say(host, pack("last_word"))
@@ -147,10 +151,10 @@ class Hub:
                 self._frozen.remove(self._host_of[node_id])
                 self._change(Change.THAW, self._host_of[node_id])
 
-    def _let_in(self, node_id: str, incarnation: int) -> None:
+    def _let_in(self, node_id: str) -> None:
         """Lets a node's process connect and hands it what was kept. As it connects between two rounds, nothing reaches
         it twice."""
-        host = self._host_of[node_id] = self._joining[node_id, incarnation]
+        host = self._host_of[node_id] = self._joining[node_id].popleft()
         self._hosts.add(host)
         self._change(Change.JOIN, host)
         self._wait(lambda: host in self._ready, lambda: _no("start", {host}))

@@ -51,7 +51,8 @@ class _Local:
     ) -> None:
         self.clock = clock
         self.makers = makers
-        self.group = NodeGroup({name: makers[name]() for name in clock.present()}, routing, faults)
+        nodes = {name: makers[name]() for name in clock.present()}
+        self.group = NodeGroup(nodes, routing, faults, lasting=clock.lasting)
         self.listeners = listeners
         self.announcer = Stamp(CLOCK, routing)
         self.kept = {node_id: JoinerMail(node_id, routing) for node_id in clock.said_to_joiners}
@@ -82,7 +83,10 @@ class _Local:
             case Change.KILL:
                 self.group.leave(node_id)
             case Change.JOIN:
-                self.group.join(node_id, self.makers[node_id](), happening.incarnation)
+                if happening.memory:
+                    self.group.come_back(node_id)
+                else:
+                    self.group.join(node_id, self.makers[node_id](), happening.incarnation)
                 self.group.give_kept(node_id, self.kept[node_id].messages(), happening.at_ms + JOINER_DELAY_MS)
             case Change.FREEZE | Change.THAW:
                 pass  # the clock alone knows

@@ -9,6 +9,7 @@ from typing import Any
 import zenoh
 
 from comms.errors import FleetError, HostLostError, WordsError, one_line
+from comms.journal import Journal
 from comms.keys import HostSpec, RunKeys
 from comms.node import Received
 from comms.result import BusResult, LastWord
@@ -21,7 +22,6 @@ from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S
 from comms.wall.clock import Phase, WallClock
 from comms.wall.gate import Gate
 from comms.wall.host import BEAT_EVERY_S
-from comms.wall.journal import Journal
 from comms.wall.line import Life, WallLine
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import NodeSeat

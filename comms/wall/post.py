@@ -13,12 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from comms.errors import WordsError
+from comms.journal import HeardMessages, Journal
 from comms.keys import RunKeys
 from comms.node import Received
 from comms.runner import Intake, Outgoing
 from comms.said.routing import Routing
 from comms.wall.gate import FLOOD, WORDS
-from comms.wall.journal import HeardMessages, Journal
 from comms.wall.line import Answered, Asked, Event, Life, Mail, WallLine
 from comms.wall.words import Beat, pack_beat, unpack_beat
 from comms.words import unpack

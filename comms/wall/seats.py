@@ -13,13 +13,13 @@ from collections.abc import Iterable, Mapping
 from itertools import count
 from typing import Protocol
 
+from comms.journal import Journal
 from comms.node import Listener, Node, Received
 from comms.result import STRIP_TO_TASK, LastWord, StripLatency
 from comms.runner import GuardedListener, GuardedNode, Outgoing, close_all
 from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.said.topics import RUN
-from comms.wall.journal import Journal
 
 
 class OrderWindow:

@@ -37,7 +37,7 @@ class Hello:
 
 @dataclass(frozen=True, slots=True)
 class Beat:
-    """`tallies`: see `comms.wall.journal`."""
+    """`tallies`: see `comms.journal`."""
 
     incarnation: int
     tallies: dict[str, int]

@@ -28,6 +28,7 @@ from comms.errors import (
     NodeError,
     RefusedError,
     RunawayError,
+    StoreRefusedError,
 )
 from comms.session import open_client, open_hub, read_where_packets_are_awaited
 from secondlook.fleet.nodes import make_nodes
@@ -58,7 +59,7 @@ def main() -> int:
     except HostLostError as error:
         tell(lost=error.host, at_ms=error.at_ms)
         return FAILED
-    except (NodeError, FleetError, RunawayError, ConnectionFailedError, RefusedError) as error:
+    except (NodeError, FleetError, RunawayError, ConnectionFailedError, RefusedError, StoreRefusedError) as error:
         tell(failed=str(error))
         return FAILED
     return 0

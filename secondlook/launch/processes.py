@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 import selectors
+import shutil
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -24,6 +25,7 @@ from secondlook.recorded.observer import RunStopped
 
 POLL_EVERY_S = 0.1
 GRACE_S = 3.0  # to end by themselves, once their pipe is closed
+STATE = "state"  # the folder beside the logs in which nodes keep their memories
 HUB_PATIENCE = 1.5  # times the hub's own patience with its hosts, whose words come first that way
 
 
@@ -54,7 +56,8 @@ class Processes:
         self._drive = drive
         self._logs = logs
         run = f"{fleet.run_info.scenario}-{secrets.token_hex(4)}"
-        self._setup = Setup(run, fleet.roster, fleet.run_info, fleet.time_limit_ms, patience_s)
+        state = logs.with_name(STATE)
+        self._setup = Setup(run, fleet.roster, fleet.run_info, fleet.time_limit_ms, patience_s, state)
         routing = self._setup.routing()
         self._in_hub, self._hosts = hosts_of_run(fleet.roster, processes, drive.hosts_apart(routing))
         self._here = {one.node_id for one in fleet.roster if NODES[one.role].run is Process.LAUNCHER}
@@ -127,6 +130,7 @@ class Processes:
                 child.bury()
             self._children.clear()
             self._selector.close()
+            shutil.rmtree(self._setup.state, ignore_errors=True)  # of a run that has ended nobody goes on
             # Last: a session cannot be closed as long as a frozen hub holds the other end.
             self._listening.stop(GRACE_S)
 

@@ -12,7 +12,7 @@ import numpy as np
 from comms.lockstep.clock import WRAP_UP_MS
 from comms.lockstep.group import LockstepNode
 from comms.node import Node, Received
-from comms.runner import Intake, Outgoing
+from comms.runner import GuardedNode, Intake, Outgoing
 from comms.said.codec import decode
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
@@ -56,7 +56,7 @@ def replay_node(
     intake = Intake(routing)
     messages = [received for key, payload in recording if (received := intake.open(key, payload)) is not None]
     expected = [one for one in messages if one.header.sender == node_id]
-    runner = LockstepNode(node_id, node, routing)
+    runner = LockstepNode(GuardedNode(node_id, node, routing))
     last_ms = 0
     due_times: set[int] = set()
     for one in messages:

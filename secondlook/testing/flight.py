@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
@@ -12,6 +12,7 @@ from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
 from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, NodeEvent, absent_at_start
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import JoinerMail
+from comms.memory.lasting import Handled
 from comms.node import Received
 from comms.runner import Intake
 from comms.said.routing import Routing
@@ -115,26 +116,37 @@ class Flight(Mission):
 
 @dataclass(frozen=True)
 class Life:
-    """One start of a node: there from `start_ms` up to, but not at, `end_ms`; `killed`: that is because it was."""
+    """One start of a node: there from `start_ms` up to, but not at, `end_ms`; `killed`: that is because it was. One
+    that came back with its memory goes on with its life; `away`: from when to when it was not there meanwhile."""
 
     incarnation: int
     start_ms: int
     end_ms: int
     killed: bool
+    away: tuple[tuple[int, int], ...] = ()
+
+    @property
+    def spans_ms(self) -> list[tuple[int, int]]:
+        """From when up to, but not at, when it was there."""
+        times_ms = [self.start_ms, *(ms for pair in self.away for ms in pair), self.end_ms]
+        return list(zip(times_ms[::2], times_ms[1::2], strict=True))
 
 
 def lives(flight: Flight, node_id: str) -> list[Life]:
     """The starts of a node in their order; none for one that is absent to the end."""
-    found: list[Life] = []
     beyond_ms = _end_ms(flight) + 1
     events = sorted((one for one in flight.events if one.node_id == node_id), key=lambda one: one.at_ms)
-    starts_ms = [] if node_id in absent_at_start(events) else [0]
-    starts_ms += [one.at_ms for one in events if isinstance(one, Join)]
-    ends_ms = [one.at_ms for one in events if isinstance(one, Kill)]
-    for incarnation, start_ms in enumerate(starts_ms):
-        killed = incarnation < len(ends_ms) and ends_ms[incarnation] < beyond_ms
-        if start_ms < beyond_ms:
-            found.append(Life(incarnation, start_ms, ends_ms[incarnation] if killed else beyond_ms, killed))
+    found = [] if node_id in absent_at_start(events) else [Life(0, 0, beyond_ms, killed=False)]
+    for event in events:
+        if event.at_ms >= beyond_ms:
+            break
+        if isinstance(event, Kill):
+            found[-1] = replace(found[-1], end_ms=event.at_ms, killed=True)
+        elif isinstance(event, Join) and event.memory:
+            away = (*found[-1].away, (found[-1].end_ms, event.at_ms))
+            found[-1] = replace(found[-1], end_ms=beyond_ms, killed=False, away=away)
+        elif isinstance(event, Join):
+            found.append(Life(len(found), event.at_ms, beyond_ms, killed=False))
     return found
 
 
@@ -149,6 +161,20 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
     """The messages that a node was given in one of its lives, each with the time in milliseconds, in that order."""
     if flight.routing.nodes[node_id].listens_only:  # no trouble strikes what it hears
         return [(one.header.sent_ms, one) for one in flight.heard]
+    found: list[tuple[int, Received]] = []
+    handled = Handled()
+    for from_ms, until_ms in life.spans_ms:
+        given = _given(flight, node_id, from_ms, until_ms, handled)
+        for _, one in given:
+            handled.add(one)
+        found += given
+    return found
+
+
+def _given(
+    flight: Flight, node_id: str, from_ms: int, until_ms: int, handled: Handled
+) -> list[tuple[int, Received]]:  # fmt: skip
+    """What a node was given while it was there without a break; `handled`: what it had been given before."""
     intake, kept = Intake(flight.routing), JoinerMail(node_id, flight.routing)
     found: list[tuple[int, Received]] = []
     for one in flight.heard:
@@ -156,7 +182,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
         if route is None or node_id not in route.readers:
             continue
         sent_ms = one.header.sent_ms
-        if sent_ms < life.start_ms:
+        if sent_ms < from_ms:
             kept.add(one.key, one.payload)
             continue
         for delivery in flight.faults.deliveries(node_id, one, flight.routing):
@@ -165,14 +191,14 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
                 found.append((one.topic.due_ms(sent_ms) + delivery.later_ms, opened))
     for key, payload in kept.messages():
         opened = intake.open(key, payload)
-        if opened is not None:
-            found.append((life.start_ms + JOINER_DELAY_MS, opened))
+        if opened is not None and not handled.has(opened):
+            found.append((from_ms + JOINER_DELAY_MS, opened))
     for event in flight.events:
         if isinstance(event, Freeze) and event.node_id == node_id:
             found = [
                 (event.until_ms if event.at_ms <= due_ms < event.until_ms else due_ms, one) for due_ms, one in found
             ]
-    return sorted((one for one in found if one[0] < life.end_ms), key=lambda one: (one[0], one[1].header.order))
+    return sorted((one for one in found if one[0] < until_ms), key=lambda one: (one[0], one[1].header.order))
 
 
 _MOST_TOLD = 10

@@ -43,9 +43,10 @@ class Trouble:
         at_ms = self._event_ms(at_s)
         self._plan(Freeze(node, at_ms, at_ms + _span_ms("for_s", for_s)))
 
-    def join(self, node: str, *, at_s: float | None = None) -> None:
-        """A node that was killed comes back, started anew; one that was not has been absent until then."""
-        join = Join(node, self._event_ms(at_s))
+    def join(self, node: str, *, at_s: float | None = None, memory: bool = False) -> None:
+        """A node that was killed comes back, started anew or, with its memory, as it was; one that was not has been
+        absent until then."""
+        join = Join(node, self._event_ms(at_s), memory)
         if self._from_ms > 0 and node in absent_at_start([*self.events, join]) - absent_at_start(self.events):
             raise UserError(f"join: {node!r} is not allowed; must be killed before, or be let in late from the start")
         self._plan(join)

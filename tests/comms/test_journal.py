@@ -8,13 +8,13 @@ from fleets import ROSTER, say_state
 from hypothesis import given
 from hypothesis import strategies as st
 
+from comms.journal import MOST_TRIES, HeardMessages, Journal
 from comms.node import Publication, Received
 from comms.runner import Intake, Stamp
 from comms.said.codec import Header, decode
 from comms.said.messages import Contact
 from comms.said.routing import Routing
 from comms.said.topics import CONTACT, LOOK, STATE, topic_of
-from comms.wall.journal import MOST_TRIES, HeardMessages, Journal
 
 ROUTING = Routing(ROSTER)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from comms.errors import NodeError
 from comms.lockstep.group import LockstepNode
-from comms.runner import Intake, Outgoing
+from comms.runner import GuardedNode, Intake, Outgoing
 from comms.said.codec import CLOCK, Header, encode
 from comms.said.messages import Maneuver, Message
 from comms.said.routing import Routing
@@ -115,7 +115,8 @@ class _Told:
         self._commanded: Maneuver | None = None
         self._said: list[Outgoing] = []
         node = checked.make(config=fleet.specs[node_id].config)
-        self._runner = LockstepNode(node_id, WatchedNode(checked.name, node, checked.watchdog), self._routing)
+        watched = WatchedNode(checked.name, node, checked.watchdog)
+        self._runner = LockstepNode(GuardedNode(node_id, watched, self._routing))
         self._wake_ms = self._act(start=True)
 
     def all(self, letters: Sequence[Letter]) -> list[Outgoing]:

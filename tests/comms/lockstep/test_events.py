@@ -112,6 +112,25 @@ def test_what_is_sent_as_one_joins_reaches_it_once(bus: Bus) -> None:
     assert heard[:5] == [(number, 10 * number + 10) for number in range(5)]
 
 
+def test_who_comes_back_with_its_memory_is_given_what_it_missed_and_woken_then() -> None:
+    alpha = every_ten(say_state("alpha"), say_contact(1), say_contact(2))
+    coordinator = Scripted(
+        starts=lambda now_ms: says(wake_ms=50),
+        wakes=lambda now_ms: says(say_over()) if now_ms > 99 else Step(wake_ms=100),
+    )
+    notes = Notes()
+    events = (Kill("coordinator", 25), Join("coordinator", 73, memory=True))
+    BUSES["local"]({"alpha": alpha, "coordinator": coordinator}, notes, events=events)
+    assert coordinator.log.count(("start", 0)) == 1
+    at_once = [entry for entry in coordinator.log if entry[0] == 74 or entry == ("wake", 74)]
+    assert at_once[-1] == ("wake", 74)
+    # Of the state the latest, of contacts all since those of 20 ms.
+    assert [entry[3] for entry in at_once[:-1]] == [7, 8, 10, 11, 13, 14, 16, 17, 18, 19, 20]
+    assert [entry[0] for entry in coordinator.log if isinstance(entry[0], int) and 21 < entry[0] < 74] == []
+    over = next(one for one in notes.heard if one.key == "coord/mission_over")
+    assert (over.header.sent_ms, over.header.incarnation, over.header.sequence) == (100, 0, 0)
+
+
 def test_who_was_killed_and_comes_back_begins_anew(bus: Bus) -> None:
     def offers(now_ms: int) -> Step:
         task = Publication(TASK.key(vehicle="beta", number=now_ms), Task(TaskAction.TAKE, now_ms, 0, 0, 0, 9, 5))
@@ -228,6 +247,7 @@ def test_whatever_goes_wrong_both_buses_tell_the_same(
         ([Freeze("alpha", 9, 20), Kill("alpha", 15)], "alpha: an event at 15 ms is not allowed; must be after 20 ms"),
         ([Freeze("alpha", 9, 9)], "alpha: must be thawed after 9 ms, not at 9 ms"),
         ([Freeze("alpha", 9, 12), Join("alpha", 20)], "alpha: join at 20 ms is not allowed; it must be absent then"),
+        ([Join("alpha", 20, memory=True)], "alpha: join with memory at 20 ms is not allowed; it has none yet"),
     ],
 )
 def test_events_that_do_not_fit_are_refused(events: list[NodeEvent], sentence: str) -> None:
@@ -241,6 +261,8 @@ def test_the_timeline_is_in_order_and_counts_incarnations() -> None:
         Kill("alpha", 5),
         Kill("beta", 8),
         Join("beta", 30),
+        Kill("beta", 40),
+        Join("beta", 50, memory=True),
         Freeze("coordinator", 8, 20),
     ]
     assert timeline(events, ROUTING) == (
@@ -249,5 +271,7 @@ def test_the_timeline_is_in_order_and_counts_incarnations() -> None:
         Happening(8, Change.KILL, "beta", 0),
         Happening(8, Change.FREEZE, "coordinator", 0),
         Happening(20, Change.THAW, "coordinator", 0),
-        Happening(30, Change.JOIN, "beta", 1),
+        Happening(30, Change.JOIN, "beta", 1, start=1),
+        Happening(40, Change.KILL, "beta", 1, start=1),
+        Happening(50, Change.JOIN, "beta", 1, start=2, memory=True),
     )

@@ -10,13 +10,13 @@ import pytest
 from by_wall import ROUTING, WALL_KEYS
 from fleets import say_state
 
+from comms.journal import Journal
 from comms.node import Publication, Received
 from comms.runner import Intake, Outgoing, Stamp
 from comms.said.messages import Contact
 from comms.said.topics import CONTACT, STATE
 from comms.session import open_hub
 from comms.wall.gate import FLOOD, Gate
-from comms.wall.journal import Journal
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
 from comms.wall.words import Beat, pack_beat, pack_time
@@ -163,7 +163,7 @@ def test_words_without_end_are_dropped_before_they_are_read() -> None:
 def test_answers_without_end_are_dropped_where_there_is_no_room_for_them(monkeypatch: pytest.MonkeyPatch) -> None:
     """A sender answers with more than it may ever have said; what it says live has a rate besides."""
     monkeypatch.setattr("comms.wall.post.MOST_HELD", 10)
-    monkeypatch.setattr("comms.wall.journal.MOST_HEARD", 20)
+    monkeypatch.setattr("comms.journal.MOST_HEARD", 20)
     line, alpha = FakeLine(), Alpha()
     post = post_over(line)
     alpha.say(contact(0))

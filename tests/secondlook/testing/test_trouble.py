@@ -12,7 +12,17 @@ from flights import BRIEF
 from comms.node import Received
 from comms.said.messages import AgentState
 from secondlook.errors import UserError
-from secondlook.testing import Fleet, Flight, Heard
+from secondlook.testing import (
+    Fleet,
+    Flight,
+    Heard,
+    assert_maps_converged,
+    assert_never_assigned_to_lost,
+    assert_no_strip_lost,
+    assert_no_strip_served_twice,
+    assert_one_strip_at_a_time,
+)
+from secondlook.testing.flight import lives
 
 MakeFleet = Callable[..., Fleet]
 
@@ -49,6 +59,40 @@ class TestNodes:
         incarnations = [one.header.incarnation for one in flight.messages("agent/helper/**")]
         assert set(incarnations) == {0, 1}
         assert incarnations == sorted(incarnations)
+
+    def test_one_that_comes_back_with_its_memory_goes_on_as_it_was(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.kill("helper", at_s=60)
+        fleet.join("helper", at_s=70, memory=True)
+        flight = fleet.run()
+        assert not any(60 <= at_s < 70 for at_s in times_s(flight, "helper"))
+        said = [one.header for one in flight.messages("agent/helper/**")]
+        assert {one.incarnation for one in said} == {0}
+        assert [one.sequence for one in said] == list(range(len(said)))
+        (life,) = lives(flight, "helper")
+        assert (life.incarnation, life.away, life.killed) == (0, ((60_000, 70_000),), False)
+
+    def test_memory_is_the_same_on_both_buses(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        for node, kill_s, join_s in [("primary", 20, 24), ("coordinator", 50, 58), ("helper", 60, 70)]:
+            fleet.kill(node, at_s=kill_s)
+            fleet.join(node, at_s=join_s, memory=True)
+        fleet.kill("coordinator", at_s=70.2)
+        fleet.join("coordinator", at_s=70.3, memory=True)
+        fleet.kill("helper", at_s=90)
+        fleet.join("helper", at_s=91)
+        local, zenoh = fleet.run(), fleet.run(bus="zenoh")
+        assert local.digest == zenoh.digest
+        for flight in (local, zenoh):
+            assert_maps_converged(flight)
+            assert_no_strip_lost(flight)
+            assert_no_strip_served_twice(flight)
+            assert_one_strip_at_a_time(flight)
+            assert_never_assigned_to_lost(flight)
+            coordinators = {one.header.incarnation for one in flight.messages("coord/**")}
+            helpers = {one.header.incarnation for one in flight.messages("agent/helper/**")}
+            assert (coordinators, helpers) == ({0}, {0, 1})
+        assert not (zenoh.folder / "state").exists()
 
     def test_one_that_joins_late_was_absent(self, brief: MakeFleet) -> None:
         fleet = brief()

@@ -1,0 +1,166 @@
+"""The file of one node's memory: what was committed is there; what is not ours or not whole is refused untouched."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import fields, replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from comms.errors import NodeError, StoreRefusedError
+from comms.memory.store import Entry, Identity, Past, Store
+
+OURS = Identity("alpha", "toy", "0" * 64, "1", "wall", "0.1.0", "2")
+ENTRIES = st.lists(st.tuples(st.integers(0, 2**40), st.binary(max_size=300), st.integers(0, 2**32 - 1)), max_size=12)
+
+
+@contextmanager
+def opened(folder: Path, identity: Identity = OURS) -> Iterator[Store]:
+    store = Store(folder, "alpha", identity)
+    try:
+        yield store
+    finally:
+        store.close()
+
+
+def remember(store: Store, count: int, first: int = 0) -> tuple[Entry, ...]:
+    entries = tuple(Entry(step, 100 * step, b"given %d" % step, step) for step in range(first, first + count))
+    for entry in entries:
+        store.add(entry)
+    return entries
+
+
+def killed(folder: Path, to: Path) -> Path:
+    """What a process that is killed now would leave behind."""
+    return Path(shutil.copytree(folder, to))
+
+
+def bytes_in(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def refusal(folder: Path, identity: Identity = OURS) -> str:
+    """Why it is refused; nothing in the folder is touched."""
+    before = bytes_in(folder)
+    with pytest.raises(StoreRefusedError) as refused:
+        Store(folder, "alpha", identity)
+    assert bytes_in(folder) == before
+    assert "\n" not in str(refused.value)
+    return str(refused.value).removeprefix(f"{folder / 'alpha.sqlite'}: ")
+
+
+def test_a_new_one_holds_nothing_and_stays_so(tmp_path: Path) -> None:
+    for _ in range(2):
+        with opened(tmp_path / "made" / "for it") as store:
+            assert store.past is None
+    assert store.path.stat().st_mode & 0o777 == 0o600
+
+
+@given(before=ENTRIES, state=st.none() | st.binary(max_size=10_000), after=ENTRIES)
+def test_what_was_remembered_is_there_after_a_kill(
+    before: list[tuple[int, bytes, int]], state: bytes | None, after: list[tuple[int, bytes, int]]
+) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        there, left = Path(folder) / "there", Path(folder) / "left"
+        with opened(there) as store:
+            entries = [Entry(step, *parts) for step, parts in enumerate([*before, *after])]
+            for entry in entries[: len(before)]:
+                store.add(entry)
+            if state is not None:
+                store.put(len(before), state)
+                entries = entries[len(before) :]
+            for entry in entries if state is not None else entries[len(before) :]:
+                store.add(entry)
+            killed(there, left)
+        for place in (left, there):
+            with opened(place) as store:
+                steps = 0 if state is None else len(before)
+                is_empty = state is None and not entries
+                assert store.past == (None if is_empty else Past(steps, state, tuple(entries)))
+
+
+@pytest.mark.parametrize("name", [one.name for one in fields(Identity)])
+def test_that_of_another_is_refused(tmp_path: Path, name: str) -> None:
+    with opened(tmp_path) as store:
+        remember(store, 3)
+    another = replace(OURS, **{name: "other"})
+    ours = getattr(OURS, name)
+    shown = ours if len(ours) <= 40 else f"{ours[:12]}..."
+    said = refusal(tmp_path, another)
+    assert said == f"is of another {name}, {shown} and not other; must be moved away, or another folder given"
+    with opened(tmp_path) as store:
+        assert store.past is not None
+
+
+def test_that_of_a_mission_that_is_over_is_refused(tmp_path: Path) -> None:
+    with opened(tmp_path) as store:
+        remember(store, 3)
+        store.end()
+    assert refusal(tmp_path) == "is of a mission that is over; must be moved away, or another folder given"
+
+
+def test_one_that_is_in_use_is_refused(tmp_path: Path) -> None:
+    with opened(tmp_path):
+        assert refusal(tmp_path) == "is in use by another process; of each node there may be one"
+
+
+def test_a_place_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "state").write_text("a file")
+    with pytest.raises(StoreRefusedError, match=r"alpha\.sqlite: .*; must be a file that can be written"):
+        Store(tmp_path / "state", "alpha", OURS)
+
+
+def test_a_step_that_cannot_be_written_is_the_nodes_failure(tmp_path: Path) -> None:
+    with opened(tmp_path) as store:
+        store.close()
+        with pytest.raises(NodeError, match=r"alpha\.sqlite: .*; must be a file that can be written"):
+            remember(store, 1)
+
+
+@given(data=st.data())
+def test_one_that_is_cut_short_is_refused(data: st.DataObject) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        with opened(Path(folder)) as store:
+            remember(store, 40)
+            store.put(40, bytes(20_000))
+            remember(store, 5, first=40)
+        size = store.path.stat().st_size
+        os.truncate(store.path, data.draw(st.integers(0, size - 1)))
+        assert refusal(Path(folder)).startswith("is cut short or damaged: ")
+
+
+@given(data=st.data())
+def test_where_the_newest_commits_are_cut_off_those_before_are_there(data: st.DataObject) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        there, left = Path(folder) / "there", Path(folder) / "left"
+        with opened(there) as store:
+            entries = remember(store, 30)
+            killed(there, left)
+        wal = left / "alpha.sqlite-wal"
+        os.truncate(wal, data.draw(st.integers(0, wal.stat().st_size)))
+        with opened(left) as store:
+            journal = () if store.past is None else store.past.journal
+        assert journal == entries[: len(journal)]
+
+
+@given(data=st.data())
+def test_a_damaged_byte_is_noticed_or_does_no_harm(data: st.DataObject) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        with opened(Path(folder)) as store:
+            remember(store, 40)
+            store.put(40, bytes(range(256)) * 20)
+            entries = remember(store, 20, first=40)
+        past = Past(40, bytes(range(256)) * 20, entries)
+        content = bytearray(store.path.read_bytes())
+        content[data.draw(st.integers(0, len(content) - 1))] ^= data.draw(st.integers(1, 255))
+        store.path.write_bytes(content)
+        with contextlib.suppress(StoreRefusedError), opened(Path(folder)) as store:
+            assert store.past == past
