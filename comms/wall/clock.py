@@ -3,7 +3,8 @@
 Pure: readings of the local monotonic clock, in seconds, are arguments.
 
 The mission starts when all hosts are there. A clock that is started anew takes the mission's time from the first host
-that knows it, so that the hub may be restarted in mid-mission.
+that knows it, so that the hub may be restarted in mid-mission. Where all were, it goes on from the latest time that one
+of them remembers.
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ class _Host:
     instance: str = ""
     heard_s: float = -HERE_S
     ready: bool = False
+    remembers_ms: int = 0
     last_word: LastWord | None = None
 
 
@@ -181,8 +183,11 @@ class WallClock:
     def pass_time(self, now_s: float) -> None:
         """Goes on to the next phase if it is time for it."""
         if self.phase is Phase.WAITING and not self.missing:
-            self.time.hear(0, self.factor, now_s)
-            self._run("all are here, the mission begins")
+            begins_ms = max((known.remembers_ms for known in self._hosts.values()), default=0)
+            self.taken_up = begins_ms > 0
+            self.time.hear(begins_ms, self.factor, now_s)
+            goes_on = f"goes on at {begins_ms / 1000:.0f} s"
+            self._run(f"all are here, the mission {goes_on if self.taken_up else 'begins'}")
         elif self.phase is Phase.RUNNING:
             now_ms = self.time.now_ms(now_s)
             if self.over_ms is not None:
@@ -210,11 +215,12 @@ class WallClock:
         known.ready = hello.welcomed
         if not hello.welcomed:
             self.words.append((host, pack("welcome")))
-        if self.phase is Phase.WAITING and hello.now_ms is not None:
+            known.remembers_ms = hello.now_ms or 0
+        elif self.phase is Phase.WAITING and hello.now_ms is not None:
             self.taken_up = True
             self.time.hear(hello.now_ms, self.factor, now_s)
             self._run(f"the mission is under way, at {hello.now_ms / 1000:.0f} s")
-        elif known.last_word is None and self.phase in (FINISHED_LISTENING if self._listens[host] else FINISHED_ACTING):
+        if known.last_word is None and self.phase in (FINISHED_LISTENING if self._listens[host] else FINISHED_ACTING):
             self.words.append((host, pack_finish(self._result)))
 
     def _run(self, notice: str) -> None:

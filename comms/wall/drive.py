@@ -23,9 +23,11 @@ from comms.wall.seats import ListenerSeat, NodeSeat, Seat
 
 @dataclass(frozen=True)
 class ByWallClock:
-    """See `comms.drive.Drive`. `factor`: > 0. Whoever is lost ends the run."""
+    """See `comms.drive.Drive`. `factor`: > 0. Whoever is lost ends the run, unless with `keeps_going` it is started
+    again: then nodes keep their memories in files, and go on by what is in them."""
 
     factor: float
+    keeps_going: bool = False
 
     mode = ClockMode.WALL
 
@@ -65,6 +67,7 @@ class ByWallClock:
             setup.time_limit_ms,
             self.factor,
             strict=True,
+            forgiving=self.keeps_going,
             patience_s=setup.patience_s,
             alive=alive,
         )
@@ -73,7 +76,8 @@ class ByWallClock:
     def acting(self, session: zenoh.Session, setup: Setup, spec: HostSpec, nodes: Mapping[str, Node]) -> Host:
         """See `comms.drive.Drive`."""
         routing = setup.routing()
-        return _host(session, setup, spec.host, NodeSeat(nodes, routing), routing)
+        stores = {node_id: setup.store_of(node_id, node_id) for node_id in nodes} if self.keeps_going else {}
+        return _host(session, setup, spec.host, NodeSeat(nodes, routing, stores), routing)
 
     def listening(
         self, session: zenoh.Session, setup: Setup, host: str, node_id: str, listener: Listener

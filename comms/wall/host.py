@@ -30,6 +30,7 @@ HELLO_EVERY_S = 1.0
 FIRST_HELLO_EVERY_S = 0.1  # until the clock has answered
 BEAT_EVERY_S = 0.5
 GOODBYE_WITHIN_S = 5.0
+CATCH_UP_WITHIN_S = 1.0  # so long a node that goes on waits for what it has missed
 CLOCK_LOST_AFTER_S = 3.0  # of wall time without a time signal; there are four a second
 GIVES_UP_AFTER_S = 20.0  # of wall time beyond the mission's time limit
 COMPLETE_WITHIN_S = 5.0  # so long a listener waits at the end for what is still missing
@@ -65,7 +66,6 @@ class WallHost:
         self._time_limit_ms = time_limit_ms
         self._instance = secrets.token_hex(8)
         self._time = MissionTime()
-        self._incarnation = 0
         self._early: list[Received] = []
         self._welcomed = False
         self._waits_for_start = False
@@ -75,6 +75,7 @@ class WallHost:
         self._answer_by_s = time.monotonic() + answer_within_s
         self._clock_heard_s = time.monotonic()
         self._clock_is_heard = True
+        self._catch_up_by_s = 0.0
         self._to_me = f"clock/to/{host}"
         intake = Intake(routing)
         self._gate = Gate(routing, intake)
@@ -86,7 +87,7 @@ class WallHost:
             expressions=[*seat.reads, "clock/beat/*", "clock/time", self._to_me],
             keeps=seat.keeps,
         )
-        self._post = WallPost(self._line, keys, routing, intake)
+        self._post = WallPost(self._line, keys, routing, intake, seat.handled())
         # Before the first hello: whoever the clock has heard of is missed when it ends, however soon that is.
         self._token = session.liveliness().declare_token(keys.life(host, self._instance))
 
@@ -137,12 +138,14 @@ class WallHost:
                 )
             if self._time.known:
                 now_ms = self._time.now_ms(now_s)
-                self._post.publish(self._seat.act(now_ms))
+                if not self._is_catching_up(now_s):
+                    self._post.publish(self._seat.act(now_ms))
                 if now_ms >= self._time_limit_ms + GIVES_UP_AFTER_S * 1000 * self._time.factor:
                     return
             if self._result is not None and (
                 not self._seat.listens or self._post.is_complete or now_s >= self._finish_by_s
             ):
+                self._seat.end()
                 return
             event = self._line.get(self._next_s(now_s) - time.monotonic())
             if event is None:
@@ -154,8 +157,17 @@ class WallHost:
                     case Words(key, words):
                         self._hear(key, words)
 
+    def _is_catching_up(self, now_s: float) -> bool:
+        """Whether nodes that were taken up are still to hear what they have missed before they are woken: they would
+        find others silent that they have not listened to."""
+        if now_s < self._catch_up_by_s and self._post.has_caught_up:
+            self._catch_up_by_s = 0.0
+        return now_s < self._catch_up_by_s
+
     def _next_s(self, now_s: float) -> float:
         next_s = min(self._hello_at_s, self._beat_at_s)
+        if now_s < self._catch_up_by_s:
+            return min(next_s, self._catch_up_by_s)
         next_ms = self._seat.next_ms if self._time.known else None
         # A millisecond has begun when it is over that the floor of the time shows it.
         return next_s if next_ms is None else max(now_s, min(next_s, self._time.local_s(next_ms)))
@@ -163,13 +175,15 @@ class WallHost:
     def _speak(self, now_s: float) -> None:
         if now_s >= self._hello_at_s:
             self._hello_at_s = now_s + (HELLO_EVERY_S if self._welcomed else FIRST_HELLO_EVERY_S)
-            now_ms = self._time.now_ms(now_s) if self._time.known else None
+            # Who is not welcomed yet tells until when it remembers: a clock that begins goes by it for want of better.
+            remembers_ms = None if self._welcomed else self._seat.taken_up_at_ms
+            now_ms = self._time.now_ms(now_s) if self._time.known else remembers_ms
             hello = Hello(self._instance, SCHEMA_VERSION, self._scenario_sha256, self._welcomed, now_ms)
             self._say(pack_hello(hello))
         if now_s >= self._beat_at_s:
             self._beat_at_s = now_s + BEAT_EVERY_S
             if self._time.known:
-                self._post.beat(self._incarnation, self._seat.kept)
+                self._post.beat(self._seat.kept)
 
     def _listen_for_clock(self, now_s: float) -> None:
         heard = now_s - self._clock_heard_s < CLOCK_LOST_AFTER_S
@@ -208,9 +222,13 @@ class WallHost:
             # Who was there before the start is the first of its name; later ones are told apart by when they came. The
             # wait for a clock that takes up a mission's time was no wait for the start.
             is_first = self._waits_for_start and not taken_up
-            self._incarnation = 0 if is_first else incarnation_at(now_ms, self._time_limit_ms)
-            self._seat.begin(self._incarnation, factor)
-            self._notice("the mission begins" if is_first else f"the mission is at {now_ms / 1000:.0f} s")
+            self._seat.begin(0 if is_first else incarnation_at(now_ms, self._time_limit_ms), factor)
+            at = f"the mission is at {now_ms / 1000:.0f} s"
+            if self._seat.taken_up_at_ms is not None:
+                self._catch_up_by_s = time.monotonic() + CATCH_UP_WITHIN_S
+                self._notice(f"goes on from {self._seat.taken_up_at_ms / 1000:.0f} s; {at}")
+            else:
+                self._notice("the mission begins" if is_first else at)
             early, self._early = self._early, []
             for received in early:
                 self._pass_on(received)
@@ -230,7 +248,7 @@ class WallHost:
     def _leave(self) -> None:
         """Gives the last word; returns when the clock has heard it, or is gone. The session may be closed then: the
         news of its end cannot overtake the word."""
-        self._post.beat(self._incarnation, self._seat.kept)
+        self._post.beat(self._seat.kept)
         self._say(pack_last_word(self._seat.last_word(self._post.intake.dropped)))
         deadline_s = time.monotonic() + GOODBYE_WITHIN_S
         while (left_s := deadline_s - time.monotonic()) > 0:

@@ -36,8 +36,9 @@ class WallHub:
     """The hub of one run over an open session.
 
     `hosts`: the other processes it waits for. `seat`: the nodes of this process. `strict`: a process that is lost,
-    fails or is silent for `patience_s` ends the run; else the others go on without it. `alive`: called with the mission
-    time every half second. `notice`: told in words what a person should know.
+    fails or is silent for `patience_s` ends the run; else the others go on without it. `forgiving`: then only silence
+    does, as who is lost or fails is started again. `alive`: called with the mission time every half second. `notice`:
+    told in words what a person should know.
     """
 
     def __init__(
@@ -52,6 +53,7 @@ class WallHub:
         factor: float,
         *,
         strict: bool,
+        forgiving: bool = False,
         patience_s: float = PATIENCE_S,
         alive: Callable[[int], None] = lambda now_ms: None,
         notice: Callable[[str], None] = lambda sentence: None,
@@ -59,6 +61,7 @@ class WallHub:
         self._keys = keys
         self._seat = seat
         self._strict = strict
+        self._ends_when_lost = strict and not forgiving
         self._patience_s = patience_s
         self._alive = alive
         self._notice = notice
@@ -119,7 +122,7 @@ class WallHub:
             self._post.publish([self._announced])
         elif clock.phase not in (Phase.WAITING, Phase.RUNNING) and not self._seat_closed:
             self._seat_closed = True
-            self._post.beat(0, self._seat.kept)
+            self._post.beat(self._seat.kept)
             clock.done_here(self._seat.last_word(self._post.intake.dropped))
             clock.done_here(LastWord(messages={RUN.name: 1}))
 
@@ -134,7 +137,7 @@ class WallHub:
         if now_s >= self._beat_at_s:
             self._beat_at_s = now_s + BEAT_EVERY_S
             if self._under_way:
-                self._post.beat(0, {CLOCK: self._kept, **self._seat.kept})
+                self._post.beat({CLOCK: self._kept, **self._seat.kept})
         if now_s >= self._alive_at_s:
             self._alive_at_s = now_s + SIGN_OF_LIFE_EVERY_S
             self._alive(self._now_ms(now_s))
@@ -181,14 +184,14 @@ class WallHub:
                 case ["done", *_]:
                     self._clock.done(host, unpack_last_word(words))
                 case ["failed", str(sentence)]:
-                    if self._strict:
+                    if self._ends_when_lost:
                         raise FleetError(one_line(sentence))
                     self._notice(one_line(sentence))
         except WordsError as error:
             self._post.intake.drop("senseless words", host, str(error))
 
     def _lose(self, host: str, instance: str) -> None:
-        if self._strict and not self._clock.is_done(host):
+        if self._ends_when_lost and not self._clock.is_done(host):
             raise HostLostError(host, self._now_ms(time.monotonic()))
         self._clock.gone(host, instance)
 

@@ -41,14 +41,17 @@ Item = Received | Words | Life
 
 
 class WallPost:
-    """The post of the nodes of one process over its line. `intake`: opens what the line lets in."""
+    """The post of the nodes of one process over its line. `intake`: opens what the line lets in. `heard`: what has come
+    to the nodes' predecessors and need not come again."""
 
-    def __init__(self, line: WallLine, keys: RunKeys, routing: Routing, intake: Intake) -> None:
+    def __init__(
+        self, line: WallLine, keys: RunKeys, routing: Routing, intake: Intake, heard: HeardMessages | None = None
+    ) -> None:
         self.line = line
         self.intake = intake
         self._routing = routing
         self._keys = keys
-        self._heard = HeardMessages()
+        self._heard = HeardMessages() if heard is None else heard
         self._beats: dict[str, Beat] = {}
         self._asked: dict[str, set[str]] = {}
         self._held: dict[str, list[Received]] = {}
@@ -81,10 +84,10 @@ class WallPost:
             self.intake.drop("ahead of time", received.header.sender, f"{received.key}: by {ahead_ms / 1000:.3f} s")
         return ahead_ms <= AHEAD_MS
 
-    def beat(self, incarnation: int, kept: Mapping[str, Journal]) -> None:
+    def beat(self, kept: Mapping[str, Journal]) -> None:
         """Tells what the nodes here keep."""
         for node, its in kept.items():
-            self.line.say(self._keys.beat(node), pack_beat(Beat(incarnation, its.tallies)), drop=True)
+            self.line.say(self._keys.beat(node), pack_beat(Beat(its.incarnation, its.tallies)), drop=True)
 
     def publish(self, outgoing: Iterable[Outgoing]) -> None:
         """Sends messages."""
@@ -94,6 +97,15 @@ class WallPost:
     def is_complete(self) -> bool:
         """Whether all is here that those who have told what they keep have kept for us."""
         return not any(self._missing(sender) for sender in self._beats)
+
+    @property
+    def has_caught_up(self) -> bool:
+        """Whether everybody who keeps something for us has told what it is, and all that was asked for has come."""
+        told = (
+            node in self._beats or not any(map(self.line.reads, self._routing.kept_by(node)))
+            for node in self._routing.nodes
+        )
+        return not self._asked and all(told)
 
     def _receive_message(self, key: str, payload: bytes) -> list[Item]:
         received = self.intake.open(key, payload)

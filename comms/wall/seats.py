@@ -11,12 +11,15 @@ import time
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from itertools import count
+from types import MappingProxyType
 from typing import Protocol
 
-from comms.journal import Journal
+from comms.journal import HeardMessages, Journal
+from comms.memory.lasting import LastingNode
+from comms.memory.store import Store
 from comms.node import Listener, Node, Received
 from comms.result import STRIP_TO_TASK, LastWord, StripLatency
-from comms.runner import GuardedListener, GuardedNode, Outgoing, close_all
+from comms.runner import GuardedListener, Outgoing, close_all
 from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.said.topics import RUN
@@ -49,46 +52,31 @@ class OrderWindow:
 
 
 class WallNode:
-    """One node. It is started when the run is announced to it; what came before that is held until then.
+    """One node. It is started when the run is announced to it; what came before that is held until then. One that was
+    taken up has been started, and is not given again what it has handled."""
 
-    `kept`: what it has said and keeps for others.
-    """
-
-    def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
-        self.kept = Journal()
-        self._node = GuardedNode(node_id, node, routing, incarnation)
+    def __init__(self, node: LastingNode) -> None:
+        self.node = node
         self._held: list[Received] = []
-        self._started = False
-
-    @property
-    def wake_ms(self) -> int | None:
-        """The wake-up that it has asked for."""
-        return self._node.wake_ms
+        self._started = node.is_taken_up
 
     def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Handles a message; returns what the node publishes. Raises NodeError."""
         if self._started:
-            return self._keep(self._node.act(now_ms, [received]))
+            if self.node.is_taken_up and self.node.handled.has(received):
+                return []
+            return self.node.act(now_ms, [received])
         self._held.append(received)
         if received.topic is not RUN:
             return []
         self._started = True
         held = sorted(self._held, key=lambda one: one.header.order)
         self._held.clear()
-        return self._keep(self._node.act(now_ms, held, start=True))
+        return self.node.act(now_ms, held, start=True)
 
     def wake(self, now_ms: int) -> list[Outgoing]:
         """Wakes the node if that is due; returns what it publishes. Raises NodeError."""
-        if not self._node.is_due(now_ms):
-            return []
-        published = self._node.act(now_ms, wake=True)
-        self._node.check_wake(now_ms)
-        return self._keep(published)
-
-    def _keep(self, published: list[Outgoing]) -> list[Outgoing]:
-        for one in published:
-            self.kept.add(one)
-        return published
+        return self.node.act(now_ms, wake=True) if self.node.is_due(now_ms) else []
 
 
 WINDOW_S = 0.5  # of wall time, within which listeners get messages in the order of their sending
@@ -100,6 +88,8 @@ class Seat(Protocol):
     reads: tuple[str, ...]
     keeps: tuple[str, ...]
     listens: bool
+    taken_up_at_ms: int | None
+    """The mission time at which a node here goes on; None where none does, as all begin."""
 
     def begin(self, incarnation: int, factor: float) -> None:
         """The mission's time is known; nothing else is called before."""
@@ -118,6 +108,12 @@ class Seat(Protocol):
     def kept(self) -> Mapping[str, Journal]:
         """By node id, what is kept for others."""
 
+    def handled(self) -> HeardMessages:
+        """What of the messages that their senders keep need not come again."""
+
+    def end(self) -> None:
+        """The mission is over for those here: nobody is to take them up. Raises NodeError."""
+
     def close(self) -> None:
         """The run is over for this process, in whatever way."""
 
@@ -126,27 +122,33 @@ class Seat(Protocol):
 
 
 class NodeSeat:
-    """Seats nodes, keyed by node id."""
+    """Seats nodes, keyed by node id. `stores`: where nodes keep their memory, if not in this process; raises
+    StoreRefusedError for one by which a node cannot go on."""
 
     listens = False
 
-    def __init__(self, nodes: Mapping[str, Node], routing: Routing) -> None:
+    def __init__(
+        self, nodes: Mapping[str, Node], routing: Routing, stores: Mapping[str, Store] = MappingProxyType({})
+    ) -> None:
         self.reads = tuple(one for node_id in nodes for one in routing.subscriptions(node_id))
         self.keeps = tuple(one for node_id in nodes for one in routing.publications(node_id))
         self.kept: dict[str, Journal] = {}
-        self._raw = nodes
         self._routing = routing
-        self._nodes: dict[str, WallNode] = {}
-        self._said: Counter[str] = Counter()
+        self._stores = stores
+        self._nodes = {
+            node_id: WallNode(LastingNode(node_id, node, routing, store=stores.get(node_id)))
+            for node_id, node in nodes.items()
+        }
+        times_ms = [one.node.now_ms for one in self._nodes.values() if one.node.is_taken_up]
+        self.taken_up_at_ms = max(times_ms, default=None)
         self._latency = StripLatency()
         self._is_coordinators = any(routing.nodes[node_id].role is Role.COORDINATOR for node_id in nodes)
 
     def begin(self, incarnation: int, factor: float) -> None:
-        """Seats the nodes; they are started when the run is announced to them."""
-        self._nodes = {
-            node_id: WallNode(node_id, node, self._routing, incarnation) for node_id, node in self._raw.items()
-        }
-        self.kept = {node_id: node.kept for node_id, node in self._nodes.items()}
+        """Tells the nodes which start this is; they are started when the run is announced to them."""
+        for one in self._nodes.values():
+            one.node.begin(incarnation)
+        self.kept = {node_id: one.node.said for node_id, one in self._nodes.items()}
 
     def hear(self, received: Received, now_ms: int) -> list[Outgoing]:
         """Lets those nodes handle a message that read it."""
@@ -165,18 +167,31 @@ class NodeSeat:
     @property
     def next_ms(self) -> int | None:
         """When the next wake-up is due."""
-        return min((node.wake_ms for node in self._nodes.values() if node.wake_ms is not None), default=None)
+        wakes_ms = (one.node.wake_ms for one in self._nodes.values())
+        return min((wake_ms for wake_ms in wakes_ms if wake_ms is not None), default=None)
+
+    def handled(self) -> HeardMessages:
+        """Where there is one node, all that it has handled; one of several may have been the only one to handle it."""
+        nodes = list(self._nodes.values())
+        return nodes[0].node.handled.newest() if len(nodes) == 1 else HeardMessages()
+
+    def end(self) -> None:
+        """Tells the nodes' memories."""
+        for one in self._nodes.values():
+            one.node.end()
 
     def close(self) -> None:
-        """Nodes have nothing to close."""
+        """Closes the nodes' memories."""
+        for store in self._stores.values():
+            store.close()
 
     def last_word(self, dropped: Mapping[str, int]) -> LastWord:
         """What the nodes have said, and the latencies measured here."""
         latencies = {STRIP_TO_TASK: self._latency.milliseconds}
-        return LastWord(messages=dict(self._said), dropped=dict(dropped), latencies_ms=latencies)
+        said = sum((one.node.said.said for one in self._nodes.values()), Counter[str]())
+        return LastWord(messages=dict(said), dropped=dict(dropped), latencies_ms=latencies)
 
     def _noted(self, outgoing: list[Outgoing]) -> list[Outgoing]:
-        self._said.update(one.route.topic.name for one in outgoing)
         if self._is_coordinators:
             self._latency.sending(outgoing, time.perf_counter())
         return outgoing
@@ -189,6 +204,7 @@ class ListenerSeat:
     listens = True
     keeps: tuple[str, ...] = ()
     kept: Mapping[str, Journal] = {}
+    taken_up_at_ms: int | None = None
 
     def __init__(self, listeners: Mapping[str, Listener], routing: Routing) -> None:
         self.reads = tuple(one for node_id in listeners for one in routing.subscriptions(node_id))
@@ -214,6 +230,13 @@ class ListenerSeat:
     def next_ms(self) -> int | None:
         """When the next message is due."""
         return self._window.due_ms
+
+    def handled(self) -> HeardMessages:
+        """Nothing: all that is kept is to come."""
+        return HeardMessages()
+
+    def end(self) -> None:
+        """Listeners are not taken up."""
 
     def close(self) -> None:
         """Passes on all there is, and closes the listeners."""

@@ -25,7 +25,8 @@ class Hello:
     """A host says that it is there.
 
     `instance`: made up by the process, so that two of one name are told apart. `now_ms`: the mission time it goes by,
-    None as long as it knows none. `welcomed`: whether it has heard the clock.
+    None as long as it knows none; of one that is not welcomed yet until when it remembers the mission, None where it
+    does not. `welcomed`: whether it has heard the clock.
     """
 
     instance: str

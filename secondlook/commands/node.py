@@ -6,6 +6,7 @@ import ipaddress
 import re
 import sys
 from collections.abc import Callable
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from secondlook.errors import UserError
 from secondlook.fleet.nodes import COORDINATOR, WORLD
 from secondlook.launch.run_folder import run_folder
 from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
+from secondlook.launch.supervisor import Supervisor, starts_before
 from secondlook.scenario import Scenario, load_scenario
 
 _FORM = re.compile(r"(?P<protocol>tcp|tls)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})")
@@ -101,6 +103,29 @@ Certificate = Annotated[
     Path | None, typer.Option("--tls-cert", metavar="FILE", help="This node's certificate; its name is the node's.")
 ]
 Key = Annotated[Path | None, typer.Option("--tls-key", metavar="FILE", help="The private key of that.")]
+State = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="DIR",
+        help="Keep the node's memory in a file there, and go on by what is in it; without, a node begins anew.",
+    ),
+]
+
+
+class Restart(StrEnum):
+    """When a node's process is started again."""
+
+    never = "never"
+    on_failure = "on-failure"
+
+
+RESTART = "--restart"
+RestartOption = Annotated[
+    Restart,
+    typer.Option(
+        RESTART, help="Start its process again when it dies by a signal or a failure, ever later and so many times."
+    ),
+]
 Wait = Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="So long the router may take to be there.")]
 
 
@@ -117,9 +142,11 @@ def router(
     tls_ca: Authority = None,
     tls_cert: Certificate = None,
     tls_key: Key = None,
+    restart: RestartOption = Restart.never,
 ) -> None:
     """What all others connect to: it routes, holds the clock and announces the run."""
-    check_endpoint("--listen", listen, insecure=insecure, any_port=True)
+    check_endpoint("--listen", listen, insecure=insecure, any_port=restart is Restart.never)
+    _supervise_if_asked("router", restart)
     check_factor("--factor", factor)
     mission = load_scenario(scenario, set_ or (), seed)
     link = Link(_run_id(run, mission), certificates([listen], tls_ca, tls_cert, tls_key), listen=listen)
@@ -141,10 +168,13 @@ def _acting(node_id: str) -> Callable[..., None]:
         tls_cert: Certificate = None,
         tls_key: Key = None,
         wait: Wait = 10.0,
+        state: State = None,
+        restart: RestartOption = Restart.never,
     ) -> None:
+        _supervise_if_asked(node_id, restart)
         mission = load_scenario(scenario, set_ or (), seed)
         link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
-        raise typer.Exit(run_node(mission, link, node_id))
+        raise typer.Exit(run_node(mission, link, node_id, state))
 
     return command
 
@@ -166,13 +196,16 @@ def agent(
     tls_cert: Certificate = None,
     tls_key: Key = None,
     wait: Wait = 10.0,
+    state: State = None,
+    restart: RestartOption = Restart.never,
 ) -> None:
     """The agent of one vehicle."""
+    _supervise_if_asked(vehicle, restart)
     mission = load_scenario(scenario, set_ or (), seed)
     if vehicle not in mission.vehicles:
         raise UserError(f"{vehicle}: is no vehicle of scenario {mission.name}; must be {' or '.join(mission.vehicles)}")
     link = _link(mission, connect, listen, run, insecure, tls_ca, tls_cert, tls_key, wait)
-    raise typer.Exit(run_node(mission, link, vehicle))
+    raise typer.Exit(run_node(mission, link, vehicle, state))
 
 
 node_app.command("coordinator", help="The coordinator, which gives out the second looks.")(_acting(COORDINATOR))
@@ -191,11 +224,26 @@ def recorder(
     tls_cert: Certificate = None,
     tls_key: Key = None,
     wait: Wait = 10.0,
+    restart: RestartOption = Restart.never,
 ) -> None:
-    """The recorder, which writes all files of a run."""
+    """The recorder, which writes all files of a run; each start writes into a folder of its own."""
+    _supervise_if_asked("recorder", restart)
+    if out is not None and starts_before():
+        out = out.with_name(f"{out.name}-{starts_before() + 1}")
     mission = load_scenario(scenario, set_ or (), seed)
     link = _link(mission, connect, None, run, insecure, tls_ca, tls_cert, tls_key, wait)
     raise typer.Exit(run_recorder(mission, link, run_folder(out, mission.name)))
+
+
+def _supervise_if_asked(name: str, restart: Restart) -> None:
+    """Instead of the node runs what starts its process, with the same arguments; then this command is over."""
+    if restart is Restart.on_failure:
+        arguments = sys.argv[1:]
+        for place, argument in enumerate(arguments):
+            if argument.partition("=")[0] == RESTART:
+                del arguments[place : place + (1 if "=" in argument else 2)]
+                break
+        raise typer.Exit(Supervisor(name, arguments).run())
 
 
 def _link(

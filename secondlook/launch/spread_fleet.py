@@ -6,12 +6,15 @@ import json
 import logging
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from comms.errors import ConnectionFailedError, Interrupted, NodeError, RefusedError
+from comms.drive import identity_of
+from comms.errors import ConnectionFailedError, Interrupted, NodeError, RefusedError, StoreRefusedError
 from comms.keys import RunKeys
+from comms.memory.store import Store
+from comms.node import Node
 from comms.result import BusResult, Ending
 from comms.said.announcement import ClockMode, Role
 from comms.said.routing import Routing
@@ -35,6 +38,7 @@ from secondlook.fleet.nodes import (
 from secondlook.launch.mission import not_over, recorder_config
 from secondlook.launch.run_display import closing_table
 from secondlook.launch.signals import signals_ask
+from secondlook.launch.supervisor import AGAIN, OVER, end_with_supervisor, tell_supervisor
 from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise
 from secondlook.report import write_report
@@ -60,6 +64,7 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
     """Routes and holds the clock until the mission is over; returns the exit code. Raises UserError where it cannot
     listen. `record`: it waits for a recorder too."""
     _log_to_stderr()
+    end_with_supervisor()
     fleet = build_fleet(scenario, record=record, mode=ClockMode.WALL)
     routing, keys = Routing(fleet.roster), RunKeys(link.run)
     hosts = hosts_when_spread(fleet.roster)
@@ -88,17 +93,21 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
             with signals_ask(hub.interrupt):
                 result = hub.run()
         except Interrupted:
+            tell_supervisor(OVER)
             _say(ROUTER, "interrupted; the others go on, and connect again when it is back")
             return FAILED
+    tell_supervisor(OVER)
     outcome = _Outcome(result)
     failure = outcome.failure(scenario)
     _say(ROUTER, failure or outcome.closing_words)
     return FAILED if failure else 0
 
 
-def run_node(scenario: Scenario, link: Link, node_id: str) -> int:
-    """Runs an acting node of the fleet; returns the exit code. Raises UserError where it cannot take part."""
+def run_node(scenario: Scenario, link: Link, node_id: str, state: Path | None = None) -> int:
+    """Runs an acting node of the fleet; returns the exit code. Raises UserError where it cannot take part. `state`: the
+    folder in which it keeps its memory, and by which it goes on where there is one."""
     _log_to_stderr()
+    end_with_supervisor()
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     if node_id not in fleet.specs:
         raise UserError(
@@ -106,19 +115,37 @@ def run_node(scenario: Scenario, link: Link, node_id: str) -> int:
         )
     try:
         nodes = make_nodes({node_id: fleet.specs[node_id]})
-        outcome = _run_as_guest(fleet, link, node_id, NodeSeat(nodes, Routing(fleet.roster)))
+        outcome = _run_as_guest(fleet, link, node_id, _seat(nodes, node_id, fleet, link, state))
     except NodeError as error:
         _say(node_id, str(error))
         return FAILED
+    tell_supervisor(OVER)
     failure = outcome.failure(scenario)
     _say(node_id, failure or outcome.closing_words)
     return FAILED if failure else 0
+
+
+def _seat(nodes: Mapping[str, Node], node_id: str, fleet: Fleet, link: Link, state: Path | None) -> NodeSeat:
+    routing = Routing(fleet.roster)
+    if state is None:
+        return NodeSeat(nodes, routing)
+    try:
+        # Durable: a vehicle may lose its power.
+        store = Store(state, node_id, identity_of(node_id, link.run, fleet.run_info), durable=True)
+        try:
+            return NodeSeat(nodes, routing, {node_id: store})
+        except BaseException:
+            store.close()
+            raise
+    except StoreRefusedError as error:
+        raise UserError(str(error)) from error
 
 
 def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     """Records a mission into a folder, as `secondlook run` does; returns the exit code. Raises UserError where it
     cannot take part."""
     _log_to_stderr()
+    end_with_supervisor()
     began_s = time.perf_counter()
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     write_whole(folder / "scenario.yaml", scenario.to_yaml())
@@ -128,6 +155,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     try:
         listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
         outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
+        tell_supervisor(OVER)
         failure = outcome.failure(scenario)
     except NodeError as error:
         failure = str(error)
@@ -187,6 +215,7 @@ def _run_as_guest(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Outcome:
         session = open_guest(link.connect, link.listen, link.certificates, within_s=link.wait_s)
     except ConnectionFailedError as error:
         seat.close()
+        tell_supervisor(AGAIN)
         raise UserError(str(error)) from error
     with session:
         guest = WallHost(
@@ -204,6 +233,7 @@ def _run_as_guest(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Outcome:
             with signals_ask(guest.interrupt):
                 result = guest.run()
         except RefusedError as error:
+            tell_supervisor(AGAIN)
             raise UserError(str(error)) from error
         return _Outcome(result, guest.factor, guest.now_ms if guest.interrupted else None)
 
