@@ -78,7 +78,8 @@ class ListeningHost(Host, Protocol):
 
 class Drive(Protocol):
     """`mode`: as it is announced. `factor`: by how much mission time runs faster than the wall clock; None where nobody
-    can say, as in lockstep."""
+    can say, as in lockstep. `keeps_going`: whether a run goes on without a process that dies until that is started
+    again, which is for the launcher to do."""
 
     @property
     def mode(self) -> ClockMode:
@@ -86,6 +87,10 @@ class Drive(Protocol):
 
     @property
     def factor(self) -> float | None:
+        """See the class."""
+
+    @property
+    def keeps_going(self) -> bool:
         """See the class."""
 
     def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:

@@ -32,6 +32,7 @@ class Lockstep:
 
     mode = ClockMode.LOCKSTEP
     factor = None
+    keeps_going = False
 
     def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:
         """One for each node to which something is to happen, and one more for each time that it joins."""

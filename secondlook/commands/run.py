@@ -89,6 +89,14 @@ RealTime = Annotated[
         help="By the wall clock, FACTOR times as fast, 1 if left out; not repeatable, so without a digest.",
     ),
 ]
+KEEP_GOING = "--keep-going"
+KeepGoing = Annotated[
+    bool,
+    typer.Option(
+        KEEP_GOING,
+        help="With --real-time: start again what dies, some times in a row; it goes on by its memory.",
+    ),
+]
 Set = Annotated[
     list[str] | None,
     typer.Option(
@@ -124,6 +132,7 @@ def run(
     bus: Annotated[BusName, typer.Option(help="Real processes over Zenoh, or all in this process.")] = BusName.zenoh,
     processes: Processes = None,
     real_time: RealTime = None,
+    keep_going: KeepGoing = False,
     set_: Set = None,
     cell: Cell = None,
     no_record: NoRecord = False,
@@ -139,10 +148,14 @@ def run(
         raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
     if real_time is not None:
         check_factor(REAL_TIME, real_time)
+    if keep_going and real_time is None:
+        raise UserError(f"{KEEP_GOING}: is not allowed in lockstep, where a run is to repeat; must go with {REAL_TIME}")
+    if keep_going and bus is BusName.local:
+        raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
-    drive = Lockstep() if real_time is None else ByWallClock(real_time)
+    drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:

@@ -102,18 +102,20 @@ class StatusLines:
 
 
 class ChildProcess:
-    """Starts the program `secondlook.launch.child_program` as it is told. What it prints goes to `<folder>/<host>.txt`.
+    """Starts the program `secondlook.launch.child_program` as it is told. What it prints is added to
+    `<folder>/<host>.txt`.
 
     `status` is what it says.
     """
 
     def __init__(self, setup: ChildSetup, folder: Path) -> None:
         self.host = setup.host
+        self._began_s = time.monotonic()
         self._log = folder / f"{setup.host}.txt"
         read_fd, child_fd = os.pipe()
         self.status = StatusLines(read_fd)
         try:
-            with self._log.open("wb") as log:
+            with self._log.open("ab") as log:
                 self._process = subprocess.Popen(
                     # -P: a file of the user's in the working directory must not shadow a room of the same name.
                     # Run and host are there for whoever looks at the list of processes.
@@ -136,6 +138,11 @@ class ChildProcess:
     def pid(self) -> int:
         """Its process id."""
         return self._process.pid
+
+    @property
+    def lived_s(self) -> float:
+        """How long ago it was started, in seconds of wall time."""
+        return time.monotonic() - self._began_s
 
     def tell(self, line: str) -> None:
         """Writes a line to its standard input."""

@@ -118,6 +118,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
         ending=ending,
         failure=failure,
         factor=options.drive.factor,
+        restarts=run.restarts,
     )
     try:
         write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n")
@@ -140,6 +141,7 @@ def check_bodies(scenario: Scenario) -> None:
 class _Run:
     def __init__(self, scenario: Scenario, fleet: Fleet, observer: Observer, options: RunOptions) -> None:
         self.processes = 1
+        self.restarts: dict[str, int] = {}
         config = recorder_config(scenario, options.folder / "mission.rrd", options.live_pipe)
         recorder = {RECORDER: node_spec(Role.RECORDER, config)} if options.record else {}
         self._fleet = replace(fleet, specs=fleet.specs | recorder)
@@ -179,7 +181,10 @@ class _Run:
             patience_s=options.patience_s,
         ) as processes:
             self.processes = processes.count
-            return processes.run()
+            try:
+                return processes.run()
+            finally:
+                self.restarts = dict(processes.restarts)
 
 
 def _make(node_id: str, spec: NodeSpec, watchdog: Watchdog, made: Made | None) -> WatchedNode:

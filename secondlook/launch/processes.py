@@ -6,7 +6,9 @@ import secrets
 import selectors
 import shutil
 import time
+from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +19,13 @@ from comms.node import Listener
 from comms.result import BusResult, Ending
 from comms.session import PATIENCE_S
 from secondlook.fleet.build import Fleet
-from secondlook.fleet.nodes import HUB, NODES, OBSERVER, Process, hosts_of_run
+from secondlook.fleet.nodes import HUB, NODES, OBSERVER, NodeSpec, Process, hosts_of_run
 from secondlook.launch.child_process import ChildProcess, ChildSetup
 from secondlook.launch.listening_thread import ListeningThread
-from secondlook.launch.verdict import Verdict
+from secondlook.launch.revival import Revival
+from secondlook.launch.verdict import Fate, Verdict
 from secondlook.recorded.observer import RunStopped
+from viz.recorder_config import RecorderConfig
 
 POLL_EVERY_S = 0.1
 GRACE_S = 3.0  # to end by themselves, once their pipe is closed
@@ -38,8 +42,9 @@ class Processes:
 
     `logs`: a folder for what they print; no file is left there of those that print nothing. `observer` lives in this
     process, and is closed on leaving the context at the latest. `drive`: what makes time go on; raises ValueError where
-    that cannot be with this fleet. `processes`: see `hosts_of_run`. `patience_s`: wall time after which a process that
-    should say something and does not is given up.
+    that cannot be with this fleet. Where it keeps going, whoever dies is started again, all but the hub, who holds the
+    clock and the sea; `restarts` counts that by host. `processes`: see `hosts_of_run`. `patience_s`: wall time after
+    which a process that should say something and does not is given up.
     """
 
     def __init__(
@@ -63,6 +68,7 @@ class Processes:
         self._here = {one.node_id for one in fleet.roster if NODES[one.role].run is Process.LAUNCHER}
         self._to_join = {spec.host for spec in self._hosts if spec.joins}
         self._killed: set[str] = set()
+        self._revival = Revival() if drive.keeps_going else None
         self._endpoint = ""
         self._passwords = {spec.host: secrets.token_hex(16) for spec in self._hosts}
         self._patience_s = patience_s
@@ -89,6 +95,11 @@ class Processes:
         """Of each child process that is there by now, by host; may be asked from any thread."""
         return {host: child.pid for host, child in list(self._children.items())}
 
+    @property
+    def restarts(self) -> Counter[str]:
+        """How often each host was started again."""
+        return Counter() if self._revival is None else self._revival.counts
+
     def run(self) -> BusResult:
         """Starts all, waits for the run's end; raises RunFailedError, and RunStopped where the observer does."""
         self._start_all()
@@ -105,7 +116,9 @@ class Processes:
             now_s = time.monotonic()
             for host, fate in fates.items():
                 if fate is not None and host not in self._killed:
-                    self._verdict.ends(host, fate, now_s)
+                    self._bury(host, fate, now_s)
+            for host in [] if self._revival is None else self._revival.due(now_s):
+                self._start_again(host)
             if self._listening.error is not None:
                 self._verdict.says(str(self._listening.error))
             if now_s - self._hub_heard_s >= HUB_PATIENCE * self._patience_s:
@@ -134,6 +147,24 @@ class Processes:
             # Last: a session cannot be closed as long as a frozen hub holds the other end.
             self._listening.stop(GRACE_S)
 
+    def _bury(self, host: str, fate: Fate, now_s: float) -> None:
+        if self._revival is None or host == HUB or fate.exit_code == 0:
+            self._verdict.ends(host, fate, now_s)
+            return
+        child = self._children.pop(host)
+        if child.status.fileno() in self._selector.get_map():
+            self._selector.unregister(child.status)
+        child.bury()
+        sentence = self._revival.dies(host, fate, child.lived_s, now_s)
+        if sentence is not None:
+            self._verdict.says(sentence)
+
+    def _start_again(self, host: str) -> None:
+        spec = next(one for one in self._hosts if one.host == host)
+        self._start(spec, start=self.restarts[host], password=self._passwords[host])
+        if self._endpoint:
+            self._children[host].tell(self._endpoint)
+
     def _start_all(self) -> None:
         in_hub = tuple(self._in_hub)
         self._start(HostSpec(HUB, in_hub), hosts=self._hosts, passwords=self._passwords)
@@ -141,8 +172,8 @@ class Processes:
             if self._here.isdisjoint(spec.nodes):
                 self._start(spec, password=self._passwords[spec.host])
 
-    def _start(self, spec: HostSpec, **more: Any) -> None:
-        nodes = {node_id: self._fleet.specs[node_id] for node_id in spec.nodes}
+    def _start(self, spec: HostSpec, *, start: int = 0, **more: Any) -> None:
+        nodes = {node_id: _for_start(self._fleet.specs[node_id], start) for node_id in spec.nodes}
         child = ChildProcess(ChildSetup(self._setup, self._drive, spec, nodes, **more), self._logs)
         self._children[spec.host] = child
         self._selector.register(child.status, selectors.EVENT_READ, child)
@@ -173,6 +204,8 @@ class Processes:
                 child.tell("done")
             case {"alive_ms": now_ms}:
                 self._hub_alive_ms = now_ms
+            case {"failed": sentence} if self._revival is not None and child.host != HUB:
+                self._revival.says(child.host, sentence)
             case {"failed": sentence}:
                 self._verdict.says(sentence)
             case {"lost": host, "at_ms": at_ms}:
@@ -202,3 +235,13 @@ class Processes:
         for child in self._children.values():
             child.wait(deadline_s)  # whoever is late is killed on leaving the context
         return BusResult(**{**result, "ending": Ending(result["ending"])})
+
+
+def _for_start(spec: NodeSpec, start: int) -> NodeSpec:
+    """How to make a node for one of its starts, from 0: a recorder that is started again writes another file, so that
+    nothing that was recorded is lost, and shows nothing."""
+    config = spec.config
+    if start == 0 or not isinstance(config, RecorderConfig):
+        return spec
+    path = config.path.with_stem(f"{config.path.stem}-{start + 1}")
+    return replace(spec, config=replace(config, path=path, live_pipe=None))

@@ -71,6 +71,8 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
             one, other = pair["vehicles"]
             told = f"{one} and {other}: {pair['closest_m']:.1f} m at {pair['t_s']:.0f} s, less than {least_m:g} m"
             table.add_row("too close", told, style="yellow")
+    if restarts := summary.get("restarts"):
+        table.add_row("started again", ", ".join(f"{host} {count} x" for host, count in restarts.items()))
     table.add_row("files", str(folder))
     console = Console(soft_wrap=True, highlight=False)
     console.print(table)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 from importlib.metadata import version
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -24,12 +26,14 @@ def summarise(
     ending: str,
     failure: str | None = None,
     factor: float | None = None,
+    restarts: Mapping[str, int] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """summary.json's content.
 
     `result` is None for a run that was cut off: then digest and rounds are not known, and the rest is what the observer
     has heard until then. `ending`: a `comms.result.Ending`, or `failed` or `interrupted`. `failure`: the sentence that
     the run failed with. `wall_s`: start-up included. `factor`: of a run by the wall clock; None for lockstep.
+    `restarts`: how often processes that died were started again, by host.
     """
     told = observer.metrics.summary()
     closest = told.pop("closest")
@@ -44,6 +48,7 @@ def summarise(
         "digest": None if result is None else result.digest,
         "ending": ending,
         **({} if failure is None else {"failure": failure}),
+        **({"restarts": dict(restarts)} if restarts else {}),
         "time": {
             "mission_s": mission_s,
             "primary_s": told.pop("primary_s"),
