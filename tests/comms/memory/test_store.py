@@ -12,7 +12,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from comms.errors import NodeError, StoreRefusedError
@@ -64,6 +64,7 @@ def test_a_new_one_holds_nothing_and_stays_so(tmp_path: Path) -> None:
     assert store.path.stat().st_mode & 0o777 == 0o600
 
 
+@settings(max_examples=40, deadline=None)
 @given(before=ENTRIES, state=st.none() | st.binary(max_size=10_000), after=ENTRIES)
 def test_what_was_remembered_is_there_after_a_kill(
     before: list[tuple[int, bytes, int]], state: bytes | None, after: list[tuple[int, bytes, int]]
@@ -125,6 +126,7 @@ def test_a_step_that_cannot_be_written_is_the_nodes_failure(tmp_path: Path) -> N
             remember(store, 1)
 
 
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_one_that_is_cut_short_is_refused(data: st.DataObject) -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -137,6 +139,7 @@ def test_one_that_is_cut_short_is_refused(data: st.DataObject) -> None:
         assert refusal(Path(folder)).startswith("is cut short or damaged: ")
 
 
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_where_the_newest_commits_are_cut_off_those_before_are_there(data: st.DataObject) -> None:
     with tempfile.TemporaryDirectory() as folder:
@@ -151,6 +154,7 @@ def test_where_the_newest_commits_are_cut_off_those_before_are_there(data: st.Da
         assert journal == entries[: len(journal)]
 
 
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_a_damaged_byte_is_noticed_or_does_no_harm(data: st.DataObject) -> None:
     with tempfile.TemporaryDirectory() as folder:

@@ -186,3 +186,26 @@ def test_the_silent_are_those_of_whom_nothing_was_heard_for_so_long() -> None:
     assert told.silent(10.0, 10.0) == ["beta", "observer"]
     told.done("beta", LastWord())
     assert told.silent(15.0, 10.0) == ["alpha", "observer"]
+
+
+def test_where_all_were_started_again_the_mission_goes_on_from_what_one_remembers() -> None:
+    told = clock()
+    told.hello("alpha", hello(welcomed=False, now_ms=42_000), 1.0)
+    told.hello("beta", hello(welcomed=False, now_ms=43_000), 1.0)
+    for host in HOSTS:
+        told.hello(host, hello(), 2.0)
+        assert told.phase == Phase.WAITING
+        told.notices.clear()
+        told.pass_time(2.0)
+    assert (phase(told), told.taken_up, told.time.now_ms(3.0)) == (Phase.RUNNING, True, 53_000)
+    assert told.notices == ["all are here, the mission goes on at 43 s"]
+
+
+def test_who_knows_the_time_knows_it_better_than_who_remembers() -> None:
+    told = clock()
+    told.hello("alpha", hello(welcomed=False, now_ms=42_000), 1.0)
+    told.hello("beta", hello(now_ms=60_000), 2.0)
+    assert (phase(told), told.time.now_ms(2.0)) == (Phase.RUNNING, 60_000)
+    told.hello("observer", hello(welcomed=False, now_ms=90_000), 3.0)
+    told.hello("observer", hello(), 3.1)
+    assert told.time.now_ms(3.0) == 70_000
