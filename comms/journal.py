@@ -24,7 +24,7 @@ MOST_TRIES = 3  # to get what a tally tells of, where answers come but something
 
 class Journal:
     """What one incarnation of a sender has said, as far as the topic table says that it is kept; `tallies`: of each key
-    expression; `said`: how many messages of each topic, also of those that are not kept."""
+    expression; `said`: how many messages of each topic."""
 
     def __init__(self, incarnation: int = 0) -> None:
         self.incarnation = incarnation
@@ -33,13 +33,12 @@ class Journal:
         self.said: Counter[str] = Counter()
 
     def add(self, sent: Outgoing) -> None:
-        """The sender's next message: each has to be told, also those that are not kept."""
+        """The sender's next message."""
         topic = sent.route.topic
         self.said[topic.name] += 1
+        expression = topic.expression(topic.vehicle_of(sent.key))
         gain = self.kept.add(topic, sent.key, sent.payload)
-        if gain:
-            expression = topic.expression(topic.vehicle_of(sent.key))
-            self.tallies[expression] = self.tallies.get(expression, 0) + gain
+        self.tallies[expression] = self.tallies.get(expression, 0) + gain
 
 
 @dataclass
@@ -63,8 +62,6 @@ class HeardMessages:
         sender = self._sender(header.sender, header.incarnation)
         if sender is None:
             return False
-        if topic.keep is Keep.NOTHING:
-            return True
         gain = self._gain(sender, topic, received.key, header)
         sender.sums[topic.expression(received.vehicle)] += gain
         return gain > 0
@@ -78,7 +75,7 @@ class HeardMessages:
         return joined
 
     def has(self, received: Received) -> bool:
-        """Whether a message that is kept has come, or one in its place that is as new or newer."""
+        """Whether a message has come, or one in its place that is as new or newer."""
         header, topic = received.header, received.topic
         sender = self._senders.get(header.sender)
         if sender is None or sender.incarnation != header.incarnation:
@@ -90,7 +87,7 @@ class HeardMessages:
     def has_room(self, received: Received) -> bool:
         """Whether there is room to remember a message: no mission says as much as there is room for."""
         sender = self._senders.get(received.header.sender)
-        if sender is None or sender.incarnation != received.header.incarnation or received.topic.keep is Keep.NOTHING:
+        if sender is None or sender.incarnation != received.header.incarnation:
             return True
         if received.topic.keep is Keep.EVENTS:
             return len(sender.events[received.topic.name]) < MOST_HEARD

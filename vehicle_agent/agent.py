@@ -85,7 +85,8 @@ class Agent:
             self.on_run(message, now_ms)
         elif self.coverage is not None and not self._over:
             if isinstance(message, Look):
-                self._hear_look(message, received.header.incarnation, now_ms)
+                if received.header.sent_ms >= self._started_ms:  # else its predecessor's, who has told of it
+                    self._hear_look(message, received.header.incarnation, now_ms)
             elif isinstance(message, ManeuverStatus):
                 if self.maneuver is not None and message.number == self.maneuver.number:
                     self._word_due_ms = _next_word_due_ms(message)

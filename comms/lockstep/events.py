@@ -38,8 +38,8 @@ class Join:
     """The node is absent until `at_ms`; or, after a `Kill`, it comes back then: started anew or, with `memory`, as it
     was.
 
-    What it missed it is given as the topic table says: the latest message of a key, all of them, or none. To one that
-    was started anew it is news from the mission's start on.
+    What it missed it is given as the topic table says: the latest message of a key, or all of them. To one that was
+    started anew all since the mission's start is news.
     """
 
     node_id: str

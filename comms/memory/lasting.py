@@ -37,7 +37,7 @@ log = logging.getLogger("secondlook.comms")
 
 
 class Handled:
-    """What of the messages that their senders keep a node has handled, of each start of a sender by itself."""
+    """Which messages a node has handled, of each start of a sender by itself."""
 
     def __init__(self) -> None:
         self._starts: dict[str, dict[int, HeardMessages]] = {}
@@ -50,7 +50,7 @@ class Handled:
             del starts[min(starts)]
 
     def has(self, received: Received) -> bool:
-        """Whether the node has handled it, or a newer one in its place; False of what nobody keeps."""
+        """Whether the node has handled it, or a newer one in its place."""
         heard = self._starts.get(received.header.sender, {}).get(received.header.incarnation)
         return heard is not None and heard.has(received)
 

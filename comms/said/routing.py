@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from comms.said.announcement import Role
-from comms.said.topics import TOPICS, Keep, Reach, Topic, topic_of
+from comms.said.topics import TOPICS, Reach, Topic, topic_of
 from comms.said.wire import IDENTIFIER
 
 MOST_ROUTES = 100_000  # that are remembered by their key
@@ -59,7 +59,7 @@ class Routing:
                 writers = self._who(topic, topic.writers, vehicle)
                 if len(writers) > 1:
                     raise ValueError(f"{topic.name} of {vehicle or 'the fleet'} has two writers: {', '.join(writers)}")
-                if writers and topic.keep is not Keep.NOTHING:
+                if writers:
                     self._kept_by.setdefault(writers[0], set()).add(topic.expression(vehicle))
 
     @cached_property

@@ -44,11 +44,10 @@ class Reach(enum.Enum):
 
 
 class Keep(enum.Enum):
-    """What a late joiner is given: the latest message of each key, every message in order, or nothing."""
+    """What a late joiner, or one that goes on, is given: the latest message of each key, or every message in order."""
 
     LATEST = "latest"
     EVENTS = "events"
-    NOTHING = "nothing"
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ NAV = Topic(
 )  # fmt: skip
 LOOK = Topic(
     "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | {Role.OBSERVER: Reach.ALL}, 150_000, 0.2,
-    Keep.NOTHING, crosses_water=False,
+    Keep.EVENTS, crosses_water=False,
 )  # fmt: skip
 MANEUVER_STATUS = Topic(
     "maneuver_status", "veh/{vehicle}/maneuver_status", ManeuverStatus, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 400, 0.1,

@@ -109,7 +109,7 @@ class Seat(Protocol):
         """By node id, what is kept for others."""
 
     def handled(self) -> HeardMessages:
-        """What of the messages that their senders keep need not come again."""
+        """Which messages need not come again."""
 
     def end(self) -> None:
         """The mission is over for those here: nobody is to take them up. Raises NodeError."""

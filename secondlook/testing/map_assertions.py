@@ -99,12 +99,12 @@ def _own_layer_is_told(flight: Flight, vehicle: str, life: Life) -> list[str]:
 
 
 def _summed_up(flight: Flight, vehicle: str, life: Life, until_ms: int) -> RiskLayer:
-    """The looks that reached an agent until then."""
+    """The looks since its start that reached an agent until then."""
     own = CoverageLayer(vehicle, flight.run.grid.spec)
     taken: set[tuple[int, int]] = set()
     for due_ms, one in reached(flight, vehicle, life):
         look = one.message
-        if isinstance(look, Look) and look.valid and due_ms <= until_ms:
+        if isinstance(look, Look) and look.valid and one.header.sent_ms >= life.start_ms and due_ms <= until_ms:
             name = one.header.incarnation, look.number
             if name not in taken:  # one that is delivered twice is one look
                 taken.add(name)

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from comms.journal import MOST_TRIES, HeardMessages, Journal
 from comms.node import Publication, Received
 from comms.runner import Intake, Stamp
-from comms.said.codec import Header, decode
+from comms.said.codec import decode
 from comms.said.messages import Contact
 from comms.said.routing import Routing
-from comms.said.topics import CONTACT, LOOK, STATE, topic_of
+from comms.said.topics import CONTACT, STATE, topic_of
 
 ROUTING = Routing(ROSTER)
 
@@ -111,14 +111,6 @@ def test_a_new_incarnation_is_heard_from_its_beginning_and_the_old_one_no_more()
     assert new.missing(receiver) == []
     new.say(say_state("alpha", 3))
     assert new.missing(receiver) == [STATE.expression("alpha")]
-
-
-def test_what_is_not_kept_is_always_news_and_never_missing() -> None:
-    assert LOOK.keep.value == "nothing"
-    look = Received(LOOK.key(vehicle="alpha"), LOOK, "alpha", Header("world", 0, 4, 0), say_state("alpha").message)
-    receiver = HeardMessages()
-    assert receiver.add(look)
-    assert receiver.add(look)
 
 
 def test_a_sender_that_cannot_give_what_it_tells_of_is_asked_a_few_times_only() -> None:

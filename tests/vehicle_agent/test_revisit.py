@@ -250,6 +250,18 @@ class TestTheSweep:
         assert agent.last(TaskStatus).progress == 0
         assert agent.all(CoverageTile)  # but coverage it is
 
+    def test_a_look_from_before_its_start_is_its_predecessors(self) -> None:
+        config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
+        agent = OneNode(RevisitAgent(config), Role.REVISIT, now_ms=30_000)
+        agent.hear("run", RUN, at_ms=30_001, sent_ms=0)
+        seen = look(Maneuver(1, ManeuverKind.FOLLOW, 50, 0, 50, 200, 5), 1, 0, 10, SEES_25_M)
+        agent.hear(f"veh/{HELPER}/look", seen, sent_ms=29_999)
+        agent.wait(30)
+        assert not agent.all(CoverageTile)
+        agent.hear(f"veh/{HELPER}/look", seen, sent_ms=30_000)
+        agent.wait(30)
+        assert agent.all(CoverageTile)
+
     def test_the_tiles_go_out_before_it_says_that_it_is_done(self) -> None:
         agent = revisit()
         tell(agent, STRIP)
