@@ -146,11 +146,11 @@ class WallClock:
             self._greet(host, known, hello, now_s)
 
     def gone(self, host: str, instance: str) -> None:
-        """The connection of a process is gone; one that takes no part is not missed."""
+        """The connection of a process is gone; one that takes no part is not missed. At the end it is waited for a
+        while as if it were there: it may be started again."""
         known = self._hosts.get(host)
         if known is not None and known.instance == instance and known.last_word is None:
             known.instance, known.ready = "", False
-            known.heard_s -= HERE_S
             self.notices.append(f"{host} is gone")
 
     def is_done(self, host: str) -> bool:

@@ -145,7 +145,9 @@ def router(
     restart: RestartOption = Restart.never,
 ) -> None:
     """What all others connect to: it routes, holds the clock and announces the run."""
-    check_endpoint("--listen", listen, insecure=insecure, any_port=restart is Restart.never)
+    check_endpoint("--listen", listen, insecure=insecure, any_port=True)
+    if restart is Restart.on_failure and listen.endswith(":0"):
+        raise UserError(f"--listen {listen}: is another port at each start; {RESTART} needs one that stays")
     _supervise_if_asked("router", restart)
     check_factor("--factor", factor)
     mission = load_scenario(scenario, set_ or (), seed)

@@ -170,6 +170,8 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
         failure=failure,
         factor=outcome.factor,
     )
+    if failure is None and summary["risk"] is None:  # of one that was started again at the very end, say
+        failure = "the mission was over before anything was heard of it"
     try:
         write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
         write_report(folder)

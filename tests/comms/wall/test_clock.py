@@ -209,3 +209,18 @@ def test_who_knows_the_time_knows_it_better_than_who_remembers() -> None:
     told.hello("observer", hello(welcomed=False, now_ms=90_000), 3.0)
     told.hello("observer", hello(), 3.1)
     assert told.time.now_ms(3.0) == 70_000
+
+
+def test_who_is_gone_at_the_end_is_waited_for_a_while_as_it_may_be_started_again() -> None:
+    told = under_way()
+    told.hello("alpha", hello(), 1.0)
+    told.hello("beta", hello(), 1.0)
+    told.over(5_000)
+    told.pass_time(1.5)
+    told.gone("alpha", "1")
+    told.pass_time(1.5 + WRAP_UP_S)
+    told.done("beta", LastWord())
+    told.pass_time(1.0 + HERE_S - 0.1)
+    assert phase(told) == Phase.ENDING
+    told.pass_time(1.0 + HERE_S)
+    assert phase(told) == Phase.CLOSING

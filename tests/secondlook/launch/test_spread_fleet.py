@@ -161,6 +161,10 @@ TLS = ("--tls-ca", "ca.pem", "--tls-cert", "cert.pem", "--tls-key", "key.pem")
             "--run a/b: is not allowed; must be at most 64 of a-z, 0-9, _ and -",
         ),
         (
+            ("router", "brief.yaml", "--listen", "tcp/127.0.0.1:0", "--restart", "on-failure"),
+            "--listen tcp/127.0.0.1:0: is another port at each start; --restart needs one that stays",
+        ),
+        (
             ("router", "brief.yaml", "--listen", "tcp/127.0.0.1:7447", "--factor", "0"),
             "--factor 0: is not allowed; must be above 0, at most 1000",
         ),
