@@ -90,6 +90,7 @@ class Flight:
         self._scenario = scenario
         self._routing = Routing(build_fleet(scenario, record=True).roster)
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        self._heard_live: dict[tuple[str, bytes], Received] = {}
         self._options = [source, *(word for one in settings for word in ("--set", one)), "--run", "bench"]
         with socket.socket() as free:
             free.bind(("127.0.0.1", 0))
@@ -180,6 +181,7 @@ class Flight:
             below = key.removeprefix(keys.root)
             received = None if below.startswith("clock/") else intake.open(below, payload)
             if received is not None:
+                self._heard_live[below, payload] = received
                 heard.put(received)
 
         with open_guest(self._endpoint, None, None, within_s=30.0) as session:
@@ -197,7 +199,7 @@ class Flight:
             if code:
                 outcome.problems.append(f"{name}: {(self._said(name).splitlines() or ['no word'])[-1]}")
         records = sorted(path.parent for path in self._folder.glob("record*/messages.mpk"))
-        heard: dict[tuple[str, bytes], Received] = {}
+        heard = dict(self._heard_live)
         intake = Intake(self._routing)
         for record in records:
             for key, payload in read_messages(record / "messages.mpk"):
@@ -212,7 +214,8 @@ class Flight:
         anew = {one.sender for one in heard if one.header.incarnation > 0}
         outcome.problems += [f"{sender} began anew" for sender in sorted(anew)]
         strips = {one.number for one in heard if isinstance(one.message, StripStatus)}
-        if strips != set(range(1, len(strips) + 1)):
+        first = min(strips, default=1)
+        if strips != set(range(first, first + len(strips))):
             outcome.problems.append("strips are missing")
         outcome.risk = risk_of(heard, self._scenario)
 

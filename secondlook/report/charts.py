@@ -46,7 +46,8 @@ def risk_series(mission: RecordedMission) -> RiskSeries:
     times_s = list(np.linspace(0.0, mission.end_s, count + 1))
     metrics = Metrics()
     samples: list[RiskSample] = []
-    for received in mission.received(RunInfo, CoverageTile):
+    # In the order of sending: a recorder that came late has heard of the run after other things.
+    for received in sorted(mission.received(RunInfo, CoverageTile), key=lambda one: one.header.order):
         while received.header.sent_ms / 1000 > times_s[len(samples)]:
             samples.append(_sample(metrics, times_s[len(samples)]))
         metrics.hear(received)
