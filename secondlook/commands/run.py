@@ -142,16 +142,7 @@ def run(
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
 ) -> None:
     """Fly a mission, and write what happened."""
-    if web and not live:
-        raise UserError("--web: says how to show a mission --live; must go with --live")
-    if live and no_record:
-        raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
-    if real_time is not None:
-        check_factor(REAL_TIME, real_time)
-    if keep_going and real_time is None:
-        raise UserError(f"{KEEP_GOING}: is not allowed in lockstep, where a run is to repeat; must go with {REAL_TIME}")
-    if keep_going and bus is BusName.local:
-        raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
+    _check(bus, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
@@ -179,6 +170,20 @@ def run(
             closing_table(summary, folder)
     if failure or unreported:
         raise typer.Exit(MISSION_FAILED)
+
+
+def _check(bus: BusName, real_time: float | None, *, keep_going: bool, live: bool, web: bool, no_record: bool) -> None:
+    """Raises UserError for options that do not go together."""
+    if web and not live:
+        raise UserError("--web: says how to show a mission --live; must go with --live")
+    if live and no_record:
+        raise UserError("--no-record: is not allowed with --live, which shows what the recorder draws")
+    if real_time is not None:
+        check_factor(REAL_TIME, real_time)
+    if keep_going and real_time is None:
+        raise UserError(f"{KEEP_GOING}: is not allowed in lockstep, where a run is to repeat; must go with {REAL_TIME}")
+    if keep_going and bus is BusName.local:
+        raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
 
 
 def _report(folder: Path) -> str:

@@ -49,12 +49,7 @@ def summarise(
         "ending": ending,
         **({} if failure is None else {"failure": failure}),
         **({"restarts": dict(restarts)} if restarts else {}),
-        "time": {
-            "mission_s": mission_s,
-            "primary_s": told.pop("primary_s"),
-            "wall_s": round(wall_s, 3),
-            "real_time_factor": round(mission_s / wall_s, 1),
-        },
+        "time": _times(mission_s, told.pop("primary_s"), wall_s),
         **told,
         "separation": {
             "least_m": scenario.mission.separation_m,
@@ -67,6 +62,15 @@ def summarise(
         "rounds": None if result is None else result.rounds,
         "messages": dict(sorted((observer.messages if result is None else result.messages).items())),
         "dropped": _dropped(observer, result, factor),
+    }
+
+
+def _times(mission_s: float, primary_s: float | None, wall_s: float) -> dict[str, float | None]:
+    return {
+        "mission_s": mission_s,
+        "primary_s": primary_s,
+        "wall_s": round(wall_s, 3),
+        "real_time_factor": round(mission_s / wall_s, 1),
     }
 
 
