@@ -32,7 +32,7 @@ from secondlook.fleet.nodes import (
     make_nodes,
     node_spec,
 )
-from secondlook.launch.mission import not_over, recorder_config
+from secondlook.launch.mission import not_over, recorder_config, warn_of_pairs
 from secondlook.launch.run_display import closing_table
 from secondlook.launch.signals import signals_ask
 from secondlook.recorded.observer import Observer
@@ -142,6 +142,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
         failure=failure,
         factor=outcome.factor,
     )
+    warn_of_pairs(summary)
     try:
         write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
         write_report(folder)
