@@ -5,7 +5,7 @@ from __future__ import annotations
 from comms.said.messages import StripState
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
-from coordinator.cut.strips import Cut
+from coordinator.cut.strips import Counted
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.vehicles import KnownVehicle
@@ -53,7 +53,7 @@ class Briefing:
         """A strip as an allocator sees it."""
         return self.as_open(record.strip, record.cut)
 
-    def as_open(self, strip: Strip, cut: Cut) -> OpenStrip:
+    def as_open(self, strip: Strip, cut: Counted) -> OpenStrip:
         """The same of one that is not open yet."""
         return OpenStrip(strip, cut.counts_m2 / self._p_detect)
 

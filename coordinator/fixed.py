@@ -67,7 +67,8 @@ class Lanes:
             if all(one is not None and one.state in (StripState.DONE, StripState.FAILED) for one in records):
                 first = ledger.next_number
                 for lane in lanes:
-                    self._strips.open(Cut(lane, self._removable_m2(lane), 0.0, foreseen=True), now_ms, "a lane")
+                    cut = Cut(lane, counts_m2=0.0, removable_m2=self._removable_m2(lane), foreseen=True)
+                    self._strips.open(cut, now_ms, "a lane")
                 self.routes.routes[name] = list(range(first, ledger.next_number))
                 self._lanes[name] = lanes[::-1]
 

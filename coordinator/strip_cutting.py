@@ -14,7 +14,7 @@ from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.cutter import Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.strips import Cut, CuttingRules
+from coordinator.cut.strips import Counted, CuttingRules
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE
@@ -66,7 +66,7 @@ class StripCutting:
         helpers, grid = self._briefing.helpers(now_ms), self._fleet.map.grid
         deadline_s = min(self._briefing.expected_deadline_s(), now_ms / 1000 + HORIZON_S)
 
-        def flown(cuts: Sequence[Cut]) -> Mapping[int, float]:
+        def flown(cuts: Sequence[Counted]) -> Mapping[int, float]:
             if not helpers:
                 return dict.fromkeys(range(len(cuts)), 1.0)
             strips = [self._briefing.as_open(cut.strip(grid, place), cut) for place, cut in enumerate(cuts)]

@@ -104,7 +104,7 @@ class Across:
     ) -> None:
         self.step_m = max(1, math.ceil(width_m / MOST_BINS))
         self._bins = max(1, math.ceil(width_m / self.step_m))
-        self._rho, self._helpers = rho, helpers
+        self._width_m, self._rho, self._helpers = width_m, rho, helpers
         # What a track leaves and sees, by how far to its right the first bin lies: rows are views of one table each.
         self._farthest = self._bins + math.ceil(float(curve.range_m[-1]) / self.step_m) + 1
         begin_m = np.arange(-self._farthest, self._farthest + self._bins, dtype=np.float64) * self.step_m
@@ -124,10 +124,15 @@ class Across:
             len(flown),
         )
         self._asked = self._flown.seen
+        self._first, self._last = 0, math.floor(width_m / self.step_m)  # bins between which tracks may be moved
 
     def ask_for(self, tracks: Sequence[Measured]) -> None:
-        """Whatever these tracks see is asked of every plan."""
+        """Whatever these tracks see is asked of every plan, whose tracks lie within the width or no farther outside
+        than these do."""
         self._asked = self._levels_of(tracks)
+        outermost_m = [0.0, self._width_m, *(one.across_m for one in tracks)]
+        self._first = math.ceil(min(outermost_m) / self.step_m)
+        self._last = math.floor(max(outermost_m) / self.step_m)
 
     def lost_m(self, tracks: Sequence[Measured]) -> float:
         """How much of what is asked is missed by the tracks flown and these."""
@@ -154,14 +159,15 @@ class Across:
 
     def refined(self, bins: Sequence[int]) -> list[int]:
         """The tracks moved, one by one and several together, as long as that is better."""
-        found, worth = sorted(bins), self.worth(bins)
+        found = sorted(np.clip(np.array(bins, dtype=np.intp), self._first, self._last).tolist())
+        worth = self.worth(found)
         movable = min(len(found), MOST_MOVED)
         moves, fixed = _moves(movable), self._after(self._flown, found[movable:])
         tried = in_vain = 0
         while in_vain < len(moves) and tried < MOST_ROUNDS * len(moves):
             group, shifts = moves[tried % len(moves)]
             others = self._after(fixed, [found[index] for index in range(movable) if index not in group])
-            moved = np.array([found[index] for index in group]) + shifts
+            moved = np.clip(np.array([found[index] for index in group]) + shifts, self._first, self._last)
             best, its_worth = self._best(others, moved, worth)
             tried, in_vain = tried + 1, in_vain + 1
             if its_worth.is_better(worth):
@@ -172,7 +178,7 @@ class Across:
 
     def with_one_more(self, bins: Sequence[int]) -> list[int]:
         """These and the track beside them that is worth most."""
-        places = np.arange(0, self._bins + 1, COARSE)[:, np.newaxis]
+        places = np.arange(self._first, self._last + 1, COARSE)[:, np.newaxis]
         best, _ = self._best(self._after(self._flown, bins), places, Worth(math.inf, math.inf))
         return sorted([*bins, int(places[best, 0])])
 

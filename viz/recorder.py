@@ -18,12 +18,12 @@ from comms.said.messages import (
     Message,
     Nav,
     Plan,
-    StripStatus,
     TaskStatus,
     TruthLook,
     TruthPose,
     TruthTargets,
 )
+from comms.strip_books import StripBooks
 from viz import palette, paths
 from viz.blueprint import mission_blueprint
 from viz.canvas import Canvas
@@ -84,6 +84,7 @@ class _Mission:
         self._story = config.story()
         self._table = TaskTable(canvas, run)
         self._second_looks = SecondLooks(canvas, extent)
+        self._books = StripBooks()
         self._time_ms = -1
         fleet, curves, truth = Fleet(canvas, run, extent), Curves(canvas, run, config.thresholds), Truth(canvas)
         self._draw: dict[type[Message], tuple[Callable[[Received, Any], None], ...]] = {
@@ -94,12 +95,12 @@ class _Mission:
             TaskStatus: (fleet.on_task_status, self._table.on_task_status),
             Contact: (fleet.on_contact,),
             Hotspot: (self._second_looks.on_hotspot,),
-            StripStatus: (self._second_looks.on_strip, self._table.on_strip),
             Curve: (curves.on_curve,),
             TruthTargets: (truth.on_targets,),
             TruthLook: (truth.on_look,),
             TruthPose: (truth.on_pose,),
         }
+        self._draw |= dict.fromkeys(StripBooks.telling, (self._on_strips,))
         for one in self._story.telling:
             self._draw[one] = (*self._draw.get(one, ()), self._tell)
 
@@ -122,6 +123,11 @@ class _Mission:
         self._second_looks.finish()
         self._table.finish()
         self._put_lines(self._story.rest())
+
+    def _on_strips(self, received: Received, message: Message) -> None:
+        for one in self._books.hear(received):
+            self._second_looks.on_strip(one, one.message)
+            self._table.on_strip(one, one.message)
 
     def _tell(self, received: Received, message: Message) -> None:
         self._put_lines(self._story.tell(received))

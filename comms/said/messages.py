@@ -263,6 +263,11 @@ class StripState(enum.Enum):
     FAILED = "failed"
     WITHDRAWN = "withdrawn"
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether nothing becomes of the strip any more."""
+        return self in (StripState.DONE, StripState.FAILED, StripState.WITHDRAWN)
+
 
 @dataclass(frozen=True, slots=True)
 class StripStatus:

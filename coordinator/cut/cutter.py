@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from coordinator.cut.ground import Ground
-from coordinator.cut.strips import Cut, CuttingRules, cells_wide, cut_windows
+from coordinator.cut.strips import Counted, Cut, CuttingRules, cells_wide, cut_windows
 from coordinator.cut.window import Window
 from planner.types import GridSpec
 
@@ -22,7 +22,7 @@ STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be
 TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
 BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
 
-Flown = Callable[[Sequence[Cut]], Mapping[int, float]]
+Flown = Callable[[Sequence[Counted]], Mapping[int, float]]
 """Tells how far helpers come in time: by its place in these strips the share that they fly of each, if any."""
 
 
@@ -77,33 +77,31 @@ class Cutter:
     def _best(self, left: Ground, time_m: float, opened: Sequence[Window], flown: Flown) -> tuple[list[Window], Ground]:
         """The windows by which helpers leave least, those of the open strips or some cut anew, and the ground as they
         leave it."""
-        stay = [one.window for one in self._cuts(left, opened) if one.counts_m2 > self._kept.least_m2(one.window)]
-        best, before_m2, kept = stay, left.left_m2(), self._kept
-        after, rest_m2 = self._flown(left, best, flown)
+        stay = _counted(left, opened, self._kept.least_m2)
+        best, before_m2, kept = [one.window for one in stay], left.left_m2(), self._kept
+        after, rest_m2 = self._flown(left, stay, flown)
         most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
         for way in self._ways:
-            anew = way.windows(left, time_m)
+            anew = _counted(left, way.windows(left, time_m))
             after_anew, rest_m2 = self._flown(left, anew, flown)
             gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
             if gained_m2 > most_m2 or not best:
-                most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
+                most_m2, best, after, self._kept = gained_m2, [one.window for one in anew], after_anew, way
         return best, after
 
-    def _flown(self, ground: Ground, windows: Sequence[Window], flown: Flown) -> tuple[Ground, float]:
+    def _flown(self, ground: Ground, blocks: Sequence[Counted], flown: Flown) -> tuple[Ground, float]:
         """The ground as helpers leave it that fly some windows by the best routes, and what is left of the objective
         with what their metres cost at least."""
-        cuts = self._cuts(ground, windows)
         after, least_m2 = ground.copy(), 0.0
-        for place, share in flown(self._in_cells(cuts)).items():
-            after.fly(windows[place], share)
-            least_m2 += share * self._kept.least_m2(windows[place])
+        in_cells = [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in blocks]
+        for place, share in flown(in_cells).items():
+            window = blocks[place].window
+            after.fly(window, share)
+            least_m2 += share * self._kept.least_m2(window)
         return after, after.left_m2() + least_m2
 
-    def _in_cells(self, cuts: Sequence[Cut]) -> list[Cut]:
-        return [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in cuts]
-
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
-        """What windows bring if they are flown one after the other."""
+        """What windows of cells bring if they are flown one after the other."""
         left, found = ground.copy(), list[Cut]()
         for window in windows:
             cells = window.cells
@@ -111,9 +109,23 @@ class Cutter:
             counts_m2 = float(worth.sum())
             removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * self._cell_area_m2
             foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
-            found.append(Cut(window, removed_m2, counts_m2, foreseen))
+            found.append(Cut(window, counts_m2, removed_m2, foreseen))
             left.fly(window)
         return found
+
+
+def _counted(
+    ground: Ground, windows: Sequence[Window], least_m2: Callable[[Window], float] | None = None
+) -> list[Counted]:
+    """What windows count if they are flown one after the other; one that counts no more than `least_m2` says is left
+    out, and not flown."""
+    left, found = ground.copy(), list[Counted]()
+    for window in windows:
+        counts_m2 = float(left.worth(window.cells).sum())
+        if least_m2 is None or counts_m2 > least_m2(window):
+            found.append(Counted(window, counts_m2))
+            left.fly(window)
+    return found
 
 
 class OneHeading:

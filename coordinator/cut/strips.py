@@ -36,20 +36,25 @@ class CuttingRules:
 
 
 @dataclass(frozen=True)
-class Cut:
-    """A strip's window and the risk that one look along it is expected to remove (residual risk times m2); `counts_m2`:
-    what that counts in the objective. `foreseen`: whether most of that is expected, and not seen yet; `why`: what makes
-    it so, in words."""
+class Counted:
+    """A strip's window, and what one look along it counts in the objective (residual risk times m2)."""
 
     window: Window
-    removable_m2: float
     counts_m2: float
-    foreseen: bool = False
-    why: str = ""
 
     def strip(self, grid: GridSpec, number: int) -> Strip:
         """The strip that it becomes under a number."""
         return strip_of(grid, self.window, number)
+
+
+@dataclass(frozen=True)
+class Cut(Counted):
+    """The same and the risk that the look is expected to remove (residual risk times m2). `foreseen`: whether most of
+    what it counts is expected, and not seen yet; `why`: what makes it so, in words."""
+
+    removable_m2: float
+    foreseen: bool = False
+    why: str = ""
 
 
 def cut_windows(

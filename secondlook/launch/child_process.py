@@ -15,8 +15,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from comms.drive import Drive, Setup
-from comms.errors import one_line
+from comms.errors import NodeError, one_line
 from comms.keys import HostSpec
+from secondlook.files import CannotWriteError
 from secondlook.fleet.nodes import NodeSpec
 from secondlook.launch.verdict import Fate
 
@@ -105,7 +106,8 @@ class ChildProcess:
     """Starts the program `secondlook.launch.child_program` as it is told. What it prints is added to
     `<folder>/<host>.txt`.
 
-    `status` is what it says.
+    `status` is what it says. Raises CannotWriteError where its log cannot be written, and NodeError where the system
+    starts no more processes.
     """
 
     def __init__(self, setup: ChildSetup, folder: Path) -> None:
@@ -115,24 +117,37 @@ class ChildProcess:
         read_fd, child_fd = os.pipe()
         self.status = StatusLines(read_fd)
         try:
-            with self._log.open("ab") as log:
-                self._process = subprocess.Popen(
-                    # -P: a file of the user's in the working directory must not shadow a room of the same name.
-                    # Run and host are there for whoever looks at the list of processes.
-                    [sys.executable, "-P", "-m", "secondlook.launch.child_program", setup.setup.run, setup.host],
-                    stdin=subprocess.PIPE,
-                    stdout=log,
-                    stderr=log,
-                    pass_fds=(child_fd,),
-                    env={**os.environ, STATUS_FD: str(child_fd), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-                    start_new_session=True,
-                )
+            self._process = self._started(setup, child_fd)
+        except BaseException:
+            self.status.close()
+            raise
         finally:
             os.close(child_fd)
         assert self._process.stdin is not None
         self._stdin = self._process.stdin
         with contextlib.suppress(OSError):  # a child that dies at once is noticed by its end
             send_setup(self._stdin, setup)
+
+    def _started(self, setup: ChildSetup, status_fd: int) -> subprocess.Popen[bytes]:
+        try:
+            log = self._log.open("ab")
+        except OSError as error:
+            raise CannotWriteError(self._log, error) from error
+        with log:
+            try:
+                return subprocess.Popen(
+                    # -P: a file of the user's in the working directory must not shadow a room of the same name.
+                    # Run and host are there for whoever looks at the list of processes.
+                    [sys.executable, "-P", "-m", "secondlook.launch.child_program", setup.setup.run, setup.host],
+                    stdin=subprocess.PIPE,
+                    stdout=log,
+                    stderr=log,
+                    pass_fds=(status_fd,),
+                    env={**os.environ, STATUS_FD: str(status_fd), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+                    start_new_session=True,
+                )
+            except OSError as error:
+                raise NodeError(f"{self.host} cannot be started: {error.strerror}") from error
 
     @property
     def pid(self) -> int:

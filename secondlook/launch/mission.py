@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -94,32 +94,21 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
     observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
     run = _Run(scenario, fleet, observer, options)
-    result, failure = None, None
-    try:
-        with signals_interrupt(), log_to_file(options.folder / LOGS / "launcher.txt"):
-            result = run.on_local() if options.bus == "local" else run.on_zenoh()
-    except (NodeError, RunawayError, RunFailedError) as error:
-        ending, failure = "failed", str(error)
-    except RunStopped:
-        ending = "stopped"
-    except KeyboardInterrupt:
-        ending, failure = "interrupted", f"interrupted at {observer.metrics.now_ms / 1000:.0f} s of the mission"
-    else:
-        ending = result.ending.value
-        if result.ending is not Ending.OVER:
-            failure = not_over(result, scenario)
-    summary = summarise(
-        scenario,
-        observer,
-        result,
-        bus=options.bus,
-        processes=run.processes,
-        wall_s=time.perf_counter() - began_s,
-        ending=ending,
-        failure=failure,
-        factor=options.drive.factor,
-        restarts=run.restarts,
-    )
+    with log_to_file(options.folder / LOGS / "launcher.txt"):
+        result, ending, failure = run.fly()
+        summary = summarise(
+            scenario,
+            observer,
+            result,
+            bus=options.bus,
+            processes=run.processes,
+            wall_s=time.perf_counter() - began_s,
+            ending=ending,
+            failure=failure,
+            factor=options.drive.factor,
+            restarts=run.restarts,
+        )
+        warn_of_pairs(summary)
     try:
         write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     except CannotWriteError as error:
@@ -127,6 +116,22 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     if failure is not None:
         raise RunFailedError(failure)
     return summary
+
+
+def warn_of_pairs(summary: Mapping[str, Any]) -> None:
+    """One warning in the log for each two vehicles that came nearer to each other than `mission.separation_m`."""
+    least_m = summary["separation"]["least_m"]
+    for pair in summary["separation"]["closest"]:
+        if pair["closest_m"] < least_m:
+            one, other = pair["vehicles"]
+            log.warning(
+                "%s and %s came within %.1f m of each other at %.0f s, less than the %g m of mission.separation_m",
+                one,
+                other,
+                pair["closest_m"],
+                pair["t_s"],
+                least_m,
+            )
 
 
 def check_bodies(scenario: Scenario) -> None:
@@ -142,13 +147,27 @@ class _Run:
     def __init__(self, scenario: Scenario, fleet: Fleet, observer: Observer, options: RunOptions) -> None:
         self.processes = 1
         self.restarts: dict[str, int] = {}
+        self._scenario = scenario
         config = recorder_config(scenario, options.folder / "mission.rrd", options.live_pipe)
         recorder = {RECORDER: node_spec(Role.RECORDER, config)} if options.record else {}
         self._fleet = replace(fleet, specs=fleet.specs | recorder)
         self._observer = observer
         self._options = options
 
-    def on_local(self) -> BusResult:
+    def fly(self) -> tuple[BusResult | None, str, str | None]:
+        """What the bus reports, where the run was not cut off; how it ended; and why it failed, if it has."""
+        try:
+            with signals_interrupt():
+                result = self._on_local() if self._options.bus == "local" else self._on_zenoh()
+        except (NodeError, RunawayError, RunFailedError) as error:
+            return None, "failed", str(error)
+        except RunStopped:
+            return None, "stopped", None
+        except KeyboardInterrupt:
+            return None, "interrupted", f"interrupted at {self._observer.metrics.now_ms / 1000:.0f} s of the mission"
+        return result, result.ending.value, None if result.ending is Ending.OVER else not_over(result, self._scenario)
+
+    def _on_local(self) -> BusResult:
         fleet, patience_s = self._fleet, self._options.patience_s
         specs = dict(fleet.specs)
         listeners = {OBSERVER: self._observer}
@@ -170,7 +189,7 @@ class _Run:
             log.error("%s; it was at", error, exc_info=error)
             raise RunFailedError(str(error)) from None
 
-    def on_zenoh(self) -> BusResult:
+    def _on_zenoh(self) -> BusResult:
         options = self._options
         with Processes(
             self._fleet,

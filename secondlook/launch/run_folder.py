@@ -38,8 +38,13 @@ def run_folder(out: Path | None, name: str) -> Path:
 
 
 class _LogFile(logging.FileHandler):
+    # It says nothing where the disk is full: of that the run's other files tell, in a sentence.
+    def emit(self, record: logging.LogRecord) -> None:
+        with contextlib.suppress(OSError):  # the file is opened here
+            super().emit(record)
+
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - its name there
-        """Says nothing where the disk is full: of that the run's other files tell, in a sentence."""
+        pass
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import math
 from collections import Counter
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,17 +16,16 @@ from comms.said.messages import (
     AgentState,
     CoverageTile,
     Look,
-    MissionOver,
     Mode,
     Nav,
     Plan,
     StripState,
     StripStatus,
-    Task,
     TruthLook,
     TruthPose,
     TruthTargets,
 )
+from comms.strip_books import StripBooks
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
@@ -36,8 +35,6 @@ from planner.types import BoolArray, FloatArray
 from secondlook.recorded.closest_approach import ClosestApproaches
 
 RISK_AT_FACTORS = (1.0, 1.05)
-CUT_ANEW = "its coordinator was started anew"
-_STILL_OPEN = (StripState.OPEN, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
 
 
 @dataclass
@@ -72,8 +69,7 @@ class StripFigures:
 
 @dataclass
 class Metrics:
-    """Hears the messages in order; may be asked at any time. `coordinators`: the newest incarnation that has said
-    anything; what those before have left counts as withdrawn."""
+    """Hears the messages in order; may be asked at any time."""
 
     now_ms: int = 0
     run: RunInfo | None = None
@@ -86,7 +82,7 @@ class Metrics:
     risk_at: list[dict[str, float]] = field(default_factory=list)
     approaches: ClosestApproaches = field(default_factory=lambda: ClosestApproaches({}))
     misfits: int = 0
-    coordinators: int = 0
+    books: StripBooks = field(default_factory=StripBooks)
 
     def hear(self, received: Received) -> None:
         """Folds one message in. What contradicts the run's announcement is counted in `misfits`."""
@@ -114,10 +110,9 @@ class Metrics:
                 vehicle.finished_ms = received.header.sent_ms
                 if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
                     vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))
-        elif isinstance(message, StripStatus | Task | MissionOver):
-            self._hear_coordinator(received.header.incarnation)
-            if isinstance(message, StripStatus):
-                self._hear_strip(received, message)
+        elif isinstance(message, StripBooks.telling):
+            for one in self.books.hear(received):
+                self._hear_strip(one, one.message)
         elif isinstance(message, TruthTargets):
             self.targets = message
         elif isinstance(message, TruthLook):
@@ -238,13 +233,6 @@ class Metrics:
         except ValueError:
             self.misfits += 1
 
-    def _hear_coordinator(self, incarnation: int) -> None:
-        if incarnation > self.coordinators:  # it was started anew, and cuts strips of its own, or none
-            self.coordinators = incarnation
-            for left in self.strips.values():
-                if left.status.state in _STILL_OPEN:
-                    left.status = replace(left.status, state=StripState.WITHDRAWN, vehicle="", reason=CUT_ANEW)
-
     def _hear_strip(self, received: Received, status: StripStatus) -> None:
         number = received.number
         strip = self.strips.get(number)
@@ -272,7 +260,7 @@ class Metrics:
         return {
             "published": len(states),
             "revisited": states.count(StripState.DONE),
-            "open": sum(states.count(state) for state in _STILL_OPEN),
+            "open": sum(not state.has_ended for state in states),
             "withdrawn": states.count(StripState.WITHDRAWN),
             "failed": states.count(StripState.FAILED),
             "foreseen": foreseen.total(),

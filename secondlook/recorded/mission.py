@@ -26,12 +26,12 @@ from comms.said.messages import (
     Message,
     Nav,
     Plan,
-    StripStatus,
     TruthLook,
     TruthTargets,
 )
 from comms.said.topics import TOPICS, Topic, topic_of
 from comms.said.wire import WireError
+from comms.strip_books import StripBooks
 from planner.fleet_map import FleetMap
 from planner.types import PriorityGround
 from secondlook.errors import UserError
@@ -161,7 +161,7 @@ class Mission(ABC):
     @cached_property
     def strips(self) -> list[StripRecord]:
         """Every strip with its fate, by number."""
-        return strips(self.said(StripStatus))
+        return strips(self.received(*StripBooks.telling))
 
     @cached_property
     def hotspots(self) -> list[HotspotRecord]:

@@ -10,6 +10,7 @@ import shapely
 
 from comms.node import Received
 from comms.said.messages import Hotspot, HotspotState, StripState, StripStatus
+from comms.strip_books import StripBooks
 from planner.types import Strip
 
 
@@ -103,10 +104,11 @@ class StripRecord:
         return next((event.t_s for event in self.history if event.state is state), None)
 
 
-def strips(published: Iterable[Received[StripStatus]]) -> list[StripRecord]:
-    """Every strip that was ever published, by number."""
+def strips(said: Iterable[Received]) -> list[StripRecord]:
+    """Every strip that was ever published, by number; `said`: the messages of `StripBooks.telling`."""
+    books = StripBooks()
     told: dict[int, list[Received[StripStatus]]] = {}
-    for one in published:
+    for one in (strip for received in said for strip in books.hear(received)):
         told.setdefault(one.number, []).append(one)
     return [_record(number, statuses) for number, statuses in sorted(told.items())]
 

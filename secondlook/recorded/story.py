@@ -23,6 +23,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from comms.strip_books import StripBooks
 from planner.types import Point
 
 MOST_NAMED = 3
@@ -55,6 +56,7 @@ class Story:
     telling = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, MissionOver)
 
     def __init__(self) -> None:
+        self._books = StripBooks()
         self._told: dict[Hashable, object] = {}
         self._removable_m2: dict[int, float] = {}
         self._hotspots: dict[str, _HotspotNews] = {}
@@ -63,11 +65,15 @@ class Story:
         """The lines that are ready now that this message has come; none where it has nothing new for a person."""
         header = received.header
         lines = self.rest(before_ms=header.sent_ms) if self._hotspots else []
-        told = self._words(received) if type(received.message) in self.telling else None
-        if told is not None:
-            text, warns = told
-            lines.append(Line(header.sent_ms, header.sender, text, warns))
-        return lines
+        if type(received.message) not in self.telling:
+            return lines
+        said: list[Received] = []
+        if isinstance(received.message, StripBooks.telling):
+            said += self._books.hear(received)
+        if not isinstance(received.message, StripStatus):
+            said.append(received)
+        told = [words for words in map(self._words, said) if words is not None]
+        return [*lines, *(Line(header.sent_ms, header.sender, text, warns) for text, warns in told)]
 
     def rest(self, *, before_ms: int | None = None) -> list[Line]:
         """The lines still held back: all, or those of another time than this."""

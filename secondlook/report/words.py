@@ -62,7 +62,6 @@ def fate_in_words(strip: StripRecord) -> str:
 def fate(strip: StripRecord, before: RiskMap, after: RiskMap) -> Fate:
     """A strip's fate; `before` and `after`: the risk at the end by the primaries alone and by all."""
     last = strip.history[-1]
-    ended = last.state in (StripState.DONE, StripState.FAILED, StripState.WITHDRAWN)
     cells = after.cells_within(strip.polygon)
     return Fate(
         number=strip.number,
@@ -71,7 +70,7 @@ def fate(strip: StripRecord, before: RiskMap, after: RiskMap) -> Fate:
         vehicle=strip.vehicle,
         cut_s=strip.history[0].t_s,
         begun_s=strip.first(StripState.UNDER_WAY),
-        ended_s=last.t_s if ended else None,
+        ended_s=last.t_s if last.state.has_ended else None,
         length_m=strip.strip.length_m,
         width_m=strip.strip.width_m,
         risk_before=before.mean_of(cells),

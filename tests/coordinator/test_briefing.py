@@ -72,7 +72,7 @@ class TestTheTimeLeft:
 def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     known = Known()
     known.heard(HELPER, Mode.IDLE)
-    cut = Cut(Window(10, 70, 20, 30), 2100.0, 4200.0)
+    cut = Cut(Window(10, 70, 20, 30), counts_m2=4200.0, removable_m2=2100.0)
     known.ledger.open(cut.strip(known.fleet.map.grid, 1), cut, 0, "badly seen")
     told = known.briefing.situation(60_000)
     (one,) = told.strips

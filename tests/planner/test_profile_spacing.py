@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.across import MOST_MOVED, Across, HelperLooks, Measured
@@ -163,18 +163,22 @@ def curve(near_m: float, far_m: float, peak: float) -> DetectionCurve:
     beyond_m=st.sampled_from([0, 15, 60]),
     sees=st.lists(st.tuples(st.floats(5, 160), st.sampled_from([0.03, 0.3, 0.8])), min_size=1, max_size=4),
     rho=st.sampled_from([0.0, 0.3]),
+    wanted_risk=st.sampled_from([None, None, 0.5]),
 )
-def test_every_survey_ends_and_sees_what_algorithm_1_would_see(
+@example(ProfileSpacing, 70.0, 0, 60, [(146.0, 0.3)], 0.0, None)  # one look sees all of it, from either side
+@example(JointSpacing, 121.8, 10, 0, [(78.0, 0.3), (127.0, 0.03), (81.0, 0.3), (72.0, 0.03)], 0.0, None)
+def test_every_survey_ends_within_the_area_and_sees_what_algorithm_1_would_see(
     planner: type[ProfileSpacing],
     width_m: float,
     nadir_gap_m: int,
     beyond_m: int,
     sees: list[tuple[float, float]],
     rho: float,
+    wanted_risk: float | None,
 ) -> None:
     """Flown track by track, each with the next curve, the last one for good."""
     spacing = planner(nadir_gap_m, max(1, 3 * nadir_gap_m + beyond_m))
-    terms = SpacingTerms(5.0, rho, helpers=HelperLooks(20.0, 0.6))
+    terms = SpacingTerms(5.0, rho, wanted_risk, HelperLooks(20.0, 0.6))
     decision: SpacingDecision | None = spacing.decide(width_m, 0.0, None)
     looked: tuple[FlownTrack, ...] = ()
     alike = len(set(sees)) == 1
@@ -196,7 +200,13 @@ def test_every_survey_ends_and_sees_what_algorithm_1_would_see(
         so_far = PartSoFar(width_m, None, looked, tuple(ahead), seen, r_eff_m)
         decision = spacing.lay(so_far, terms)
         assert decision == spacing.lay(so_far, terms)
-    if alike and not any(one.single for one in looked):
+        if decision is not None and not decision.singles:
+            # Where the area is narrow Algorithm 1 itself lays a track outside; nobody goes farther than that.
+            theirs = spacing._algorithm_1(so_far)
+            assert min(0.0, *theirs) <= min(decision.offsets_m)
+            assert max(decision.offsets_m) <= max(width_m, *theirs)
+    may_lose = wanted_risk is not None and planner.counts_helpers
+    if alike and not may_lose and not any(one.single for one in looked):
         ground = Across(width_m, [Measured(one.across_m, seen, r_eff_m) for one in looked], seen, r_eff_m, 5.0)
         ground.ask_for([Measured(across_m, seen, r_eff_m) for across_m in algorithm_1(spacing, width_m, r_eff_m)])
         assert ground.lost_m([]) == 0

@@ -102,6 +102,17 @@ def test_changes_of_open_strips_are_drawn_once_a_minute(record: Record, tmp_path
     assert worths(path, 3) == [(81, "810"), (140, "1400")]
 
 
+def test_what_a_coordinator_that_is_gone_has_left_disappears(record: Record, tmp_path: Path) -> None:
+    next_one = passes(50)._replace(header=Header("coordinator", 1, 0, 50_000))
+    said = [RUN, says(10, 1, StripState.OPEN, 100), says(20, 2, StripState.DONE, 100), next_one, passes(51)]
+    path = record(said, tmp_path / "strips.rrd")
+    assert [time_ms for time_ms, _ in rows(path, "/strips/1", "Clear:is_recursive")] == [50_000]
+    assert not rows(path, "/strips/2", "Clear:is_recursive")
+    tables = rows(path, "/tasks", "TextDocument:text")
+    assert tables[-1][0] == 50_000
+    assert tables[-1][1][0].startswith("Strips: 0 open, 1 done, 1 withdrawn, 0 failed\n")
+
+
 def test_what_is_foreseen_is_told_apart_and_why(record: Record, tmp_path: Path) -> None:
     def said(time_s: float, state: StripState, why: str) -> Received:
         strip = replace(STRIP, state=state, why=why, foreseen=why.startswith("expected"))

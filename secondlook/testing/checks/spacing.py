@@ -5,9 +5,12 @@ from __future__ import annotations
 from itertools import chain, repeat
 from typing import Any
 
+import numpy as np
 from hypothesis import strategies as st
 
-from planner.spacing_planners import LENGTH_TOLERANCE_M, counted_range_m, lowest_range_m
+from planner.profile_spacing import PartSoFar, ProfilePlanner, SpacingTerms
+from planner.spacing_planners import LENGTH_TOLERANCE_M, FlownTrack, counted_range_m, lowest_range_m
+from planner.types import DetectionCurve
 from secondlook.scenario.plug_ins import SPACING
 from secondlook.testing.checks.examples import EXAMPLES, PATIENCE_S, Checked, is_number, is_whole
 
@@ -16,6 +19,8 @@ _MOST_TRACKS = 2000  # what a plan may hold
 _LONGEST_NOTE = 100  # characters
 _PAIR = 2
 _MOST_IN_VAIN = 10  # decisions that cover nothing more
+_WIDEST_M = 120.0  # by P(y), which is asked for after each track
+_CELL_M = 5.0
 
 
 def check_spacing_planner(planner: Any, *, examples: int = EXAMPLES, patience_s: float = PATIENCE_S) -> None:
@@ -23,8 +28,9 @@ def check_spacing_planner(planner: Any, *, examples: int = EXAMPLES, patience_s:
 
     As long as something is to be covered it lays tracks, at finite places, with a range in whole metres; flown pair
     after pair as its decisions say, whatever the sonar turns out to see, the survey ends; the same question gives the
-    same answer, whatever it was asked before; and it comes back, within `patience_s` of wall time. AssertionError tells
-    the first that it does not keep to.
+    same answer, whatever it was asked before; and it comes back, within `patience_s` of wall time. The same holds where
+    it is told P(y) in full (`planner.profile_spacing.ProfilePlanner`). AssertionError tells the first that it does not
+    keep to.
     """
     __tracebackhide__ = True
     checked = Checked(SPACING, planner, patience_s)
@@ -32,6 +38,8 @@ def check_spacing_planner(planner: Any, *, examples: int = EXAMPLES, patience_s:
     def check(width_m: float, nadir_gap_m: int, beyond_m: int, r_eff_m: list[int]) -> None:
         given = {"nadir_gap_m": float(nadir_gap_m), "told_range_m": float(lowest_range_m(nadir_gap_m) + beyond_m)}
         _survey(checked, given, width_m, r_eff_m)
+        if isinstance(checked.make(**given), ProfilePlanner):
+            _survey_by_profile(checked, given, min(width_m, _WIDEST_M), r_eff_m)
 
     checked.against(
         check,
@@ -71,11 +79,54 @@ def _survey(checked: Checked, given: dict[str, float], width_m: float, r_eff_m: 
             return
 
 
+def _survey_by_profile(checked: Checked, given: dict[str, float], width_m: float, r_eff_m: list[int]) -> None:
+    """Flies a survey as the survey agent does where the planner is told P(y): each track with the next curve, the last
+    one for good."""
+    veteran, terms, flown = checked.make(**given), SpacingTerms(_CELL_M), list[FlownTrack]()
+    planned_m: tuple[float, ...] = ()
+    curve, known_m = _curve(given, r_eff_m[0]), r_eff_m[0]
+    while len(flown) <= _MOST_TRACKS:
+        part = PartSoFar(width_m, None, tuple(flown), planned_m, curve, known_m)
+        told = f"{checked.name}, lay, after {len(flown)} tracks over {width_m:g} m,"
+        decision = checked.ask(veteran, "lay", part, terms)
+        if checked.ask(checked.make(**given), "lay", part, terms) != decision:
+            raise AssertionError(f"{told} decides otherwise when it was asked nothing else before")
+        if decision is None:
+            return
+        range_m, offsets_m, replans, _ = _read(decision, told)
+        asks_after: Any = getattr(decision, "asks_after", None)
+        singles: Any = getattr(decision, "singles", None)
+        if not is_whole(asks_after) or asks_after < 1 or not isinstance(singles, bool):
+            raise AssertionError(
+                f"{told} must say after how many tracks to ask again, at least 1, and whether they are single ones,"
+                f" not {asks_after!r} and {singles!r}"
+            )
+        if not replans:
+            return
+        for across_m in offsets_m[: int(asks_after)]:
+            known_m = r_eff_m[min(len(flown), len(r_eff_m) - 1)]
+            curve = _curve(given, known_m)
+            flown.append(FlownTrack(across_m, max(known_m, range_m) if singles else known_m, singles, curve))
+        planned_m = offsets_m[int(asks_after) :]
+    raise AssertionError(f"{checked.name}, lay: the survey never ends: {width_m:g} m, and {_MOST_TRACKS} tracks flown")
+
+
+def _curve(given: dict[str, float], r_eff_m: int) -> DetectionCurve:
+    """P(y) that falls from the nadir gap to r_eff, and ends there; nothing is seen where that is nearer."""
+    near_m = given["nadir_gap_m"]
+    if r_eff_m <= near_m:
+        return DetectionCurve(np.array([0.0, 1.0]), np.zeros(2))
+    return DetectionCurve(np.array([near_m, float(r_eff_m)]), np.array([0.6, 0.1]))
+
+
 def _decision(
     checked: Checked, plug_in: Any, question: tuple[float, float, int | None]
 ) -> tuple[int, tuple[float, ...], bool, str]:
-    decision = checked.ask(plug_in, "decide", *question)
-    told = f"{checked.name}, asked for {question},"
+    return _read(checked.ask(plug_in, "decide", *question), f"{checked.name}, asked for {question},")
+
+
+def _read(decision: Any, told: str) -> tuple[int, tuple[float, ...], bool, str]:
+    """Range, offsets, whether to ask again, and note, if they can be planned with."""
     try:
         range_m, offsets_m = decision.range_m, tuple(decision.offsets_m)
         replans, note = decision.replans, decision.note

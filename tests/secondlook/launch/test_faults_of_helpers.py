@@ -4,6 +4,7 @@ and in the end each strip is accounted for."""
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -238,6 +239,10 @@ def check_of_last(flight: Flight) -> None:
     figures = flight.summary["hotspots"]
     assert figures["open"] == sum(status.state is StripState.OPEN for status in last.values())
     assert figures["published"] == sum(figures[one] for one in ("revisited", "open", "withdrawn", "failed"))
+    counted = Counter(one.state for one in flight.strips)
+    assert counted[StripState.DONE] == figures["revisited"]
+    assert counted[StripState.WITHDRAWN] == figures["withdrawn"]
+    assert {one.number for one in flight.strips if one.state not in ENDED} <= last.keys()
     for status in last.values():
         assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
 

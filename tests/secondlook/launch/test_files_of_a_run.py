@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from flights import BRIEF, events, flight, until
@@ -100,6 +101,36 @@ def test_a_recording_that_cannot_be_written_at_all_is_named(tmp_path: Path) -> N
     told = rf"^{tmp_path}/mission\.rrd: Is a directory; must be a file that can be written$"
     with pytest.raises(RunFailedError, match=told):
         run_mission(load_scenario(BRIEF), RunOptions(tmp_path, bus="local"))
+
+
+def test_a_log_of_a_process_that_cannot_be_written_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    opened = Path.open
+
+    def open_but_one(path: Path, *arguments: Any, **more: Any) -> Any:
+        if path.name == "coordinator.txt":
+            raise OSError(28, os.strerror(28))
+        return opened(path, *arguments, **more)
+
+    monkeypatch.setattr(Path, "open", open_but_one)
+    monkeypatch.setattr("sys.argv", ["secondlook", "run", str(BRIEF), "--out", str(folder), "--no-record"])
+    with pytest.raises(SystemExit) as stopped:
+        secondlook_main()
+    log = folder / "logs" / "coordinator.txt"
+    said = f"{log}: No space left on device; must be a file that can be written; what was recorded is in {folder}\n"
+    assert (stopped.value.code, capsys.readouterr().err) == (1, said)
+    assert json.loads((folder / "summary.json").read_text())["ending"] == "failed"
+
+
+def test_a_process_that_the_system_does_not_start_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def no_more(*_: object, **__: object) -> None:
+        raise OSError(11, os.strerror(11))
+
+    monkeypatch.setattr(subprocess, "Popen", no_more)
+    with pytest.raises(RunFailedError, match=r"^world cannot be started: Resource temporarily unavailable$"):
+        run_mission(load_scenario(BRIEF), RunOptions(tmp_path))
 
 
 def leave_no_room_for(name: str, monkeypatch: pytest.MonkeyPatch) -> None:

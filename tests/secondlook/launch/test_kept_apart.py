@@ -73,6 +73,16 @@ class TestMissions:
         closing_table(told | {"separation": told["separation"] | {"least_m": 12}}, tmp_path)
         assert re.search(r"too close +\w+ and \w+: \d+\.\d m at \d+ s, less than 12 m", capsys.readouterr().out)
 
+    def test_each_pair_that_does_is_a_warning_in_the_log(self, tmp_path: Path) -> None:
+        # Nobody can keep apart who is not where it believes to be.
+        beside = ("mission.separation_m=60", "vehicles.helper.position_error_m=30")
+        flight = Fleet(BRIEF, folder=tmp_path, overrides=beside).run()
+        (pair,) = flight.summary["separation"]["closest"]
+        assert (flight.folder / "logs" / "launcher.txt").read_text() == (
+            f"secondlook.mission: helper and primary came within {pair['closest_m']:.1f} m of each other at "
+            f"{pair['t_s']:.0f} s, less than the 60 m of mission.separation_m\n"
+        )
+
 
 class TestTheFigure:
     def test_between_two_positions(self) -> None:

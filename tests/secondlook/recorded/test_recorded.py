@@ -26,8 +26,8 @@ import secondlook
 from comms.node import Received
 from comms.said.announcement import RunInfo
 from comms.said.codec import SCHEMA_VERSION, Header
-from comms.said.messages import AgentState, Message, Mode, Plan, PlannedTrack, StripState, StripStatus
-from comms.said.topics import PLAN, STATE, STRIP, Topic
+from comms.said.messages import AgentState, Message, MissionOver, Mode, Plan, PlannedTrack, StripState, StripStatus
+from comms.said.topics import MISSION_OVER, PLAN, STATE, STRIP, Topic
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
@@ -220,6 +220,18 @@ def test_a_strip_is_its_rectangle_and_tells_its_changes() -> None:
     ]
     assert (strip.number, strip.state, strip.vehicle, strip.expected_m2) == (7, StripState.WITHDRAWN, "h", 90.0)
     assert (strip.first(StripState.OPEN), strip.first(StripState.DONE)) == (1.0, None)
+
+
+def test_strips_of_a_coordinator_that_is_gone_stand_as_withdrawn() -> None:
+    said: list[Received] = [
+        heard(STRIP, "coordinator", 1, status(StripState.ACCEPTED, "h"), number=1),
+        heard(STRIP, "coordinator", 2, status(StripState.DONE, "h"), number=2),
+        heard(MISSION_OVER, "coordinator", 3, MissionOver(""))._replace(header=Header("coordinator", 1, 0, 3000)),
+    ]
+    left, done = strips(said)
+    assert (left.state, left.vehicle, left.history[-1].t_s) == (StripState.WITHDRAWN, "h", 3)
+    assert left.history[-1].reason == "its coordinator is gone"
+    assert done.state is StripState.DONE
 
 
 def test_a_strip_is_foreseen_if_it_was_at_last() -> None:

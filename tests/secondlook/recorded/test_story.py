@@ -67,6 +67,17 @@ def test_of_a_strip_it_is_told_why_it_is_there() -> None:
     assert line.text == words
 
 
+def test_strips_of_a_coordinator_that_is_gone_are_told_when_the_next_one_speaks() -> None:
+    story = Story()
+    story.tell(strip(StripState.OPEN))
+    over = said(MISSION_OVER, MissionOver("survey over"))
+    told = story.tell(over._replace(header=Header("x", 1, 0, TIME_MS)))
+    assert told == [
+        *line("strip 3 withdrawn: its coordinator is gone"),
+        *line("the mission is over: survey over"),
+    ]
+
+
 def task(state: TaskState, reason: str = "", progress: float = 0.0) -> Received:
     return said(TASK_STATUS, TaskStatus(3, state, progress, 90_400, reason), vehicle="helper", number=7)
 

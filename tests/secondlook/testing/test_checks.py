@@ -17,6 +17,7 @@ from comms.node import Publication, Step
 from comms.said.messages import AgentState, Mode
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.coordinator import Coordinator
+from planner.profile_spacing import ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, SpacingDecision
 from planner.types import DetectionCurve
 from secondlook.errors import UserError
@@ -320,6 +321,52 @@ class Bare:
 def test_a_spacing_planner_that_is_wrong(planner: Any, sentence: str) -> None:
     with pytest.raises(AssertionError) as caught:
         check_spacing_planner(planner, examples=60, patience_s=0.3 if planner is Forever else 10.0)
+    assert re.match(sentence, str(caught.value)), caught.value
+
+
+class Astray(ProfileSpacing):
+    """Lays a track where no place is, once it knows P(y)."""
+
+    def lay(self, part: Any, terms: Any) -> Any:
+        return SpacingDecision(60, (float("inf"),), replans=True)
+
+
+class Tireless(ProfileSpacing):
+    """Lays one track more, for ever."""
+
+    def lay(self, part: Any, terms: Any) -> Any:
+        return SpacingDecision(60, (30.0,), replans=True, asks_after=1)
+
+
+class Hasty(ProfileSpacing):
+    """Wants to be asked again before anything is flown."""
+
+    def lay(self, part: Any, terms: Any) -> Any:
+        return SpacingDecision(60, (30.0,), replans=True, asks_after=0)
+
+
+class Moody(ProfileSpacing):
+    """Goes by how often it was asked."""
+
+    asked = 0
+
+    def lay(self, part: Any, terms: Any) -> Any:
+        type(self).asked += 1
+        return SpacingDecision(60, (float(self.asked),), replans=False)
+
+
+@pytest.mark.parametrize(
+    ("planner", "sentence"),
+    [
+        (Astray, r"Astray, lay, after 0 tracks over [\d.]+ m, lays a track at inf m, which is no place"),
+        (Tireless, r"Tireless, lay: the survey never ends: [\d.]+ m, and 2000 tracks flown"),
+        (Hasty, r"Hasty, lay, after 0 tracks over [\d.]+ m, must say after how many tracks to ask again, .* not 0 and"),
+        (Moody, r"Moody, lay, after 0 tracks over [\d.]+ m, decides otherwise when it was asked nothing else before"),
+    ],
+)
+def test_a_planner_by_the_whole_curve_that_is_wrong(planner: Any, sentence: str) -> None:
+    with pytest.raises(AssertionError) as caught:
+        check_spacing_planner(planner, examples=2)
     assert re.match(sentence, str(caught.value)), caught.value
 
 
