@@ -57,6 +57,7 @@ def explain(
     data: dict[str, Value],
     places: Mapping[KeyPath, Place],
     classes: Mapping[int, type[BaseModel]],
+    tags: Iterable[str] = (),
 ) -> list[Problem]:
     """One problem for each error.
 
@@ -65,9 +66,10 @@ def explain(
         data: what was validated.
         places: where each value of `data` stands, the whole under `()`.
         classes: for the `id()` of a mapping within `data`, the class it was taken for.
+        tags: what tells the members of unions apart that are no scenario's.
     """
     mistakes = (error for error in errors if error["type"] != _FOLLOWS)
-    problems = (_problem(error, data, places, classes) for error in mistakes)
+    problems = (_problem(error, data, places, classes, _TAGS.union(tags)) for error in mistakes)
     return [problem for problem in problems if problem]
 
 
@@ -85,10 +87,14 @@ def nearest(name: str, names: Iterable[str]) -> str | None:
 
 
 def _problem(
-    error: ErrorDetails, data: dict[str, Value], places: Mapping[KeyPath, Place], classes: Mapping[int, type[BaseModel]]
+    error: ErrorDetails,
+    data: dict[str, Value],
+    places: Mapping[KeyPath, Place],
+    classes: Mapping[int, type[BaseModel]],
+    tags: frozenset[str],
 ) -> Problem | None:
     kind, context = error["type"], error.get("ctx", {})
-    path, holder, value = _locate(error["loc"], data)
+    path, holder, value = _locate(error["loc"], data, tags)
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
         # The error lies with the key that tells the members of the union apart.
         tag = context["discriminator"].strip("'()")
@@ -111,14 +117,16 @@ def _problem(
     return Problem(place_of(path, places), f"{dotted(path)}: {text} is not allowed; {what}")
 
 
-def _locate(location: Iterable[str | int], data: dict[str, Value]) -> tuple[KeyPath, Any, Any]:
+def _locate(
+    location: Iterable[str | int], data: dict[str, Value], tags: frozenset[str]
+) -> tuple[KeyPath, Any, Any]:
     """The path in the user's data, the mapping or list that holds the value, and the value (None where missing)."""
     path: KeyPath = ()
     holder: Any = None
     value: Any = data
     for step in location:
         inside = step in value if isinstance(value, dict) else isinstance(value, list) and step in range(len(value))
-        if inside or not (step in _TAGS or step == _KEY_MARK):
+        if inside or not (step in tags or step == _KEY_MARK):
             path = (*path, step)
             holder, value = value, value[step] if inside else None
     return path, holder, value

@@ -18,12 +18,13 @@ from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
-from secondlook.launch.mission import Bus, RunOptions, run_mission
+from secondlook.launch.mission import Bus, Made, RunOptions, run_mission
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.recorded.observer import RunStopped
 from secondlook.scenario import Scenario, load_scenario, make_scenario
 from secondlook.testing.flight import Flight, Heard
 from secondlook.testing.inside import Inside
+from secondlook.testing.plan import TroublePlan, load_plan
 from secondlook.testing.trouble import Trouble
 
 ScenarioSource = str | os.PathLike[str] | Scenario | Mapping[str, Any]
@@ -95,6 +96,7 @@ class Fleet(Trouble):
         record: with a recording, mission.rrd, and messages.mpk.
         fault_seed: decides which messages are struck by faults that have a probability.
         patience_s: wall time after which a node that does not answer is given up; `math.inf` to step through one.
+        made: on `local`, told each node that acts under its id when it is made, again if it is started anew.
 
     A mission repeats exactly. `run_until` makes use of that: it ends the flight when its condition holds, and a later
     `run` or `run_until` flies the same mission again from its start, and on from there with the trouble that was
@@ -116,6 +118,7 @@ class Fleet(Trouble):
         record: bool = False,
         fault_seed: int = 0,
         patience_s: float = PATIENCE_S,
+        made: Made | None = None,
     ) -> None:
         self.scenario = scenario_from(scenario, overrides, seed)
         super().__init__(Routing(build_fleet(self.scenario, record=False).roster), fault_seed)
@@ -124,6 +127,7 @@ class Fleet(Trouble):
         self._processes = processes
         self._record = record
         self._patience_s = patience_s
+        self._made = made
         self._heard: Heard | None = None
         self._until_now: list[Received] = []
 
@@ -142,6 +146,21 @@ class Fleet(Trouble):
     def messages(self, keys: str = "**") -> list[Received]:
         """The messages of the latest flight whose keys are like `keys`; see `Heard.messages`."""
         return self.heard.messages(keys)
+
+    @classmethod
+    def of_plan(cls, plan: str | os.PathLike[str] | TroublePlan, **options: Any) -> Fleet:
+        """The fleet of a plan's mission, with all of the plan's trouble scheduled; `options` as for a `Fleet`.
+
+        Raises UserError for a file that is no plan.
+        """
+        found = plan if isinstance(plan, TroublePlan) else load_plan(plan)
+        fleet = cls(found.scenario, fault_seed=found.fault_seed, **options)
+        found.schedule(fleet)
+        return fleet
+
+    def plan(self, path: str | os.PathLike[str]) -> None:
+        """Schedules the trouble of a plan's file, whose mission and seed of faults are left out. Raises UserError."""
+        load_plan(path).schedule(self)
 
     def run(self, *, bus: Bus | None = None) -> Flight:
         """Flies the mission to its end, on another bus than the fleet's if one is given.
@@ -179,6 +198,12 @@ class Fleet(Trouble):
         self._heard = watch.heard
         faults, events = self.faults, self.events
         nodes: dict[str, Node] = {}
+
+        def made(node_id: str, node: Node) -> None:
+            nodes[node_id] = node
+            if self._made is not None:
+                self._made(node_id, node)
+
         options = RunOptions(
             folder,
             bus,
@@ -186,7 +211,7 @@ class Fleet(Trouble):
             record=self._record,
             drive=Lockstep(faults, events),
             watch=watch.hear,
-            made=nodes.__setitem__,
+            made=made,
             patience_s=self._patience_s,
         )
         summary = run_mission(self.scenario, options)

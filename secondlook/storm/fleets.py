@@ -1,0 +1,159 @@
+"""The fleet of a storm: a small mission of any kind that a scenario allows, drawn from a number."""
+
+from __future__ import annotations
+
+import math
+from random import Random
+from typing import Any
+
+from secondlook.scenario import Scenario, make_scenario
+from secondlook.scenario.plug_ins import ALLOCATOR, SPACING
+
+Corners = list[list[float]]
+
+_LONGEST_S = 400.0  # that drawn surveys take, about: a storm is to fly in half a second
+SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
+
+
+def draw_fleet(number: int) -> Scenario:
+    """The mission of this number, 0 or more; the same one each time.
+
+    Areas of some 100 to 400 m, convex or not, with and without holes; 1 to 4 primaries with shares of it, which may
+    take second looks themselves; 0 to 6 helpers of any kind; every allocator and spacing of ours.
+    """
+    rng = Random(f"fleet {number}")
+    primaries = rng.choices((1, 2, 3, 4), (12, 5, 2, 1))[0]
+    helpers = rng.choices((0, 1, 2, 3, 4, 5, 6), (4, 20, 12, 5, 2, 1, 1))[0]
+    width_m, height_m = rng.uniform(100, 260) * primaries**0.5, rng.uniform(80, 200)
+    vehicles: dict[str, Any] = {}
+    for place in range(primaries):
+        name = "primary" if primaries == 1 else f"primary-{place + 1}"
+        part = {} if primaries == 1 else {"part": f"{place + 1} of {primaries}"}
+        vehicles[name] = _primary(rng, width_m, height_m) | part
+    for place in range(helpers):
+        vehicles["helper" if helpers == 1 else f"helper-{place + 1}"] = _helper(rng, width_m, height_m)
+    return make_scenario(
+        {
+            "name": f"storm-{number}",
+            "seed": number % 2**31,
+            "area": _area(rng, width_m, height_m, cells_m=(5, 5, 10) if helpers < 4 else (10,)),
+            "mission": _mission(rng),
+            "seabed": _seabed(rng),
+            "targets": {"count": rng.choice((0, 20, 60))},
+            "vehicles": vehicles,
+            "coordinator": _coordinator(rng),
+            **({"current": {"speed_mps": _m(rng.uniform(0.1, 1)), "toward_deg": 45.0}} if rng.random() < 0.1 else {}),
+        }
+    )
+
+
+def _area(rng: Random, width_m: float, height_m: float, cells_m: tuple[int, ...]) -> dict[str, Any]:
+    corners: Corners = [[0, 0], [width_m, 0], [width_m, height_m], [0, height_m]]
+    kind = rng.choices(("rectangle", "skew", "notched"), (5, 3, 2))[0]
+    if kind == "skew":
+        corners = [[x_m + rng.uniform(-0.15, 0.15) * width_m, y_m] for x_m, y_m in corners]
+    elif kind == "notched":
+        notch_x_m, notch_y_m = width_m * rng.uniform(0.4, 0.8), height_m * rng.uniform(0.3, 0.7)
+        corners[2:3] = [[width_m, notch_y_m], [notch_x_m, notch_y_m], [notch_x_m, height_m]]
+    holes: list[Corners] = []
+    if kind == "rectangle" and rng.random() < 0.25:
+        x_m, y_m = width_m * rng.uniform(0.2, 0.6), height_m * rng.uniform(0.2, 0.6)
+        holes = [[[x_m, y_m], [x_m + 0.2 * width_m, y_m], [x_m + 0.2 * width_m, y_m + 25], [x_m, y_m + 25]]]
+    priority = {"polygon_m": _rounded([[0, 0], [60, 0], [60, 60], [0, 60]]), "weight": rng.choice((0, 3))}
+    return {
+        "polygon_m": _rounded(corners),
+        "holes_m": [_rounded(hole) for hole in holes],
+        "track_heading_deg": rng.choice((0, 0, 0, 90, 30, "auto")),
+        "cell_m": rng.choice(cells_m),
+        "priorities": [priority] if rng.random() < 0.1 else [],
+    }
+
+
+def _rounded(corners: Corners) -> Corners:
+    return [[_m(x_m), _m(y_m)] for x_m, y_m in corners]
+
+
+def _m(value: float) -> float:
+    return round(value, 2)
+
+
+def _mission(rng: Random) -> dict[str, Any]:
+    ends = {"deadline_factor": _m(rng.uniform(1, 2))}
+    if rng.random() < 0.1:
+        ends = {"deadline_s": _m(rng.uniform(0.5, 2) * _LONGEST_S)}
+    return ends | {"time_limit_s": 1000, "rho": rng.choice((0, 0, 0, 0.3, 1)), "separation_m": rng.choice((0, 8, 12, 12, 20))}
+
+
+def _seabed(rng: Random) -> dict[str, Any]:
+    if rng.random() < 0.4:
+        return {"kind": "uniform"}
+    return {
+        "kind": "patchy",
+        "ripple_fields": rng.randint(0, 4),
+        "vegetation_patches": rng.randint(0, 8),
+        "scale_m": [20, 80],
+        "strength": [0.4, 0.9],
+    }
+
+
+def _coordinator(rng: Random) -> dict[str, Any]:
+    allocators = [name for name in ALLOCATOR.ours if name != "none"]
+    return {
+        "allocator": rng.choice(["plan", "plan", *allocators]),
+        "lost_after_s": rng.choice((10, 20, 30)),
+        "strips": rng.choices(("reacting", "beforehand", "lanes"), (10, 1, 1))[0],
+        "objective": rng.choice(("mean", "worst30", "both", "both")),
+        "across": rng.random() < 0.7,
+    }
+
+
+def _start(rng: Random, width_m: float, height_m: float) -> dict[str, float]:
+    # Outside, as vehicles come from a ship or the shore, each some way from the others.
+    return {"x_m": _m(rng.uniform(-0.3, 1.3) * width_m), "y_m": _m(-rng.uniform(20, 80)), "heading_deg": 0.0}
+
+
+def _primary(rng: Random, width_m: float, height_m: float) -> dict[str, Any]:
+    nadir_gap_m, range_m = rng.choice((0.0, 5.0, 10.0, 15.0)), _m(rng.uniform(45, 90))
+    near, middle, far = rng.uniform(0.3, 0.95), rng.uniform(0.3, 0.9), rng.uniform(0, 0.3)
+    curve = {"range_m": [0, 20, 40, range_m], "p_detect": [0, _m(near), _m(middle), _m(far)]}
+    tracks = width_m / (2 * SPREAD * range_m) + 1
+    slowest_mps = tracks * (height_m + 80) / _LONGEST_S
+    return {
+        "role": "survey",
+        "start": _start(rng, width_m, height_m),
+        "speed_mps": _m(rng.uniform(1, 2) * max(1.2, slowest_mps)),
+        "turn_radius_m": _m(rng.uniform(4, 20)),
+        "endurance_s": 36000,
+        "nadir_gap_m": nadir_gap_m,
+        "range_m": range_m,
+        "spacing": rng.choice(["adaptive"] * 6 + list(SPACING.ours)),
+        "hotspot_risk": _m(rng.uniform(0.2, 0.7)),
+        "revisits": rng.random() < 0.3,
+        "sensor": {"curve": curve},
+    }
+
+
+def _helper(rng: Random, width_m: float, height_m: float) -> dict[str, Any]:
+    sensor: dict[str, Any] = {"p_detect": _m(rng.uniform(0.4, 0.95)), "range_m": _m(rng.uniform(10, 30))}
+    if rng.random() < 0.15:
+        sensor = {"footprint": "wedge", "p_detect": 0.4, "near_m": 5.0, "range_m": 40.0, "half_angle_deg": 30.0}
+    return {
+        "role": "revisit",
+        "start": _start(rng, width_m, height_m),
+        "speed_mps": _m(rng.uniform(1.2, 8)),
+        "turn_radius_m": _m(rng.uniform(2, 12)),
+        "endurance_s": rng.choice((36000, 36000, 36000, _m(rng.uniform(0.2, 1.2) * _LONGEST_S))),
+        "sensor": sensor,
+    }
+
+
+def survey_s(scenario: Scenario) -> float:
+    """About how long the survey takes, in seconds: for when things may go wrong, not to be relied on."""
+    across_m, along_m = scenario.area.extent_m
+    longest_s = 0.0
+    for primary in scenario.survey_vehicles.values():
+        _, shares = primary.share_of
+        tracks = across_m / shares / (2 * SPREAD * primary.told_range_m) + 1
+        leg_m = along_m + 2 * primary.run_in_m + math.pi * primary.turn_radius_m
+        longest_s = max(longest_s, tracks * leg_m / primary.speed_mps)
+    return longest_s

@@ -1,0 +1,224 @@
+"""What must hold of a mission in any storm, looked for when it has been flown; `secondlook.storm.witness` has looked
+while it was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from comms.lockstep.events import Join, Kill, absent_at_start
+from comms.node import Received
+from comms.said.messages import AgentState, CoverageTile, MissionOver, Mode, StripState, StripStatus
+from coordinator.fleet import GIVEN_UP_AFTER
+from planner.fleet_map import CLOSED
+from secondlook.fleet.nodes import COORDINATOR
+from secondlook.storm.witness import Violation, Witness
+from secondlook.testing.flight import Flight
+from secondlook.testing.mission_assertions import assert_no_message_dropped
+from secondlook.testing.plan import TroublePlan
+from secondlook.testing.strip_assertions import (
+    assert_no_strip_lost,
+    assert_no_strip_served_twice,
+    assert_one_strip_at_a_time,
+)
+
+AGREE_WITHIN_S = 60.0  # after the core is healed: what is late by half a minute, the next report, and its answer
+END_WITHIN_S = 30.0  # of the deadline
+
+
+def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Violation]:
+    """All that does not hold of a flight, what the witness saw first."""
+    found = list(witness.violations)
+    for check in (
+        _ends_in_time,
+        _core_has_finished,
+        _books_are_kept,
+        _books_agree_with_agents,
+        _map_is_what_came,
+        _layers_are_what_was_seen,
+        _core_is_all_on_the_map,
+    ):
+        found += check(flight, plan, witness)
+    if not plan.trouble:
+        found += _calm(flight)
+    return found
+
+
+def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    """The mission ends by its deadline, that of the core where others have failed."""
+    overs = flight.said(MissionOver)
+    if not overs:
+        yield Violation("the mission ends", flight.end_s, COORDINATOR, "it was never said that it is over")
+        return
+    mission = plan.scenario.mission
+    surveyed_s = plan.heals_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s
+    for name in plan.scenario.survey_vehicles:
+        states = [one for one in flight.said(AgentState, f"agent/{name}/state") if one.message.mode is not Mode.FINISHED]
+        if states and (name in plan.core or not plan.core):
+            surveyed_s = max(surveyed_s, states[-1].t_s)
+    ends_s = mission.ends_s(surveyed_s) + END_WITHIN_S
+    if overs[-1].t_s > ends_s + END_WITHIN_S:
+        yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")
+
+
+def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    for name in _core_vehicles(plan):
+        states = flight.said(AgentState, f"agent/{name}/state")
+        if not states:
+            yield Violation("the core finishes", flight.end_s, name, "it was never heard")
+        elif states[-1].message.mode is not Mode.FINISHED:
+            what = f"its last word is that it is in {states[-1].message.mode.value}"
+            yield Violation("the core finishes", states[-1].t_s, name, what)
+
+
+def _books_are_kept(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    yield from _asserted("no strip is lost", assert_no_strip_lost, flight)
+    yield from _asserted("a vehicle has one strip", assert_one_strip_at_a_time, flight)
+
+
+def _asserted(invariant: str, holds: Callable[[Flight], None], flight: Flight) -> Iterator[Violation]:
+    try:
+        holds(flight)
+    except AssertionError as error:
+        first = str(error).splitlines()[1].strip()
+        yield Violation(invariant, flight.end_s, COORDINATOR, first)
+
+
+_AT_WORK = (StripState.ACCEPTED, StripState.UNDER_WAY)
+
+
+def _books_agree_with_agents(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    """When the core has been healed for a while, no helper of it is for long at a strip that is not with it by the
+    books, nor has a strip there that it is not at."""
+    booked: dict[str, int] = {}
+    where: dict[int, str] = {}
+    agreed_s: dict[str, float] = {}
+    helpers = [name for name in _core_vehicles(plan) if name in plan.scenario.revisit_vehicles]
+    for one in flight.heard:
+        message = one.message
+        if isinstance(message, MissionOver):
+            return
+        if isinstance(message, StripStatus):
+            _book(booked, where, one.number, message)
+        elif isinstance(message, AgentState) and one.vehicle in helpers:
+            before_s = agreed_s.setdefault(one.vehicle, max(plan.heals_s, one.t_s))
+            has = booked.get(one.vehicle, 0)
+            offered = where.get(message.works_on) == one.vehicle
+            if message.works_on == has or (offered and not has):
+                agreed_s[one.vehicle] = max(plan.heals_s, one.t_s)
+            elif one.t_s - before_s > AGREE_WITHIN_S:
+                what = f"at strip {message.works_on} (0 for none), by the books at {has}, since {before_s:.3f} s"
+                yield Violation("books and agents agree", one.t_s, one.vehicle, what)
+                return
+
+
+def _book(booked: dict[str, int], where: dict[int, str], number: int, status: StripStatus) -> None:
+    """Keeps which strip is with whom by what the coordinator says: `booked` those accepted, `where` those offered, too.
+    """
+    before = where.pop(number, "")
+    if booked.get(before) == number:
+        del booked[before]
+    if status.state in _AT_WORK:
+        booked[status.vehicle] = number
+    if status.state in (*_AT_WORK, StripState.OFFERED):
+        where[number] = status.vehicle
+
+
+def _map_is_what_came(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    """The map that a coordinator holds is the join of all tiles that reached it, of all starts of each vehicle."""
+    for beside in witness.coordinators:
+        if not beside.node.has_begun:
+            continue
+        held = beside.node.fleet.map
+        for vehicle, (sums, largest) in beside.joined().items():
+            layer = held.layers.get(vehicle)
+            if layer is None or any(CLOSED in versions.values() for versions in layer.versions.values()):
+                wrong = 0 if layer is not None else sums.size  # of more than 8 starts the first are held as one
+            else:
+                wrong = int(np.count_nonzero((layer.sum_levels != sums) | (layer.largest_levels != largest)))
+            if wrong:
+                what = f"{wrong} of {sums.size} cells of {vehicle} are not what its tiles say"
+                yield Violation("the map is what came", flight.end_s, beside.node_id, what)
+
+
+def _layers_are_what_was_seen(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    """An agent holds what its looks sum up to, no less and no more, and tells of no more."""
+    for name, starts in witness.agents.items():
+        for incarnation, beside in enumerate(starts):
+            if beside.own is None or beside.node.coverage is None:
+                continue
+            own, held = beside.own.layer, beside.node.coverage.layer
+            if not np.array_equal(own.sum_levels, held.sum_levels):
+                wrong = int(np.count_nonzero(own.sum_levels != held.sum_levels))
+                yield Violation("layers are what was seen", flight.end_s, name, f"{wrong} cells are others")
+            for one in flight.said(CoverageTile, f"agent/{name}/coverage/*"):
+                if one.header.incarnation == _incarnation(flight, name, incarnation) and not _within(one, own.sum_levels):
+                    what = f"{one.key} tells of more than it has seen"
+                    yield Violation("coverage is never invented", one.t_s, name, what)
+                    break
+
+
+def _incarnation(flight: Flight, name: str, start: int) -> int:
+    """How the messages of a node's start, counted from 0, are marked."""
+    return start
+
+
+def _within(said: Received[CoverageTile], levels: np.ndarray) -> bool:
+    tile = said.message
+    rows, columns = tile.sum_levels.shape
+    window = slice(tile.first_row, tile.first_row + rows), slice(tile.first_column, tile.first_column + columns)
+    return bool((tile.sum_levels <= levels[window]).all())
+
+
+def _core_is_all_on_the_map(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    """What those of the core have told since they were last started has all reached the coordinator in the end."""
+    if not witness.coordinators or not witness.coordinators[-1].node.has_begun:
+        return
+    beside = witness.coordinators[-1]
+    for name in _core_vehicles(plan):
+        newest: dict[tuple[int, int], Received[CoverageTile]] = {}
+        last = max((one.header.incarnation for one in flight.said(AgentState, f"agent/{name}/state")), default=0)
+        for one in flight.said(CoverageTile, f"agent/{name}/coverage/*"):
+            place = one.message.first_row, one.message.first_column
+            if one.header.incarnation == last and (place not in newest or one.message.version > newest[place].message.version):
+                newest[place] = one
+        for place, one in newest.items():
+            come = beside.tiles.get((name, place), {}).get(last)
+            if come is None or come.version < one.message.version:
+                what = f"{one.key} in version {one.message.version} has not reached the coordinator"
+                yield Violation("the maps converge", one.t_s, name, what)
+                break
+
+
+def _calm(flight: Flight) -> Iterator[Violation]:
+    """What must hold beside that where nothing goes wrong."""
+    yield from _asserted("no strip is served twice", assert_no_strip_served_twice, flight)
+    yield from _asserted("no message is dropped", assert_no_message_dropped, flight)
+    surveying_until_s = {
+        name: max((one.t_s for one in flight.said(AgentState, f"agent/{name}/state") if one.message.mode is Mode.SURVEY), default=0.0)
+        for name in flight.scenario.survey_vehicles
+    }
+    for one in flight.closest:
+        # A primary is never held up: of two that survey nobody gives way.
+        if one.closest_m < flight.scenario.mission.separation_m and any(
+            one.t_s > surveying_until_s.get(name, 0.0) for name in one.vehicles
+        ):
+            what = f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other"
+            yield Violation("vehicles keep apart", one.t_s, one.vehicles[0], what)
+
+
+def _core_vehicles(plan: TroublePlan) -> list[str]:
+    """The vehicles that must come to the end: those of the core, all where there is none."""
+    return [name for name in plan.scenario.vehicles if not plan.core or name in plan.core]
+
+
+def killed_at_the_end(flight: Flight) -> set[str]:
+    """The nodes that are not there any more, or never were."""
+    gone = absent_at_start(flight.events)
+    for event in sorted(flight.events, key=lambda one: one.at_ms):
+        if isinstance(event, Kill):
+            gone.add(event.node_id)
+        elif isinstance(event, Join):
+            gone.discard(event.node_id)
+    return gone

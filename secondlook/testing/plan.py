@@ -1,0 +1,152 @@
+"""A plan of trouble in a file: a mission, what goes wrong in it and when, and who is healed; to be flown in a test."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, ValidationError
+
+from secondlook.errors import UserError
+from secondlook.scenario import Scenario
+from secondlook.scenario.errors import ScenarioError
+from secondlook.scenario.explain import explain
+from secondlook.scenario.text import LARGEST_FILE_BYTES, Value, decode, dump, read
+from secondlook.scenario.values import Duration, Mapping, Share
+from secondlook.testing.trouble import Trouble
+
+TimeOrZero = Annotated[float, Field(ge=0, le=1e7)]
+"""Simulated seconds since the mission's start."""
+KeyText = Annotated[str, Field(max_length=200)]
+
+
+class _Planned(Mapping):
+    what: str
+
+    def schedule(self, trouble: Trouble) -> None:
+        """Schedules it by the method of `Trouble` that has its name. Raises UserError."""
+        arguments = self.model_dump(exclude={"what"}, exclude_none=True)
+        getattr(trouble, self.what)(**arguments)
+
+
+class KillOrJoin(_Planned):
+    """`kill`: the node is gone from then on. `join`: it comes back, or comes only then."""
+
+    what: Literal["kill", "join"]
+    node: str
+    at_s: TimeOrZero
+
+
+class Freeze(_Planned):
+    """The node does nothing for a while."""
+
+    what: Literal["freeze"]
+    node: str
+    at_s: TimeOrZero
+    for_s: Duration
+
+
+class CutOff(_Planned):
+    """Nothing crosses the water from the vehicle or to it."""
+
+    what: Literal["cut_off"]
+    vehicle: str
+    from_s: TimeOrZero
+    for_s: Duration
+
+
+class _Struck(_Planned):
+    keys: KeyText
+    to: str = ""
+    probability: Share = 1.0
+    from_s: TimeOrZero = 0.0
+    for_s: Duration | None = None
+
+
+class DropOrCorrupt(_Struck):
+    """Messages are lost, or arrive with one byte changed."""
+
+    what: Literal["drop", "corrupt"]
+
+
+class Repeat(_Struck):
+    """Messages come a second time."""
+
+    what: Literal["repeat"]
+    after_s: Duration
+
+
+class Delay(_Struck):
+    """Messages come later."""
+
+    what: Literal["delay"]
+    by_s: Duration
+
+
+class Reorder(_Struck):
+    """Messages come later by up to so much."""
+
+    what: Literal["reorder"]
+    within_s: Duration
+
+
+AnyTrouble = Annotated[
+    KillOrJoin | Freeze | CutOff | DropOrCorrupt | Repeat | Delay | Reorder, Field(discriminator="what")
+]
+KINDS = ("kill", "join", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder")
+
+
+class TroublePlan(Mapping):
+    """A mission and all that goes wrong in it; `Trouble` says of each kind what it does.
+
+    Of a storm (`secondlook storm`) there is a core, too: whom `trouble` leaves alone from `heals_s` on, while all
+    others may have failed for good. Without a core everybody has to come to the end.
+    """
+
+    scenario: Scenario
+    """The mission, as in a file of its own."""
+    fault_seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = 0
+    """Decides which messages are struck by what has a probability."""
+    core: Annotated[tuple[str, ...], Field(strict=False, max_length=65)] = ()
+    """Node ids."""
+    heals_s: TimeOrZero = 0.0
+    """From when on the core is left alone."""
+    trouble: Annotated[tuple[AnyTrouble, ...], Field(strict=False, max_length=10_000)] = ()
+    """What goes wrong: entries with `what`, the name of a method of `Trouble`, and that method's arguments."""
+
+    def to_yaml(self) -> str:
+        """This plan as a file that loads as an equal one."""
+        return dump(self.model_dump(mode="json", exclude_none=True))
+
+    def schedule(self, trouble: Trouble) -> None:
+        """Schedules all that goes wrong. Raises UserError, which names the entry."""
+        for place, one in enumerate(self.trouble):
+            try:
+                one.schedule(trouble)
+            except UserError as error:
+                raise UserError(f"trouble[{place}]: {error}") from error
+
+
+def load_plan(path: str | os.PathLike[str]) -> TroublePlan:
+    """The plan that a YAML file holds; raises ScenarioError, a sentence a line, for all that is wrong with it."""
+    source = os.fspath(path)
+    try:
+        with Path(source).open("rb") as file:
+            document = read(decode(file.read(LARGEST_FILE_BYTES + 1), source), source)
+    except OSError as error:
+        raise UserError(f"{source}: cannot be read: {error.strerror}") from error
+    classes: dict[int, type[BaseModel]] = {}
+    problems = document.problems
+    try:
+        plan = TroublePlan.model_validate(document.data, context=classes)
+    except ValidationError as error:
+        problems = problems + explain(error.errors(), document.data, document.places, classes, tags=KINDS)
+    if problems:
+        raise ScenarioError(problems)
+    return plan
+
+
+def make_plan(data: dict[str, Value] | dict[str, Any]) -> TroublePlan:
+    """The plan that plain data of ours says. Raises pydantic's ValidationError for what is none."""
+    return TroublePlan.model_validate(data)
