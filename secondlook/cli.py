@@ -19,6 +19,7 @@ from secondlook.commands.replay import replay
 from secondlook.commands.report import report
 from secondlook.commands.run import REAL_TIME, run
 from secondlook.commands.scenarios import scenarios
+from secondlook.commands.storm import storm
 from secondlook.commands.view import view
 from secondlook.errors import UserError
 from secondlook.installed_command import WRONG_USE
@@ -69,7 +70,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, compare, paper, replay, view, report, geojson):
+for command in (run, scenarios, check, plan, compare, storm, paper, replay, view, report, geojson):
     app.command()(command)
 
 

@@ -117,9 +117,7 @@ def _problem(
     return Problem(place_of(path, places), f"{dotted(path)}: {text} is not allowed; {what}")
 
 
-def _locate(
-    location: Iterable[str | int], data: dict[str, Value], tags: frozenset[str]
-) -> tuple[KeyPath, Any, Any]:
+def _locate(location: Iterable[str | int], data: dict[str, Value], tags: frozenset[str]) -> tuple[KeyPath, Any, Any]:
     """The path in the user's data, the mapping or list that holds the value, and the value (None where missing)."""
     path: KeyPath = ()
     holder: Any = None

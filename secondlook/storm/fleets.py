@@ -81,7 +81,11 @@ def _mission(rng: Random) -> dict[str, Any]:
     ends = {"deadline_factor": _m(rng.uniform(1, 2))}
     if rng.random() < 0.1:
         ends = {"deadline_s": _m(rng.uniform(0.5, 2) * _LONGEST_S)}
-    return ends | {"time_limit_s": 1000, "rho": rng.choice((0, 0, 0, 0.3, 1)), "separation_m": rng.choice((0, 8, 12, 12, 20))}
+    return ends | {
+        "time_limit_s": 1000,
+        "rho": rng.choice((0, 0, 0, 0.3, 1)),
+        "separation_m": rng.choice((0, 8, 12, 12, 20)),
+    }
 
 
 def _seabed(rng: Random) -> dict[str, Any]:
@@ -100,7 +104,7 @@ def _coordinator(rng: Random) -> dict[str, Any]:
     allocators = [name for name in ALLOCATOR.ours if name != "none"]
     return {
         "allocator": rng.choice(["plan", "plan", *allocators]),
-        "lost_after_s": rng.choice((10, 20, 30)),
+        "lost_after_s": rng.choice((20, 30, 60)),  # reports come every 10 s
         "strips": rng.choices(("reacting", "beforehand", "lanes"), (10, 1, 1))[0],
         "objective": rng.choice(("mean", "worst30", "both", "both")),
         "across": rng.random() < 0.7,

@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from comms.lockstep.events import Join, Kill, absent_at_start
 from comms.node import Received
 from comms.said.messages import AgentState, CoverageTile, MissionOver, Mode, StripState, StripStatus
 from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import CLOSED
+from planner.risk import LevelArray
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.storm.witness import Violation, Witness
 from secondlook.testing.flight import Flight
@@ -53,10 +53,9 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
         return
     mission = plan.scenario.mission
     surveyed_s = plan.heals_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s
-    for name in plan.scenario.survey_vehicles:
-        states = [one for one in flight.said(AgentState, f"agent/{name}/state") if one.message.mode is not Mode.FINISHED]
-        if states and (name in plan.core or not plan.core):
-            surveyed_s = max(surveyed_s, states[-1].t_s)
+    for name in _core_vehicles(plan):
+        if name in plan.scenario.survey_vehicles:
+            surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY))
     ends_s = mission.ends_s(surveyed_s) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
         yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")
@@ -114,8 +113,7 @@ def _books_agree_with_agents(flight: Flight, plan: TroublePlan, witness: Witness
 
 
 def _book(booked: dict[str, int], where: dict[int, str], number: int, status: StripStatus) -> None:
-    """Keeps which strip is with whom by what the coordinator says: `booked` those accepted, `where` those offered, too.
-    """
+    """Keeps which strip is with whom, as the coordinator says: `booked` those accepted, `where` those offered, too."""
     before = where.pop(number, "")
     if booked.get(before) == number:
         del booked[before]
@@ -153,18 +151,13 @@ def _layers_are_what_was_seen(flight: Flight, plan: TroublePlan, witness: Witnes
                 wrong = int(np.count_nonzero(own.sum_levels != held.sum_levels))
                 yield Violation("layers are what was seen", flight.end_s, name, f"{wrong} cells are others")
             for one in flight.said(CoverageTile, f"agent/{name}/coverage/*"):
-                if one.header.incarnation == _incarnation(flight, name, incarnation) and not _within(one, own.sum_levels):
+                if one.header.incarnation == incarnation and not _within(one, own.sum_levels):
                     what = f"{one.key} tells of more than it has seen"
                     yield Violation("coverage is never invented", one.t_s, name, what)
                     break
 
 
-def _incarnation(flight: Flight, name: str, start: int) -> int:
-    """How the messages of a node's start, counted from 0, are marked."""
-    return start
-
-
-def _within(said: Received[CoverageTile], levels: np.ndarray) -> bool:
+def _within(said: Received[CoverageTile], levels: LevelArray) -> bool:
     tile = said.message
     rows, columns = tile.sum_levels.shape
     window = slice(tile.first_row, tile.first_row + rows), slice(tile.first_column, tile.first_column + columns)
@@ -181,7 +174,8 @@ def _core_is_all_on_the_map(flight: Flight, plan: TroublePlan, witness: Witness)
         last = max((one.header.incarnation for one in flight.said(AgentState, f"agent/{name}/state")), default=0)
         for one in flight.said(CoverageTile, f"agent/{name}/coverage/*"):
             place = one.message.first_row, one.message.first_column
-            if one.header.incarnation == last and (place not in newest or one.message.version > newest[place].message.version):
+            is_newer = place not in newest or one.message.version > newest[place].message.version
+            if one.header.incarnation == last and is_newer:
                 newest[place] = one
         for place, one in newest.items():
             come = beside.tiles.get((name, place), {}).get(last)
@@ -195,10 +189,7 @@ def _calm(flight: Flight) -> Iterator[Violation]:
     """What must hold beside that where nothing goes wrong."""
     yield from _asserted("no strip is served twice", assert_no_strip_served_twice, flight)
     yield from _asserted("no message is dropped", assert_no_message_dropped, flight)
-    surveying_until_s = {
-        name: max((one.t_s for one in flight.said(AgentState, f"agent/{name}/state") if one.message.mode is Mode.SURVEY), default=0.0)
-        for name in flight.scenario.survey_vehicles
-    }
+    surveying_until_s = {name: _last_s(flight, name, Mode.SURVEY) for name in flight.scenario.survey_vehicles}
     for one in flight.closest:
         # A primary is never held up: of two that survey nobody gives way.
         if one.closest_m < flight.scenario.mission.separation_m and any(
@@ -208,17 +199,12 @@ def _calm(flight: Flight) -> Iterator[Violation]:
             yield Violation("vehicles keep apart", one.t_s, one.vehicles[0], what)
 
 
+def _last_s(flight: Flight, name: str, *modes: Mode) -> float:
+    """When a vehicle last said that it is in one of these modes; 0 if never."""
+    said = flight.said(AgentState, f"agent/{name}/state")
+    return max((one.t_s for one in said if one.message.mode in modes), default=0.0)
+
+
 def _core_vehicles(plan: TroublePlan) -> list[str]:
     """The vehicles that must come to the end: those of the core, all where there is none."""
     return [name for name in plan.scenario.vehicles if not plan.core or name in plan.core]
-
-
-def killed_at_the_end(flight: Flight) -> set[str]:
-    """The nodes that are not there any more, or never were."""
-    gone = absent_at_start(flight.events)
-    for event in sorted(flight.events, key=lambda one: one.at_ms):
-        if isinstance(event, Kill):
-            gone.add(event.node_id)
-        elif isinstance(event, Join):
-            gone.discard(event.node_id)
-    return gone

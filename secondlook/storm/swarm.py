@@ -32,14 +32,16 @@ def draw_storm(scenario: Scenario, number: int) -> TroublePlan:
     if rng.random() < CALM_SHARE:
         return _plan(scenario, number, (), 0.0, [])
     heals_s = max(_SHORTEST_S, _s(rng.uniform(0.1, 1.2) * survey_s(scenario)))
+    # Whoever is healed later may have been given up, or is too late for the end.
+    heals_s = min(heals_s, _s(0.9 * GIVEN_UP_AFTER * scenario.coordinator.lost_after_s))
+    if scenario.mission.deadline_s is not None:
+        heals_s = min(heals_s, _s(scenario.mission.deadline_s / 2))
     core = (COORDINATOR, *_core_vehicles(rng, scenario))
     trouble = _Swarm(rng, scenario, core, heals_s).drawn()
     return _plan(scenario, number, core, heals_s, trouble)
 
 
-def _plan(
-    scenario: Scenario, number: int, core: tuple[str, ...], heals_s: float, trouble: list[_Entry]
-) -> TroublePlan:
+def _plan(scenario: Scenario, number: int, core: tuple[str, ...], heals_s: float, trouble: list[_Entry]) -> TroublePlan:
     mission = scenario.mission
     lost_s = GIVEN_UP_AFTER * scenario.coordinator.lost_after_s
     # Whoever was started anew surveys from the beginning; what is not over by then never will be.

@@ -68,7 +68,12 @@ class Witness:
 
 def _stand_beside(node: Any, beside: Any) -> None:
     """From now on `beside` is told of each step of the node, after it."""
-    on_message, on_wake = node.on_message, node.on_wake
+    start, on_message, on_wake = node.start, node.on_message, node.on_wake
+
+    def begin(now_ms: int) -> Step:
+        step: Step = start(now_ms)
+        beside.started_ms = now_ms
+        return step
 
     def hear(received: Received, now_ms: int) -> Step:
         step: Step = on_message(received, now_ms)
@@ -80,7 +85,7 @@ def _stand_beside(node: Any, beside: Any) -> None:
         beside.woke(step, now_ms)
         return step
 
-    node.on_message, node.on_wake = hear, wake
+    node.start, node.on_message, node.on_wake = begin, hear, wake
 
 
 Place = tuple[int, int]
@@ -94,6 +99,7 @@ class CoordinatorWitness:
     node: Coordinator
     tell: Tell
     tiles: dict[tuple[str, Place], dict[int, CoverageTile]] = field(default_factory=dict)
+    started_ms: int = 0
     _state_ms: dict[str, int] = field(default_factory=dict)
     _state_order: dict[str, tuple[int, int]] = field(default_factory=dict)
     _least_risk: float = np.inf
@@ -174,6 +180,7 @@ class AgentWitness:
     node: Agent
     own: CoverageLayer | None = None
     over: bool = False
+    started_ms: int = 0
     _taken: set[tuple[int, int]] = field(default_factory=set)
 
     def heard(self, received: Received, step: Step, now_ms: int) -> None:
@@ -185,7 +192,8 @@ class AgentWitness:
             self.over = self.over or self.own is not None
         elif isinstance(message, Look) and self.own is not None and not self.over and message.valid:
             name = received.header.incarnation, message.number
-            if name not in self._taken:
+            # What was seen before it was started is in the layer of the start before.
+            if name not in self._taken and received.header.sent_ms >= self.started_ms:
                 self._taken.add(name)
                 self.own.add(message)
 

@@ -1,0 +1,136 @@
+"""`secondlook storm`: does the fleet come through whatever goes wrong?"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from concurrent.futures.process import BrokenProcessPool
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from comms.said.announcement import LARGEST_SEED
+from secondlook.errors import UserError
+from secondlook.files import CannotWriteError, write_whole
+from secondlook.launch.mission import Bus
+from secondlook.launch.signals import signals_interrupt
+from secondlook.scenario import Scenario, load_scenario
+from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
+from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.testing.plan import TroublePlan, load_plan
+
+FAILED = 1
+MOST_STORMS = 1_000_000
+_RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
+
+
+def storm(
+    scenario: Annotated[
+        str | None, typer.Argument(help="A bundled scenario's name or a YAML file; left out, fleets are drawn, too.")
+    ] = None,
+    seeds: Annotated[str, typer.Option(metavar="A..B", help="From which to which storm.")] = "1..100",
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=LARGEST_SEED, help="Fly this storm alone, with a recording.")
+    ] = None,
+    plan: Annotated[Path | None, typer.Option(help="Fly the storm of this plan file, with a recording.")] = None,
+    bus: Annotated[Bus, typer.Option(help="Of a single storm.")] = "local",
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder: of storms that fail their plan files, of a single one its files.")
+    ] = None,
+) -> None:
+    """Fly fleets through swarms of faults, drawn from a number each, and tell what did not hold."""
+    if set_ and scenario is None:
+        raise UserError("--set: not allowed without a scenario, as fleets are drawn then")
+    mission = None if scenario is None else load_scenario(scenario, set_ or ())
+    if plan is not None:
+        if scenario is not None or seed is not None:
+            raise UserError("--plan: not allowed beside a scenario or --seed; the plan holds both")
+        _fly_one(load_plan(plan), plan.stem, bus, out)
+    elif seed is not None:
+        _fly_one(storm_of(mission, seed), f"storm-{seed}", bus, out)
+    else:
+        _fly_many(mission, scenario, _range_of(seeds), jobs or os.cpu_count() or 1, out)
+
+
+def _range_of(seeds: str) -> range:
+    match = _RANGE.fullmatch(seeds)
+    first, last = (int(match[1]), int(match[2])) if match else (1, 0)
+    if not first <= last <= LARGEST_SEED or last - first >= MOST_STORMS:
+        raise UserError(f"--seeds: {seeds} is not allowed; must be A..B, at most {MOST_STORMS} whole numbers")
+    return range(first, last + 1)
+
+
+def _fly_one(plan: TroublePlan, name: str, bus: Bus, out: Path | None) -> None:
+    folder = Path("runs") / name if out is None else out
+    _prepare(folder)
+    write_whole(folder / "plan.yaml", plan.to_yaml())
+    outcome = fly_storm(plan, bus=bus, folder=folder, record=True)
+    for violation in outcome.violations:
+        typer.echo(str(violation))
+    if not outcome.violations:
+        typer.echo(f"All that must hold does; the mission was over at {outcome.end_s:.0f} s.")
+    typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
+    if outcome.violations:
+        raise typer.Exit(FAILED)
+
+
+def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs: int, out: Path | None) -> None:
+    if out is not None:
+        _prepare(out)
+    outcomes: Outcomes = {}
+    failure = _fly(mission, named, numbers, jobs, outcomes, out)
+    failed = sorted(number for number, outcome in outcomes.items() if outcome.violations)
+    if out is not None:
+        told = {number: [str(one) for one in outcomes[number].violations] for number in failed}
+        content = {"first": numbers[0], "last": numbers[-1], "flown": len(outcomes), "failed": told}
+        write_whole(out / "storm.json", json.dumps(content, indent=2) + "\n")
+    typer.echo(f"{len(outcomes)} storms flown; in {len(failed)} of them something did not hold.")
+    if failure:
+        sys.stderr.write(f"{failure}\n")
+    if failed or failure:
+        raise typer.Exit(FAILED)
+
+
+def _fly(
+    mission: Scenario | None, named: str | None, numbers: range, jobs: int, outcomes: Outcomes, out: Path | None
+) -> str:
+    """Flies all; what went wrong with the campaign itself, in a sentence, or nothing."""
+    columns = (TextColumn("storm"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:
+        task = progress.add_task("storm", total=len(numbers))
+
+        def tell(number: int, outcome: Outcome) -> None:
+            progress.update(task, completed=len(outcomes))
+            if outcome.violations:
+                again = " ".join(["secondlook storm", *([named] if named else []), f"--seed {number}"])
+                typer.echo(f"seed {number}: {outcome.violations[0]}; again: {again}")
+                if out is not None:
+                    write_whole(out / f"storm-{number}.yaml", storm_of(mission, number).to_yaml())
+
+        try:
+            with signals_interrupt():
+                fly_storms(mission, numbers, jobs, outcomes, tell)
+        except KeyboardInterrupt:
+            return f"interrupted after {len(outcomes)} of {len(numbers)} storms"
+        except BrokenProcessPool:
+            return f"a process that flew storms has died, after {len(outcomes)} of {len(numbers)} storms"
+    return ""
+
+
+def _prepare(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise CannotWriteError(folder, error) from error

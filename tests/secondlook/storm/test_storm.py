@@ -1,0 +1,120 @@
+"""Storms: drawn alike from their number, flown with real nodes, and told of where something does not hold."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from coordinator.fleet import GIVEN_UP_AFTER
+from planner.fleet_map import VehicleLayer
+from secondlook.cli import app
+from secondlook.errors import UserError
+from secondlook.scenario import load_scenario
+from secondlook.storm.campaign import storm_of
+from secondlook.storm.fly import fly_storm
+from secondlook.testing import Fleet
+from secondlook.testing.plan import load_plan
+
+QUICK = 5
+"""A storm that is flown in some tenths of a second."""
+
+
+def test_a_number_is_one_storm_and_another_number_another() -> None:
+    assert storm_of(None, QUICK) == storm_of(None, QUICK)
+    assert storm_of(None, QUICK) != storm_of(None, QUICK + 1)
+
+
+def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time() -> None:
+    drawn: set[str] = set()
+    calm = 0
+    for number in range(200):
+        plan = storm_of(None, number)
+        calm += not plan.trouble
+        for one in plan.trouble:
+            drawn.add(one.what)
+            ends_s = getattr(one, "at_s", getattr(one, "from_s", 0.0)) + (getattr(one, "for_s", 0.0) or 0.0)
+            whom = {getattr(one, "node", ""), getattr(one, "vehicle", ""), getattr(one, "to", "")}
+            if whom & set(plan.core) and one.what != "join":
+                assert ends_s <= plan.heals_s + 0.1, (number, one)
+        assert plan.heals_s <= GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s
+    assert drawn == {"kill", "join", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder"}
+    assert 10 <= calm <= 35  # a tenth of 200
+
+
+def test_a_storm_of_a_given_scenario_keeps_its_fleet() -> None:
+    brief = load_scenario(Path(__file__).parents[2] / "support" / "brief.yaml")
+    plan = storm_of(brief, 4)
+    assert plan.scenario.vehicles == brief.vehicles
+    assert plan.scenario.seed == 4
+
+
+@pytest.mark.parametrize("number", [2, QUICK, 7])
+def test_what_must_hold_does(number: int) -> None:
+    first, again = (fly_storm(storm_of(None, number)) for _ in range(2))
+    assert not first.violations
+    assert first.digest == again.digest is not None
+
+
+def test_a_map_that_forgets_what_was_told_before_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def forget(layer: VehicleLayer, place: object, window: object, incarnation: int, told: object) -> object:
+        return told
+
+    monkeypatch.setattr(VehicleLayer, "_with_other_starts", forget)
+    found = (violation for number in range(40) for violation in fly_storm(storm_of(None, number)).violations)
+    assert any(violation.invariant == "the map is what came" for violation in found)
+
+
+def test_a_plan_file_is_flown_as_the_storm_it_was_written_from(tmp_path: Path) -> None:
+    plan = storm_of(None, QUICK)
+    (tmp_path / "plan.yaml").write_text(plan.to_yaml())
+    assert load_plan(tmp_path / "plan.yaml") == plan
+    flight = Fleet.of_plan(tmp_path / "plan.yaml", folder=tmp_path / "flights").run()
+    assert flight.digest == fly_storm(plan).digest
+    fleet = Fleet(plan.scenario, folder=tmp_path / "others", fault_seed=plan.fault_seed)
+    fleet.plan(tmp_path / "plan.yaml")
+    assert fleet.run().digest == flight.digest
+
+
+@pytest.mark.parametrize(
+    ("entry", "sentence"),
+    [
+        ("{what: kill, node: primary}", r"plan.yaml:4: trouble\[0\].at_s: missing; must be given"),
+        ("{what: drown, node: primary}", r"plan.yaml:4: trouble\[0\].what: \"drown\" is not allowed; must be .*"),
+        ("{what: kill, node: primary, at_s: 5, for_s: 3}", r"plan.yaml:4: trouble\[0\].for_s: 3 is not allowed; .*"),
+        ("{what: kill, node: nobody, at_s: 5}", r"trouble\[0\]: 'nobody' cannot be killed, .*"),
+    ],
+)
+def test_a_plan_that_cannot_be_flown_is_refused_in_a_sentence(tmp_path: Path, entry: str, sentence: str) -> None:
+    brief = load_scenario(Path(__file__).parents[2] / "support" / "brief.yaml")
+    text = "".join(f"  {line}\n" for line in brief.to_yaml().splitlines())
+    (tmp_path / "plan.yaml").write_text(f"fault_seed: 1\ncore: []\ntrouble:\n- {entry}\nscenario:\n{text}")
+    with pytest.raises(UserError, match=f"(?s)^.*{sentence}$"):
+        Fleet.of_plan(tmp_path / "plan.yaml", folder=tmp_path)
+
+
+def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
+    many = CliRunner().invoke(
+        app, ["storm", "--seeds", f"{QUICK}..{QUICK}", "--jobs", "1", "--out", str(tmp_path / "m")]
+    )
+    assert many.exit_code == 0, many.output
+    assert "1 storms flown; in 0 of them something did not hold." in many.output
+    assert (tmp_path / "m" / "storm.json").is_file()
+    one = CliRunner().invoke(app, ["storm", "--seed", str(QUICK), "--out", str(tmp_path / "o")])
+    assert one.exit_code == 0, one.output
+    assert load_plan(tmp_path / "o" / "plan.yaml") == storm_of(None, QUICK)
+    assert (tmp_path / "o" / "flight-1" / "mission.rrd").is_file()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--seeds", "5..3"], "--seeds: 5..3 is not allowed; must be A..B, at most 1000000 whole numbers"),
+        (["--set", "seed=3"], "--set: not allowed without a scenario, as fleets are drawn then"),
+    ],
+)
+def test_wrong_use_is_refused_in_a_sentence(arguments: list[str], sentence: str) -> None:
+    refused = CliRunner().invoke(app, ["storm", *arguments])
+    assert isinstance(refused.exception, UserError)
+    assert str(refused.exception) == sentence
