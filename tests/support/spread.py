@@ -16,7 +16,7 @@ from typing import Any
 
 from flights import BRIEF, until
 
-from comms.said.topics import TOPICS, Keep, topic_of
+from comms.said.topics import LOOK, TOPICS, Keep, topic_of
 from secondlook.recorded.mission_files import read_messages
 
 # So that a slow machine does no harm: nobody is lost soon, and the helper has time for strips after the survey.
@@ -131,12 +131,19 @@ def kill(one: Started) -> None:
 
 
 def lost_of_what_is_kept(fleet: SpreadFleet) -> dict[str, int]:
-    """By topic, what of that which is kept for whoever has missed it the recorder has not got in the end."""
+    """By topic, what of all that is kept for whoever has missed it the recorder has not got in the end.
+
+    Looks are left out: those of bodies that are not ours nobody counts.
+    """
     said = Counter(fleet.summary["messages"])
     heard = Counter[str]()
     for key, _ in read_messages(fleet.record / "messages.mpk"):
         found = topic_of(key)
         assert found is not None
         heard[found[0].name] += 1
-    lost = {topic.name: said[topic.name] - heard[topic.name] for topic in TOPICS if topic.keep is Keep.EVENTS}
+    lost = {
+        topic.name: said[topic.name] - heard[topic.name]
+        for topic in TOPICS
+        if topic.keep is Keep.EVENTS and topic is not LOOK
+    }
     return {name: count for name, count in lost.items() if count}

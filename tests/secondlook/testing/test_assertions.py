@@ -395,11 +395,12 @@ class TestMissions:
         ):
             assert_all_finished(without(two, lambda one: isinstance(one.message, MissionOver)))
 
-    def test_messages_that_were_dropped(self, two: Flight) -> None:
-        flight = replace(two, summary={**two.summary, "dropped": {"malformed": 2, "lost by a fault": 9}})
+    def test_messages_that_were_dropped(self, two: Flight, tmp_path: Path) -> None:
+        dropped = {"malformed": 2, "lost by a fault": 9}
+        flight = replace(two, folder=tmp_path, summary={**two.summary, "dropped": dropped})
         with pytest.raises(AssertionError, match=r"^messages were dropped:\n  2: malformed$"):
             assert_no_message_dropped(flight)
-        (two.folder / "logs").mkdir()
+        (tmp_path / "logs").mkdir()
         with pytest.raises(AssertionError, match=r"2: malformed; which, is told in .*/logs$"):
             assert_no_message_dropped(flight)
         assert_no_message_dropped(replace(two, summary={**two.summary, "dropped": {"lost by a fault": 9}}))
