@@ -51,7 +51,8 @@ def test_a_mission_by_the_wall_clock_ends_well_and_loses_nothing(tmp_path: Path,
         modes += [message.mode] if isinstance(message, RunInfo) else []
     assert kept == summary["messages"]
     assert modes == [ClockMode.WALL]
-    assert {path.name for path in flying.folder.iterdir()} == {
+    # On a busy machine vehicles may come too close, of which a log warns.
+    assert {path.name for path in flying.folder.iterdir()} - {"logs"} == {
         "events.jsonl", "messages.mpk", "mission.rrd", "report.html", "risk.npz", "scenario.yaml", "summary.json",
     }  # fmt: skip
 
