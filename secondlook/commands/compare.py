@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import sys
-from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,20 +12,18 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.compare.flights import Contender, Flown, contenders, fly_all
+from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
+from secondlook.compare.flights import Flown, contenders, fly_all
 from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
 from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
-from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import load_scenario
 
-FAILED = 1
 MOST_SEEDS = 10_000
 WIDEST = 500  # characters
 
@@ -64,7 +61,16 @@ def compare(
     flown: Flown = {}
     numbers = range(first_seed, first_seed + seeds)
     shown = sys.stderr.isatty() and not as_json
-    failure = _fly(chosen, numbers, jobs or os.cpu_count() or 1, flown, shown=shown)
+    workers = jobs or os.cpu_count() or 1
+
+    def fly(tell: Tell) -> None:
+        def progress(flown: Flown) -> None:
+            failed = len(failures(flown))
+            tell(sum(len(by_seed) for by_seed in flown.values()), f"{failed} failed" if failed else "")
+
+        fly_all(chosen, numbers, workers, flown, progress)
+
+    failure = fly_watched("compare", "missions", seeds * len(chosen), fly, shown=shown)
     stood = standings(flown)
     reacting = verdict(chosen, {one.name: one.against_first for one in stood}, objective)
     title = f"{mission.name}, seeds {numbers[0]} to {numbers[-1]}"
@@ -89,44 +95,10 @@ def compare(
         raise typer.Exit(FAILED)
 
 
-def _fly(chosen: list[Contender], seeds: range, jobs: int, flown: Flown, *, shown: bool) -> str:
-    """Flies all; what went wrong with the comparison itself, in a sentence, or nothing."""
-    total = len(seeds) * len(chosen)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("missions{task.fields[told]}"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
-        task = progress.add_task("compare", total=total, told="")
-
-        def tell(flown: Flown) -> None:
-            failed = len(failures(flown))
-            progress.update(task, completed=_count(flown), told=f", {failed} failed" if failed else "")
-
-        try:
-            with signals_interrupt():
-                fly_all(chosen, seeds, jobs, flown, tell)
-        except KeyboardInterrupt:
-            return f"interrupted after {_count(flown)} of {total} missions"
-        except BrokenProcessPool:
-            return f"a process that flew missions has died, after {_count(flown)} of {total} missions"
-    return ""
-
-
-def _count(flown: Flown) -> int:
-    return sum(len(by_seed) for by_seed in flown.values())
-
-
 def _prepare(folder: Path) -> None:
     if find_spec("matplotlib") is None:
         raise UserError("--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+    make_folder(folder)
 
 
 def _write(content: str, flown: Flown, title: str, folder: Path) -> None:

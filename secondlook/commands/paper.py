@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import sys
-from concurrent.futures.process import BrokenProcessPool
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,17 +11,15 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
-from secondlook.launch.signals import signals_interrupt
 from secondlook.paper.measured import MeasuredMission, measure_all
 from secondlook.paper.published import PublishedMission, published_missions
 from secondlook.paper.report import as_json as entries_of
 from secondlook.paper.report import conclusions, differing_decisions, tables
 
-FAILED = 1
 NEEDED = {"sklearn": "scikit-learn", "matplotlib": "matplotlib"}
 """What is imported, and what it is called where packages are installed from."""
 
@@ -35,7 +32,7 @@ def paper(
     """Fly the paper's three experiments. Prints its tables beside what came of them; needs secondlook[paper]."""
     _require_extra()
     if out is not None:
-        _make(out)
+        make_folder(out)
     runs = _measure(seeds, shown=sys.stderr.isatty() and not as_json)
     if as_json:
         typer.echo(json.dumps(entries_of(runs), indent=2))
@@ -65,30 +62,20 @@ def _measure(runs: int, *, shown: bool) -> list[list[MeasuredMission]]:
     missions: list[tuple[PublishedMission, int]] = [
         (mission, seed_of(run, index)) for run in range(runs) for index, mission in enumerate(published_missions())
     ]
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TextColumn("missions"))
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
-        task = progress.add_task("paper", total=len(missions))
-        try:
-            with signals_interrupt():
-                measured = measure_all(missions, lambda done: progress.update(task, completed=done))
-        except RunFailedError as error:
-            failure = str(error)
-        except BrokenProcessPool:
-            failure = "a process that measured a mission has died"
-        except KeyboardInterrupt:
-            failure = "interrupted"
-        else:
-            each = len(published_missions())
-            return [measured[start : start + each] for start in range(0, len(measured), each)]
-    sys.stderr.write(f"{failure}\n")
-    raise typer.Exit(FAILED)
+    measured: list[MeasuredMission] = []
 
+    def fly(tell: Tell) -> None:
+        measured.extend(measure_all(missions, lambda done: tell(done, "")))
 
-def _make(folder: Path) -> None:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+        failure = fly_watched("paper", "missions", len(missions), fly, shown=shown)
+    except RunFailedError as error:
+        failure = str(error)
+    if failure:
+        sys.stderr.write(f"{failure}\n")
+        raise typer.Exit(FAILED)
+    each = len(published_missions())
+    return [measured[start : start + each] for start in range(0, len(measured), each)]
 
 
 def _require_extra() -> None:

@@ -6,25 +6,21 @@ import json
 import os
 import re
 import sys
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from comms.said.announcement import LARGEST_SEED
+from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
 from secondlook.errors import UserError
-from secondlook.files import CannotWriteError, write_whole
+from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
-from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
 from secondlook.storm.fly import Outcome, fly_storm
 from secondlook.testing.plan import TroublePlan, load_plan
 
-FAILED = 1
 MOST_STORMS = 1_000_000
 _RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
 
@@ -73,7 +69,7 @@ def _range_of(seeds: str) -> range:
 
 def _fly_one(plan: TroublePlan, name: str, bus: Bus, out: Path | None) -> None:
     folder = Path("runs") / name if out is None else out
-    _prepare(folder)
+    make_folder(folder)
     write_whole(folder / "plan.yaml", plan.to_yaml())
     outcome = fly_storm(plan, bus=bus, folder=folder, record=True)
     for violation in outcome.violations:
@@ -87,9 +83,21 @@ def _fly_one(plan: TroublePlan, name: str, bus: Bus, out: Path | None) -> None:
 
 def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs: int, out: Path | None) -> None:
     if out is not None:
-        _prepare(out)
+        make_folder(out)
     outcomes: Outcomes = {}
-    failure = _fly(mission, named, numbers, jobs, outcomes, out)
+    again = " ".join(["secondlook storm", *([named] if named else []), "--seed"])
+
+    def fly(tell: Tell) -> None:
+        def progress(number: int, outcome: Outcome) -> None:
+            tell(len(outcomes), "")
+            if outcome.violations:
+                typer.echo(f"seed {number}: {outcome.violations[0]}; again: {again} {number}")
+                if out is not None:
+                    write_whole(out / f"storm-{number}.yaml", storm_of(mission, number).to_yaml())
+
+        fly_storms(mission, numbers, jobs, outcomes, progress)
+
+    failure = fly_watched("storm", "storms", len(numbers), fly, shown=sys.stderr.isatty())
     failed = sorted(number for number, outcome in outcomes.items() if outcome.violations)
     if out is not None:
         told = {number: [str(one) for one in outcomes[number].violations] for number in failed}
@@ -100,37 +108,3 @@ def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs:
         sys.stderr.write(f"{failure}\n")
     if failed or failure:
         raise typer.Exit(FAILED)
-
-
-def _fly(
-    mission: Scenario | None, named: str | None, numbers: range, jobs: int, outcomes: Outcomes, out: Path | None
-) -> str:
-    """Flies all; what went wrong with the campaign itself, in a sentence, or nothing."""
-    columns = (TextColumn("storm"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("storm", total=len(numbers))
-
-        def tell(number: int, outcome: Outcome) -> None:
-            progress.update(task, completed=len(outcomes))
-            if outcome.violations:
-                again = " ".join(["secondlook storm", *([named] if named else []), f"--seed {number}"])
-                typer.echo(f"seed {number}: {outcome.violations[0]}; again: {again}")
-                if out is not None:
-                    write_whole(out / f"storm-{number}.yaml", storm_of(mission, number).to_yaml())
-
-        try:
-            with signals_interrupt():
-                fly_storms(mission, numbers, jobs, outcomes, tell)
-        except KeyboardInterrupt:
-            return f"interrupted after {len(outcomes)} of {len(numbers)} storms"
-        except BrokenProcessPool:
-            return f"a process that flew storms has died, after {len(outcomes)} of {len(numbers)} storms"
-    return ""
-
-
-def _prepare(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise CannotWriteError(folder, error) from error

@@ -326,8 +326,9 @@ class TestCommand:
     def test_what_was_flown_before_an_end_too_early_is_told(
         self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
     ) -> None:
-        def fail(chosen: object, seeds: object, jobs: object, flown: Flown, progress: object) -> None:
+        def fail(chosen: object, seeds: object, jobs: object, flown: Flown, progress: Callable[[Flown], None]) -> None:
             flown["greedy"] = {1: result(1, 0.4)}
+            progress(flown)
             raise raised
 
         monkeypatch.setattr("secondlook.commands.compare.fly_all", fail)

@@ -287,8 +287,8 @@ class TestCommand:
         ("raised", "told"),
         [
             (RunFailedError("primary has failed"), "primary has failed\n"),
-            (KeyboardInterrupt(), "interrupted\n"),
-            (BrokenProcessPool(), "a process that measured a mission has died\n"),
+            (KeyboardInterrupt(), "interrupted after 0 of 6 missions\n"),
+            (BrokenProcessPool(), "a process that flew missions has died, after 0 of 6 missions\n"),
         ],
         ids=["failed", "interrupted", "died"],
     )
