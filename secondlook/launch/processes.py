@@ -22,7 +22,7 @@ from secondlook.fleet.build import Fleet
 from secondlook.fleet.nodes import HUB, NODES, OBSERVER, NodeSpec, Process, hosts_of_run
 from secondlook.launch.child_process import ChildProcess, ChildSetup
 from secondlook.launch.listening_thread import ListeningThread
-from secondlook.launch.revival import Revival
+from secondlook.launch.restarts import Revival
 from secondlook.launch.verdict import Fate, Verdict
 from secondlook.recorded.observer import RunStopped
 from viz.recorder_config import RecorderConfig

@@ -6,8 +6,7 @@ import logging
 
 import pytest
 
-from secondlook.launch.restarts import LASTED_S, LONGEST_S, MOST_IN_A_ROW, Restarts
-from secondlook.launch.revival import Revival
+from secondlook.launch.restarts import LASTED_S, LONGEST_S, MOST_IN_A_ROW, Restarts, Revival
 from secondlook.launch.verdict import Fate
 
 KILLED = Fate(-9, "was killed by SIGKILL")
