@@ -13,7 +13,6 @@ from planner.types import Strip
 
 NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
-ENDED = frozenset({StripState.DONE, StripState.FAILED, StripState.WITHDRAWN})
 _ALLOWED: dict[StripState, frozenset[StripState]] = {
     StripState.OPEN: frozenset({StripState.OFFERED, StripState.WITHDRAWN}),
     StripState.OFFERED: frozenset(
@@ -104,7 +103,7 @@ class Ledger:
         if state in WITH_A_VEHICLE:
             self._with[vehicle] = number
         record.state, record.since_ms, record.reason = state, now_ms, reason
-        record.vehicle = vehicle if state in WITH_A_VEHICLE or state in ENDED else ""
+        record.vehicle = vehicle if state in WITH_A_VEHICLE or state.has_ended else ""
         record.revision += 1
 
     def _check(self, record: StripRecord, state: StripState, vehicle: str) -> None:

@@ -19,7 +19,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.ledger import ENDED, NUMBERS_A_SECOND, WITH_A_VEHICLE
+from coordinator.ledger import NUMBERS_A_SECOND, WITH_A_VEHICLE
 from coordinator.strip_life import ANSWER_WITHIN_MS
 from secondlook.testing.flight import Flight, fail_if, lives, reached
 
@@ -52,7 +52,7 @@ def assert_no_strip_lost(flight: Flight) -> None:
         expected = 1 if before is None else before.message.revision + 1
         if status.revision != expected:
             problems.append(f"strip {number} comes in revision {status.revision} {at}, where {expected} was due")
-        if before is not None and before.message.state in ENDED:
+        if before is not None and before.message.state.has_ended:
             was = f"was {before.message.state.value} at {_s(before)} s"
             problems.append(f"strip {number} {was}, and is {status.state.value} {at}")
         strips[number] = one
@@ -99,7 +99,7 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
         f"strip {number} was still {last.message.state.value} when the mission was over at {over_ms / 1000:.3f} s,"
         " before its deadline"
         for number, last in strips.items()
-        if last.message.state not in ENDED
+        if not last.message.state.has_ended
     ]
 
 

@@ -27,7 +27,7 @@ from comms.said.topics import CONTACT, COVERAGE, CURVE, HOTSPOT, PLAN, STATE, TA
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
-from coordinator.ledger import ENDED, WITH_A_VEHICLE
+from coordinator.ledger import WITH_A_VEHICLE
 from secondlook.testing.checks.any_mail import Letter, letters
 
 HELPERS = [HELPER, SECOND_HELPER]
@@ -82,7 +82,7 @@ def test_the_coordinator(
         elif isinstance(message, StripStatus):
             before = strips.get(one.number)
             assert message.revision == (1 if before is None else before.revision + 1)
-            assert before is None or before.state not in ENDED
+            assert before is None or not before.state.has_ended
             assert message.vehicle or message.state not in WITH_A_VEHICLE
             strips[one.number] = message
     assert sorted(strips) == list(range(1, len(strips) + 1))

@@ -25,7 +25,6 @@ from comms.said.messages import (
     TaskStatus,
 )
 from coordinator.allocate.simple import NearestAllocator
-from coordinator.ledger import ENDED
 from secondlook.testing import (
     Fleet,
     Flight,
@@ -76,7 +75,7 @@ def check(flight: Flight, *, but_served_twice: bool = False) -> dict[int, StripS
         assert one.message.reason
         last[one.number] = one.message
     for status in last.values():
-        assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
+        assert status.state.has_ended or status.reason.startswith("left when the mission was over: ")
     assert any(isinstance(one.message, MissionOver) for one in flight.heard)
     return last
 
@@ -242,9 +241,9 @@ def check_of_last(flight: Flight) -> None:
     counted = Counter(one.state for one in flight.strips)
     assert counted[StripState.DONE] == figures["revisited"]
     assert counted[StripState.WITHDRAWN] == figures["withdrawn"]
-    assert {one.number for one in flight.strips if one.state not in ENDED} <= last.keys()
+    assert {one.number for one in flight.strips if not one.state.has_ended} <= last.keys()
     for status in last.values():
-        assert status.state in ENDED or status.reason.startswith("left when the mission was over: ")
+        assert status.state.has_ended or status.reason.startswith("left when the mission was over: ")
 
 
 class TestBadLinks:

@@ -24,7 +24,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.ledger import ENDED, WITH_A_VEHICLE
+from coordinator.ledger import WITH_A_VEHICLE
 from secondlook.scenario import load_scenario
 
 PRIMARY = "primary"
@@ -66,7 +66,7 @@ class TestEveryMission:
         for received, status in mission.all(StripStatus):
             before = last.get(received.number)
             assert status.revision == (1 if before is None else before.revision + 1)
-            assert before is None or before.state not in ENDED
+            assert before is None or not before.state.has_ended
             last[received.number] = status
         figures = mission.summary["hotspots"]
         assert sorted(last) == list(range(1, figures["published"] + 1))
