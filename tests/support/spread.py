@@ -18,6 +18,7 @@ from flights import BRIEF, until
 
 from comms.said.topics import LOOK, TOPICS, Keep, topic_of
 from secondlook.recorded.mission_files import read_messages
+from secondlook.scenario import load_scenario
 
 # So that a slow machine does no harm: nobody is lost soon, and the helper has time for strips after the survey.
 PATIENT = ("--set", "coordinator.lost_after_s=200", "--set", "mission.deadline_factor=2.5")
@@ -130,20 +131,18 @@ def kill(one: Started) -> None:
     one.process.wait()
 
 
-def lost_of_what_is_kept(fleet: SpreadFleet) -> dict[str, int]:
-    """By topic, what of all that is kept for whoever has missed it the recorder has not got in the end.
+def lost_of_what_is_kept(folder: Path) -> dict[str, int]:
+    """By topic, what of all that is kept for whoever has missed it the recorder of a run has not got in the end.
 
-    Looks are left out: those of bodies that are not ours nobody counts.
+    Looks of bodies that are not ours are left out, as nobody counts them.
     """
-    said = Counter(fleet.summary["messages"])
+    said = Counter[str](json.loads((folder / "summary.json").read_text())["messages"])
+    external = load_scenario(folder / "scenario.yaml").external_vehicles
     heard = Counter[str]()
-    for key, _ in read_messages(fleet.record / "messages.mpk"):
+    for key, _ in read_messages(folder / "messages.mpk"):
         found = topic_of(key)
         assert found is not None
-        heard[found[0].name] += 1
-    lost = {
-        topic.name: said[topic.name] - heard[topic.name]
-        for topic in TOPICS
-        if topic.keep is Keep.EVENTS and topic is not LOOK
-    }
+        topic, vehicle = found
+        heard[topic.name] += topic is not LOOK or vehicle not in external
+    lost = {topic.name: said[topic.name] - heard[topic.name] for topic in TOPICS if topic.keep is Keep.EVENTS}
     return {name: count for name, count in lost.items() if count}

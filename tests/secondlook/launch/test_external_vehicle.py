@@ -153,7 +153,7 @@ def test_the_example_flies_a_mission_through_its_own_agent(tmp_path: Path) -> No
         finally:
             body.kill()
             body.wait()
-        assert lost_of_what_is_kept(fleet) == {}
+        assert lost_of_what_is_kept(fleet.record) == {}
         summary = fleet.summary
     assert summary["hotspots"]["revisited"] > 0
     assert summary["vehicles"]["helper"]["path_m"] > 100

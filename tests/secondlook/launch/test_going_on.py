@@ -103,6 +103,7 @@ def test_a_run_that_keeps_going_starts_again_what_dies(tmp_path: Path) -> None:
     # What was on its way when a process was killed is lost to who only listens, where a newer word has come since.
     assert summary["ending"] == "over"
     assert summary["dropped"].keys() <= {"lost on the way to the observer"}
+    assert lost_of_what_is_kept(flying.folder) == {}
     assert summary["restarts"] == {"primary": 1, "helper": 1, "coordinator": 1, "recorder": 1}
     assert (summary["vehicles"]["primary"]["tracks"], summary["risk"]["uncovered_share"]) == (4, 0.0)
     assert_gone_on(flying.folder, AGENTS)
@@ -130,7 +131,7 @@ def test_nodes_of_a_spread_fleet_go_on_by_their_memories(tmp_path: Path) -> None
             fleet.node(*role, more=["--state", "state"] if role[-1] == "primary" else again)
         fleet.node("recorder")
         assert fleet.started["primary"].says("the mission begins")
-        for name, words in {**WHEN, "world": ('"coord/strip/', '"done"')}.items():
+        for name, words in {"world": ('"agent/primary/maneuver"', '"number": 1'), **WHEN}.items():
             assert until(has_said(fleet.record, *words)), name
             if name == "primary":  # by hand
                 kill(fleet.started[name])
@@ -141,7 +142,7 @@ def test_nodes_of_a_spread_fleet_go_on_by_their_memories(tmp_path: Path) -> None
                 assert fleet.started[name].says(f"{name}: goes on from "), fleet.started[name].said
         going = {name: one.ends() for name, one in fleet.started.items() if name != "primary"}
         assert going == dict.fromkeys(going, 0)
-        assert lost_of_what_is_kept(fleet) == {}
+        assert lost_of_what_is_kept(fleet.record) == {}
         assert_gone_on(fleet.record, (*AGENTS, "world"))
         assert re.fullmatch(
             r"helper: the mission begins\nhelper: was killed by SIGKILL; it is started again, restart 1 of at most 6 "

@@ -52,7 +52,7 @@ def test_a_vehicle_that_is_cut_off_is_lost_for_a_while_and_its_map_is_whole_in_t
         finally:
             body.kill()
             body.wait()
-        assert lost_of_what_is_kept(fleet) == {}
+        assert lost_of_what_is_kept(fleet.record) == {}
         summary = fleet.summary
         reasons = [one["reason"] for one in events(fleet.record) if one["key"].startswith("coord/strip/")]
     assert "helper is lost: nothing heard of it" in reasons

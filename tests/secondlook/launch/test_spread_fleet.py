@@ -45,7 +45,7 @@ def test_a_mission_goes_on_while_router_and_helper_are_started_anew_and_nothing_
     assert again.says("helper: the mission is at ")
     going = [one for name, one in fleet.started.items() if name not in ("second", "helper")]
     assert {one.name: one.ends() for one in going} == {one.name: 0 for one in going}
-    assert lost_of_what_is_kept(fleet) == {}
+    assert lost_of_what_is_kept(fleet.record) == {}
     summary = fleet.summary
     assert (summary["ending"], summary["factor"], summary["digest"]) == ("over", FACTOR, None)
     assert summary["vehicles"]["primary"]["tracks"] == 4
