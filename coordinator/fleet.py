@@ -17,7 +17,9 @@ from planner.risk import LevelArray
 
 log = logging.getLogger("secondlook.coordinator")
 
-GIVEN_UP_AFTER = 10  # times as long as for a lost vehicle must a primary be silent before the mission ends without it
+GIVEN_UP_AFTER = 10
+"""So many times as long as for a lost vehicle must a primary be silent, or stand still, before the mission ends without
+it. One that stands still may hear nothing, and then never surveys, though it says each 10 s that it is there."""
 
 
 class KnownFleet:
@@ -28,7 +30,7 @@ class KnownFleet:
 
     def __init__(self, run: RunInfo, lost_after_ms: int, now_ms: int) -> None:
         self.map = FleetMap(run.grid.spec, run.rho)
-        self.vehicles = {entry.vehicle: KnownVehicle(entry, heard_ms=now_ms) for entry in run.vehicles}
+        self.vehicles = {one.vehicle: KnownVehicle(one, heard_ms=now_ms, stirred_ms=now_ms) for one in run.vehicles}
         self.primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
         self._lost_after_ms = lost_after_ms
         self._given_up_after_ms = GIVEN_UP_AFTER * lost_after_ms
@@ -78,11 +80,13 @@ class KnownFleet:
                 lost.append(name)
                 log.info("%s is lost: nothing heard of it since %.0f s", name, vehicle.heard_ms / 1000)
         for vehicle in self.surveying:
-            if now_ms - vehicle.heard_ms >= self._given_up_after_ms:
+            if now_ms - vehicle.stirred_ms >= self._given_up_after_ms:
                 vehicle.finished_ms = now_ms
+                how = "nothing heard of it" if vehicle.lost else "it has not stirred"
+                log.warning("%s is given up: %s since %.0f s", vehicle.entry.vehicle, how, vehicle.stirred_ms / 1000)
         return lost
 
     def deadlines_ms(self) -> Iterator[int]:
         """When somebody is lost, or given up, if nothing is heard until then."""
         yield from (one.heard_ms + self._lost_after_ms for one in self.vehicles.values() if not one.lost)
-        yield from (one.heard_ms + self._given_up_after_ms for one in self.surveying)
+        yield from (one.stirred_ms + self._given_up_after_ms for one in self.surveying)

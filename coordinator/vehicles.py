@@ -54,6 +54,11 @@ def pass_of(track: PlannedTrack, entry: RosterVehicle) -> Pass:
     return pass_over(start, end, entry.run_in_m, footprint_of(entry.sonar).lead_m)
 
 
+def _stirs(before: AgentState, state: AgentState) -> bool:
+    """Whether a vehicle is elsewhere, or at something else, than it was."""
+    return (before.mode, before.works_on, before.x_m, before.y_m) != (state.mode, state.works_on, state.x_m, state.y_m)
+
+
 Order = tuple[int, int]
 """Incarnation and sequence number of a sender's message."""
 
@@ -79,7 +84,8 @@ class Offer:
 class KnownVehicle:
     """One vehicle of the fleet.
 
-    `heard_ms`: when its newest state was sent. `finished_ms`: when it had surveyed all, or was given up; for a primary.
+    `heard_ms`: when its newest state was sent; `stirred_ms`: when the newest that told of another place or work than
+    the one before. `finished_ms`: when it had surveyed all, or was given up; for a primary.
     `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
@@ -103,6 +109,7 @@ class KnownVehicle:
     plan: Plan | None = None
     curves: dict[int, DetectionCurve] = field(default_factory=dict)
     arrivals: Arrivals = field(default_factory=Arrivals)
+    stirred_ms: int = 0
     _plan_order: Order = _NONE_YET
     _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
@@ -140,14 +147,16 @@ class KnownVehicle:
             return False
         if header.incarnation > self._state_order[0]:  # started anew: it may do better
             self.failures = self.unanswered = 0
+        stirs = header.incarnation > self._state_order[0] or self.state is None or _stirs(self.state, state)
         self._state_order = order
         self.state = state
         self.heard_ms = header.sent_ms
+        self.stirred_ms = header.sent_ms if stirs else self.stirred_ms
         self.lost = False
         if state.mode is Mode.FINISHED:
             self._surveyed_in = header.incarnation
             self.finished_ms = now_ms if self.finished_ms is None else self.finished_ms
-        elif self._surveyed_in != header.incarnation:  # given up too early, or started anew
+        elif self._surveyed_in != header.incarnation and stirs:  # given up too early, or started anew
             self.finished_ms = None
         return True
 

@@ -161,8 +161,8 @@ class Coordinator(Mapping):
     but given to nobody), or `package.module:Class` of your own."""
     node: Annotated[str, plug_in(NODE)] | None = None
     """`package.module:Class` of a whole coordinator of your own."""
-    lost_after_s: Duration = 30.0
-    """A vehicle not heard of for so long counts as lost."""
+    lost_after_s: Annotated[float, Field(ge=20, le=1e7)] = 30.0
+    """A vehicle not heard of for so long counts as lost. Agents tell their state every 10 s: one may be late."""
     min_strip_m: Length = 30.0
     """Least length of a strip."""
     max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 2000.0

@@ -19,10 +19,11 @@ from coordinator_by_hand import (
 )
 
 from comms.said.announcement import Role
-from comms.said.messages import MissionOver, Mode, StripStatus, Task, TaskAction, TaskState
+from comms.said.messages import AgentState, MissionOver, Mode, StripStatus, Task, TaskAction, TaskState
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator
 from coordinator.coordinator import Coordinator
+from coordinator.vehicles import KnownVehicle
 from planner.tiles import tiles
 
 ALL_TILES = sum(range(1, len(tiles(GRID)) + 1))  # what a state tells of all of them in their first version
@@ -199,6 +200,38 @@ class TestTheEnd:
         assert told.node.all(MissionOver) == []  # 1.05 times 500 s
         told.keep_alive([PRIMARY, HELPER], 2)
         assert told.node.all(MissionOver)
+
+    def test_a_primary_that_stands_still_for_five_minutes_is_given_up_until_it_stirs(self) -> None:
+        told = coordinator(idle=(HELPER,))
+        told.hotspot()
+        state = AgentState(Mode.SURVEY, 1, 1.0, 0, 0, 0, 0)
+        told.node.hear(f"agent/{PRIMARY}/state", state, sent_ms=told.node.now_ms)
+        since_ms = told.node.now_ms
+
+        def stands_until(time_ms: int, state: AgentState) -> None:
+            while told.node.now_ms + 10_000 <= time_ms:
+                told.node.wait(10)
+                told.node.hear(f"agent/{PRIMARY}/state", state)
+                told.state(HELPER, Mode.IDLE)
+            told.node.wait_until(time_ms)
+
+        def surveying() -> list[KnownVehicle]:
+            node = told.node.node
+            assert isinstance(node, Coordinator)
+            return node.fleet.surveying
+
+        stands_until(since_ms + 299_999, state)
+        assert len(surveying()) == 1
+        stands_until(since_ms + 300_001, state)
+        assert surveying() == []
+        told.node.hear(f"agent/{PRIMARY}/state", state)
+        assert surveying() == []
+        moved = AgentState(Mode.SURVEY, 1, 1.0, 0, 3, 0, 0)
+        told.node.hear(f"agent/{PRIMARY}/state", moved)
+        assert len(surveying()) == 1
+        assert told.node.all(MissionOver) == []
+        stands_until(since_ms + 700_000, moved)
+        assert len(told.node.all(MissionOver)) >= 1
 
     def test_a_run_without_a_primary_is_over_at_once(self) -> None:
         told = coordinator((vehicle(HELPER, Role.REVISIT),))

@@ -83,9 +83,10 @@ class Told:
         tiles_told: int = 0,
         hotspots_told: int = 0,
     ) -> None:
-        """An agent's state; helpers are at (122.5, 0) and head north."""
+        """An agent's state; helpers are at (122.5, 0) and head north. A primary inches on: by 1 m in 1000 s."""
         x_m = 122.5 if name != SECOND_HELPER else 322.5
-        message = AgentState(mode, works_on, battery, 0, x_m, 0, 0, tiles_told, hotspots_told)
+        y_m = self.node.now_ms / 1e6 if name == PRIMARY else 0.0
+        message = AgentState(mode, works_on, battery, 0, x_m, y_m, 0, tiles_told, hotspots_told)
         self.node.hear(f"agent/{name}/state", message, at_ms=at_ms)
 
     def status(self, name: str, strip: int, state: TaskState, reason: str = "", at_ms: int | None = None) -> None:
@@ -117,7 +118,8 @@ class Told:
         while self.node.now_ms + 10_000 <= until_ms:
             self.node.wait(10)
             for name, state in last.items():
-                self.node.hear(f"agent/{name}/state", state)
+                y_m = self.node.now_ms / 1e6 if name == PRIMARY else state.y_m
+                self.node.hear(f"agent/{name}/state", replace(state, y_m=y_m))
         self.node.wait_until(until_ms)
 
     def settle(self) -> list[Said]:
