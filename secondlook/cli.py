@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from secondlook.commands.certificates import certificates
 from secondlook.commands.check import check
 from secondlook.commands.compare import compare
 from secondlook.commands.geojson import geojson
@@ -70,7 +71,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, compare, storm, paper, replay, view, report, geojson):
+for command in (run, scenarios, check, plan, compare, storm, paper, replay, view, report, geojson, certificates):
     app.command()(command)
 
 

@@ -1,28 +1,24 @@
-"""Certificates for tests, made as the documentation says."""
+"""Certificates for tests, made as `secondlook certificates` makes them."""
 
 from __future__ import annotations
 
-import re
-import subprocess
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 from comms.session import Certificates
-
-PAGE = Path(__file__).parents[2] / "docs" / "several-hosts.md"
-ADDRESS = "192.0.2.1"
+from secondlook.fleet.certificates import certify
 
 
 def make_certificates(folder: Path, names: Sequence[str], address: str) -> dict[str, Certificates]:
-    """Certificates of one authority, by name; all hold for a router at `address`."""
-    (commands,) = re.findall(r"```bash\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    commands = re.sub(r"for name in [a-z ]+;", f"for name in {' '.join(names)};", commands)
-    done = subprocess.run(
-        ["bash", "-euc", commands.replace(ADDRESS, address)], cwd=folder, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    authority = folder / "ca.pem"
-    return {name: Certificates(authority, folder / f"{name}.pem", folder / f"{name}.key") for name in names}
+    """Certificates of one authority, by name, in a new folder; the router's holds for `address`."""
+    certify(folder, {name: [address] if name == "router" else [] for name in names}, datetime.now(UTC), 1)
+    return {name: files_of(folder, name) for name in names}
+
+
+def files_of(folder: Path, name: str) -> Certificates:
+    """The files of one name in the folder of an authority."""
+    return Certificates(folder / "ca.pem", folder / f"{name}.pem", folder / f"{name}.key")
 
 
 def options(one: Certificates) -> list[str]:

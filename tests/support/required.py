@@ -18,11 +18,6 @@ def require(missing: str | None) -> None:
     pytest.skip(missing)
 
 
-def missing_for_certificates() -> str | None:
-    """What making certificates lacks here."""
-    return None if shutil.which("openssl") else "certificates cannot be made: there is no openssl"
-
-
 def missing_for_namespaces() -> str | None:
     """What running in network namespaces of one's own lacks here."""
     if shutil.which("ip") is None:

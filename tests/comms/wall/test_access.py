@@ -5,20 +5,21 @@ from __future__ import annotations
 import queue
 from collections.abc import Iterator
 from contextlib import ExitStack
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 import zenoh
 from by_wall import ROUTING, WALL_KEYS
-from certificates import make_certificates
+from certificates import files_of, make_certificates
 from fleets import EACH_ALONE
 from flights import until
-from required import missing_for_certificates, require
 
 from comms.errors import ConnectionFailedError
 from comms.keys import HostSpec
 from comms.session import Certificates, open_guest, open_router, subscribe
 from comms.wall.access import access_rules
+from secondlook.fleet.certificates import certify
 
 NAMES = ("router", "world", "alpha", "beta", "coordinator", "observer")
 HOSTS = (HostSpec("world", ("world",)), *EACH_ALONE)
@@ -27,8 +28,7 @@ SOON_S = 20.0
 
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Certificates]:
-    require(missing_for_certificates())
-    return make_certificates(tmp_path_factory.mktemp("certificates"), NAMES, "127.0.0.1")
+    return make_certificates(tmp_path_factory.mktemp("fleet") / "certificates", NAMES, "127.0.0.1")
 
 
 class Guarded:
@@ -135,8 +135,30 @@ def test_nobody_answers_for_somebody_else(guarded: Guarded) -> None:
 
 
 def test_who_is_not_certified_by_the_authority_cannot_connect(guarded: Guarded, tmp_path: Path) -> None:
-    others = make_certificates(tmp_path, ["beta"], "127.0.0.1")
+    others = make_certificates(tmp_path / "others", ["beta"], "127.0.0.1")
     for wrong in (others["beta"], None):
         with pytest.raises(ConnectionFailedError, match=r"^no connection to tls/127.0.0.1:\d+ within 0.5 s: nobody"):
             open_guest(guarded.endpoint, None, wrong, within_s=0.5)
     assert guarded.session("beta").info.routers_zid() == [guarded.router.info.zid()]
+
+
+def test_a_certificate_that_is_over_connects_neither_way(tmp_path: Path) -> None:
+    folder, begin = tmp_path / "certificates", datetime.now(UTC) - timedelta(days=3)
+    certify(folder, {"router": ["127.0.0.1"], "beta": []}, begin, 10)
+    certify(folder, {"late-router": ["127.0.0.1"], "late-beta": []}, begin, 1, add=True)
+    beta, late_beta = files_of(folder, "beta"), files_of(folder, "late-beta")
+    router, endpoint = open_router("tls/127.0.0.1:0", files_of(folder, "router"), None)
+    with router:
+        with pytest.raises(ConnectionFailedError):
+            open_guest(endpoint, None, late_beta, within_s=0.5)
+        with open_guest(endpoint, None, beta, within_s=SOON_S) as session:
+            assert session.info.routers_zid() == [router.info.zid()]
+    late_router, endpoint = open_router("tls/127.0.0.1:0", files_of(folder, "late-router"), None)
+    with late_router, pytest.raises(ConnectionFailedError):
+        open_guest(endpoint, None, beta, within_s=0.5)
+
+
+def test_a_nodes_certificate_does_not_pass_for_the_routers(certificates: dict[str, Certificates]) -> None:
+    router, endpoint = open_router("tls/127.0.0.1:0", certificates["alpha"], None)
+    with router, pytest.raises(ConnectionFailedError):
+        open_guest(endpoint, None, certificates["beta"], within_s=0.5)

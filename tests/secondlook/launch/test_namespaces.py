@@ -9,7 +9,7 @@ from pathlib import Path
 from certificates import make_certificates, options
 from flights import events, until
 from namespaces import namespaces
-from required import missing_for_certificates, missing_for_namespaces, require
+from required import missing_for_namespaces, require
 from spread import lost_of_what_is_kept, spread_fleet
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "vehicle"
@@ -20,13 +20,13 @@ BODY = ("--start", "-10", "-20", "--speed", "12", "--range", "15", "--run", "bay
 
 def test_a_vehicle_that_is_cut_off_is_lost_for_a_while_and_its_map_is_whole_in_the_end(tmp_path: Path) -> None:
     require(missing_for_namespaces())
-    require(missing_for_certificates())
     longer = ("--set", "mission.deadline_factor=2.5")  # the helper is to have time for strips however slow it goes
     with (
         namespaces("ship", "helper") as hosts,
         spread_fleet(tmp_path, f"tls/{hosts.address}:7447", *longer, scenario=EXAMPLE / "bay.yaml") as fleet,
     ):
-        made = {name: options(one) for name, one in make_certificates(tmp_path, NAMES, hosts.address).items()}
+        certificates = make_certificates(tmp_path / "certificates", NAMES, hosts.address)
+        made = {name: options(one) for name, one in certificates.items()}
         fleet.router(10, *made["router"], before=hosts.within("hub"))
         ship, helper = hosts.within("ship"), hosts.within("helper")
         fleet.node("world", more=made["world"], before=ship)
