@@ -7,9 +7,7 @@ message than the sender, so that both sums are equal just where it has everythin
 
 from __future__ import annotations
 
-import copy
 from collections import Counter, defaultdict
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from comms.kept import Kept
@@ -18,7 +16,8 @@ from comms.runner import Outgoing
 from comms.said.codec import Header
 from comms.said.topics import Keep, Topic
 
-MOST_HEARD = 100_000  # events of a sender, and keys of which it has the latest, that a receiver remembers
+MOST_HEARD = 100_000  # events of a start, and keys of which it has the latest, that a receiver remembers
+MOST_STARTS = 8  # of a sender, that a receiver remembers
 MOST_TRIES = 3  # to get what a tally tells of, where answers come but something is still missing
 
 
@@ -42,8 +41,7 @@ class Journal:
 
 
 @dataclass
-class _FromSender:
-    incarnation: int
+class _FromStart:
     latest: dict[str, int] = field(default_factory=dict)
     events: dict[str, set[int]] = field(default_factory=lambda: defaultdict(set))
     sums: dict[str, int] = field(default_factory=lambda: defaultdict(int))
@@ -51,81 +49,77 @@ class _FromSender:
 
 
 class HeardMessages:
-    """What a receiver has of the messages that their senders keep."""
+    """What a receiver has of the messages that their senders keep, of each of a sender's last starts by itself."""
 
     def __init__(self) -> None:
-        self._senders: dict[str, _FromSender] = {}
+        self._starts: dict[str, dict[int, _FromStart]] = {}
 
     def add(self, received: Received) -> bool:
-        """Adds a message; whether it is news: one that came before, or is older than what came, is none."""
+        """Adds a message; whether it is news: one that came before, or is older than what came, is none. Nor is one of
+        too many starts ago."""
         header, topic = received.header, received.topic
-        sender = self._sender(header.sender, header.incarnation)
-        if sender is None:
+        start = self._start(header.sender, header.incarnation)
+        if start is None:
             return False
-        gain = self._gain(sender, topic, received.key, header)
-        sender.sums[topic.expression(received.vehicle)] += gain
+        gain = self._gain(start, topic, received.key, header)
+        start.sums[topic.expression(received.vehicle)] += gain
         return gain > 0
-
-    @classmethod
-    def joined(cls, parts: Iterable[HeardMessages]) -> HeardMessages:
-        """A copy of what is in all of them, no sender being in two."""
-        joined = cls()
-        for part in parts:
-            joined._senders |= copy.deepcopy(part._senders)
-        return joined
 
     def has(self, received: Received) -> bool:
         """Whether a message has come, or one in its place that is as new or newer."""
         header, topic = received.header, received.topic
-        sender = self._senders.get(header.sender)
-        if sender is None or sender.incarnation != header.incarnation:
+        start = self._starts.get(header.sender, {}).get(header.incarnation)
+        if start is None:
             return False
         if topic.keep is Keep.EVENTS:
-            return header.sequence in sender.events[topic.name]
-        return header.sequence <= sender.latest.get(received.key, -1)
+            return header.sequence in start.events[topic.name]
+        return header.sequence <= start.latest.get(received.key, -1)
 
     def has_room(self, received: Received) -> bool:
         """Whether there is room to remember a message: no mission says as much as there is room for."""
-        sender = self._senders.get(received.header.sender)
-        if sender is None or sender.incarnation != received.header.incarnation:
+        start = self._starts.get(received.header.sender, {}).get(received.header.incarnation)
+        if start is None:
             return True
         if received.topic.keep is Keep.EVENTS:
-            return len(sender.events[received.topic.name]) < MOST_HEARD
-        return len(sender.latest) < MOST_HEARD or received.key in sender.latest
+            return len(start.events[received.topic.name]) < MOST_HEARD
+        return len(start.latest) < MOST_HEARD or received.key in start.latest
 
     def missing(self, name: str, incarnation: int, tallies: dict[str, int]) -> list[str]:
-        """The key expressions of a sender under which something is missing, going by its tallies."""
-        sender = self._sender(name, incarnation)
-        if sender is None:
+        """The key expressions of a sender's newest start under which something is missing, going by its tallies."""
+        start = self._start(name, incarnation)
+        if start is None or incarnation < max(self._starts[name]):
             return []
         return [
             expression
             for expression, tally in tallies.items()
-            if sender.sums[expression] < tally and sender.tried.get(expression) != (tally, MOST_TRIES)
+            if start.sums[expression] < tally and start.tried.get(expression) != (tally, MOST_TRIES)
         ]
 
     def answered(self, name: str, expression: str, tally: int) -> None:
         """The sender was asked for what a tally tells of, and has answered. Where something of it is missing that does
         not come, it is not asked for for ever."""
-        sender = self._senders[name]
-        before, tries = sender.tried.get(expression, (tally, 0))
-        sender.tried[expression] = (tally, tries + 1 if before == tally else 1)
+        starts = self._starts[name]
+        tried = starts[max(starts)].tried
+        before, tries = tried.get(expression, (tally, 0))
+        tried[expression] = (tally, tries + 1 if before == tally else 1)
 
-    def _sender(self, name: str, incarnation: int) -> _FromSender | None:
-        known = self._senders.get(name)
-        if known is None or known.incarnation < incarnation:
-            known = self._senders[name] = _FromSender(incarnation)
-        return known if known.incarnation == incarnation else None
+    def _start(self, name: str, incarnation: int) -> _FromStart | None:
+        starts = self._starts.setdefault(name, {})
+        if incarnation not in starts:
+            starts[incarnation] = _FromStart()
+            if len(starts) > MOST_STARTS:
+                del starts[min(starts)]
+        return starts.get(incarnation)
 
-    def _gain(self, sender: _FromSender, topic: Topic, key: str, header: Header) -> int:
+    def _gain(self, start: _FromStart, topic: Topic, key: str, header: Header) -> int:
         if topic.keep is Keep.EVENTS:
-            seen = sender.events[topic.name]
+            seen = start.events[topic.name]
             if header.sequence in seen:
                 return 0
             seen.add(header.sequence)
             return header.sequence + 1
-        before = sender.latest.get(key, -1)
+        before = start.latest.get(key, -1)
         if header.sequence <= before:
             return 0
-        sender.latest[key] = header.sequence
+        start.latest[key] = header.sequence
         return header.sequence - before

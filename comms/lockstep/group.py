@@ -4,6 +4,7 @@ it, and handled in order when the clock grants it. No I/O."""
 from __future__ import annotations
 
 import bisect
+import contextlib
 from collections.abc import Collection, Iterable, Mapping
 from types import MappingProxyType
 
@@ -15,7 +16,9 @@ from comms.memory.lasting import LastingNode
 from comms.memory.store import Store
 from comms.node import Node, Received
 from comms.runner import GuardedNode, Intake, Outgoing, SenderDigest
+from comms.said.codec import header_of
 from comms.said.routing import Route, Routing
+from comms.said.wire import WireError
 
 LOST = "lost by a fault"
 
@@ -213,7 +216,8 @@ class JoinerMail:
         route = self._routing.route(key)
         if route is not None and self._node_id in route.readers:
             self.arrived.add(route.writer, len(payload))
-            self._kept.add(route.topic, key, payload)
+            with contextlib.suppress(WireError):  # what nobody can read nobody needs
+                self._kept.add(route.topic, key, payload, header_of(payload).incarnation)
 
     def messages(self) -> list[tuple[str, bytes]]:
         """Key and payload of each kept message."""

@@ -30,33 +30,9 @@ from comms.said.wire import WireError
 SNAPSHOT_AFTER_S = 0.4  # of handling what is in the journal: so long it takes to handle it again
 SNAPSHOT_SHARE = 5.0  # times as long as a snapshot takes is handled before the next, as long as that is not too long
 LONGEST_JOURNAL_S = 1.0
-MOST_STARTS = 8  # of a sender, of which is known what was handled
 _START, _WAKE, _SHUNNED = 1, 2, 4  # what a step was, beside its mail
 
 log = logging.getLogger("secondlook.comms")
-
-
-class Handled:
-    """Which messages a node has handled, of each start of a sender by itself."""
-
-    def __init__(self) -> None:
-        self._starts: dict[str, dict[int, HeardMessages]] = {}
-
-    def add(self, received: Received) -> None:
-        """The node has handled it."""
-        starts = self._starts.setdefault(received.header.sender, {})
-        starts.setdefault(received.header.incarnation, HeardMessages()).add(received)
-        if len(starts) > MOST_STARTS:
-            del starts[min(starts)]
-
-    def has(self, received: Received) -> bool:
-        """Whether the node has handled it, or a newer one in its place."""
-        heard = self._starts.get(received.header.sender, {}).get(received.header.incarnation)
-        return heard is not None and heard.has(received)
-
-    def newest(self) -> HeardMessages:
-        """A copy of what is known of the last start of each sender."""
-        return HeardMessages.joined(starts[max(starts)] for starts in self._starts.values())
 
 
 class _State(NamedTuple):
@@ -68,7 +44,7 @@ class _State(NamedTuple):
     incarnation: int
     told: int
     said: Journal
-    handled: Handled
+    handled: HeardMessages
 
 
 class LastingNode(GuardedNode):
@@ -85,7 +61,7 @@ class LastingNode(GuardedNode):
     ) -> None:
         super().__init__(node_id, node, routing, incarnation)
         self.said = Journal(incarnation)
-        self.handled = Handled()
+        self.handled = HeardMessages()
         self.now_ms = 0
         self._routing = routing
         self._store = store

@@ -6,6 +6,7 @@ wake-up when it is due; listeners get messages in the order of sending within a 
 
 from __future__ import annotations
 
+import copy
 import heapq
 import time
 from collections import Counter
@@ -173,7 +174,7 @@ class NodeSeat:
     def handled(self) -> HeardMessages:
         """Where there is one node, all that it has handled; one of several may have been the only one to handle it."""
         nodes = list(self._nodes.values())
-        return nodes[0].node.handled.newest() if len(nodes) == 1 else HeardMessages()
+        return copy.deepcopy(nodes[0].node.handled) if len(nodes) == 1 else HeardMessages()
 
     def end(self) -> None:
         """Tells the nodes' memories."""

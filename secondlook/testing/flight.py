@@ -8,11 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, overload
 
+from comms.journal import HeardMessages
 from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
 from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, NodeEvent, absent_at_start
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import JoinerMail
-from comms.memory.lasting import Handled
 from comms.node import Received
 from comms.runner import Intake
 from comms.said.routing import Routing
@@ -162,7 +162,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
     if flight.routing.nodes[node_id].listens_only:  # no trouble strikes what it hears
         return [(one.header.sent_ms, one) for one in flight.heard]
     found: list[tuple[int, Received]] = []
-    handled = Handled()
+    handled = HeardMessages()
     for from_ms, until_ms in life.spans_ms:
         given = _given(flight, node_id, from_ms, until_ms, handled)
         for _, one in given:
@@ -172,7 +172,7 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
 
 
 def _given(
-    flight: Flight, node_id: str, from_ms: int, until_ms: int, handled: Handled
+    flight: Flight, node_id: str, from_ms: int, until_ms: int, handled: HeardMessages
 ) -> list[tuple[int, Received]]:  # fmt: skip
     """What a node was given while it was there without a break; `handled`: what it had been given before."""
     intake, kept = Intake(flight.routing), JoinerMail(node_id, flight.routing)

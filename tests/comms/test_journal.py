@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from fleets import ROSTER, say_state
 from hypothesis import given
 from hypothesis import strategies as st
+from one_node import received
 
-from comms.journal import MOST_TRIES, HeardMessages, Journal
+from comms.journal import MOST_STARTS, MOST_TRIES, HeardMessages, Journal
+from comms.kept import Kept
 from comms.node import Publication, Received
 from comms.runner import Intake, Stamp
 from comms.said.codec import decode
@@ -34,10 +36,10 @@ class Sender:
     def say(self, publication: Publication) -> Received:
         sent = self._stamp(publication.key, publication.message, len(self.said))
         self.kept.add(sent)
-        received = self._intake.open(sent.key, sent.payload)
-        assert received is not None
-        self.said.append(received)
-        return received
+        opened = self._intake.open(sent.key, sent.payload)
+        assert opened is not None
+        self.said.append(opened)
+        return opened
 
     def missing(self, receiver: HeardMessages) -> list[str]:
         return receiver.missing("alpha", self.incarnation, self.kept.tallies)
@@ -102,15 +104,40 @@ def test_what_is_kept_comes_in_the_order_of_its_sending() -> None:
     assert only == [1, 3]
 
 
-def test_a_new_incarnation_is_heard_from_its_beginning_and_the_old_one_no_more() -> None:
+def test_a_new_incarnation_is_heard_from_its_beginning_and_nobody_is_asked_for_more_of_the_old_one() -> None:
     old, new, receiver = Sender(), Sender(incarnation=7), HeardMessages()
     assert receiver.add(old.say(say_state("alpha", 1)))
     assert receiver.add(new.say(say_state("alpha", 1)))
-    assert not receiver.add(old.say(say_state("alpha", 2)))
+    assert receiver.add(old.say(say_state("alpha", 2))), "it was late"
+    assert not receiver.add(old.said[-1])
+    old.say(say_state("alpha", 3))
     assert old.missing(receiver) == []
     assert new.missing(receiver) == []
     new.say(say_state("alpha", 3))
     assert new.missing(receiver) == [STATE.expression("alpha")]
+
+
+def test_what_came_is_known_of_each_start_of_its_sender() -> None:
+    def heard(incarnation: int, sequence: int) -> Received:
+        message = say_state("alpha").message
+        return received(STATE.key(vehicle="alpha"), message, sequence=sequence, incarnation=incarnation)
+
+    receiver = HeardMessages()
+    for incarnation, sequence in [(0, 5), (2, 3)]:
+        receiver.add(heard(incarnation, sequence))
+    found = {one: receiver.has(heard(*one)) for one in [(0, 4), (0, 5), (0, 6), (1, 0), (2, 3), (2, 4)]}
+    assert [one for one, has in found.items() if has] == [(0, 4), (0, 5), (2, 3)]
+    for incarnation in range(3, 3 + MOST_STARTS):
+        assert receiver.add(heard(incarnation, 0))
+    assert not receiver.has(heard(2, 3)), "there is room for so many starts"
+    assert not receiver.add(heard(0, 9)), "one of too many starts ago is no news"
+
+
+def test_of_each_start_of_a_sender_the_latest_is_kept() -> None:
+    kept = Kept()
+    for incarnation, payload in ((0, b"a"), (0, b"b"), (1, b"c"), (0, b"d")):
+        kept.add(STATE, "agent/alpha/state", payload, incarnation)
+    assert [payload for _, payload in kept.messages()] == [b"c", b"d"]
 
 
 def test_a_sender_that_cannot_give_what_it_tells_of_is_asked_a_few_times_only() -> None:

@@ -23,13 +23,13 @@ from one_node import received
 from comms.errors import NodeError, StoreRefusedError
 from comms.lockstep.local_bus import run_local
 from comms.memory import lasting
-from comms.memory.lasting import Handled, LastingNode
+from comms.memory.lasting import LastingNode
 from comms.memory.store import Identity, Store
 from comms.node import Node, Received, Step
 from comms.runner import GuardedNode
 from comms.said.messages import Contact
 from comms.said.routing import Routing
-from comms.said.topics import CONTACT, STATE
+from comms.said.topics import CONTACT
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.scenario import load_scenario
 
@@ -226,22 +226,3 @@ def test_a_snapshot_of_what_is_not_there_any_more_is_refused(tmp_path: Path) -> 
     store.put(3, b"no pickle")
     store.close()
     assert refused(tmp_path, Picklable()).startswith("holds a snapshot that cannot be read: ")
-
-
-def test_what_was_handled_is_known_of_each_start_of_its_sender() -> None:
-    def heard(incarnation: int, sequence: int) -> Received:
-        message = say_state("alpha").message
-        return received(STATE.key(vehicle="alpha"), message, sequence=sequence, incarnation=incarnation)
-
-    handled = Handled()
-    for incarnation, sequence in [(0, 5), (2, 3)]:
-        handled.add(heard(incarnation, sequence))
-    found = {one: handled.has(heard(*one)) for one in [(0, 4), (0, 5), (0, 6), (1, 0), (2, 3), (2, 4)]}
-    assert [one for one, has in found.items() if has] == [(0, 4), (0, 5), (2, 3)]
-    newest = handled.newest()
-    assert [newest.has(heard(*one)) for one in [(0, 5), (2, 3)]] == [False, True]
-    newest.add(heard(2, 9))
-    assert not handled.has(heard(2, 9)), "that is a copy"
-    for incarnation in range(3, 12):
-        handled.add(heard(incarnation, 0))
-    assert not handled.has(heard(2, 3)), "there is room for so many starts"
