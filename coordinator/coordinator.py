@@ -9,7 +9,7 @@ from itertools import chain
 from comms.node import Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.codec import Header
-from comms.said.messages import AgentState, CoverageTile, Curve, Hotspot, Plan, TaskStatus
+from comms.said.messages import AgentState, CoverageTile, Curve, Hotspot, Plan, TaskState, TaskStatus
 from coordinator.agenda import Agenda, Item
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
@@ -125,6 +125,8 @@ class Coordinator:
             self._hear_state(vehicle, header, message, now_ms)
         elif isinstance(message, TaskStatus) and vehicle is not None:
             self._strips.hear_status(vehicle, header, message, now_ms)
+            if message.state is TaskState.REFUSED:  # its state stays as it was, but it does not go where it was sent
+                self._dispatch.note_state(vehicle.entry.vehicle, now_ms, does_another=True)
         elif isinstance(message, Plan | Curve) and vehicle is not None and vehicle.hear_survey(header, message):
             self._cut_soon(now_ms)
 
