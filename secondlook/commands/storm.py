@@ -18,8 +18,11 @@ from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
-from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.fly import Outcome, fly_storm, violations_of
+from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, what_is_left
+from secondlook.storm.shrink import shrink as make_smaller
 from secondlook.testing.plan import TroublePlan, load_plan
+from secondlook.worker_pool import worker_pool
 
 MOST_STORMS = 1_000_000
 _RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
@@ -34,6 +37,12 @@ def storm(
         int | None, typer.Option(min=0, max=LARGEST_SEED, help="Fly this storm alone, with a recording.")
     ] = None,
     plan: Annotated[Path | None, typer.Option(help="Fly the storm of this plan file, with a recording.")] = None,
+    shrink: Annotated[
+        bool, typer.Option("--shrink", help="Leave out of this storm what it fails without, and fly what is left.")
+    ] = False,
+    flights: Annotated[
+        int, typer.Option(min=1, max=MOST_STORMS, help="With --shrink, how often it is flown at most.")
+    ] = MOST_FLIGHTS,
     bus: Annotated[Bus, typer.Option(help="Of a single storm.")] = "local",
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
@@ -52,9 +61,11 @@ def storm(
     if plan is not None:
         if scenario is not None or seed is not None:
             raise UserError("--plan: not allowed beside a scenario or --seed; the plan holds both")
-        _fly_one(load_plan(plan), plan.stem, bus, out)
+        _fly_one(load_plan(plan), out or Path("runs") / plan.stem, bus, flights if shrink else 0)
     elif seed is not None:
-        _fly_one(storm_of(mission, seed), f"storm-{seed}", bus, out)
+        _fly_one(storm_of(mission, seed), out or Path("runs") / f"storm-{seed}", bus, flights if shrink else 0)
+    elif shrink:
+        raise UserError("--shrink: not allowed without --seed or --plan; it shrinks a single storm")
     else:
         _fly_many(mission, scenario, _range_of(seeds), jobs or os.cpu_count() or 1, out)
 
@@ -67,9 +78,10 @@ def _range_of(seeds: str) -> range:
     return range(first, last + 1)
 
 
-def _fly_one(plan: TroublePlan, name: str, bus: Bus, out: Path | None) -> None:
-    folder = Path("runs") / name if out is None else out
+def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
     make_folder(folder)
+    if flights:
+        plan = _shrunk(plan, folder, bus, flights)
     write_whole(folder / "plan.yaml", plan.to_yaml())
     outcome = fly_storm(plan, bus=bus, folder=folder, record=True)
     for violation in outcome.violations:
@@ -79,6 +91,42 @@ def _fly_one(plan: TroublePlan, name: str, bus: Bus, out: Path | None) -> None:
     typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
     if outcome.violations:
         raise typer.Exit(FAILED)
+
+
+def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroublePlan:
+    """The smallest plan in which the same does not hold. It is written, too, where the search is broken off, which ends
+    the command."""
+    smallest = plan
+    flown = 0
+
+    def fly(tell: Tell) -> None:
+        # In a process of its own, as Ctrl-C is to end the search and not to pass for a failure of the mission.
+        with worker_pool(1) as pool:
+            first = next(iter(pool.submit(violations_of, plan, bus).result()), None)
+            if first is None:
+                return
+
+            def fails(tried: TroublePlan) -> bool:
+                nonlocal flown
+                flown += 1
+                left = smallest
+                tell(flown, f"{len(left.trouble)} faults and {len(left.scenario.vehicles)} vehicles left")
+                return any(is_alike(one, first) for one in pool.submit(violations_of, tried, bus).result())
+
+            def found(smaller: TroublePlan) -> None:
+                nonlocal smallest
+                smallest = smaller
+
+            make_smaller(plan, fails, most_flights=flights, found=found)
+
+    failure = fly_watched("shrink", "flights", flights, fly, shown=sys.stderr.isatty())
+    if flown or failure:
+        typer.echo(f"{what_is_left(plan, smallest)} {flown} flights.")
+    if failure:
+        write_whole(folder / "plan.yaml", smallest.to_yaml())
+        sys.stderr.write(f"{failure}; the smallest until then is {folder / 'plan.yaml'}\n")
+        raise typer.Exit(FAILED)
+    return smallest
 
 
 def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs: int, out: Path | None) -> None:

@@ -32,23 +32,31 @@ def draw_storm(scenario: Scenario, number: int) -> TroublePlan:
     if rng.random() < CALM_SHARE:
         return _plan(scenario, number, (), 0.0, [])
     heals_s = max(_SHORTEST_S, _s(rng.uniform(0.1, 1.2) * survey_s(scenario)))
-    # Whoever is healed later may have been given up, or is too late for the end.
-    heals_s = min(heals_s, _s(0.9 * GIVEN_UP_AFTER * scenario.coordinator.lost_after_s))
-    if scenario.mission.deadline_s is not None:
-        heals_s = min(heals_s, _s(scenario.mission.deadline_s / 2))
+    heals_s = min(heals_s, latest_heals_s(scenario))
     core = (COORDINATOR, *_core_vehicles(rng, scenario))
     trouble = _Swarm(rng, scenario, core, heals_s).drawn()
     return _plan(scenario, number, core, heals_s, trouble)
 
 
 def _plan(scenario: Scenario, number: int, core: tuple[str, ...], heals_s: float, trouble: list[_Entry]) -> TroublePlan:
-    mission = scenario.mission
-    lost_s = GIVEN_UP_AFTER * scenario.coordinator.lost_after_s
-    # Whoever was started anew surveys from the beginning; what is not over by then never will be.
-    limit_s = 2 * mission.ends_s(heals_s + 2 * survey_s(scenario) + lost_s) + 600
-    mission = mission.model_copy(update={"time_limit_s": max(limit_s, mission.time_limit_s)})
+    time_limit_s = max(limit_s(scenario, heals_s), scenario.mission.time_limit_s)
+    mission = scenario.mission.model_copy(update={"time_limit_s": time_limit_s})
     drawn = {"fault_seed": number, "core": core, "heals_s": heals_s, "trouble": trouble}
     return make_plan({"scenario": scenario.model_copy(update={"mission": mission}), **drawn})
+
+
+def latest_heals_s(scenario: Scenario) -> float:
+    """Until when a core must be healed: later it may have been given up, or is too late for the end."""
+    latest_s = _s(0.9 * GIVEN_UP_AFTER * scenario.coordinator.lost_after_s)
+    deadline_s = scenario.mission.deadline_s
+    return latest_s if deadline_s is None else min(latest_s, _s(deadline_s / 2))
+
+
+def limit_s(scenario: Scenario, heals_s: float) -> float:
+    """A mission whose core is healed at `heals_s` and that is not over by then never will be."""
+    lost_s = GIVEN_UP_AFTER * scenario.coordinator.lost_after_s
+    # Whoever was started anew surveys from the beginning.
+    return 2 * scenario.mission.ends_s(heals_s + 2 * survey_s(scenario) + lost_s) + 600
 
 
 def _core_vehicles(rng: Random, scenario: Scenario) -> list[str]:
