@@ -82,11 +82,7 @@ def show(client: ViewerClient, time_s: float) -> bytes:
     Raises PictureError where the viewer has not opened the recording, or not drawn it, after READY_WITHIN_S.
     """
     deadline = time.monotonic() + READY_WITHIN_S
-    while not _has_opened(client):
-        if time.monotonic() > deadline:
-            raise PictureError(f"The viewer had not opened the recording after {READY_WITHIN_S:.0f} s.")
-        time.sleep(POLL_S)
-    client.set_time(TIMELINE, duration=time_s, play_state="paused")
+    go_to(client, time_s)
     picture, since = None, time.monotonic()
     while picture is None or (time.monotonic() < deadline and time.monotonic() - since < STEADY_S):
         latest = _drawn(client)
@@ -96,6 +92,16 @@ def show(client: ViewerClient, time_s: float) -> bytes:
             picture, since = latest, time.monotonic()
         time.sleep(POLL_S)
     return picture
+
+
+def go_to(client: ViewerClient, time_s: float) -> None:
+    """Moves a viewer to a simulated time, once it has opened the recording. Raises PictureError where it does not."""
+    deadline = time.monotonic() + READY_WITHIN_S
+    while not _has_opened(client):
+        if time.monotonic() > deadline:
+            raise PictureError(f"The viewer had not opened the recording after {READY_WITHIN_S:.0f} s.")
+        time.sleep(POLL_S)
+    client.set_time(TIMELINE, duration=time_s, play_state="paused")
 
 
 def _drawn(client: ViewerClient) -> bytes | None:

@@ -82,10 +82,11 @@ class RecordingViewer:
     """Use as a context, which the viewer does not outlive, even if this process is killed. It listens on this machine
     only, on ports that the system picks.
 
-    With `web` there is a `page` for a browser; else a window opens. Raises ViewerError where that is not to be had.
+    With `web` there is a `page` for a browser; else a window opens, with `at_s` paused at that simulated time. Raises
+    ViewerError where that is not to be had.
     """
 
-    def __init__(self, recording: Path, *, web: bool) -> None:
+    def __init__(self, recording: Path, *, web: bool, at_s: float | None = None) -> None:
         folder = Path(tempfile.mkdtemp(prefix="secondlook-view-"))
         self.log = folder / "viewer.txt"
         command = [PROGRAM, str(recording.resolve()), *(WEB if web else WINDOW), *BIND]
@@ -97,6 +98,8 @@ class RecordingViewer:
                 self._page = WebPage(web_address(self.process, self.log), server_url(self.process, self.log))
             else:
                 wait_for(DRAWS, self.process, self.log, WINDOW_WITHIN_S)
+                if at_s is not None:
+                    self._go_to(at_s)
         except BaseException:
             self.close()
             raise
@@ -113,6 +116,17 @@ class RecordingViewer:
     def page(self) -> str:
         """The address for a browser; "" without `web`."""
         return self._page.address if self._page else ""
+
+    def _go_to(self, time_s: float) -> None:
+        # Imported when it is asked for: it takes half a second, which every command would.
+        from rerun.experimental import ViewerClient  # noqa: PLC0415
+
+        from viz.picture import PictureError, go_to  # noqa: PLC0415
+
+        try:
+            go_to(ViewerClient.connect(server_url(self.process, self.log)), time_s)
+        except (PictureError, ConnectionError) as error:
+            raise ViewerError(f"the viewer does not go to {time_s:g} s: {error}") from error
 
     def wait(self) -> None:
         """Waits until the window is closed, or what interrupts this process."""

@@ -90,6 +90,8 @@ def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
         typer.echo(f"All that must hold does; the mission was over at {outcome.end_s:.0f} s.")
     typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
     if outcome.violations:
+        run = max(folder.glob("flight-*"), key=lambda path: path.stat().st_mtime)
+        typer.echo(f"The moment: secondlook view {run} --at {outcome.violations[0].t_s:g}")
         raise typer.Exit(FAILED)
 
 

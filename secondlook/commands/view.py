@@ -20,8 +20,14 @@ from viz.viewer_program import ViewerError, check_display
 def view(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     web: Annotated[bool, typer.Option("--web", help="In a browser on this machine, not in a window.")] = False,
+    at: Annotated[
+        float | None,
+        typer.Option(min=0, metavar="SECONDS", help="Simulated time at which the window shows it, paused."),
+    ] = None,
 ) -> None:
     """Open the recording of a run in Rerun. Ends with the window, or with Ctrl-C."""
+    if web and at is not None:
+        raise UserError("--at: not allowed beside --web; a browser's page begins where it chooses")
     recording = _recording(run)
     try:
         if not web:
@@ -29,7 +35,7 @@ def view(
         with (
             contextlib.suppress(KeyboardInterrupt),
             _whole(recording) as whole,
-            RecordingViewer(whole, web=web) as viewer,
+            RecordingViewer(whole, web=web, at_s=at) as viewer,
         ):
             if web:
                 typer.echo(f"The mission is shown at {viewer.page}; Ctrl-C ends it")

@@ -17,7 +17,7 @@ from comms.node import Received
 from tests.viz.mission_stream import VIEWS
 from viz import recording_viewer
 from viz.recording_viewer import RecordingViewer
-from viz.viewer_program import LISTENING, ViewerError
+from viz.viewer_program import LISTENING, ViewerError, server_url
 
 PATIENCE_S = 30.0
 
@@ -50,6 +50,14 @@ def test_the_window_shows_the_recording(
         assert [report for view in client.get_state().views for report in view.reports] == []
     assert viewer.process.poll() is not None
     assert not viewer.log.parent.exists()
+
+
+@pytest.mark.usefixtures("drawable")
+def test_the_window_opens_at_a_moment(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(recording_viewer, "WINDOW", ("--headless", "--window-size", "800x500"))
+    with RecordingViewer(recording, web=False, at_s=12.5) as viewer:
+        client = ViewerClient.connect(server_url(viewer.process, viewer.log))
+        wait_until(lambda: [one.current_time for one in client.get_state().recordings] == [12_500_000_000])
 
 
 def test_the_page_is_served_on_this_machine_alone(recording: Path) -> None:

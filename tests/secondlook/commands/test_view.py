@@ -18,6 +18,7 @@ import pytest
 from flights import LONG, flight, until
 
 from secondlook import cli
+from secondlook.errors import UserError
 from tests.viz.recordings import verify
 from tests.viz.test_recording_file import counted, ends_of_messages
 from viz.recording_viewer import is_empty
@@ -51,6 +52,11 @@ def test_the_page_is_there_until_ctrl_c(brief_run: Path) -> None:
     assert process.returncode == 0
     with pytest.raises(URLError):
         urllib.request.urlopen(page, timeout=30)
+
+
+def test_a_page_has_no_moment_to_open_at(brief_run: Path) -> None:
+    with pytest.raises(UserError, match=r"^--at: not allowed beside --web; a browser's page begins where it chooses$"):
+        cli.app(["view", str(brief_run), "--web", "--at", "5"], standalone_mode=False)
 
 
 def test_a_recording_whose_recorder_was_killed_is_repaired_with_all_it_had(tmp_path: Path) -> None:

@@ -173,6 +173,7 @@ def test_the_command_writes_the_smallest_and_flies_it(tmp_path: Path) -> None:
     assert done.exit_code == 1, done.output
     assert "Left are 0 of 6 faults and 2 of 2 vehicles, in an area of " in done.output
     assert "tired" in done.output
+    assert f"The moment: secondlook view {tmp_path / 'o' / 'flight-1'} --at " in done.output
     smallest = load_plan(tmp_path / "o" / "plan.yaml")
     assert smallest.scenario.coordinator.allocator == allocator
     assert (tmp_path / "o" / "flight-1" / "mission.rrd").is_file()
