@@ -35,6 +35,28 @@ def test_fails(fleet):
 """
 
 
+STORMS = """
+import pytest
+
+class Tired:
+    def assign(self, situation):
+        raise RuntimeError("tired")
+
+@pytest.mark.storm(seeds=2)
+def test_drawn(storm):
+    assert storm.fly().end_s > 0
+
+@pytest.mark.storm("bay.yaml", seeds=[7, 9])
+def test_of_a_file(storm):
+    assert storm.plan.scenario.name == "brief"
+    assert storm.fly().digest
+
+@pytest.mark.storm("bay.yaml", seeds=[9], overrides={"coordinator.allocator": Tired})
+def test_fails(storm):
+    storm.fly()
+"""
+
+
 def pytest_in(folder: Path, *arguments: str) -> str:
     """What a call of pytest prints."""
     command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-v", *arguments]
@@ -77,6 +99,22 @@ def test_the_option_says_on_which_bus(project: Path) -> None:
     ]
 
 
+def test_a_test_is_run_in_each_storm_of_its_mark(project: Path) -> None:
+    (project / "tests" / "test_mine.py").write_text(STORMS)
+    printed = pytest_in(project)
+    outcomes = dict(re.findall(r"^tests/test_mine\.py::(\S+) (PASSED|FAILED|ERROR)", printed, re.MULTILINE))
+    assert outcomes == {
+        "test_drawn[storm-1]": "PASSED",
+        "test_drawn[storm-2]": "PASSED",
+        "test_of_a_file[storm-7]": "PASSED",
+        "test_of_a_file[storm-9]": "PASSED",
+        "test_fails[storm-9]": "FAILED",
+    }, printed
+    told = re.search(r"^the mission ends: .*tired.*\nagain: secondlook storm --plan (.*)\n", printed, re.MULTILINE)
+    assert told, printed
+    assert "'test_mine:Tired'" in Path(told[1]).read_text()
+
+
 def test_marks_that_make_no_sense_and_a_room_in_the_way_are_told(tmp_path: Path) -> None:
     told = {
         '"bay.yml"': "ScenarioError: bay.yml: no such file",
@@ -86,6 +124,10 @@ def test_marks_that_make_no_sense_and_a_room_in_the_way_are_told(tmp_path: Path)
     for number, mark in enumerate(told):
         test = f"import pytest\n@pytest.mark.fleet({mark})\ndef test_it(fleet):\n    pass\n"
         (tmp_path / f"test_{number}.py").write_text(test)
+    told["seeds=0"] = "mark storm: seeds 0 is not allowed; must be how many, at least 1, or a list of numbers of storms"
+    (tmp_path / "test_storm.py").write_text(
+        "import pytest\n@pytest.mark.storm(seeds=0)\ndef test_it(storm):\n    pass\n"
+    )
     printed = pytest_in(tmp_path, "--continue-on-collection-errors")
     assert [sentence for sentence in told.values() if sentence not in printed] == []
     (tmp_path / "planner.py").write_text("")
