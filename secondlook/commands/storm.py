@@ -18,8 +18,8 @@ from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
-from secondlook.storm.fly import Outcome, fly_storm, violations_of
-from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, what_is_left
+from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
 from secondlook.testing.plan import TroublePlan, load_plan
 from secondlook.worker_pool import worker_pool
@@ -44,6 +44,10 @@ def storm(
         int, typer.Option(min=1, max=MOST_STORMS, help="With --shrink, how often it is flown at most.")
     ] = MOST_FLIGHTS,
     bus: Annotated[Bus, typer.Option(help="Of a single storm.")] = "local",
+    again: Annotated[
+        int,
+        typer.Option(min=0, metavar="N", help="Of many each Nth is flown twice, each 10 Nth over Zenoh, too; 0: none."),
+    ] = 50,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
     ] = None,
@@ -67,7 +71,7 @@ def storm(
     elif shrink:
         raise UserError("--shrink: not allowed without --seed or --plan; it shrinks a single storm")
     else:
-        _fly_many(mission, scenario, _range_of(seeds), jobs or os.cpu_count() or 1, out)
+        _fly_many(mission, scenario, _range_of(seeds), again, jobs or os.cpu_count() or 1, out)
 
 
 def _range_of(seeds: str) -> range:
@@ -131,7 +135,9 @@ def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroubleP
     return smallest
 
 
-def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs: int, out: Path | None) -> None:
+def _fly_many(
+    mission: Scenario | None, named: str | None, numbers: range, twice: int, jobs: int, out: Path | None
+) -> None:
     if out is not None:
         make_folder(out)
     outcomes: Outcomes = {}
@@ -145,7 +151,7 @@ def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs:
                 if out is not None:
                     write_whole(out / f"storm-{number}.yaml", storm_of(mission, number).to_yaml())
 
-        fly_storms(mission, numbers, jobs, outcomes, progress)
+        fly_storms(mission, numbers, jobs, outcomes, progress, twice)
 
     failure = fly_watched("storm", "storms", len(numbers), fly, shown=sys.stderr.isatty())
     failed = sorted(number for number, outcome in outcomes.items() if outcome.violations)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import logging
 import tempfile
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from comms.errors import NodeError
-from secondlook.errors import UserError
 from secondlook.launch.mission import Bus
 from secondlook.launch.processes import RunFailedError
 from secondlook.storm.invariants import check_flight
-from secondlook.storm.witness import RUN, Violation, Witness
+from secondlook.storm.witness import Violation, Witness
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.flight import Flight
 from secondlook.testing.plan import TroublePlan
@@ -46,19 +44,8 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
         flight = fleet.run()
     except (RunFailedError, NodeError) as error:
         at_s = fleet.heard.now_s
-        violations = [*witness.violations, Violation("the mission ends", at_s, RUN, str(error))]
+        violations = [*witness.violations, Violation("the mission ends", at_s, "run", str(error))]
     else:
         violations = check_flight(flight, plan, witness)
     end_s = fleet.heard.now_s if flight is None else flight.end_s
     return Outcome(tuple(violations), None if flight is None else flight.digest, end_s, time.perf_counter() - began_s)
-
-
-def violations_of(plan: TroublePlan, bus: Bus = "local") -> tuple[Violation, ...]:
-    """What does not hold in a storm, for one of many that are tried; nothing of one that cannot be flown."""
-    logging.disable(logging.WARNING)
-    try:
-        return fly_storm(plan, bus=bus).violations
-    except UserError:
-        return ()
-    finally:
-        logging.disable(logging.NOTSET)

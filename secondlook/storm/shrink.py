@@ -8,6 +8,7 @@ so do vehicles, all that a scenario says beside what it must, and the digits of 
 from __future__ import annotations
 
 import json
+import logging
 import math
 import re
 from collections.abc import Callable, Sequence
@@ -16,6 +17,9 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
+from secondlook.errors import UserError
+from secondlook.launch.mission import Bus
+from secondlook.storm.fly import fly_storm
 from secondlook.storm.plan_edits import (
     Data,
     Edit,
@@ -37,7 +41,7 @@ from secondlook.storm.plan_edits import (
     without_keys,
 )
 from secondlook.storm.swarm import latest_heals_s, limit_s
-from secondlook.storm.witness import RUN, Violation
+from secondlook.storm.witness import Violation
 from secondlook.testing.plan import TroublePlan, make_plan
 
 Fails = Callable[[TroublePlan], bool]
@@ -47,6 +51,7 @@ MOST_FLIGHTS = 300
 _LATE_S = 0.1
 _FOR_GOOD_S = 1e5  # what lasts longer is meant to last for ever
 _SHORTEST_S = 1.0
+_RUN = "run"  # of whom a violation is where a run has failed
 _BEGINNING = re.compile(r"[^0-9:,]*")
 _SPANS = ("for_s", "by_s", "after_s", "within_s")
 _DIGITS = (1, 2, 3)
@@ -85,11 +90,25 @@ def shrink(
         return search.best
 
 
+def violations_of(plan: TroublePlan, bus: Bus = "local") -> tuple[Violation, ...]:
+    """What does not hold in a storm that is tried; nothing of one that cannot be flown. What it logs is not printed."""
+    log, nowhere = logging.getLogger("secondlook"), logging.NullHandler()
+    before, log.propagate = log.propagate, False
+    log.addHandler(nowhere)
+    try:
+        return fly_storm(plan, bus=bus).violations
+    except UserError:
+        return ()
+    finally:
+        log.removeHandler(nowhere)
+        log.propagate = before
+
+
 def is_alike(violation: Violation, first: Violation) -> bool:
     """Whether it is the same that does not hold: of a run that has failed, its sentence up to the first number, too."""
-    if (violation.invariant, violation.who == RUN) != (first.invariant, first.who == RUN):
+    if (violation.invariant, violation.who == _RUN) != (first.invariant, first.who == _RUN):
         return False
-    return first.who != RUN or _BEGINNING.match(violation.what)[0] == _BEGINNING.match(first.what)[0]  # type: ignore[index]
+    return first.who != _RUN or _BEGINNING.match(violation.what)[0] == _BEGINNING.match(first.what)[0]  # type: ignore[index]
 
 
 def what_is_left(before: TroublePlan, after: TroublePlan) -> str:

@@ -21,10 +21,6 @@ from vehicle_agent.coverage import CoverageLayer
 _HAIR = 1e-9  # what sums of the same risk in another order may differ by, a cell
 
 
-RUN = "run"
-"""Of whom it is that a mission does not come to its end."""
-
-
 @dataclass(frozen=True)
 class Violation:
     """What must hold and did not: at what time of the mission, of whom, and what was found instead."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,10 +13,11 @@ from planner.fleet_map import VehicleLayer
 from secondlook.cli import app
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
-from secondlook.storm.campaign import storm_of
-from secondlook.storm.fly import fly_storm
+from secondlook.storm import campaign
+from secondlook.storm.campaign import flown_again, storm_of
+from secondlook.storm.fly import Outcome, fly_storm
 from secondlook.testing import Fleet
-from secondlook.testing.plan import load_plan
+from secondlook.testing.plan import TroublePlan, load_plan
 
 QUICK = 5
 """A storm that is flown in some tenths of a second."""
@@ -55,6 +57,32 @@ def test_what_must_hold_does(number: int) -> None:
     first, again = (fly_storm(storm_of(None, number)) for _ in range(2))
     assert not first.violations
     assert first.digest == again.digest is not None
+
+
+def test_each_so_many_th_storm_is_flown_twice_and_over_zenoh(monkeypatch: pytest.MonkeyPatch) -> None:
+    plan, flown = storm_of(None, QUICK), []
+
+    def fly(plan: TroublePlan, *, bus: str = "local") -> Outcome:
+        flown.append(bus)
+        return Outcome((), f"{bus} {len(flown)}", 20.0, 0.1)
+
+    monkeypatch.setattr(campaign, "fly_storm", fly)
+    first = Outcome((), "local 1", 20.0, 0.1)
+    differs = ("the same digest over Zenoh", "it is zenoh 2 and was local 1")
+    for number, buses, told in ((7, [], []), (4, ["local"], []), (40, ["local", "zenoh"], [differs])):
+        flown.clear()
+        found = flown_again(plan, number, first, 4)
+        assert flown == buses
+        assert [(one.invariant, one.what) for one in found.violations] == told
+    assert flown_again(plan, 40, first, 0) == first
+    (found_again,) = flown_again(plan, 4, replace(first, digest="another"), 4).violations
+    assert found_again.invariant == "the same digest again"
+
+
+def test_a_storm_is_the_same_over_zenoh() -> None:
+    plan = storm_of(None, QUICK)
+    outcome = fly_storm(plan)
+    assert flown_again(plan, 10, outcome, 1) == outcome
 
 
 def test_a_map_that_forgets_what_was_told_before_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
