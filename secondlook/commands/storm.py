@@ -18,7 +18,7 @@ from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
-from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.fly import Outcome, fly_storm, latest_flight
 from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
 from secondlook.testing.plan import TroublePlan, load_plan
@@ -94,8 +94,7 @@ def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
         typer.echo(f"All that must hold does; the mission was over at {outcome.end_s:.0f} s.")
     typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
     if outcome.violations:
-        run = max(folder.glob("flight-*"), key=lambda path: path.stat().st_mtime)
-        typer.echo(f"The moment: secondlook view {run} --at {outcome.violations[0].t_s:g}")
+        typer.echo(f"The moment: secondlook view {latest_flight(folder)} --at {outcome.violations[0].t_s:g}")
         raise typer.Exit(FAILED)
 
 

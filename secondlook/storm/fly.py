@@ -10,7 +10,7 @@ from pathlib import Path
 from comms.errors import NodeError
 from secondlook.launch.mission import Bus
 from secondlook.launch.processes import RunFailedError
-from secondlook.storm.invariants import check_flight
+from secondlook.storm.invariants import check_failed, check_flight
 from secondlook.storm.witness import Violation, Witness
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.flight import Flight
@@ -39,13 +39,18 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
     began_s = time.perf_counter()
     witness = Witness()
     flight: Flight | None = None
+    record = record or any(one.what == "disk_full" for one in plan.trouble)
     fleet = Fleet.of_plan(plan, folder=folder, bus=bus, record=record, made=witness.made)
     try:
         flight = fleet.run()
     except (RunFailedError, NodeError) as error:
-        at_s = fleet.heard.now_s
-        violations = [*witness.violations, Violation("the mission ends", at_s, "run", str(error))]
+        violations = [*witness.violations, *check_failed(str(error), plan, latest_flight(folder), fleet.heard)]
     else:
         violations = check_flight(flight, plan, witness)
     end_s = fleet.heard.now_s if flight is None else flight.end_s
     return Outcome(tuple(violations), None if flight is None else flight.digest, end_s, time.perf_counter() - began_s)
+
+
+def latest_flight(folder: Path) -> Path:
+    """Of the flights of a fleet the folder of the last one."""
+    return max(folder.glob("flight-*"), key=lambda one: int(one.name.removeprefix("flight-")))

@@ -3,7 +3,9 @@ while it was."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -12,9 +14,11 @@ from comms.said.messages import AgentState, CoverageTile, MissionOver, Mode, Str
 from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import CLOSED
 from planner.risk import LevelArray
+from secondlook.errors import UserError
 from secondlook.fleet.nodes import COORDINATOR
+from secondlook.recorded.mission import load_run
 from secondlook.storm.witness import Violation, Witness
-from secondlook.testing.flight import Flight
+from secondlook.testing.flight import Flight, Heard
 from secondlook.testing.mission_assertions import assert_no_message_dropped
 from secondlook.testing.plan import TroublePlan
 from secondlook.testing.strip_assertions import (
@@ -38,6 +42,7 @@ def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Vi
         _map_is_what_came,
         _layers_are_what_was_seen,
         _core_is_all_on_the_map,
+        _full_disk_is_told,
     ):
         found += check(flight, plan, witness)
     if not plan.trouble:
@@ -208,3 +213,32 @@ def _last_s(flight: Flight, name: str, *modes: Mode) -> float:
 def _core_vehicles(plan: TroublePlan) -> list[str]:
     """The vehicles that must come to the end: those of the core, all where there is none."""
     return [name for name in plan.scenario.vehicles if not plan.core or name in plan.core]
+
+
+_NAMES_A_FILE = re.compile(r"(/.+?): .+; must be a file that can be written")
+
+
+def _full_disk_is_told(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    if _disk_was_full(plan, flight.heard):
+        yield Violation("a full disk is told", flight.end_s, "run", "it was full, and the mission has not failed")
+
+
+def _disk_was_full(plan: TroublePlan, heard: Heard) -> bool:
+    return any(one.what == "disk_full" and one.at_s <= heard.now_s for one in plan.trouble)
+
+
+def check_failed(error: str, plan: TroublePlan, folder: Path, heard: Heard) -> list[Violation]:
+    """What does not hold of a mission that has failed. One may fail: whose disk is full; its sentence names a file in
+    the folder of the flight, and what is on disk is the beginning of what was said."""
+    if not _disk_was_full(plan, heard):
+        return [Violation("the mission ends", heard.now_s, "run", error)]
+    match = _NAMES_A_FILE.fullmatch(error)
+    if match is None or folder not in Path(match[1]).parents:
+        return [Violation("a full disk is told", heard.now_s, "run", error)]
+    try:
+        there = [(one.key, one.payload) for one in load_run(folder).messages()]
+    except UserError as unreadable:
+        return [Violation("what is on disk is read back", heard.now_s, "run", str(unreadable))]
+    if there != [(one.key, one.payload) for one in heard][: len(there)]:
+        return [Violation("what is on disk is read back", heard.now_s, "run", "it is not what was said first")]
+    return []

@@ -209,7 +209,7 @@ def _begins_s(one: Any) -> float:
 
 def _ends_s(one: Any) -> float:
     """When an entry of a plan's trouble is over; what happens at a moment, then."""
-    if one.what in ("kill", "join"):
+    if not hasattr(one, "for_s"):
         return float(one.at_s)
     for_s = math.inf if one.for_s is None else one.for_s
     return _begins_s(one) + float(for_s)

@@ -21,6 +21,8 @@ from secondlook.testing.plan import TroublePlan, make_plan
 
 CALM_SHARE = 0.1
 """Of all storms: nothing goes wrong in these, and more must hold."""
+FULL_DISK_SHARE = 0.02
+"""Of those in which something goes wrong: the disk is full from some moment on."""
 _SHORTEST_S = 20.0  # until the core is healed
 _FOR_EVER_S = 1e6
 _Entry = dict[str, Any]
@@ -34,8 +36,15 @@ def draw_storm(scenario: Scenario, number: int) -> TroublePlan:
     heals_s = max(_SHORTEST_S, _s(rng.uniform(0.1, 1.2) * survey_s(scenario)))
     heals_s = min(heals_s, latest_heals_s(scenario))
     core = (COORDINATOR, *_core_vehicles(rng, scenario))
-    trouble = _Swarm(rng, scenario, core, heals_s).drawn()
+    trouble = _Swarm(rng, scenario, core, heals_s).drawn() + _full_disk(scenario, number)
     return _plan(scenario, number, core, heals_s, trouble)
+
+
+def _full_disk(scenario: Scenario, number: int) -> list[_Entry]:
+    """Seldom, as the mission ends there."""
+    rng = Random(f"disk {number}")
+    at_s = _s(rng.uniform(0.05, 1.2) * survey_s(scenario))
+    return [{"what": "disk_full", "at_s": at_s}] if rng.random() < FULL_DISK_SHARE else []
 
 
 def _plan(scenario: Scenario, number: int, core: tuple[str, ...], heals_s: float, trouble: list[_Entry]) -> TroublePlan:

@@ -23,6 +23,7 @@ from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.recorded.observer import RunStopped
 from secondlook.scenario import Scenario, load_scenario, make_scenario
 from secondlook.testing.flight import Flight, Heard
+from secondlook.testing.full_disk import filling
 from secondlook.testing.inside import Inside
 from secondlook.testing.plan import TroublePlan, load_plan
 from secondlook.testing.trouble import Trouble
@@ -193,6 +194,8 @@ class Fleet(Trouble):
         return Heard(tuple(self.scenario.vehicles))
 
     def _fly(self, watch: _Watch, bus: Bus) -> tuple[Flight, bool]:
+        if self.disk_full_ms is not None and bus != "local":
+            raise UserError("disk_full: not allowed over Zenoh, as files are written in several processes there")
         folder = next(one for n in count(1) if not (one := self.folder / f"flight-{n}").exists())
         folder.mkdir(parents=True)
         self._heard = watch.heard
@@ -204,17 +207,18 @@ class Fleet(Trouble):
             if self._made is not None:
                 self._made(node_id, node)
 
-        options = RunOptions(
-            folder,
-            bus,
-            self._processes,
-            record=self._record,
-            drive=Lockstep(faults, events),
-            watch=watch.hear,
-            made=made,
-            patience_s=self._patience_s,
-        )
-        summary = run_mission(self.scenario, options)
+        with filling(self.disk_full_ms, watch.hear) as hear:
+            options = RunOptions(
+                folder,
+                bus,
+                self._processes,
+                record=self._record,
+                drive=Lockstep(faults, events),
+                watch=hear,
+                made=made,
+                patience_s=self._patience_s,
+            )
+            summary = run_mission(self.scenario, options)
         if watch.error is not None:
             raise watch.error
         watch.check_all_repeated()

@@ -38,6 +38,13 @@ class KillOrJoin(_Planned):
     at_s: TimeOrZero
 
 
+class DiskFull(_Planned):
+    """No file can be written from then on."""
+
+    what: Literal["disk_full"]
+    at_s: TimeOrZero
+
+
 class Freeze(_Planned):
     """The node does nothing for a while."""
 
@@ -92,9 +99,9 @@ class Reorder(_Struck):
 
 
 AnyTrouble = Annotated[
-    KillOrJoin | Freeze | CutOff | DropOrCorrupt | Repeat | Delay | Reorder, Field(discriminator="what")
+    KillOrJoin | DiskFull | Freeze | CutOff | DropOrCorrupt | Repeat | Delay | Reorder, Field(discriminator="what")
 ]
-KINDS = ("kill", "join", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder")
+KINDS = ("kill", "join", "disk_full", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder")
 
 
 class TroublePlan(Mapping):

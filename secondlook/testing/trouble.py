@@ -24,6 +24,7 @@ class Trouble:
     def __init__(self, routing: Routing, seed: int) -> None:
         self.routing = routing
         self.events: tuple[NodeEvent, ...] = ()
+        self.disk_full_ms: int | None = None
         self._seed = seed
         self._message_faults: list[MessageFault] = []
         self._cut_offs: list[CutOff] = []
@@ -50,6 +51,11 @@ class Trouble:
         if self._from_ms > 0 and node in absent_at_start([*self.events, join]) - absent_at_start(self.events):
             raise UserError(f"join: {node!r} is not allowed; must be killed before, or be let in late from the start")
         self._plan(join)
+
+    def disk_full(self, *, at_s: float | None = None) -> None:
+        """From then on no file can be written, the test's own included, until the mission has failed: with
+        RunFailedError, which names a file, at the latest when it ends. On the local bus alone."""
+        self.disk_full_ms = self._event_ms(at_s)
 
     def cut_off(self, vehicle: str, *, for_s: float, from_s: float | None = None) -> None:
         """For a while nothing crosses the water from the vehicle's agent or to it. Agent and vehicle go on talking."""

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import resource
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+import secondlook
 from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import VehicleLayer
 from secondlook.cli import app
@@ -17,7 +19,7 @@ from secondlook.storm import campaign
 from secondlook.storm.campaign import flown_again, storm_of
 from secondlook.storm.fly import Outcome, fly_storm
 from secondlook.testing import Fleet
-from secondlook.testing.plan import TroublePlan, load_plan
+from secondlook.testing.plan import DiskFull, TroublePlan, load_plan
 
 QUICK = 5
 """A storm that is flown in some tenths of a second."""
@@ -31,7 +33,7 @@ def test_a_number_is_one_storm_and_another_number_another() -> None:
 def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time() -> None:
     drawn: set[str] = set()
     calm = 0
-    for number in range(200):
+    for number in range(300):
         plan = storm_of(None, number)
         calm += not plan.trouble
         for one in plan.trouble:
@@ -41,8 +43,8 @@ def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time() -> 
             if whom & set(plan.core) and one.what != "join":
                 assert ends_s <= plan.heals_s + 0.1, (number, one)
         assert plan.heals_s <= GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s
-    assert drawn == {"kill", "join", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder"}
-    assert 10 <= calm <= 35  # a tenth of 200
+    assert drawn == {"kill", "join", "disk_full", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder"}
+    assert 15 <= calm <= 50  # a tenth of 300
 
 
 def test_a_storm_of_a_given_scenario_keeps_its_fleet() -> None:
@@ -85,6 +87,27 @@ def test_a_storm_is_the_same_over_zenoh() -> None:
     assert flown_again(plan, 10, outcome, 1) == outcome
 
 
+def full_disk(at_s: float) -> TroublePlan:
+    """A quick storm whose disk is full from a moment on."""
+    plan = storm_of(None, QUICK)
+    return plan.model_copy(update={"trouble": (*plan.trouble, DiskFull(what="disk_full", at_s=at_s))})
+
+
+def test_a_full_disk_is_told_and_what_is_on_it_is_read_back(tmp_path: Path) -> None:
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    outcome = fly_storm(full_disk(80.0), folder=tmp_path)
+    assert (outcome.violations, outcome.digest) == ((), None)
+    assert outcome.end_s >= 80
+    assert resource.getrlimit(resource.RLIMIT_FSIZE) == before
+    last = max(one.t_s for one in secondlook.load(tmp_path / "flight-1").messages())
+    assert 0 < last <= outcome.end_s
+
+
+def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(resource, "setrlimit", lambda *_: None)  # as if all writes went well
+    assert [one.invariant for one in fly_storm(full_disk(80.0)).violations] == ["a full disk is told"]
+
+
 def test_a_map_that_forgets_what_was_told_before_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     def forget(layer: VehicleLayer, place: object, window: object, incarnation: int, told: object) -> object:
         return told
@@ -111,6 +134,7 @@ def test_a_plan_file_is_flown_as_the_storm_it_was_written_from(tmp_path: Path) -
         ("{what: kill, node: primary}", r"plan.yaml:4: trouble\[0\].at_s: missing; must be given"),
         ("{what: drown, node: primary}", r"plan.yaml:4: trouble\[0\].what: \"drown\" is not allowed; must be .*"),
         ("{what: kill, node: primary, at_s: 5, for_s: 3}", r"plan.yaml:4: trouble\[0\].for_s: 3 is not allowed; .*"),
+        ("{what: disk_full}", r"plan.yaml:4: trouble\[0\].at_s: missing; must be given"),
         ("{what: kill, node: nobody, at_s: 5}", r"trouble\[0\]: 'nobody' cannot be killed, .*"),
     ],
 )

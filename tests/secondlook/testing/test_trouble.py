@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
+import secondlook
 from comms.node import Received
 from comms.said.messages import AgentState
 from secondlook.errors import UserError
@@ -16,6 +17,7 @@ from secondlook.testing import (
     Fleet,
     Flight,
     Heard,
+    RunFailedError,
     assert_maps_converged,
     assert_never_assigned_to_lost,
     assert_no_strip_lost,
@@ -273,3 +275,22 @@ def test_bad_arguments_are_refused_in_one_sentence(
         schedule(brief())
     assert str(refused.value).startswith(sentence)
     assert "\n" not in str(refused.value)
+
+
+class TestFiles:
+    def test_a_disk_that_is_full_ends_the_mission_with_a_sentence(self, brief: MakeFleet) -> None:
+        fleet = brief(record=True)
+        fleet.disk_full(at_s=60)
+        told = r"^/.*/flown/flight-1/\w+\.\w+: File too large; must be a file that can be written$"
+        with pytest.raises(RunFailedError, match=told):
+            fleet.run()
+        assert fleet.heard.now_s >= 60
+        there = list(secondlook.load(fleet.folder / "flight-1").messages())
+        assert [one.payload for one in there] == [one.payload for one in fleet.heard][: len(there)]
+        (fleet.folder / "there").write_text("is room again")
+
+    def test_over_zenoh_it_is_refused(self, brief: MakeFleet) -> None:
+        fleet = brief(bus="zenoh")
+        fleet.disk_full(at_s=60)
+        with pytest.raises(UserError, match=r"^disk_full: not allowed over Zenoh, as files are written in several pro"):
+            fleet.run()
