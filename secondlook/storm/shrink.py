@@ -187,14 +187,14 @@ def fewest(items: Sequence[_T], fails: Callable[[list[_T]], bool]) -> list[_T]:
 
 def broken_rules(plan: TroublePlan) -> set[str]:
     """Which rules of storms a plan breaks (see `secondlook.storm.swarm`), so that its core, or everybody where there is
-    none, cannot come to the end: `started again` is who of it is killed, `over` by `heals_s` what begins before, and
+    none, cannot come to the end: `started again` is who of it is killed, `over` by `heals_s` is what may strike it, and
     `early` enough is that."""
     broken: set[str] = set()
     last: dict[str, tuple[float, str]] = {}
     for one in plan.trouble:
         if one.what in ("kill", "join"):
             last[one.node] = max(last.get(one.node, (0.0, "")), (one.at_s, one.what))
-        if _begins_s(one) <= plan.heals_s and _ends_s(one) > plan.heals_s + _LATE_S:
+        if not _spares_core(one, plan) and _ends_s(one) > plan.heals_s + _LATE_S:
             broken.add("over")
     if any(what == "kill" for node, (_, what) in last.items() if node in plan.core or not plan.core):
         broken.add("started again")
@@ -203,8 +203,11 @@ def broken_rules(plan: TroublePlan) -> set[str]:
     return broken
 
 
-def _begins_s(one: Any) -> float:
-    return float(getattr(one, "at_s", getattr(one, "from_s", 0.0)))
+def _spares_core(one: Any, plan: TroublePlan) -> bool:
+    """Whether an entry of a plan's trouble concerns another vehicle, as its reader, sender or victim, or nobody."""
+    others = set(plan.scenario.vehicles) - set(plan.core) if plan.core else set()
+    whom = {getattr(one, key, "") for key in ("node", "vehicle", "to")} | set(getattr(one, "keys", "").split("/"))
+    return bool(whom & others) or one.what == "disk_full"
 
 
 def _ends_s(one: Any) -> float:
@@ -212,7 +215,7 @@ def _ends_s(one: Any) -> float:
     if not hasattr(one, "for_s"):
         return float(one.at_s)
     for_s = math.inf if one.for_s is None else one.for_s
-    return _begins_s(one) + float(for_s)
+    return float(getattr(one, "at_s", getattr(one, "from_s", 0.0)) + for_s)
 
 
 def _time_limit(search: _Search) -> None:
@@ -245,8 +248,8 @@ def _faults(search: _Search) -> None:
         if one["node"] == other["node"]:
             rest = [entry for entry in search.data["trouble"] if entry not in (one, other)]
             search.takes(search.data | {"trouble": rest})
-    ends_s = (_ends_s(one) for one in search.best.trouble if _ends_s(one) <= search.best.heals_s + _LATE_S)
-    search.takes(search.data | {"heals_s": round(max(ends_s, default=0.0), 3)})
+    ends_s = (_ends_s(one) for one in search.best.trouble if not _spares_core(one, search.best))
+    search.takes(search.data | {"heals_s": round(min(max(ends_s, default=0.0), search.best.heals_s), 3)})
 
 
 def _area(search: _Search) -> None:

@@ -1,5 +1,5 @@
-"""What storms have found and was mended is flown again: in each plan beside this file something did not hold once, which
-its first line tells."""
+"""What storms have found and was mended is flown again: in each plan beside this file something did not hold once; its
+first line tells what."""
 
 from __future__ import annotations
 

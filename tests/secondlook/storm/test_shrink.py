@@ -116,6 +116,7 @@ def test_who_of_the_core_was_killed_is_still_started_again() -> None:
     [
         ({}, set()),
         ({"heals_s": 8.0}, {"over"}),
+        ({"heals_s": 0.5}, {"over"}),
         ({"heals_s": 1e4}, {"early"}),
         ({"core": ["coordinator", "primary", "helper"]}, {"started again"}),
         ({"core": []}, {"started again"}),
