@@ -91,7 +91,8 @@ def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
     for violation in outcome.violations:
         typer.echo(str(violation))
     if not outcome.violations:
-        typer.echo(f"All that must hold does; the mission was over at {outcome.end_s:.0f} s.")
+        how = "was over" if outcome.digest else "has failed, as its disk was full,"
+        typer.echo(f"All that must hold does; the mission {how} at {outcome.end_s:.0f} s.")
     typer.echo(f"Files: {folder}, the plan file plan.yaml among them")
     if outcome.violations:
         typer.echo(f"The moment: secondlook view {latest_flight(folder)} --at {outcome.violations[0].t_s:g}")
