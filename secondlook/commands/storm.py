@@ -17,11 +17,12 @@ from secondlook.errors import UserError
 from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
+from secondlook.storm.campaign import Outcomes, fly_storms, storm_of, times_reached
 from secondlook.storm.fly import Outcome, fly_storm
 from secondlook.testing.plan import TroublePlan, load_plan
 
 MOST_STORMS = 1_000_000
+MOST_NAMED = 20  # of what was never tried
 _RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
 
 
@@ -99,11 +100,16 @@ def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs:
 
     failure = fly_watched("storm", "storms", len(numbers), fly, shown=sys.stderr.isatty())
     failed = sorted(number for number, outcome in outcomes.items() if outcome.violations)
+    reached = times_reached(outcomes)
     if out is not None:
         told = {number: [str(one) for one in outcomes[number].violations] for number in failed}
-        content = {"first": numbers[0], "last": numbers[-1], "flown": len(outcomes), "failed": told}
+        content = {"first": numbers[0], "last": numbers[-1], "flown": len(outcomes), "failed": told, "reached": reached}
         write_whole(out / "storm.json", json.dumps(content, indent=2) + "\n")
     typer.echo(f"{len(outcomes)} storms flown; in {len(failed)} of them something did not hold.")
+    never = [name for name, count in reached.items() if not count]
+    if never:
+        more = f"; and {len(never) - MOST_NAMED} more" if len(never) > MOST_NAMED else ""
+        typer.echo(f"Never tried in these storms: {'; '.join(never[:MOST_NAMED])}{more}.")
     if failure:
         sys.stderr.write(f"{failure}\n")
     if failed or failure:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import draw_fleet
 from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.sometimes import SOMETIMES
 from secondlook.storm.swarm import draw_storm
 from secondlook.testing.plan import TroublePlan
 from secondlook.worker_pool import worker_pool
@@ -22,6 +24,12 @@ def storm_of(scenario: Scenario | None, number: int) -> TroublePlan:
     if scenario is None:
         return draw_storm(draw_fleet(number), number)
     return draw_storm(scenario.model_copy(update={"seed": number}), number)
+
+
+def times_reached(outcomes: Outcomes) -> dict[str, int]:
+    """In how many of these storms each was reached of what is to be tried sometimes."""
+    counts = Counter(name for outcome in outcomes.values() for name in outcome.reached)
+    return {name: counts[name] for name in SOMETIMES}
 
 
 def fly_storms(
@@ -45,5 +53,5 @@ def fly_storms(
 
 
 def _fly(scenario: Scenario | None, number: int) -> Outcome:
-    logging.disable(logging.WARNING)  # of thousands of missions: which are worth a look their outcomes tell
+    logging.getLogger("secondlook").propagate = False  # of thousands of missions: what matters their outcomes tell
     return fly_storm(storm_of(scenario, number))

@@ -11,6 +11,7 @@ from comms.errors import NodeError
 from secondlook.launch.mission import Bus
 from secondlook.launch.processes import RunFailedError
 from secondlook.storm.invariants import check_flight
+from secondlook.storm.sometimes import NotedFaults, reached
 from secondlook.storm.witness import Violation, Witness
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.flight import Flight
@@ -22,13 +23,23 @@ class Outcome:
     """What came of one storm.
 
     `violations`: what did not hold, empty where all did. `digest`: None where the mission did not come to its end.
-    `end_s`: simulated, `wall_s`: real seconds.
+    `end_s`: simulated, `wall_s`: real seconds. `reached`: of what is to be tried sometimes, empty where it did not end.
     """
 
     violations: tuple[Violation, ...]
     digest: str | None
     end_s: float
     wall_s: float
+    reached: frozenset[str] = frozenset()
+
+
+class _StormyFleet(Fleet):
+    """A fleet that notes what its faults strike."""
+
+    @property
+    def faults(self) -> NotedFaults:
+        """See `Trouble`."""
+        return NotedFaults(self._seed, self._message_faults, self._cut_offs)
 
 
 def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = None, record: bool = False) -> Outcome:
@@ -39,13 +50,20 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
     began_s = time.perf_counter()
     witness = Witness()
     flight: Flight | None = None
-    fleet = Fleet.of_plan(plan, folder=folder, bus=bus, record=record, made=witness.made)
+    fleet = _StormyFleet.of_plan(plan, folder=folder, bus=bus, record=record, made=witness.made)
     try:
-        flight = fleet.run()
+        with witness.listening():
+            flight = fleet.run()
     except (RunFailedError, NodeError) as error:
         at_s = fleet.heard.now_s
         violations = [*witness.violations, Violation("the mission ends", at_s, "run", str(error))]
     else:
         violations = check_flight(flight, plan, witness)
     end_s = fleet.heard.now_s if flight is None else flight.end_s
-    return Outcome(tuple(violations), None if flight is None else flight.digest, end_s, time.perf_counter() - began_s)
+    return Outcome(
+        tuple(violations),
+        None if flight is None else flight.digest,
+        end_s,
+        time.perf_counter() - began_s,
+        frozenset() if flight is None else reached(flight, witness),
+    )

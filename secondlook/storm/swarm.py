@@ -11,9 +11,12 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
+import numpy as np
+
 from comms.lockstep.faults import STRUCK
-from comms.said.topics import Topic
+from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, Topic
 from coordinator.fleet import GIVEN_UP_AFTER
+from planner.fleet_map import MOST_STARTS
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import survey_s
@@ -23,6 +26,7 @@ CALM_SHARE = 0.1
 """Of all storms: nothing goes wrong in these, and more must hold."""
 _SHORTEST_S = 20.0  # until the core is healed
 _FOR_EVER_S = 1e6
+_EACH_START_S = 15.0  # in which a vehicle sees something and says so, mostly
 _Entry = dict[str, Any]
 
 
@@ -31,7 +35,7 @@ def draw_storm(scenario: Scenario, number: int) -> TroublePlan:
     rng = Random(f"storm {number}")
     if rng.random() < CALM_SHARE:
         return _plan(scenario, number, (), 0.0, [])
-    heals_s = max(_SHORTEST_S, _s(rng.uniform(0.1, 1.2) * survey_s(scenario)))
+    heals_s = max(_SHORTEST_S, _s(rng.choice((rng.uniform(0.1, 1.2), rng.uniform(0.1, 2))) * survey_s(scenario)))
     # Whoever is healed later may have been given up, or is too late for the end.
     heals_s = min(heals_s, _s(0.9 * GIVEN_UP_AFTER * scenario.coordinator.lost_after_s))
     if scenario.mission.deadline_s is not None:
@@ -79,11 +83,14 @@ class _Swarm:
         kinds: tuple[Callable[[], list[_Entry]], ...] = (
             self._late_joins,
             self._restarts,
+            self._many_restarts,
             self._freezes,
             self._deaths,
             self._swizzle,
             self._cut_offs,
             self._partitions,
+            self._slow_links,
+            self._bodies,
             *(lambda what=what: self._strikes(what) for what in ("drop", "repeat", "delay", "reorder", "corrupt")),
         )
         trouble: list[_Entry] = []
@@ -102,7 +109,19 @@ class _Swarm:
             node = self._rng.choice(self._nodes)
             if self._free_s[node] + 2 < self._heals_s and node not in self._gone:
                 found.append({"what": "kill", "node": node, "at_s": self._later(node)})
-                found.append({"what": "join", "node": node, "at_s": self._later(node)})
+                memory = {"memory": True} if self._rng.random() < 0.4 else {}
+                found.append({"what": "join", "node": node, "at_s": self._later(node), **memory})
+        return found
+
+    def _many_restarts(self) -> list[_Entry]:
+        """One is started anew more often than its starts are told apart, if there is time for it to say something."""
+        node, found = self._rng.choice(self._vehicles), []
+        times_s = np.arange(self._free_s[node] + _EACH_START_S, self._heals_s - 1, _EACH_START_S)
+        if times_s.size > MOST_STARTS and node not in self._gone:
+            for at_s in times_s.tolist():
+                found.append({"what": "kill", "node": node, "at_s": _s(at_s)})
+                found.append({"what": "join", "node": node, "at_s": _s(at_s + 0.5)})
+                self._free_s[node] = _s(at_s + 0.6)
         return found
 
     def _freezes(self) -> list[_Entry]:
@@ -158,6 +177,36 @@ class _Swarm:
             for one, other in pairs
         ]
 
+    def _slow_links(self) -> list[_Entry]:
+        """All that some vehicles say, or are told, takes longer than answers are waited for."""
+        found: list[_Entry] = []
+        for vehicle in self._vehicles:
+            if self._rng.random() < 0.5:
+                from_s, for_s = self._span()
+                keys = self._rng.choice(
+                    (_keys_of(vehicle), f"agent/{vehicle}/task_status/*", f"coord/task/{vehicle}/*")
+                )
+                found.append(
+                    {
+                        "what": "delay",
+                        "keys": keys,
+                        "from_s": from_s,
+                        "for_s": for_s,
+                        "by_s": _s(self._rng.uniform(5, 29)),
+                    }
+                )
+        return found
+
+    def _bodies(self) -> list[_Entry]:
+        """What agents and their vehicles say to each other is lost: looks, the ends of manoeuvres, commands."""
+        found: list[_Entry] = []
+        for vehicle in self._vehicles:
+            if self._rng.random() < 0.5:
+                from_s, for_s = (0.0, self._heals_s) if self._rng.random() < 0.5 else self._span()
+                topic = self._rng.choice((LOOK, MANEUVER_STATUS, MANEUVER))
+                found.append({"what": "drop", "keys": topic.expression(vehicle), "from_s": from_s, "for_s": for_s})
+        return found
+
     def _strikes(self, what: str) -> list[_Entry]:
         found: list[_Entry] = []
         for _ in range(self._rng.randint(1, 3)):
@@ -179,7 +228,7 @@ class _Swarm:
         for node in self._vehicles:
             if node in self._core or node in self._gone:
                 continue
-            match self._rng.choice(("killed", "frozen", "cut off", "deaf", "dumb", "lossy")):
+            match self._rng.choice(("killed", "frozen", "cut off", "deaf", "dumb", "lossy", "blind")):
                 case "killed":
                     found.append({"what": "kill", "node": node, "at_s": at_s})
                 case "frozen":
@@ -190,6 +239,8 @@ class _Swarm:
                     found.append({"what": "drop", "keys": "**", "to": node, "from_s": at_s})
                 case "dumb":
                     found.append({"what": "drop", "keys": _keys_of(node), "from_s": at_s})
+                case "blind":
+                    found.append({"what": "drop", "keys": LOOK.expression(node), "from_s": at_s})
                 case "lossy":
                     share = round(self._rng.uniform(0.3, 0.95), 2)
                     found.append({"what": "drop", "keys": _keys_of(node), "from_s": at_s, "probability": share})
