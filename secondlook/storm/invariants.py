@@ -30,15 +30,10 @@ END_WITHIN_S = 30.0  # of the deadline
 def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Violation]:
     """All that does not hold of a flight, what the witness saw first."""
     found = list(witness.violations)
-    for check in (
-        _ends_in_time,
-        _core_has_finished,
-        _books_are_kept,
-        _books_agree_with_agents,
-        _map_is_what_came,
-        _layers_are_what_was_seen,
-        _core_is_all_on_the_map,
-    ):
+    checks = [_ends_in_time, _books_are_kept, _books_agree_with_agents, _map_is_what_came, _layers_are_what_was_seen]
+    if any(one.t_s > plan.heals_s for one in flight.said(MissionOver)):  # else it was over before the core was healed
+        checks += [_core_has_finished, _core_is_all_on_the_map]
+    for check in checks:
         found += check(flight, plan, witness)
     if not plan.trouble:
         found += _calm(flight, witness)

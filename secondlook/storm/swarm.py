@@ -11,12 +11,9 @@ from collections.abc import Callable
 from random import Random
 from typing import Any
 
-import numpy as np
-
 from comms.lockstep.faults import STRUCK
 from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, Topic
 from coordinator.fleet import GIVEN_UP_AFTER
-from planner.fleet_map import MOST_STARTS
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import survey_s
@@ -26,7 +23,6 @@ CALM_SHARE = 0.1
 """Of all storms: nothing goes wrong in these, and more must hold."""
 _SHORTEST_S = 20.0  # until the core is healed
 _FOR_EVER_S = 1e6
-_EACH_START_S = 15.0  # in which a vehicle sees something and says so, mostly
 _Entry = dict[str, Any]
 
 
@@ -83,7 +79,7 @@ class _Swarm:
         kinds: tuple[Callable[[], list[_Entry]], ...] = (
             self._late_joins,
             self._restarts,
-            self._many_restarts,
+            self._unheard_restarts,
             self._freezes,
             self._deaths,
             self._swizzle,
@@ -113,15 +109,19 @@ class _Swarm:
                 found.append({"what": "join", "node": node, "at_s": self._later(node), **memory})
         return found
 
-    def _many_restarts(self) -> list[_Entry]:
-        """One is started anew more often than its starts are told apart, if there is time for it to say something."""
-        node, found = self._rng.choice(self._vehicles), []
-        times_s = np.arange(self._free_s[node] + _EACH_START_S, self._heals_s - 1, _EACH_START_S)
-        if times_s.size > MOST_STARTS and node not in self._gone:
-            for at_s in times_s.tolist():
-                found.append({"what": "kill", "node": node, "at_s": _s(at_s)})
-                found.append({"what": "join", "node": node, "at_s": _s(at_s + 0.5)})
-                self._free_s[node] = _s(at_s + 0.6)
+    def _unheard_restarts(self) -> list[_Entry]:
+        """Late a vehicle is started anew, and at first nobody hears it: it counts as what it was."""
+        found: list[_Entry] = []
+        for vehicle in self._vehicles:
+            from_s = max(self._free_s[vehicle], 0.5 * self._heals_s)
+            if self._rng.random() < 0.5 and from_s + 8 < self._heals_s and vehicle not in self._gone:
+                at_s = self._between(from_s, self._heals_s - 5)
+                ends_s = _s(at_s + self._rng.uniform(1, 3))
+                found.append({"what": "kill", "node": vehicle, "at_s": at_s})
+                found.append({"what": "join", "node": vehicle, "at_s": ends_s})
+                lost = {"keys": _keys_of(vehicle), "from_s": at_s, "for_s": _s(self._heals_s - at_s)}
+                found.append({"what": "drop", **lost})
+                self._free_s[vehicle] = ends_s
         return found
 
     def _freezes(self) -> list[_Entry]:
@@ -192,7 +192,7 @@ class _Swarm:
                         "keys": keys,
                         "from_s": from_s,
                         "for_s": for_s,
-                        "by_s": _s(self._rng.uniform(5, 29)),
+                        "by_s": _s(self._rng.uniform(8, 29)),
                     }
                 )
         return found

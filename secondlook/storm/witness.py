@@ -30,7 +30,6 @@ from comms.said.tally import tally
 from coordinator.coordinator import Coordinator
 from coordinator.fleet import GIVEN_UP_AFTER
 from coordinator.ledger import WITH_A_VEHICLE
-from planner.fleet_map import MOST_STARTS
 from planner.risk import MOST_LEVELS, LevelArray
 from vehicle_agent.agent import Agent
 from vehicle_agent.coverage import CoverageLayer
@@ -59,14 +58,13 @@ LATE_STATE = "a state comes after a newer one, or again"
 LATE_TILE = "a tile comes after a newer one"
 TILE_AGAIN = "a tile comes again"
 TWO_STARTS = "two starts of a vehicle tell of one tile"
-MANY_STARTS = f"more than {MOST_STARTS} starts of a vehicle tell of one tile"
 LATE_ANSWER = "a word about a strip comes after a newer one, or again"
 LOOK_OF_BEFORE = "a look comes to an agent that was started after it"
 LOOK_AGAIN = "a look comes again"
 TASK_OF_BEFORE = "a task comes to an agent that was started after it"
 LATE_TASK = "a task comes after a newer one, or again"
 NOTED = (
-    LATE_STATE, LATE_TILE, TILE_AGAIN, TWO_STARTS, MANY_STARTS, LATE_ANSWER, LOOK_OF_BEFORE, LOOK_AGAIN,
+    LATE_STATE, LATE_TILE, TILE_AGAIN, TWO_STARTS, LATE_ANSWER, LOOK_OF_BEFORE, LOOK_AGAIN,
     TASK_OF_BEFORE, LATE_TASK,
 )  # fmt: skip
 
@@ -199,7 +197,7 @@ class CoordinatorWitness:
         else:
             self.noted.add(LATE_TILE if tile.version < before.version else TILE_AGAIN)
         if len(of_place) > 1:
-            self.noted.add(TWO_STARTS if len(of_place) <= MOST_STARTS else MANY_STARTS)
+            self.noted.add(TWO_STARTS)
         self._check_risk(received.vehicle, now_ms)
 
     def _hear_answer(self, received: Received, status: TaskStatus, now_ms: int) -> None:
