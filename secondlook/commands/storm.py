@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -18,6 +19,7 @@ from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import Outcomes, fly_storms, storm_of, times_reached
+from secondlook.storm.canaries import CANARIES, Find, find_canaries
 from secondlook.storm.fly import Outcome, fly_storm
 from secondlook.testing.plan import TroublePlan, load_plan
 
@@ -30,12 +32,18 @@ def storm(
     scenario: Annotated[
         str | None, typer.Argument(help="A bundled scenario's name or a YAML file; left out, fleets are drawn, too.")
     ] = None,
-    seeds: Annotated[str, typer.Option(metavar="A..B", help="From which to which storm.")] = "1..100",
+    seeds: Annotated[
+        str | None,
+        typer.Option(metavar="A..B", help="From which to which storm; 1..100, with --canaries 1..500, if left out."),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, max=LARGEST_SEED, help="Fly this storm alone, with a recording.")
     ] = None,
     plan: Annotated[Path | None, typer.Option(help="Fly the storm of this plan file, with a recording.")] = None,
     bus: Annotated[Bus, typer.Option(help="Of a single storm.")] = "local",
+    canaries: Annotated[
+        bool, typer.Option("--canaries", help="Plant bugs, and fly storms with each until it is found.")
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
     ] = None,
@@ -50,14 +58,18 @@ def storm(
     if set_ and scenario is None:
         raise UserError("--set: not allowed without a scenario, as fleets are drawn then")
     mission = None if scenario is None else load_scenario(scenario, set_ or ())
+    if canaries and (plan is not None or seed is not None):
+        raise UserError("--canaries: not allowed beside --plan or --seed; must be flown with a range, --seeds A..B")
     if plan is not None:
         if scenario is not None or seed is not None:
             raise UserError("--plan: not allowed beside a scenario or --seed; the plan holds both")
         _fly_one(load_plan(plan), plan.stem, bus, out)
     elif seed is not None:
         _fly_one(storm_of(mission, seed), f"storm-{seed}", bus, out)
+    elif canaries:
+        _look_for_canaries(mission, _range_of(seeds or "1..500"), jobs or os.cpu_count() or 1, out)
     else:
-        _fly_many(mission, scenario, _range_of(seeds), jobs or os.cpu_count() or 1, out)
+        _fly_many(mission, scenario, _range_of(seeds or "1..100"), jobs or os.cpu_count() or 1, out)
 
 
 def _range_of(seeds: str) -> range:
@@ -114,3 +126,33 @@ def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs:
         sys.stderr.write(f"{failure}\n")
     if failed or failure:
         raise typer.Exit(FAILED)
+
+
+def _look_for_canaries(mission: Scenario | None, numbers: range, jobs: int, out: Path | None) -> None:
+    if out is not None:
+        make_folder(out)
+    finds: dict[str, Find] = {}
+
+    def fly(tell: Tell) -> None:
+        find_canaries(mission, numbers, jobs, finds, lambda: tell(len(finds), ""))
+
+    failure = fly_watched("canaries", "planted bugs", len(CANARIES), fly, shown=sys.stderr.isatty())
+    width = max(map(len, CANARIES))
+    for name in CANARIES:
+        if name in finds:
+            typer.echo(f"{name:{width}}  {_found(finds[name])}")
+    if out is not None:
+        told = {name: asdict(find) for name, find in finds.items()}
+        write_whole(out / "canaries.json", json.dumps(told, indent=2) + "\n")
+    found = sum(find.number is not None for find in finds.values())
+    typer.echo(f"{found} of {len(CANARIES)} planted bugs found.")
+    if failure:
+        sys.stderr.write(f"{failure}\n")
+    if found < len(CANARIES) or failure:
+        raise typer.Exit(FAILED)
+
+
+def _found(find: Find) -> str:
+    if find.number is None:
+        return f"not found in {find.storms} storms"
+    return f"seed {find.number}, after {find.storms} storms: {find.invariant}"

@@ -53,5 +53,10 @@ def fly_storms(
 
 
 def _fly(scenario: Scenario | None, number: int) -> Outcome:
-    logging.getLogger("secondlook").propagate = False  # of thousands of missions: what matters their outcomes tell
+    quietly()
     return fly_storm(storm_of(scenario, number))
+
+
+def quietly() -> None:
+    """From now on this process tells nobody what nodes log: of thousands of missions what matters outcomes tell."""
+    logging.getLogger("secondlook").propagate = False
