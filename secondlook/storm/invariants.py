@@ -52,9 +52,11 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
     for name in plan.scenario.survey_vehicles:
         if name in core:
             surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY))
-        else:  # who has failed may say to the end that it is at a track
+        else:  # who has failed may say to the end that it is at a track, after a survey that went slowly
             states = flight.said(AgentState, f"agent/{name}/state")
-            failed_s = max([failed_s, *(one.message.expected_end_ms / 1000 for one in states[-1:])])
+            begun_s = {(one.message.mode, one.message.works_on): one.t_s for one in reversed(states)}
+            at_work_s = [begun_s[mode, track] for mode, track in begun_s if mode in (Mode.TRANSIT, Mode.SURVEY)]
+            failed_s = max([failed_s, *at_work_s, *(one.message.expected_end_ms / 1000 for one in states[-1:])])
     surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s)
     ends_s = mission.ends_s(surveyed_s) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
