@@ -4,6 +4,7 @@ while it was."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -54,13 +55,18 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
             surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY))
         else:  # who has failed may say to the end that it is at a track, after a survey that went slowly
             states = flight.said(AgentState, f"agent/{name}/state")
-            begun_s = {(one.message.mode, one.message.works_on): one.t_s for one in reversed(states)}
-            at_work_s = [begun_s[mode, track] for mode, track in begun_s if mode in (Mode.TRANSIT, Mode.SURVEY)]
-            failed_s = max([failed_s, *at_work_s, *(one.message.expected_end_ms / 1000 for one in states[-1:])])
+            for before, one in pairwise(states):
+                is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY)
+                if is_at_work and _where(one.message) != _where(before.message):
+                    failed_s = max(failed_s, one.t_s)
     surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s)
     ends_s = mission.ends_s(surveyed_s) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
         yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")
+
+
+def _where(state: AgentState) -> tuple[Mode, int, float, float]:
+    return state.mode, state.works_on, state.x_m, state.y_m
 
 
 def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:

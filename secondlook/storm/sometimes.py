@@ -206,6 +206,8 @@ LOGGED: Mapping[str, str] = MappingProxyType(
     {
         "a helper is given up: it does not answer": " offers in a row are not answered",
         "a helper is given up: it does not serve what it accepts": "it has not served ",
+        "a primary is given up: nothing is heard of it": " is given up: nothing heard of it since ",
+        "a primary is given up: it stands still": " is given up: it has not stirred since ",
         "a vehicle has nowhere to go to keep apart": " and has nowhere to go ",
         "a damaged message is dropped": ": malformed: ",
     }

@@ -69,6 +69,8 @@ class _Swarm:
         self._rng = rng
         self._vehicles = list(scenario.vehicles)
         self._nodes = [COORDINATOR, *self._vehicles]
+        self._revisiting = [name for name, one in scenario.survey_vehicles.items() if one.revisits]
+        self._surveyed_s = survey_s(scenario)
         self._core = core
         self._heals_s = heals_s
         self._free_s = dict.fromkeys(self._nodes, 0.0)  # from when on something else may happen to the node
@@ -93,7 +95,7 @@ class _Swarm:
         for kind in kinds:
             if self._rng.random() < 0.4:
                 trouble += kind()
-        return trouble + self._for_good()
+        return trouble + self._for_good() + self._second_surveys()
 
     def _late_joins(self) -> list[_Entry]:
         joined = [node for node in self._nodes if self._rng.random() < 0.3]
@@ -115,14 +117,18 @@ class _Swarm:
         for vehicle in self._vehicles:
             from_s = max(self._free_s[vehicle], 0.5 * self._heals_s)
             if self._rng.random() < 0.5 and from_s + 8 < self._heals_s and vehicle not in self._gone:
-                at_s = self._between(from_s, self._heals_s - 5)
-                ends_s = _s(at_s + self._rng.uniform(1, 3))
-                found.append({"what": "kill", "node": vehicle, "at_s": at_s})
-                found.append({"what": "join", "node": vehicle, "at_s": ends_s})
-                lost = {"keys": _keys_of(vehicle), "from_s": at_s, "for_s": _s(self._heals_s - at_s)}
-                found.append({"what": "drop", **lost})
-                self._free_s[vehicle] = ends_s
+                found += self._unheard_restart(vehicle, from_s)
         return found
+
+    def _unheard_restart(self, vehicle: str, from_s: float) -> list[_Entry]:
+        at_s = self._between(from_s, self._heals_s - 5)
+        self._free_s[vehicle] = _s(at_s + self._rng.uniform(1, 3))
+        lost = {"keys": _keys_of(vehicle), "from_s": at_s, "for_s": _s(self._heals_s - at_s)}
+        return [
+            {"what": "kill", "node": vehicle, "at_s": at_s},
+            {"what": "join", "node": vehicle, "at_s": self._free_s[vehicle]},
+            {"what": "drop", **lost},
+        ]
 
     def _freezes(self) -> list[_Entry]:
         found: list[_Entry] = []
@@ -244,6 +250,16 @@ class _Swarm:
                 case "lossy":
                     share = round(self._rng.uniform(0.3, 0.95), 2)
                     found.append({"what": "drop", "keys": _keys_of(node), "from_s": at_s, "probability": share})
+        return found
+
+    def _second_surveys(self) -> list[_Entry]:
+        """Primaries that take strips are started anew when they have surveyed all, and nobody hears that they begin
+        again."""
+        found: list[_Entry] = []
+        for vehicle in self._revisiting:
+            from_s = max(self._free_s[vehicle], self._surveyed_s)
+            if from_s + 8 < self._heals_s and vehicle not in self._gone and self._rng.random() < 0.7:
+                found += self._unheard_restart(vehicle, from_s)
         return found
 
     def _keys(self) -> str:

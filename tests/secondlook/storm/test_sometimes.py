@@ -95,8 +95,9 @@ def test_each_warning_of_a_node_is_in_the_table() -> None:
             for node in ast.walk(ast.parse(file.read_text())):
                 is_log = isinstance(node, ast.Call) and ast.unparse(node.func) in ("log.warning", "log.error")
                 if is_log and isinstance(node.args[0], ast.Constant):  # type: ignore[attr-defined]
-                    warned.append(re.sub(r"%[sd]", "{}", str(node.args[0].value)))  # type: ignore[attr-defined]
+                    warned.append(re.sub(r"%[sd]|%\.0f", "{}", str(node.args[0].value)))  # type: ignore[attr-defined]
     told_of = {
+        "{} is given up: {} since {} s": "a primary is given up: it stands still",
         "{} is offered nothing more: {}": "a helper is given up: it does not answer",
         "dropped a message from {}: {}: {} (said once)": "a damaged message is dropped",
     }
@@ -150,7 +151,7 @@ ROWS = {
     "its battery does not last": ("a helper refuses: its battery is too low",),
     "a word about a strip is repeated": ("a word about a strip comes after a newer one, or again",),
     "a message is damaged on its way": ("a message is malformed", "a damaged message is dropped"),
-    "a primary is silent, or says the same": ("a primary is not waited for any more",),
+    "a primary vanishes, or stands still": ("a primary is not waited for any more",),
     "a primary is cut off while it finishes": ("a task: tell_again", "a hotspot is said again"),
     "an agent's answer or a tile is lost": ("a helper's word that it is done is lost", "a tile is said again"),
     "a node is killed and goes on by its memory": ("a primary goes on by its memory",),
