@@ -18,7 +18,7 @@ from secondlook.errors import UserError
 from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.storm.campaign import Outcomes, fly_storms, storm_of, times_reached
+from secondlook.storm.campaign import Outcomes, agreement, fly_storms, storm_of, times_reached
 from secondlook.storm.canaries import CANARIES, Find, find_canaries
 from secondlook.storm.fly import Outcome, fly_storm
 from secondlook.testing.plan import TroublePlan, load_plan
@@ -124,7 +124,9 @@ def _fly_many(mission: Scenario | None, named: str | None, numbers: range, jobs:
         typer.echo(f"Never tried in these storms: {'; '.join(never[:MOST_NAMED])}{more}.")
     if failure:
         sys.stderr.write(f"{failure}\n")
-    if failed or failure:
+    truth = agreement(outcomes)
+    typer.echo(truth.told)
+    if failed or failure or not truth.holds:
         raise typer.Exit(FAILED)
 
 

@@ -13,9 +13,9 @@ from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.cli import app
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
-from secondlook.storm.campaign import storm_of, times_reached
+from secondlook.storm.campaign import agreement, storm_of, times_reached
 from secondlook.storm.canaries import CANARIES, Find, find_canary
-from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.fly import Outcome, Truth, fly_storm
 from secondlook.storm.sometimes import SOMETIMES
 from secondlook.storm.witness import Violation
 from secondlook.testing import Fleet
@@ -94,6 +94,28 @@ def test_a_flight_tells_what_it_has_reached() -> None:
     counts = times_reached({QUICK: outcome, QUICK + 1: replace(outcome, reached=frozenset())})
     assert counts.keys() == SOMETIMES.keys()
     assert counts["a strip is offered"] == 1
+
+
+@pytest.mark.parametrize(
+    ("missed", "is_exact", "holds"),
+    [(80, False, True), (92, False, True), (93, False, False), (68, True, True), (67, True, False), (67, False, True)],
+)
+def test_targets_missed_agree_with_those_to_be_expected(missed: int, is_exact: bool, holds: bool) -> None:
+    # Two flights: 80 are to be expected, with a variance of 16, so that 3 standard deviations are 12.
+    first = Truth(80, missed - 40, 40.0, 8.0, is_exact)
+    second = Truth(80, 40, 40.0, 8.0, is_exact)
+    outcomes = {number: Outcome((), "", 1.0, 0.1, truth=one) for number, one in enumerate((first, second))}
+    assert agreement(outcomes).holds is holds
+    assert f"Of 160 targets {missed} were missed, at most 92 were to be expected;" in agreement(outcomes).told
+
+
+def test_the_truth_of_a_flight_is_that_of_its_summary(tmp_path: Path) -> None:
+    plan = next(one for number in range(50) if (one := storm_of(None, number)).scenario.targets.count)
+    truth = fly_storm(plan, folder=tmp_path).truth
+    told = json.loads((tmp_path / "flight-1" / "summary.json").read_text())["truth"]
+    assert truth.targets == told["targets"] > 0
+    assert truth.missed / truth.targets == pytest.approx(told["missed_share"])
+    assert truth.predicted / truth.targets == pytest.approx(told["predicted_missed_share"])
 
 
 def test_a_plan_file_is_flown_as_the_storm_it_was_written_from(tmp_path: Path) -> None:
