@@ -342,6 +342,11 @@ class AgentWitness:
             self.noted.add(LATE_TASK)
             return
         self._task_order = order_of(header)
+        kinds = {type(one.message) for one in step.publish}
+        is_silent = CoverageTile not in kinds and self.node.coverage is not None and self.node.coverage.told()
+        if task.action is TaskAction.TELL_AGAIN and is_silent:
+            what = "it was asked to tell again what it has told, and has not"
+            self.tell(Violation("who is asked tells again", now_ms / 1000, self.node_id, what))
         if task.action is TaskAction.GIVE_BACK:
             said = [(one.message.strip, one.message.state) for one in step.publish if type(one.message) is TaskStatus]
             works_on = self.node.works_on if isinstance(self.node, RevisitAgent) else 0  # else it may be a track
