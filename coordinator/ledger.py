@@ -13,7 +13,7 @@ from planner.types import Strip
 
 NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
-_ALLOWED: dict[StripState, frozenset[StripState]] = {
+ALLOWED: dict[StripState, frozenset[StripState]] = {
     StripState.OPEN: frozenset({StripState.OFFERED, StripState.WITHDRAWN}),
     StripState.OFFERED: frozenset(
         {StripState.ACCEPTED, StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}
@@ -108,7 +108,7 @@ class Ledger:
 
     def _check(self, record: StripRecord, state: StripState, vehicle: str) -> None:
         what = f"strip {record.strip.number} cannot become {state.value}"
-        if state not in _ALLOWED[record.state]:
+        if state not in ALLOWED[record.state]:
             raise ValueError(f"{what}: it is {record.state.value}")
         if state in WITH_A_VEHICLE and not vehicle:
             raise ValueError(f"{what} with nobody")

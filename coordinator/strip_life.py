@@ -121,7 +121,7 @@ class StripLife:
         self._agenda.add(Item.ASSIGN if status.state is TaskState.REFUSED else Item.CUT, now_ms)
         match status.state:
             case TaskState.REFUSED:
-                vehicle.refused.add(status.strip)
+                vehicle.note_refusal(status.strip)
                 self._move(record, StripState.OPEN, now_ms, f"{name} refused: {status.reason}")
             case TaskState.GIVEN_BACK:
                 vehicle.refused.add(status.strip)

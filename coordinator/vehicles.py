@@ -186,6 +186,11 @@ class KnownVehicle:
         """Whether it may be offered a strip: it has not failed, nor been silent, too often in a row."""
         return self.failures < MOST_FAILURES and self.unanswered < MOST_UNANSWERED
 
+    def note_refusal(self, strip: int) -> None:
+        """Notes that it has refused a strip, also one that it was told to give back before to let another pass."""
+        self.refused.add(strip)
+        self.gave_way.discard(strip)
+
     def note_failure(self, place: Window | None = None) -> None:
         """Notes that it has not served what it accepted; where `place` is given it is not to be sent there again."""
         if place is not None:

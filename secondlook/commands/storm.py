@@ -6,6 +6,7 @@ import json
 import os
 import re
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +18,8 @@ from secondlook.errors import UserError
 from secondlook.files import write_whole
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.storm.campaign import Outcomes, fly_storms, storm_of
+from secondlook.storm.campaign import Outcomes, agreement, fly_storms, storm_of, times_reached
+from secondlook.storm.canaries import CANARIES, Find, find_canaries
 from secondlook.storm.fly import Outcome, fly_storm, latest_flight
 from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
@@ -25,6 +27,7 @@ from secondlook.testing.plan import TroublePlan, load_plan
 from secondlook.worker_pool import worker_pool
 
 MOST_STORMS = 1_000_000
+MOST_NAMED = 20  # of what was never tried
 _RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
 
 
@@ -32,7 +35,10 @@ def storm(
     scenario: Annotated[
         str | None, typer.Argument(help="A bundled scenario's name or a YAML file; left out, fleets are drawn, too.")
     ] = None,
-    seeds: Annotated[str, typer.Option(metavar="A..B", help="From which to which storm.")] = "1..100",
+    seeds: Annotated[
+        str | None,
+        typer.Option(metavar="A..B", help="From which to which storm; 1..100, with --canaries 1..500, if left out."),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, max=LARGEST_SEED, help="Fly this storm alone, with a recording.")
     ] = None,
@@ -48,6 +54,9 @@ def storm(
         int,
         typer.Option(min=0, metavar="N", help="Of many each Nth is flown twice, each 10 Nth over Zenoh, too; 0: none."),
     ] = 50,
+    canaries: Annotated[
+        bool, typer.Option("--canaries", help="Plant bugs, and fly storms with each until it is found.")
+    ] = False,
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
     ] = None,
@@ -62,6 +71,8 @@ def storm(
     if set_ and scenario is None:
         raise UserError("--set: not allowed without a scenario, as fleets are drawn then")
     mission = None if scenario is None else load_scenario(scenario, set_ or ())
+    if canaries and (plan is not None or seed is not None):
+        raise UserError("--canaries: not allowed beside --plan or --seed; must be flown with a range, --seeds A..B")
     if plan is not None:
         if scenario is not None or seed is not None:
             raise UserError("--plan: not allowed beside a scenario or --seed; the plan holds both")
@@ -70,8 +81,10 @@ def storm(
         _fly_one(storm_of(mission, seed), out or Path("runs") / f"storm-{seed}", bus, flights if shrink else 0)
     elif shrink:
         raise UserError("--shrink: not allowed without --seed or --plan; it shrinks a single storm")
+    elif canaries:
+        _look_for_canaries(mission, _range_of(seeds or "1..500"), jobs or os.cpu_count() or 1, out)
     else:
-        _fly_many(mission, scenario, _range_of(seeds), again, jobs or os.cpu_count() or 1, out)
+        _fly_many(mission, scenario, _range_of(seeds or "1..100"), again, jobs or os.cpu_count() or 1, out)
 
 
 def _range_of(seeds: str) -> range:
@@ -155,12 +168,49 @@ def _fly_many(
 
     failure = fly_watched("storm", "storms", len(numbers), fly, shown=sys.stderr.isatty())
     failed = sorted(number for number, outcome in outcomes.items() if outcome.violations)
+    reached = times_reached(outcomes)
     if out is not None:
         told = {number: [str(one) for one in outcomes[number].violations] for number in failed}
-        content = {"first": numbers[0], "last": numbers[-1], "flown": len(outcomes), "failed": told}
+        content = {"first": numbers[0], "last": numbers[-1], "flown": len(outcomes), "failed": told, "reached": reached}
         write_whole(out / "storm.json", json.dumps(content, indent=2) + "\n")
     typer.echo(f"{len(outcomes)} storms flown; in {len(failed)} of them something did not hold.")
+    never = [name for name, count in reached.items() if not count]
+    if never:
+        more = f"; and {len(never) - MOST_NAMED} more" if len(never) > MOST_NAMED else ""
+        typer.echo(f"Never tried in these storms: {'; '.join(never[:MOST_NAMED])}{more}.")
     if failure:
         sys.stderr.write(f"{failure}\n")
-    if failed or failure:
+    truth = agreement(outcomes)
+    typer.echo(truth.told)
+    if failed or failure or not truth.holds:
         raise typer.Exit(FAILED)
+
+
+def _look_for_canaries(mission: Scenario | None, numbers: range, jobs: int, out: Path | None) -> None:
+    if out is not None:
+        make_folder(out)
+    finds: dict[str, Find] = {}
+
+    def fly(tell: Tell) -> None:
+        find_canaries(mission, numbers, jobs, finds, lambda: tell(len(finds), ""))
+
+    failure = fly_watched("canaries", "planted bugs", len(CANARIES), fly, shown=sys.stderr.isatty())
+    width = max(map(len, CANARIES))
+    for name in CANARIES:
+        if name in finds:
+            typer.echo(f"{name:{width}}  {_found(finds[name])}")
+    if out is not None:
+        told = {name: asdict(find) for name, find in finds.items()}
+        write_whole(out / "canaries.json", json.dumps(told, indent=2) + "\n")
+    found = sum(find.number is not None for find in finds.values())
+    typer.echo(f"{found} of {len(CANARIES)} planted bugs found.")
+    if failure:
+        sys.stderr.write(f"{failure}\n")
+    if found < len(CANARIES) or failure:
+        raise typer.Exit(FAILED)
+
+
+def _found(find: Find) -> str:
+    if find.number is None:
+        return f"not found in {find.storms} storms"
+    return f"seed {find.number}, after {find.storms} storms: {find.invariant}"

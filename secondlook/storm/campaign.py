@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import logging
+import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import draw_fleet
-from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.fly import Outcome, Truth, fly_storm
+from secondlook.storm.sometimes import SOMETIMES
 from secondlook.storm.swarm import draw_storm
 from secondlook.storm.witness import Violation
 from secondlook.testing.plan import TroublePlan
@@ -26,6 +29,40 @@ def storm_of(scenario: Scenario | None, number: int) -> TroublePlan:
     if scenario is None:
         return draw_storm(draw_fleet(number), number)
     return draw_storm(scenario.model_copy(update={"seed": number}), number)
+
+
+def times_reached(outcomes: Outcomes) -> dict[str, int]:
+    """In how many of these storms each was reached of what is to be tried sometimes."""
+    counts = Counter(name for outcome in outcomes.values() for name in outcome.reached)
+    return {name: counts[name] for name in SOMETIMES}
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How the targets missed in many storms go with those that maps let expect: `told` says so, `holds` whether there
+    are no more of them than by chance, of calm flights also no fewer."""
+
+    told: str
+    holds: bool
+
+
+def agreement(outcomes: Outcomes) -> Agreement:
+    """Within 3 standard deviations. Where looks are lost on their way a target may have been detected, and the map does
+    not know: so fewer may be missed than predicted."""
+    every = [one.truth for one in outcomes.values()]
+    exact = [one for one in every if one.is_exact]
+    (missed, _, most), (calm_missed, calm_least, calm_most) = _sums(every), _sums(exact)
+    told = (
+        f"Of {sum(one.targets for one in every)} targets {missed} were missed, at most {most:.0f} were to be expected; "
+        f"in calm flights {calm_missed} of {sum(one.targets for one in exact)}, {calm_least:.0f} to {calm_most:.0f}."
+    )
+    return Agreement(told, missed <= most and calm_least <= calm_missed <= calm_most)
+
+
+def _sums(truths: Sequence[Truth]) -> tuple[int, float, float]:
+    """How many targets were missed, and how many at least and at most were to be expected to be."""
+    predicted, sigma = sum(one.predicted for one in truths), math.sqrt(sum(one.variance for one in truths))
+    return sum(one.missed for one in truths), predicted - 3 * sigma, predicted + 3 * sigma
 
 
 def fly_storms(
@@ -50,7 +87,7 @@ def fly_storms(
 
 
 def _fly(scenario: Scenario | None, number: int, again: int) -> Outcome:
-    logging.disable(logging.WARNING)  # of thousands of missions: which are worth a look their outcomes tell
+    quietly()
     plan = storm_of(scenario, number)
     return flown_again(plan, number, fly_storm(plan), again)
 
@@ -69,3 +106,8 @@ def flown_again(plan: TroublePlan, number: int, outcome: Outcome, again: int) ->
                 what = f"it is {other.digest} and was {outcome.digest}{f': {why}' if why else ''}"
                 found.append(Violation(f"the same digest {where}", other.end_s, "run", what))
     return replace(outcome, violations=(*outcome.violations, *found))
+
+
+def quietly() -> None:
+    """From now on this process tells nobody what nodes log: of thousands of missions what matters outcomes tell."""
+    logging.getLogger("secondlook").propagate = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -34,19 +35,14 @@ END_WITHIN_S = 30.0  # of the deadline
 def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Violation]:
     """All that does not hold of a flight, what the witness saw first."""
     found = list(witness.violations)
-    for check in (
-        _ends_in_time,
-        _core_has_finished,
-        _books_are_kept,
-        _books_agree_with_agents,
-        _map_is_what_came,
-        _layers_are_what_was_seen,
-        _core_is_all_on_the_map,
-        _full_disk_is_told,
-    ):
+    checks = [_ends_in_time, _books_are_kept, _books_agree_with_agents, _map_is_what_came, _layers_are_what_was_seen]
+    checks += [_full_disk_is_told]
+    if any(one.t_s > plan.heals_s for one in flight.said(MissionOver)):  # else it was over before the core was healed
+        checks += [_core_has_finished, _core_is_all_on_the_map]
+    for check in checks:
         found += check(flight, plan, witness)
     if not plan.trouble:
-        found += _calm(flight)
+        found += _calm(flight, witness)
     return found
 
 
@@ -57,13 +53,25 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
         yield Violation("the mission ends", flight.end_s, COORDINATOR, "it was never said that it is over")
         return
     mission = plan.scenario.mission
-    surveyed_s = plan.heals_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s
-    for name in _core_vehicles(plan):
-        if name in plan.scenario.survey_vehicles:
+    core, failed_s = _core_vehicles(plan), plan.heals_s
+    surveyed_s = 0.0
+    for name in plan.scenario.survey_vehicles:
+        if name in core:
             surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY))
+        else:  # who has failed may say to the end that it is at a track, after a survey that went slowly
+            states = flight.said(AgentState, f"agent/{name}/state")
+            for before, one in pairwise(states):
+                is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY)
+                if is_at_work and _where(one.message) != _where(before.message):
+                    failed_s = max(failed_s, one.t_s)
+    surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s)
     ends_s = mission.ends_s(surveyed_s) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
         yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")
+
+
+def _where(state: AgentState) -> tuple[Mode, int, float, float]:
+    return state.mode, state.works_on, state.x_m, state.y_m
 
 
 def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
@@ -99,8 +107,13 @@ def _books_agree_with_agents(flight: Flight, plan: TroublePlan, witness: Witness
     where: dict[int, str] = {}
     agreed_s: dict[str, float] = {}
     helpers = [name for name in _core_vehicles(plan) if name in plan.scenario.revisit_vehicles]
+    start = 0
     for one in flight.heard:
         message = one.message
+        if one.sender == COORDINATOR and one.header.incarnation > start:  # it has books of its own
+            start = one.header.incarnation
+            booked.clear()
+            where.clear()
         if isinstance(message, MissionOver):
             return
         if isinstance(message, StripStatus):
@@ -190,16 +203,21 @@ def _core_is_all_on_the_map(flight: Flight, plan: TroublePlan, witness: Witness)
                 break
 
 
-def _calm(flight: Flight) -> Iterator[Violation]:
+def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
     """What must hold beside that where nothing goes wrong."""
     yield from _asserted("no strip is served twice", assert_no_strip_served_twice, flight)
     yield from _asserted("no message is dropped", assert_no_message_dropped, flight)
-    surveying_until_s = {name: _last_s(flight, name, Mode.SURVEY) for name in flight.scenario.survey_vehicles}
+    gives_way_from_s = {
+        one.vehicle: _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0
+        for one in flight.run.vehicles
+        if one.role.revisits
+    }
     for one in flight.closest:
-        # A primary is never held up: of two that survey nobody gives way.
-        if one.closest_m < flight.scenario.mission.separation_m and any(
-            one.t_s > surveying_until_s.get(name, 0.0) for name in one.vehicles
-        ):
+        # Of two that survey nobody gives way, and who has nowhere to go cannot: that is logged.
+        first, second = one.vehicles
+        could = any(one.t_s > gives_way_from_s.get(name, np.inf) for name in one.vehicles)
+        told = [said for said in witness.logged if "nowhere to go" in said and {first, second} <= set(said.split())]
+        if one.closest_m < flight.scenario.mission.separation_m and could and not told:
             what = f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other"
             yield Violation("vehicles keep apart", one.t_s, one.vehicles[0], what)
 

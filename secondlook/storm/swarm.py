@@ -12,7 +12,7 @@ from random import Random
 from typing import Any
 
 from comms.lockstep.faults import STRUCK
-from comms.said.topics import Topic
+from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, Topic
 from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
@@ -33,7 +33,7 @@ def draw_storm(scenario: Scenario, number: int) -> TroublePlan:
     rng = Random(f"storm {number}")
     if rng.random() < CALM_SHARE:
         return _plan(scenario, number, (), 0.0, [])
-    heals_s = max(_SHORTEST_S, _s(rng.uniform(0.1, 1.2) * survey_s(scenario)))
+    heals_s = max(_SHORTEST_S, _s(rng.choice((rng.uniform(0.1, 1.2), rng.uniform(0.1, 2))) * survey_s(scenario)))
     heals_s = min(heals_s, latest_heals_s(scenario))
     core = (COORDINATOR, *_core_vehicles(rng, scenario))
     trouble = _Swarm(rng, scenario, core, heals_s).drawn() + _full_disk(scenario, number)
@@ -86,6 +86,8 @@ class _Swarm:
         self._rng = rng
         self._vehicles = list(scenario.vehicles)
         self._nodes = [COORDINATOR, *self._vehicles]
+        self._revisiting = [name for name, one in scenario.survey_vehicles.items() if one.revisits]
+        self._surveyed_s = survey_s(scenario)
         self._core = core
         self._heals_s = heals_s
         self._free_s = dict.fromkeys(self._nodes, 0.0)  # from when on something else may happen to the node
@@ -96,18 +98,21 @@ class _Swarm:
         kinds: tuple[Callable[[], list[_Entry]], ...] = (
             self._late_joins,
             self._restarts,
+            self._unheard_restarts,
             self._freezes,
             self._deaths,
             self._swizzle,
             self._cut_offs,
             self._partitions,
+            self._slow_links,
+            self._bodies,
             *(lambda what=what: self._strikes(what) for what in ("drop", "repeat", "delay", "reorder", "corrupt")),
         )
         trouble: list[_Entry] = []
         for kind in kinds:
             if self._rng.random() < 0.4:
                 trouble += kind()
-        return trouble + self._for_good()
+        return trouble + self._for_good() + self._second_surveys()
 
     def _late_joins(self) -> list[_Entry]:
         joined = [node for node in self._nodes if self._rng.random() < 0.3]
@@ -119,8 +124,28 @@ class _Swarm:
             node = self._rng.choice(self._nodes)
             if self._free_s[node] + 2 < self._heals_s and node not in self._gone:
                 found.append({"what": "kill", "node": node, "at_s": self._later(node)})
-                found.append({"what": "join", "node": node, "at_s": self._later(node)})
+                memory = {"memory": True} if self._rng.random() < 0.4 else {}
+                found.append({"what": "join", "node": node, "at_s": self._later(node), **memory})
         return found
+
+    def _unheard_restarts(self) -> list[_Entry]:
+        """Late a vehicle is started anew, and at first nobody hears it: it counts as what it was."""
+        found: list[_Entry] = []
+        for vehicle in self._vehicles:
+            from_s = max(self._free_s[vehicle], 0.5 * self._heals_s)
+            if self._rng.random() < 0.5 and from_s + 8 < self._heals_s and vehicle not in self._gone:
+                found += self._unheard_restart(vehicle, from_s)
+        return found
+
+    def _unheard_restart(self, vehicle: str, from_s: float) -> list[_Entry]:
+        at_s = self._between(from_s, self._heals_s - 5)
+        self._free_s[vehicle] = _s(at_s + self._rng.uniform(1, 3))
+        lost = {"keys": _keys_of(vehicle), "from_s": at_s, "for_s": _s(self._heals_s - at_s)}
+        return [
+            {"what": "kill", "node": vehicle, "at_s": at_s},
+            {"what": "join", "node": vehicle, "at_s": self._free_s[vehicle]},
+            {"what": "drop", **lost},
+        ]
 
     def _freezes(self) -> list[_Entry]:
         found: list[_Entry] = []
@@ -175,6 +200,36 @@ class _Swarm:
             for one, other in pairs
         ]
 
+    def _slow_links(self) -> list[_Entry]:
+        """All that some vehicles say, or are told, takes longer than answers are waited for."""
+        found: list[_Entry] = []
+        for vehicle in self._vehicles:
+            if self._rng.random() < 0.5:
+                from_s, for_s = self._span()
+                keys = self._rng.choice(
+                    (_keys_of(vehicle), f"agent/{vehicle}/task_status/*", f"coord/task/{vehicle}/*")
+                )
+                found.append(
+                    {
+                        "what": "delay",
+                        "keys": keys,
+                        "from_s": from_s,
+                        "for_s": for_s,
+                        "by_s": _s(self._rng.uniform(8, 29)),
+                    }
+                )
+        return found
+
+    def _bodies(self) -> list[_Entry]:
+        """What agents and their vehicles say to each other is lost: looks, the ends of manoeuvres, commands."""
+        found: list[_Entry] = []
+        for vehicle in self._vehicles:
+            if self._rng.random() < 0.5:
+                from_s, for_s = (0.0, self._heals_s) if self._rng.random() < 0.5 else self._span()
+                topic = self._rng.choice((LOOK, MANEUVER_STATUS, MANEUVER))
+                found.append({"what": "drop", "keys": topic.expression(vehicle), "from_s": from_s, "for_s": for_s})
+        return found
+
     def _strikes(self, what: str) -> list[_Entry]:
         found: list[_Entry] = []
         for _ in range(self._rng.randint(1, 3)):
@@ -196,7 +251,7 @@ class _Swarm:
         for node in self._vehicles:
             if node in self._core or node in self._gone:
                 continue
-            match self._rng.choice(("killed", "frozen", "cut off", "deaf", "dumb", "lossy")):
+            match self._rng.choice(("killed", "frozen", "cut off", "deaf", "dumb", "lossy", "blind")):
                 case "killed":
                     found.append({"what": "kill", "node": node, "at_s": at_s})
                 case "frozen":
@@ -207,9 +262,21 @@ class _Swarm:
                     found.append({"what": "drop", "keys": "**", "to": node, "from_s": at_s})
                 case "dumb":
                     found.append({"what": "drop", "keys": _keys_of(node), "from_s": at_s})
+                case "blind":
+                    found.append({"what": "drop", "keys": LOOK.expression(node), "from_s": at_s})
                 case "lossy":
                     share = round(self._rng.uniform(0.3, 0.95), 2)
                     found.append({"what": "drop", "keys": _keys_of(node), "from_s": at_s, "probability": share})
+        return found
+
+    def _second_surveys(self) -> list[_Entry]:
+        """Primaries that take strips are started anew when they have surveyed all, and nobody hears that they begin
+        again."""
+        found: list[_Entry] = []
+        for vehicle in self._revisiting:
+            from_s = max(self._free_s[vehicle], self._surveyed_s)
+            if from_s + 8 < self._heals_s and vehicle not in self._gone and self._rng.random() < 0.7:
+                found += self._unheard_restart(vehicle, from_s)
         return found
 
     def _keys(self) -> str:

@@ -30,12 +30,21 @@ class _Planned(Mapping):
         getattr(trouble, self.what)(**arguments)
 
 
-class KillOrJoin(_Planned):
-    """`kill`: the node is gone from then on. `join`: it comes back, or comes only then."""
+class Kill(_Planned):
+    """The node is gone from then on."""
 
-    what: Literal["kill", "join"]
+    what: Literal["kill"]
     node: str
     at_s: TimeOrZero
+
+
+class Join(_Planned):
+    """The node comes back, started anew or with its memory, or comes only then."""
+
+    what: Literal["join"]
+    node: str
+    at_s: TimeOrZero
+    memory: bool = False
 
 
 class DiskFull(_Planned):
@@ -99,7 +108,7 @@ class Reorder(_Struck):
 
 
 AnyTrouble = Annotated[
-    KillOrJoin | DiskFull | Freeze | CutOff | DropOrCorrupt | Repeat | Delay | Reorder, Field(discriminator="what")
+    Kill | Join | DiskFull | Freeze | CutOff | DropOrCorrupt | Repeat | Delay | Reorder, Field(discriminator="what")
 ]
 KINDS = ("kill", "join", "disk_full", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder")
 

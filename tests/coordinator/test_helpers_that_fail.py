@@ -203,6 +203,19 @@ class TestACoordinatorStartedAnew:
         assert told.tasks()[-1] == (HELPER, TAKE, 900_001)
 
 
+def test_what_was_given_back_to_let_another_pass_and_is_then_refused_is_not_offered_again_and_again() -> None:
+    told = with_a_helper()
+    assert isinstance(told.node.node, Coordinator)
+    told.node.node.fleet.vehicles[HELPER].gave_way.add(1)  # as it is told to give way
+    told.status(HELPER, 1, TaskState.GIVEN_BACK)
+    told.state(HELPER, Mode.IDLE)
+    told.settle()
+    assert told.tasks() == [(HELPER, TAKE, 1), (HELPER, TAKE, 1)]
+    told.status(HELPER, 1, TaskState.REFUSED, "the battery does not last")
+    told.settle()
+    assert (told.tasks()[2:], told.states()) == ([], {1: OPEN})
+
+
 def test_a_primary_started_anew_is_believed_although_its_plans_count_from_1() -> None:
     told = coordinator()
     plans = [Plan(5, (), (), (), "before"), Plan(1, (), (), (), "anew"), Plan(4, (), (), (), "late")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import resource
 from dataclasses import replace
 from pathlib import Path
@@ -11,13 +12,15 @@ from typer.testing import CliRunner
 
 import secondlook
 from coordinator.fleet import GIVEN_UP_AFTER
-from planner.fleet_map import VehicleLayer
 from secondlook.cli import app
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 from secondlook.storm import campaign
-from secondlook.storm.campaign import flown_again, storm_of
-from secondlook.storm.fly import Outcome, fly_storm
+from secondlook.storm.campaign import agreement, flown_again, storm_of, times_reached
+from secondlook.storm.canaries import CANARIES, Find, find_canary
+from secondlook.storm.fly import Outcome, Truth, fly_storm
+from secondlook.storm.sometimes import SOMETIMES
+from secondlook.storm.witness import Violation
 from secondlook.testing import Fleet
 from secondlook.testing.plan import DiskFull, TroublePlan, load_plan
 
@@ -108,13 +111,61 @@ def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch)
     assert [one.invariant for one in fly_storm(full_disk(80.0)).violations] == ["a full disk is told"]
 
 
-def test_a_map_that_forgets_what_was_told_before_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    def forget(layer: VehicleLayer, place: object, window: object, incarnation: int, told: object) -> object:
-        return told
+@pytest.mark.parametrize(
+    ("name", "invariant"),
+    [
+        ("the map forgets what a vehicle told before it was started anew", "risk never rises"),
+        ("a strip is offered to two", "an offer is in the books"),
+        ("a helper stays at a strip that it gives back", "who is told to give back does"),
+    ],
+)
+def test_a_planted_bug_is_found(name: str, invariant: str) -> None:
+    find = find_canary(name, None, range(1, 20))
+    assert (find.invariant, find.storms) == (invariant, find.number)
 
-    monkeypatch.setattr(VehicleLayer, "_with_other_starts", forget)
-    found = (violation for number in range(40) for violation in fly_storm(storm_of(None, number)).violations)
-    assert any(violation.invariant == "the map is what came" for violation in found)
+
+def test_what_holds_not_either_without_the_bug_does_not_find_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = Outcome((Violation("the mission ends", 1.0, "run", "it does not"),), None, 1.0, 0.1)
+    monkeypatch.setattr("secondlook.storm.canaries.fly_storm", lambda plan: wrong)
+    assert find_canary("the deadline is passed over", None, range(3, 5)) == Find(2)
+
+
+def test_a_planted_bug_is_gone_afterwards() -> None:
+    before = {name: vars(one.owner)[one.method] for name, one in CANARIES.items()}
+    for name, canary in CANARIES.items():
+        with canary.planted():
+            assert vars(canary.owner)[canary.method] is not before[name]
+        assert vars(canary.owner)[canary.method] is before[name]
+
+
+def test_a_flight_tells_what_it_has_reached() -> None:
+    outcome = fly_storm(storm_of(None, QUICK))
+    assert "a strip is offered" in outcome.reached
+    counts = times_reached({QUICK: outcome, QUICK + 1: replace(outcome, reached=frozenset())})
+    assert counts.keys() == SOMETIMES.keys()
+    assert counts["a strip is offered"] == 1
+
+
+@pytest.mark.parametrize(
+    ("missed", "is_exact", "holds"),
+    [(80, False, True), (92, False, True), (93, False, False), (68, True, True), (67, True, False), (67, False, True)],
+)
+def test_targets_missed_agree_with_those_to_be_expected(missed: int, is_exact: bool, holds: bool) -> None:
+    # Two flights: 80 are to be expected, with a variance of 16, so that 3 standard deviations are 12.
+    first = Truth(80, missed - 40, 40.0, 8.0, is_exact)
+    second = Truth(80, 40, 40.0, 8.0, is_exact)
+    outcomes = {number: Outcome((), "", 1.0, 0.1, truth=one) for number, one in enumerate((first, second))}
+    assert agreement(outcomes).holds is holds
+    assert f"Of 160 targets {missed} were missed, at most 92 were to be expected;" in agreement(outcomes).told
+
+
+def test_the_truth_of_a_flight_is_that_of_its_summary(tmp_path: Path) -> None:
+    plan = next(one for number in range(50) if (one := storm_of(None, number)).scenario.targets.count)
+    truth = fly_storm(plan, folder=tmp_path).truth
+    told = json.loads((tmp_path / "flight-1" / "summary.json").read_text())["truth"]
+    assert truth.targets == told["targets"] > 0
+    assert truth.missed / truth.targets == pytest.approx(told["missed_share"])
+    assert truth.predicted / truth.targets == pytest.approx(told["predicted_missed_share"])
 
 
 def test_a_plan_file_is_flown_as_the_storm_it_was_written_from(tmp_path: Path) -> None:
@@ -152,7 +203,10 @@ def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
     )
     assert many.exit_code == 0, many.output
     assert "1 storms flown; in 0 of them something did not hold." in many.output
-    assert (tmp_path / "m" / "storm.json").is_file()
+    assert "Never tried in these storms: " in many.output
+    told = json.loads((tmp_path / "m" / "storm.json").read_text())
+    assert told["flown"] == 1
+    assert told["reached"].keys() == SOMETIMES.keys()
     one = CliRunner().invoke(app, ["storm", "--seed", str(QUICK), "--out", str(tmp_path / "o")])
     assert one.exit_code == 0, one.output
     assert load_plan(tmp_path / "o" / "plan.yaml") == storm_of(None, QUICK)
@@ -163,6 +217,10 @@ def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
     ("arguments", "sentence"),
     [
         (["--seeds", "5..3"], "--seeds: 5..3 is not allowed; must be A..B, at most 1000000 whole numbers"),
+        (
+            ["--canaries", "--seed", "3"],
+            "--canaries: not allowed beside --plan or --seed; must be flown with a range, --seeds A..B",
+        ),
         (["--set", "seed=3"], "--set: not allowed without a scenario, as fleets are drawn then"),
     ],
 )
