@@ -1,13 +1,14 @@
-"""The processes of a fleet as threads of one process that take turns, over sessions like Zenoh's without a network.
+"""The processes of a fleet as threads of one process that take turns, over sessions like Zenoh's, without a network.
 
-One thread runs at a time, in an order that is always the same, and the time that they see stands still until all of them
-wait: so a whole fleet, its processes' own loops included, does the same again from one seed. What is in place of Zenoh
-carries all at once and loses nothing.
+One thread runs at a time, in an order that is always the same, and the time that they see stands still until all of
+them wait: so a whole fleet, its processes' own loops included, does the same again from one seed. What is in place of
+Zenoh carries all at once and loses nothing.
 """
 
 from __future__ import annotations
 
 import contextlib
+import math
 import queue
 import sys
 import threading
@@ -33,6 +34,10 @@ LOOPS = (comms.lockstep.host, comms.lockstep.hub, comms.wall.host, comms.wall.hu
 HANGS_AFTER_S = 60.0
 LEAST_STEP_S = 1e-4  # so that who waits for a moment that is all but there does not wait for ever
 MOST_MATCHES = 20_000  # keys of which is remembered who hears them
+
+
+class TurnsClosed(BaseException):
+    """Raised where a process waits when the turns are closed."""
 
 
 class HangsError(Exception):
@@ -70,7 +75,7 @@ class TurnQueue:
     def put(self, item: Any) -> None:
         self.items.append(item)
 
-    def get(self, timeout: float) -> Any:
+    def get(self, timeout: float = math.inf) -> Any:
         self._turns.wait(self, timeout)
         if not self.items:
             raise queue.Empty
@@ -89,6 +94,7 @@ class Turns:
         self._running: Process | None = None
         self._back = threading.Semaphore(0)
         self._began_s = 0.0
+        self._closed = False
         self._timers: list[tuple[float, Callable[[], None]]] = []
 
     @contextlib.contextmanager
@@ -116,10 +122,21 @@ class Turns:
         """Whether one of them has not ended."""
         return not all(one.ended for one in self.processes)
 
-    def settle(self) -> None:
-        """Lets them act until all wait. Raises HangsError."""
-        while ready := [one for one in self.processes if one.is_ready]:
-            for one in ready:
+    def take_turn(self) -> bool:
+        """Lets the next one act for which there is something to do; False where all wait. Raises HangsError."""
+        for _ in self.processes:
+            one = self.processes[0]
+            self.processes.append(self.processes.pop(0))
+            if one.is_ready:
+                self._let(one)
+                return True
+        return False
+
+    def close(self) -> None:
+        """Ends those that have not ended, wherever they wait."""
+        self._closed = True
+        for one in self.processes:
+            if not one.ended:
                 self._let(one)
 
     def next_s(self) -> float:
@@ -128,7 +145,7 @@ class Turns:
         return min(times, default=self.now_s)
 
     def pass_time(self) -> None:
-        """Goes on to when somebody waits no longer, and lets whoever that is act."""
+        """Goes on to when somebody waits no longer, and lets whoever that is act. Raises HangsError."""
         self.now_s = max(self.now_s + LEAST_STEP_S, self.next_s())
         due = [one for one in self._timers if one[0] <= self.now_s]
         self._timers = [one for one in self._timers if one[0] > self.now_s]
@@ -137,7 +154,6 @@ class Turns:
         for one in self.processes:
             if not one.ended and one.until_s <= self.now_s:
                 self._let(one)
-        self.settle()
 
     def later(self, after_s: float, act: Callable[[], None]) -> None:
         """Does something when so much time has passed."""
@@ -146,20 +162,26 @@ class Turns:
     def wait(self, for_queue: TurnQueue, timeout_s: float) -> None:
         """Called by a process: returns when it has its turn again."""
         process = self._running
-        if process is None or for_queue.items:  # nobody's turn: before the start, or when all is over
+        if process is None or (for_queue.items and not self._closed):  # it is nobody's turn before the start
             return
+        if self._closed and process.error is None:
+            process.error = TurnsClosed()
+            raise process.error
         process.waits_for, process.until_s = for_queue, self.now_s + max(0.0, timeout_s)
         self._note_step(process)
         self._back.release()
         process.turn.acquire()
         self._began_s = time.thread_time()
+        if self._closed:
+            process.error = TurnsClosed()
+            raise process.error
 
     def _live(self, process: Process, work: Callable[[], Any]) -> None:
         process.turn.acquire()
         self._began_s = time.thread_time()
         try:
             work()
-        except BaseException as error:  # noqa: BLE001 - it is told to whoever looks after the processes
+        except BaseException as error:
             process.error = error
         process.ended = True
         self._note_step(process)
@@ -180,10 +202,10 @@ class Turns:
 
 class Water:
     """What carries messages between sessions: whoever has subscribed is told at once. `tap`: told key and payload of
-    all that is put into it."""
+    all that a session puts into it."""
 
-    def __init__(self, turns: Turns) -> None:
-        self.tap: Callable[[str, bytes], None] = lambda key, payload: None
+    def __init__(self, turns: Turns, tap: Callable[[str, bytes], None]) -> None:
+        self.tap = tap
         self.turns = turns
         self._hear: list[tuple[zenoh.KeyExpr, Callable[[Any], None]]] = []
         self._answer: list[tuple[zenoh.KeyExpr, Callable[[Any], None]]] = []
@@ -195,10 +217,8 @@ class Water:
         """One more session."""
         return _Session(self)
 
-    def put(self, key: str, payload: bytes, *, tapped: bool = True) -> None:
+    def put(self, key: str, payload: bytes) -> None:
         """Carries a message."""
-        if tapped:
-            self.tap(key, payload)
         if key not in self._heard_by:
             if len(self._heard_by) > MOST_MATCHES:
                 self._heard_by.clear()
@@ -213,7 +233,9 @@ class Water:
     def offer_answers(self, expression: str, answer: Callable[[Any], None]) -> None:
         self._answer.append((zenoh.KeyExpr(expression), answer))
 
-    def ask(self, expression: str, on_reply: Callable[[Any], None], on_end: Callable[[], None], within_s: float) -> None:
+    def ask(
+        self, expression: str, on_reply: Callable[[Any], None], on_end: Callable[[], None], within_s: float
+    ) -> None:
         wanted = zenoh.KeyExpr(expression)
         asked = [answer for kept, answer in self._answer if kept.intersects(wanted)]
         question = _Question(wanted, on_reply, on_end, len(asked))
@@ -274,6 +296,7 @@ class _Session:
         self._water = water
 
     def put(self, key: str, payload: bytes, **_: Any) -> None:
+        self._water.tap(key, payload)
         self._water.put(key, payload)
 
     def get(self, expression: str, handler: Any, *, timeout: float, **_: Any) -> None:

@@ -1,0 +1,364 @@
+"""Whole nodes under fuzz: does anything that can be said stop one of them?
+
+python -m bench.fuzz_nodes [--messages N] [--seed S] [--first FLIGHT] [--flights N] [--each N] [--scenario FILE]
+
+Flies a mission again and again, all processes of a spread fleet in this one (`bench.turns`), by the wall clock or in
+lockstep; from some moment of it on, beside all that the fleet says, `--each` messages and words go out that no honest
+process would say (`bench.fuzzed`), through the real processes' loops: gate, checksum, decoding, checks, node. Then the
+mission goes on for a while. What must not happen: a process ends, or a step of one takes more than 2 s of processor
+time; the coordinator's books or map are no more valid; the figures of the run cannot be
+summed up; the memory of this process grows from flight to flight. One flight is repeated with `--seed`, `--first` and
+`--flights 1`. The exit code is 1 where something was found.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import logging
+import random
+import statistics
+import sys
+import tempfile
+import traceback
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+import comms.wall.host
+from bench.fuzzed import Fuzzer
+from bench.memory import rss_mb
+from bench.turns import HangsError, Process, Turns, TurnsClosed, Water
+from comms.drive import Setup
+from comms.errors import FleetError, NodeError, RefusedError, RunawayError
+from comms.keys import RunKeys
+from comms.lockstep.drive import Lockstep
+from comms.node import Node
+from comms.runner import Intake
+from comms.said.announcement import ClockMode, Role
+from comms.said.codec import header_of
+from comms.said.routing import Routing
+from comms.wall.host import WallHost
+from comms.wall.hub import WallHub
+from comms.wall.seats import ListenerSeat, NodeSeat, Seat
+from coordinator.coordinator import Coordinator
+from coordinator.ledger import WITH_A_VEHICLE
+from secondlook.fleet.build import build_fleet
+from secondlook.fleet.nodes import OBSERVER, RECORDER, hosts_of_run, hosts_when_spread, make_node, make_nodes, node_spec
+from secondlook.launch.mission import recorder_config
+from secondlook.recorded.observer import Observer
+from secondlook.recorded.summary import summarise
+from secondlook.report import write_report
+from secondlook.scenario import Scenario, load_scenario
+
+BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
+LONGEST_STEP_S = 2.0
+LATEST_S = 115.0  # of the mission: so late the fuzz begins at the latest
+AT_ONCE = 12  # messages, at most
+FACTORS = (1.0, 20.0)  # of the wall clock
+REPORTED = 0.1  # of the flights, whose report is written too
+MOST_MB_A_FLIGHT = 0.2  # that may be left of each, in the second half of many flights
+
+Said = tuple[str, bytes]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What went wrong in a flight. `after`: the last message that went out before."""
+
+    flight: int
+    what: str
+    after: Said
+
+    def __str__(self) -> str:
+        return f"flight {self.flight}: {self.what}\n  after {self.after[0]} {self.after[1][:400].hex()}"
+
+
+class Flight:
+    """One flight, with what is drawn for it from its number: which clock drives it, when the fuzz begins, what there
+    is of it. `corpus`: what a fleet has said that was left alone."""
+
+    def __init__(self, scenario: Scenario, number: int, seed: int, folder: Path, corpus: Sequence[Said]) -> None:
+        rng = random.Random(f"{seed} {number}")
+        self.is_lockstep = rng.random() < 0.3
+        self.begin_ms = round(1000 * rng.choice((0.0, rng.uniform(0.0, LATEST_S), rng.uniform(0.0, LATEST_S))))
+        self.number = number
+        self.found: list[Found] = []
+        self.said: list[Said] = []
+        self.turns = Turns()
+        self._strange, self._clocks, self._factor = rng.random() < 0.3, rng.random() < 0.1, rng.choice(FACTORS)
+        self._goes_on_s = rng.choice((0.0, 20.0, 20.0, 1000.0))
+        self._reports = rng.random() < REPORTED
+        self._rng = rng
+        self._scenario, self._folder = scenario, folder
+        self._observer = Observer(folder, with_messages=True)
+        self._keys = RunKeys("fuzz")
+        self._fleet = build_fleet(
+            scenario, record=True, mode=ClockMode.LOCKSTEP if self.is_lockstep else ClockMode.WALL
+        )
+        self._routing = Routing(self._fleet.roster)
+        self.intake = Intake(self._routing)  # opens what goes out, to tell how much of it comes through
+        self._fuzzer = Fuzzer(rng, self._routing, strange_headers=self._strange, words=self._may_change)
+        for key, payload in corpus:
+            self._fuzzer.note(key, payload)
+        self._water = Water(self.turns, self._tap)
+        self._coordinators: list[Coordinator] = []
+        self._ended: set[str] = set()
+        self._last: Said = ("nothing", b"")
+        self._now_ms = 0
+
+    def fly(self, messages: int) -> int:
+        """Flies, and lets so many messages go out, fewer where the mission is over before; returns how many."""
+        gone_out, ends_ms = 0, 0.0
+        named = SimpleNamespace(token_hex=lambda count: f"{self._rng.getrandbits(8 * count):x}")
+        with self.turns.as_their_clock(), mock.patch.object(comms.wall.host, "secrets", named):
+            (self._seat_lockstep if self.is_lockstep else self._seat_wall)()
+            try:
+                while self.turns.alive and not self.found:
+                    if not self.turns.take_turn():
+                        self.turns.pass_time()
+                    self._look()
+                    if gone_out >= messages:
+                        if self._now_ms >= ends_ms:
+                            break
+                    elif self._now_ms >= self.begin_ms and self._rng.random() < 0.5:
+                        count = min(messages - gone_out, self._rng.randint(1, AT_ONCE))
+                        self._fuzz(count)
+                        gone_out += count
+                        ends_ms = self._now_ms + 1000 * self._goes_on_s
+                self.turns.close()
+                self._look()
+            except HangsError as error:
+                self._note(str(error))
+        return gone_out
+
+    def sum_up(self) -> None:
+        """Does what is done with the files of a mission that has ended."""
+        try:
+            summary = summarise(
+                self._scenario, self._observer, None, bus="zenoh", processes=1, wall_s=1.0, ending="interrupted"
+            )
+            (self._folder / "summary.json").write_text(json.dumps(summary, allow_nan=False), encoding="utf-8")
+            if self._reports:
+                (self._folder / "scenario.yaml").write_text(self._scenario.to_yaml(), encoding="utf-8")
+                write_report(self._folder)
+        except Exception as error:
+            self._note(f"the files: {_in_full(error)}")
+
+    def _seat_wall(self) -> None:
+        """As `secondlook node` does, on each of its hosts."""
+        fleet, keys, routing = self._fleet, self._keys, self._routing
+        hosts, limit_ms = hosts_when_spread(fleet.roster), fleet.time_limit_ms
+        hub = WallHub(
+            self._water.session(), keys, routing, hosts, NodeSeat({}, routing), fleet.run_info, limit_ms, self._factor,
+            strict=False,
+        )  # fmt: skip
+        self.turns.begin("router", hub.run)
+        for spec in hosts:
+            if spec.host == RECORDER:
+                seat: Seat = ListenerSeat({OBSERVER: self._observer, RECORDER: self._recorder()}, routing)
+            else:
+                seat = NodeSeat(self._nodes(spec.nodes), routing)
+            sha256 = fleet.run_info.scenario_sha256
+            host = WallHost(self._water.session(), keys, spec.host, seat, routing, sha256, limit_ms)
+            self.turns.begin(spec.host, host.run)
+
+    def _seat_lockstep(self) -> None:
+        """As `secondlook run` does, in each of its processes."""
+        fleet, drive = self._fleet, Lockstep()
+        setup = Setup(self._keys.run, fleet.roster, fleet.run_info, fleet.time_limit_ms)
+        in_hub, hosts = hosts_of_run(fleet.roster, None)
+        hub = drive.hub(
+            self._water.session(), setup, hosts, self._nodes(in_hub), carry_out=lambda change, host: None,
+            alive=lambda now_ms: None,
+        )  # fmt: skip
+        self.turns.begin("hub", hub)
+        for spec in hosts:
+            session = self._water.session()
+            if spec.host in (OBSERVER, RECORDER):
+                listener = self._observer if spec.host == OBSERVER else self._recorder()
+                self.turns.begin(spec.host, drive.listening(session, setup, spec.host, spec.host, listener).run)
+            else:
+                self.turns.begin(spec.host, drive.acting(session, setup, spec, self._nodes(spec.nodes)).run)
+
+    def _nodes(self, names: Iterable[str]) -> dict[str, Node]:
+        nodes = make_nodes({name: self._fleet.specs[name] for name in names})
+        self._coordinators += [node for node in nodes.values() if isinstance(node, Coordinator)]
+        return nodes
+
+    def _recorder(self) -> Any:
+        config = recorder_config(self._scenario, self._folder / "mission.rrd")
+        return make_node(RECORDER, node_spec(Role.RECORDER, config))
+
+    def _may_change(self, key: str) -> bool:
+        """Whether words under a key are fuzzed. In lockstep what makes no sense to the hub ends the run, as it is to;
+        the clock's own words come from the hub alone, and may end whoever hears them."""
+        return not self.is_lockstep and (self._clocks or key.startswith(("clock/beat/", "clock/from/")))
+
+    def _tap(self, key: str, payload: bytes) -> None:
+        below = key.removeprefix(self._keys.root)
+        if not below.startswith("parcel/"):
+            self.said.append((below, payload))
+            self._fuzzer.note(below, payload)
+            if not below.startswith("clock/"):
+                self._now_ms = max(self._now_ms, header_of(payload).sent_ms)
+
+    def _fuzz(self, count: int) -> None:
+        for _ in range(count):
+            key, payload = self._last = self._fuzzer.draw(self._now_ms)
+            if not key.startswith("clock/") and self.intake.open(key, payload) is not None:
+                self.intake.dropped["none"] += 1
+            self._water.put(self._keys.topic(key), payload)
+
+    def _look(self) -> None:
+        """Looks for what must not be."""
+        for one in self.turns.processes:
+            if one.last_step_s > LONGEST_STEP_S:
+                self._note(f"{one.name}: a step took {one.last_step_s:.1f} s")
+            if one.ended and one.name not in self._ended:
+                self._ended.add(one.name)
+                if not self._may_end(one):
+                    self._note(f"{one.name}: {_in_full(one.error)}")
+        if self._witness.violations:
+            self._note(str(self._witness.violations[0]))
+        for coordinator in self._coordinators:
+            if coordinator.has_begun and not bool(
+                ((risk := coordinator.fleet.map.risk) >= 0).all() and (risk <= 1).all()
+            ):
+                self._note("the coordinator's map holds what is no probability")
+
+    def _may_end(self, process: Process) -> bool:
+        """Whether a process has ended as it is said to, or by a sentence for what the docs say ends a run."""
+        match process.error:
+            case None | TurnsClosed() | RunawayError() | RefusedError():
+                return True
+            case NodeError() as error:
+                return " floods " in str(error)
+            case FleetError():
+                return self.is_lockstep  # it tells what was found of another
+        return False
+
+    def _note_all(self, found: Iterable[str]) -> None:
+        for what in found:
+            self._note(what)
+
+    def _note(self, what: str) -> None:
+        self.found.append(Found(self.number, what, self._last))
+
+
+def _what_is_wrong(coordinator: Coordinator) -> Iterator[str]:
+    """What does not hold of its books and its map."""
+    with_whom = Counter(record.vehicle for record in coordinator.ledger.in_state(*WITH_A_VEHICLE))
+    for name, count in with_whom.items():
+        if count > 1 or name not in coordinator.fleet.vehicles:
+            yield f"{count} strips are with {name or 'nobody'}"
+    risk = coordinator.fleet.map.risk
+    if not ((risk >= 0.0).all() and (risk <= 1.0).all()):  # NaN is neither
+        yield "the coordinator's map holds what is no probability"
+
+
+def _in_full(error: BaseException | None) -> str:
+    return "ended" if error is None else "".join(traceback.format_exception(error))
+
+
+@dataclass
+class Tally:
+    """Of all flights. `opened`: what became of messages where they were opened."""
+
+    messages: int = 0
+    flights: int = 0
+    opened: Counter[str] = field(default_factory=Counter)
+    step_s: dict[str, float] = field(default_factory=dict)
+    found: list[Found] = field(default_factory=list)
+    rss_mb: list[float] = field(default_factory=list)
+
+    def add(self, flight: Flight, messages: int) -> None:
+        self.messages += messages
+        self.flights += 1
+        self.opened.update(flight.intake.dropped)
+        for one in flight.turns.processes:
+            self.step_s[one.name] = max(self.step_s.get(one.name, 0.0), one.step_s)
+        self.found += flight.found
+
+    @property
+    def mb_a_flight(self) -> float:
+        """How much more memory each flight of the second half has left than the one before, by the medians of the
+        third quarter and the last."""
+        quarter = len(self.rss_mb) // 4
+        if quarter < 5:
+            return 0.0
+        third, last = self.rss_mb[-2 * quarter : -quarter], self.rss_mb[-quarter:]
+        return (statistics.median(last) - statistics.median(third)) / quarter
+
+
+def corpus_of(scenario: Scenario) -> list[Said]:
+    """What a fleet says that is left alone, by the wall clock."""
+    for number in range(1000):
+        with tempfile.TemporaryDirectory() as folder:
+            flight = Flight(scenario, number, 0, Path(folder), ())
+            if not flight.is_lockstep:
+                flight.begin_ms = 2**60
+                flight.fly(1)
+                return flight.said
+    raise AssertionError("chance has failed")
+
+
+def fuzz(
+    scenario: Scenario, seed: int, messages: int, each: int, flights: Iterable[int], progress: Progress | None = None
+) -> Tally:
+    """Flies until so many messages have gone out, or there are no more flights."""
+    tally, corpus = Tally(), corpus_of(scenario)
+    bar = None if progress is None else progress.add_task("messages", total=messages)
+    for number in flights:
+        with tempfile.TemporaryDirectory() as folder:
+            flight = Flight(scenario, number, seed, Path(folder), corpus)
+            tally.add(flight, flight.fly(min(each, messages - tally.messages)))
+            flight.sum_up()
+            tally.found += [one for one in flight.found if one not in tally.found]
+        del flight
+        gc.collect()
+        tally.rss_mb.append(rss_mb())
+        if progress is not None and bar is not None:
+            progress.update(bar, completed=tally.messages, description=f"{len(tally.found)} found, messages")
+        if tally.messages >= messages:
+            break
+    return tally
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--messages", type=int, default=100_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--each", type=int, default=5000)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--flights", type=int, default=10**9)
+    parser.add_argument("--scenario", default=str(BRIEF))
+    options = parser.parse_args(arguments)
+    logging.disable(logging.CRITICAL)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
+        tally = fuzz(
+            load_scenario(options.scenario, (), None), options.seed, options.messages, options.each,
+            range(options.first, options.first + options.flights), progress,
+        )  # fmt: skip
+    for one in tally.found:
+        print(one)
+    print(f"{tally.messages} messages in {tally.flights} flights, {len(tally.found)} found")
+    print("opened: " + ", ".join(f"{reason} dropped {count}" for reason, count in sorted(tally.opened.items())))
+    print("longest step: " + ", ".join(f"{name} {step_s:.2f} s" for name, step_s in tally.step_s.items()))
+    print(f"memory: {tally.rss_mb[0]:.0f} MB after the first flight, {tally.rss_mb[-1]:.0f} MB after the last, "
+          f"{tally.mb_a_flight:+.3f} MB a flight in the second half")  # fmt: skip
+    return 1 if tally.found or tally.mb_a_flight > MOST_MB_A_FLIGHT else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
