@@ -227,13 +227,9 @@ class Flight:
                 self._ended.add(one.name)
                 if not self._may_end(one):
                     self._note(f"{one.name}: {_in_full(one.error)}")
-        if self._witness.violations:
-            self._note(str(self._witness.violations[0]))
         for coordinator in self._coordinators:
-            if coordinator.has_begun and not bool(
-                ((risk := coordinator.fleet.map.risk) >= 0).all() and (risk <= 1).all()
-            ):
-                self._note("the coordinator's map holds what is no probability")
+            if coordinator.has_begun:
+                self._note_all(_what_is_wrong(coordinator))
 
     def _may_end(self, process: Process) -> bool:
         """Whether a process has ended as it is said to, or by a sentence for what the docs say ends a run."""

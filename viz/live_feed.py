@@ -11,6 +11,7 @@ from collections import deque
 from pathlib import Path
 
 import rerun as rr
+import rerun_bindings
 
 log = logging.getLogger(__name__)
 
@@ -24,6 +25,8 @@ def new_stream(recording_id: str, batches: rr.ChunkBatcherConfig | None = None) 
 
     `batches`: when it sends what it holds; soon, if left out.
     """
+    # Rerun keeps what it has of a stream that is gone, two threads among that, until it is told to let go of it.
+    rerun_bindings.flush_and_cleanup_orphaned_recordings()
     stream = rr.RecordingStream("secondlook", recording_id=recording_id, send_properties=False, batcher_config=batches)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
