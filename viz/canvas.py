@@ -12,7 +12,7 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from viz.live_feed import LiveFeed, new_stream
+from viz.live_feed import LiveFeed, new_stream, send_blueprint
 from viz.paths import TIMELINE
 from viz.recording_file import RecordingFile
 
@@ -128,7 +128,7 @@ class Canvas:
         for sheet in self._sheets:
             sheet.stream.send_recording_name(name)
             sheet.stream.send_property("mission", mission)
-            sheet.stream.send_blueprint(blueprint)
+            send_blueprint(sheet.stream, blueprint)
 
     def put(self, time_ms: int, path: str, *parts: rr.AsComponents) -> None:
         """Logs one entry at a simulated time."""

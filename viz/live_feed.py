@@ -11,10 +11,12 @@ from collections import deque
 from pathlib import Path
 
 import rerun as rr
+import rerun.blueprint as rrb
 import rerun_bindings
 
 log = logging.getLogger(__name__)
 
+APPLICATION = "secondlook"
 PIECE_EVERY_S = 0.1  # of the wall clock: how far the view lags behind at least
 HELD_BYTES = 32 << 20  # kept for a viewer that is behind; a whole mission takes about 5 MB
 REST_WITHIN_S = 1.0  # at the end, for what is still held
@@ -27,10 +29,26 @@ def new_stream(recording_id: str, batches: rr.ChunkBatcherConfig | None = None) 
     """
     # Rerun keeps what it has of a stream that is gone, two threads among that, until it is told to let go of it.
     rerun_bindings.flush_and_cleanup_orphaned_recordings()
-    stream = rr.RecordingStream("secondlook", recording_id=recording_id, send_properties=False, batcher_config=batches)
+    stream = rr.RecordingStream(APPLICATION, recording_id=recording_id, send_properties=False, batcher_config=batches)
     stream.set_log_time_enabled(False)
     stream.set_log_tick_enabled(False)
     return stream
+
+
+def send_blueprint(stream: rr.RecordingStream, blueprint: rrb.Blueprint) -> None:
+    """Says how the recording is laid out.
+
+    As `RecordingStream.send_blueprint` does, but that leaves the layout's own stream and its memory holding each other.
+    """
+    made = rerun_bindings.new_blueprint(
+        application_id=APPLICATION, make_default=False, make_thread_default=False, default_enabled=True
+    )
+    layout = rr.RecordingStream._from_native(made)
+    layout.set_time("blueprint", sequence=0)
+    blueprint._log_to_stream(layout)
+    held = layout.memory_recording().storage
+    rerun_bindings.send_blueprint(held, make_active=True, make_default=True, recording=stream.to_native())
+    layout.disconnect()
 
 
 class LiveFeed:

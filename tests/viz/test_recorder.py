@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import math
 import re
@@ -371,6 +372,19 @@ def test_a_run_without_messages_leaves_a_sound_file(record: Record, tmp_path: Pa
     empty = record([], tmp_path / "empty.rrd")
     assert verify(empty).returncode == 0
     assert entities(empty) == set()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="a process's threads are counted in /proc")
+def test_a_recording_leaves_no_thread_to_those_after_it(
+    messages: list[Received], record: Record, tmp_path: Path
+) -> None:
+    def after(recordings: int) -> int:
+        for number in range(recordings):
+            record(messages[:20], tmp_path / f"{number}.rrd")
+        gc.collect()
+        return len(list(Path("/proc/self/task").iterdir()))
+
+    assert after(2) >= after(5)
 
 
 def test_messages_wait_for_the_run_info(record: Record, tmp_path: Path) -> None:
