@@ -46,6 +46,7 @@ from comms.runner import Intake
 from comms.said.announcement import ClockMode, Role
 from comms.said.codec import header_of
 from comms.said.routing import Routing
+from comms.said.topics import RUN
 from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.seats import ListenerSeat, NodeSeat, Seat
@@ -208,6 +209,7 @@ class Flight:
         if not below.startswith("parcel/"):
             self.said.append((below, payload))
             self._fuzzer.note(below, payload)
+            self._fuzzer.announced |= below == RUN.key()
             if not below.startswith("clock/"):
                 self._now_ms = max(self._now_ms, header_of(payload).sent_ms)
 

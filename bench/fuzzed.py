@@ -43,6 +43,7 @@ class Fuzzer:
 
     `strange_headers`: with incarnations, numbers and times that jump, of which few are enough to have a process left
     out for the rest of a mission. `words`: whether those under a key are changed, too.
+    `announced`: whether the run is; who goes by an announcement that is not the clock's is lost.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class Fuzzer:
         self._may_change = words
         self._said: dict[Topic, deque[tuple[str, bytes]]] = {}
         self._words: deque[tuple[str, bytes]] = deque(maxlen=REMEMBERED)
+        self.announced = False
         self._last: dict[str, tuple[int, int]] = {}
         self._vehicles = sorted({name for node in routing.roster for name in node.vehicles})
         self._names = [*self._vehicles, *routing.nodes, "nobody", ""]
@@ -261,7 +263,7 @@ class Fuzzer:
             del words[place]
 
     def _some_message(self) -> tuple[str, bytes]:
-        topics = [one for one in self._said if one is not RUN or self._rng.random() < 0.05]
+        topics = [one for one in self._said if one is not RUN or (self.announced and self._rng.random() < 0.05)]
         return self._rng.choice(self._said[self._rng.choice(topics or list(self._said))])
 
 
