@@ -2,13 +2,16 @@
 
 python -m bench.fuzz_nodes [--messages N] [--seed S] [--first FLIGHT] [--flights N] [--each N] [--scenario FILE]
 
-Flies a mission again and again, all processes of a spread fleet in this one (`bench.turns`), by the wall clock or in
-lockstep; from some moment of it on, beside all that the fleet says, `--each` messages and words go out that no honest
-process would say (`bench.fuzzed`), through the real processes' loops: gate, checksum, decoding, checks, node. Then the
-mission goes on for a while. What must not happen: a process ends, or a step of one takes more than 2 s of processor
-time; the coordinator's books or map are no more valid; the figures of the run cannot be
-summed up; the memory of this process grows from flight to flight. One flight is repeated with `--seed`, `--first` and
-`--flights 1`. The exit code is 1 where something was found.
+Flies missions, every second one of a fleet that is drawn (`secondlook.storm.fleets`), all processes of a fleet in this
+one (`bench.turns`), by the wall clock or in lockstep. From some moment of each on, beside all that the fleet says,
+`--each` messages and words go out that no honest process would say (`bench.fuzzed`), through the real processes' loops:
+gate, checksum, decoding, checks, node. Then the mission goes on for a while. What must not happen: a process ends, or a
+step of one takes more than 2 s of processor time; the coordinator's books or map are no more valid; the figures of the
+run cannot be summed up; the memory of this process grows from flight to flight. One flight is repeated with `--seed`,
+`--first` and `--flights 1`. The exit code is 1 where something was found.
+
+What the clock says is left alone before the run is announced, in lockstep, and by the wall clock in nine flights of
+ten: it comes from the hub, whose keys nobody else may write, and ends whoever it tells to end.
 """
 
 from __future__ import annotations
@@ -59,10 +62,11 @@ from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise
 from secondlook.report import write_report
 from secondlook.scenario import Scenario, load_scenario
+from secondlook.storm.fleets import draw_fleet
 
 BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 LONGEST_STEP_S = 2.0
-LATEST_S = 115.0  # of the mission: so late the fuzz begins at the latest
+LATEST_S = (115.0, 400.0)  # of the mission: so late the fuzz begins at the latest; of `brief.yaml`, and of others
 AT_ONCE = 12  # messages, at most
 FACTORS = (1.0, 20.0)  # of the wall clock
 REPORTED = 0.1  # of the flights, whose report is written too
@@ -90,7 +94,7 @@ class Flight:
     def __init__(self, scenario: Scenario, number: int, seed: int, folder: Path, corpus: Sequence[Said]) -> None:
         rng = random.Random(f"{seed} {number}")
         self.is_lockstep = rng.random() < 0.3
-        self.begin_ms = round(1000 * rng.choice((0.0, rng.uniform(0.0, LATEST_S), rng.uniform(0.0, LATEST_S))))
+        self.begin_ms = round(1000 * rng.choice((0, 1, 1)) * rng.uniform(0.0, rng.choice(LATEST_S)))
         self.number = number
         self.found: list[Found] = []
         self.said: list[Said] = []
@@ -130,7 +134,7 @@ class Flight:
                     if gone_out >= messages:
                         if self._now_ms >= ends_ms:
                             break
-                    elif self._now_ms >= self.begin_ms and self._rng.random() < 0.5:
+                    elif self._fuzzer.can_draw and self._now_ms >= self.begin_ms and self._rng.random() < 0.5:
                         count = min(messages - gone_out, self._rng.randint(1, AT_ONCE))
                         self._fuzz(count)
                         gone_out += count
@@ -310,14 +314,22 @@ def corpus_of(scenario: Scenario) -> list[Said]:
 
 
 def fuzz(
-    scenario: Scenario, seed: int, messages: int, each: int, flights: Iterable[int], progress: Progress | None = None
+    scenario: Scenario | None,
+    seed: int,
+    messages: int,
+    each: int,
+    flights: Iterable[int],
+    progress: Progress | None = None,
 ) -> Tally:
-    """Flies until so many messages have gone out, or there are no more flights."""
-    tally, corpus = Tally(), corpus_of(scenario)
+    """Flies until so many messages have gone out, or there are no more flights. `scenario`: None for the short mission
+    of the tests and any others in turn."""
+    brief = load_scenario(str(BRIEF), (), None) if scenario is None else scenario
+    tally, corpus = Tally(), corpus_of(brief)
     bar = None if progress is None else progress.add_task("messages", total=messages)
     for number in flights:
         with tempfile.TemporaryDirectory() as folder:
-            flight = Flight(scenario, number, seed, Path(folder), corpus)
+            drawn = draw_fleet(seed * 1_000_000 + number) if scenario is None and number % 2 else None
+            flight = Flight(drawn or brief, number, seed, Path(folder), () if drawn else corpus)
             tally.add(flight, flight.fly(min(each, messages - tally.messages)))
             flight.sum_up()
             tally.found += [one for one in flight.found if one not in tally.found]
@@ -339,15 +351,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--each", type=int, default=5000)
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--flights", type=int, default=10**9)
-    parser.add_argument("--scenario", default=str(BRIEF))
+    parser.add_argument("--scenario")
     options = parser.parse_args(arguments)
     logging.disable(logging.CRITICAL)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        tally = fuzz(
-            load_scenario(options.scenario, (), None), options.seed, options.messages, options.each,
-            range(options.first, options.first + options.flights), progress,
-        )  # fmt: skip
+        scenario = load_scenario(options.scenario, (), None) if options.scenario else None
+        flights = range(options.first, options.first + options.flights)
+        tally = fuzz(scenario, options.seed, options.messages, options.each, flights, progress)
     for one in tally.found:
         print(one)
     print(f"{tally.messages} messages in {tally.flights} flights, {len(tally.found)} found")

@@ -70,12 +70,17 @@ class Fuzzer:
         header = header_of(payload)
         self._last[header.sender] = header.incarnation, header.sequence
 
+    @property
+    def can_draw(self) -> bool:
+        """Whether there is something to draw from."""
+        return any(topic is not RUN for topic in self._said)
+
     def draw(self, now_ms: int) -> tuple[str, bytes]:
         """One more, said at a time of the mission."""
         kind = self._rng.random()
         if kind < 0.12 and self._words:
             return self._some_words()
-        if kind < 0.45:
+        if kind < 0.3:
             return self._bytes()
         return self._fields(now_ms)
 
@@ -157,7 +162,7 @@ class Fuzzer:
     def _value(self, kind: Any, wire: Any) -> Any:
         """A value in place of another, mostly one that its kind lets through."""
         rng = self._rng
-        if rng.random() < 0.06:
+        if rng.random() < 0.03:
             return rng.choice(JUNK)
         match kind:
             case Scaled(steps_per_unit=steps, low=low, high=high):
