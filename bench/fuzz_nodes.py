@@ -49,7 +49,7 @@ from comms.runner import Intake
 from comms.said.announcement import ClockMode, Role
 from comms.said.codec import header_of
 from comms.said.routing import Routing
-from comms.said.topics import RUN
+from comms.said.topics import MISSION_OVER, RUN, TOPICS
 from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.seats import ListenerSeat, NodeSeat, Seat
@@ -100,6 +100,7 @@ class Flight:
         self.said: list[Said] = []
         self.turns = Turns()
         self._strange, self._clocks, self._factor = rng.random() < 0.3, rng.random() < 0.1, rng.choice(FACTORS)
+        self._density, spared = rng.choice((0.05, 0.2, 0.5)), rng.choice((0.0, 0.3, 0.7))
         self._goes_on_s = rng.choice((0.0, 20.0, 20.0, 1000.0))
         self._reports = rng.random() < REPORTED
         self._rng = rng
@@ -111,7 +112,10 @@ class Flight:
         )
         self._routing = Routing(self._fleet.roster)
         self.intake = Intake(self._routing)  # opens what goes out, to tell how much of it comes through
-        self._fuzzer = Fuzzer(rng, self._routing, strange_headers=self._strange, words=self._may_change)
+        left_alone = [one for one in TOPICS if rng.random() < spared] + [MISSION_OVER] * (rng.random() < 0.8)
+        self._fuzzer = Fuzzer(
+            rng, self._routing, left_alone=left_alone, strange_headers=self._strange, words=self._may_change
+        )
         for key, payload in corpus:
             self._fuzzer.note(key, payload)
         self._water = Water(self.turns, self._tap)
@@ -134,7 +138,7 @@ class Flight:
                     if gone_out >= messages:
                         if self._now_ms >= ends_ms:
                             break
-                    elif self._fuzzer.can_draw and self._now_ms >= self.begin_ms and self._rng.random() < 0.5:
+                    elif self._fuzzer.can_draw and self._now_ms >= self.begin_ms and self._rng.random() < self._density:
                         count = min(messages - gone_out, self._rng.randint(1, AT_ONCE))
                         self._fuzz(count)
                         gone_out += count

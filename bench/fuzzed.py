@@ -7,7 +7,7 @@ import math
 import random
 import zlib
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import msgpack
@@ -41,15 +41,23 @@ JUNK: Sequence[Any] = (
 class Fuzzer:
     """Makes them, each by a draw from `rng`, out of what it was told in `note`. Keys are below the run id.
 
-    `strange_headers`: with incarnations, numbers and times that jump, of which few are enough to have a process left
-    out for the rest of a mission. `words`: whether those under a key are changed, too.
-    `announced`: whether the run is; who goes by an announcement that is not the clock's is lost.
+    `left_alone`: topics of which there is nothing. `strange_headers`: with incarnations, numbers and times that jump, of
+    which few are enough to have a process left out for the rest of a mission. `words`: whether those under a key are
+    changed, too. `announced`: whether the run is; who goes by an announcement that is not the clock's is lost.
     """
 
     def __init__(
-        self, rng: random.Random, routing: Routing, *, strange_headers: bool, words: Callable[[str], bool]
+        self,
+        rng: random.Random,
+        routing: Routing,
+        *,
+        left_alone: Collection[Topic],
+        strange_headers: bool,
+        words: Callable[[str], bool],
     ) -> None:
         self._rng = rng
+        self._left_alone = left_alone
+        self._topics = [one for one in TOPICS if one not in left_alone]
         self._routing = routing
         self._strange_headers = strange_headers
         self._may_change = words
@@ -73,12 +81,12 @@ class Fuzzer:
     @property
     def can_draw(self) -> bool:
         """Whether there is something to draw from."""
-        return any(topic is not RUN for topic in self._said)
+        return any(one is not RUN and one not in self._left_alone for one in self._said)
 
     def draw(self, now_ms: int) -> tuple[str, bytes]:
         """One more, said at a time of the mission."""
         kind = self._rng.random()
-        if kind < 0.12 and self._words:
+        if kind < 0.1 and self._words:
             return self._some_words()
         if kind < 0.3:
             return self._bytes()
@@ -153,7 +161,7 @@ class Fuzzer:
         if found is None:
             return key
         rng = self._rng
-        topic = rng.choice(TOPICS) if rng.random() < 0.1 else found[0]
+        topic = rng.choice(self._topics) if rng.random() < 0.1 else found[0]
         vehicle = rng.choice(self._vehicles) if rng.random() < 0.3 else found[1] or self._vehicles[0]
         number = rng.choice((0, 1, 2, 3, rng.randrange(20), 999_999_999, rng.randrange(10**9), 10**9, -1))
         tile = rng.choice(("0-0", "0-1", "1-0", "x", "99-99", "-"))
@@ -268,8 +276,9 @@ class Fuzzer:
             del words[place]
 
     def _some_message(self) -> tuple[str, bytes]:
-        topics = [one for one in self._said if one is not RUN or (self.announced and self._rng.random() < 0.05)]
-        return self._rng.choice(self._said[self._rng.choice(topics or list(self._said))])
+        rare = () if self.announced and self._rng.random() < 0.05 else (RUN,)
+        topics = [one for one in self._said if one not in self._left_alone and one not in rare]
+        return self._rng.choice(self._said[self._rng.choice(topics)])
 
 
 def _resealed(payload: bytes, rest: bytes) -> bytes:
