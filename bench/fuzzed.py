@@ -41,8 +41,8 @@ JUNK: Sequence[Any] = (
 class Fuzzer:
     """Makes them, each by a draw from `rng`, out of what it was told in `note`. Keys are below the run id.
 
-    `left_alone`: topics of which there is nothing. `strange_headers`: with incarnations, numbers and times that jump, of
-    which few are enough to have a process left out for the rest of a mission. `words`: whether those under a key are
+    `left_alone`: topics of which there is nothing. `strange_headers`: with incarnations, numbers and times that jump,
+    of which few are enough to have a process left out for the rest of a mission. `words`: whether those under a key are
     changed, too. `announced`: whether the run is; who goes by an announcement that is not the clock's is lost.
     """
 
