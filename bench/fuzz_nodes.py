@@ -6,9 +6,10 @@ Flies missions, every second one of a fleet that is drawn (`secondlook.storm.fle
 one (`bench.turns`), by the wall clock or in lockstep. From some moment of each on, beside all that the fleet says,
 `--each` messages and words go out that no honest process would say (`bench.fuzzed`), through the real processes' loops:
 gate, checksum, decoding, checks, node. Then the mission goes on for a while. What must not happen: a process ends, or a
-step of one takes more than 2 s of processor time; the coordinator's books or map are no more valid; the figures of the
-run cannot be summed up; the memory of this process grows from flight to flight. One flight is repeated with `--seed`,
-`--first` and `--flights 1`. The exit code is 1 where something was found.
+step of one takes more than 2 s of processor time; the coordinator's books or map are no more valid; a node that keeps
+its memory cannot be taken up again; the figures of the run cannot be summed up; the memory of this process grows from
+flight to flight. One flight is repeated with `--seed`, `--first` and `--flights 1`. The exit code is 1 where something
+was found.
 
 What the clock says is left alone before the run is announced, in lockstep, and by the wall clock in nine flights of
 ten: it comes from the hub, whose keys nobody else may write, and ends whoever it tells to end.
@@ -27,7 +28,9 @@ import tempfile
 import traceback
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -41,14 +44,14 @@ from bench.fuzzed import Fuzzer
 from bench.memory import rss_mb
 from bench.turns import HangsError, Process, Turns, TurnsClosed, Water
 from comms.drive import Setup
-from comms.errors import FleetError, NodeError, RefusedError, RunawayError
-from comms.keys import RunKeys
+from comms.errors import FleetError, NodeError, RefusedError, RunawayError, StoreRefusedError
+from comms.keys import HostSpec, RunKeys
 from comms.lockstep.drive import Lockstep
+from comms.memory.lasting import LastingNode
 from comms.node import Node
 from comms.runner import Intake
 from comms.said.announcement import ClockMode, Role
 from comms.said.codec import header_of
-from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER, RUN, TOPICS
 from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
@@ -100,6 +103,7 @@ class Flight:
         self.said: list[Said] = []
         self.turns = Turns()
         self._strange, self._clocks, self._factor = rng.random() < 0.3, rng.random() < 0.1, rng.choice(FACTORS)
+        self._lasts = not self.is_lockstep and rng.random() < 0.3
         self._density, spared = rng.choice((0.05, 0.2, 0.5)), rng.choice((0.0, 0.3, 0.7))
         self._goes_on_s = rng.choice((0.0, 20.0, 20.0, 1000.0))
         self._reports = rng.random() < REPORTED
@@ -110,7 +114,9 @@ class Flight:
         self._fleet = build_fleet(
             scenario, record=True, mode=ClockMode.LOCKSTEP if self.is_lockstep else ClockMode.WALL
         )
-        self._routing = Routing(self._fleet.roster)
+        run_info, limit_ms = self._fleet.run_info, self._fleet.time_limit_ms
+        self._setup = Setup(self._keys.run, self._fleet.roster, run_info, limit_ms, state=folder / "state")
+        self._routing = self._setup.routing()
         self.intake = Intake(self._routing)  # opens what goes out, to tell how much of it comes through
         left_alone = [one for one in TOPICS if rng.random() < spared] + [MISSION_OVER] * (rng.random() < 0.8)
         self._fuzzer = Fuzzer(
@@ -149,6 +155,17 @@ class Flight:
                 self._note(str(error))
         return gone_out
 
+    def take_up(self) -> None:
+        """Takes up the nodes that keep their memory, as who is started in their place does: they must say again what
+        they have said."""
+        for name, spec in self._fleet.specs.items() if self._lasts else ():
+            try:
+                with closing(self._setup.store_of(name, name)) as store:
+                    LastingNode(name, make_node(name, spec), self._routing, store=store)
+            except StoreRefusedError as error:
+                if "mission that is over" not in str(error):
+                    self._note(f"{name}: {_in_full(error)}")
+
     def sum_up(self) -> None:
         """Does what is done with the files of a mission that has ended."""
         try:
@@ -172,18 +189,21 @@ class Flight:
         )  # fmt: skip
         self.turns.begin("router", hub.run)
         for spec in hosts:
-            if spec.host == RECORDER:
-                seat: Seat = ListenerSeat({OBSERVER: self._observer, RECORDER: self._recorder()}, routing)
-            else:
-                seat = NodeSeat(self._nodes(spec.nodes), routing)
-            sha256 = fleet.run_info.scenario_sha256
-            host = WallHost(self._water.session(), keys, spec.host, seat, routing, sha256, limit_ms)
-            self.turns.begin(spec.host, host.run)
+            self.turns.begin(spec.host, partial(self._run_host, spec))
+
+    def _run_host(self, spec: HostSpec) -> None:
+        keys, routing, fleet = self._keys, self._routing, self._fleet
+        if spec.host == RECORDER:
+            seat: Seat = ListenerSeat({OBSERVER: self._observer, RECORDER: self._recorder()}, routing)
+        else:
+            stores = {name: self._setup.store_of(name, name) for name in spec.nodes} if self._lasts else {}
+            seat = NodeSeat(self._nodes(spec.nodes), routing, stores)
+        sha256, limit_ms = fleet.run_info.scenario_sha256, fleet.time_limit_ms
+        WallHost(self._water.session(), keys, spec.host, seat, routing, sha256, limit_ms).run()
 
     def _seat_lockstep(self) -> None:
         """As `secondlook run` does, in each of its processes."""
-        fleet, drive = self._fleet, Lockstep()
-        setup = Setup(self._keys.run, fleet.roster, fleet.run_info, fleet.time_limit_ms)
+        fleet, drive, setup = self._fleet, Lockstep(), self._setup
         in_hub, hosts = hosts_of_run(fleet.roster, None)
         hub = drive.hub(
             self._water.session(), setup, hosts, self._nodes(in_hub), carry_out=lambda change, host: None,
@@ -335,6 +355,7 @@ def fuzz(
             drawn = draw_fleet(seed * 1_000_000 + number) if scenario is None and number % 2 else None
             flight = Flight(drawn or brief, number, seed, Path(folder), () if drawn else corpus)
             tally.add(flight, flight.fly(min(each, messages - tally.messages)))
+            flight.take_up()
             flight.sum_up()
             tally.found += [one for one in flight.found if one not in tally.found]
         del flight
