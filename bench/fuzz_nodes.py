@@ -21,6 +21,7 @@ import argparse
 import gc
 import json
 import logging
+import math
 import random
 import statistics
 import sys
@@ -72,6 +73,8 @@ LONGEST_STEP_S = 2.0
 LATEST_S = (115.0, 400.0)  # of the mission: so late the fuzz begins at the latest; of `brief.yaml`, and of others
 AT_ONCE = 12  # messages, at most
 FACTORS = (1.0, 20.0)  # of the wall clock
+TOLD_EVERY = 20  # flights, where there is no terminal
+WITHOUT_CLOCK_S = 15.0  # so long the others go on when the clock has ended: over Zenoh the launcher ends them then
 REPORTED = 0.1  # of the flights, whose report is written too
 MOST_MB_A_FLIGHT = 0.2  # that may be left of each, in the second half of many flights
 
@@ -132,15 +135,18 @@ class Flight:
 
     def fly(self, messages: int) -> int:
         """Flies, and lets so many messages go out, fewer where the mission is over before; returns how many."""
-        gone_out, ends_ms = 0, 0.0
+        gone_out, ends_ms, over_s = 0, 0.0, math.inf
         named = SimpleNamespace(token_hex=lambda count: f"{self._rng.getrandbits(8 * count):x}")
         with self.turns.as_their_clock(), mock.patch.object(comms.wall.host, "secrets", named):
             (self._seat_lockstep if self.is_lockstep else self._seat_wall)()
+            clock = self.turns.processes[0]
             try:
-                while self.turns.alive and not self.found:
+                while self.turns.alive and not self.found and self.turns.now_s < over_s:
                     if not self.turns.take_turn():
                         self.turns.pass_time()
                     self._look()
+                    if clock.ended:
+                        over_s = min(over_s, self.turns.now_s + WITHOUT_CLOCK_S)
                     if gone_out >= messages:
                         if self._now_ms >= ends_ms:
                             break
@@ -230,7 +236,9 @@ class Flight:
     def _may_change(self, key: str) -> bool:
         """Whether words under a key are fuzzed. In lockstep what makes no sense to the hub ends the run, as it is to;
         the clock's own words come from the hub alone, and may end whoever hears them."""
-        return not self.is_lockstep and (self._clocks or key.startswith(("clock/beat/", "clock/from/")))
+        if self.is_lockstep:
+            return self._clocks and key.startswith("clock/from/")
+        return self._clocks or key.startswith(("clock/beat/", "clock/from/"))
 
     def _tap(self, key: str, payload: bytes) -> None:
         below = key.removeprefix(self._keys.root)
@@ -363,6 +371,9 @@ def fuzz(
         tally.rss_mb.append(rss_mb())
         if progress is not None and bar is not None:
             progress.update(bar, completed=tally.messages, description=f"{len(tally.found)} found, messages")
+            if progress.disable and tally.flights % TOLD_EVERY == 0:
+                told = f"{tally.messages} messages in {tally.flights} flights, {len(tally.found)} found"
+                print(told, file=sys.stderr, flush=True)
         if tally.messages >= messages:
             break
     return tally

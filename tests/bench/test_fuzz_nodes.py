@@ -37,11 +37,11 @@ def corpus(brief: Scenario) -> list[Said]:
 
 
 def test_nothing_that_is_said_stops_a_node(brief: Scenario) -> None:
-    tally = fuzz(brief, seed=0, messages=2500, each=500, flights=range(100))
+    tally = fuzz(brief, seed=0, messages=1500, each=300, flights=range(100))
     assert [str(one) for one in tally.found] == []
-    assert tally.messages == 2500
-    assert tally.opened["none"] > 500  # came through to the nodes
-    assert tally.opened["malformed"] > 500
+    assert tally.messages == 1500
+    assert tally.opened["none"] > 300  # came through to the nodes
+    assert tally.opened["malformed"] > 300
 
 
 def test_what_stops_a_node_is_found(brief: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,13 +58,15 @@ def test_what_stops_a_node_is_found(brief: Scenario, monkeypatch: pytest.MonkeyP
     assert all("recorder has failed" in one.what and "too many contacts" in one.what for one in tally.found)
 
 
-@pytest.mark.parametrize("is_lockstep", [False, True])
-def test_a_flight_repeats_itself(brief: Scenario, corpus: list[Said], tmp_path: Path, is_lockstep: bool) -> None:
+@pytest.mark.parametrize(("number", "is_lockstep"), [(1, True), (3, False)])
+def test_a_flight_repeats_itself(
+    brief: Scenario, corpus: list[Said], tmp_path: Path, number: int, is_lockstep: bool
+) -> None:
     said = []
-    number = next(n for n in range(100) if Flight(brief, n, 0, tmp_path, corpus).is_lockstep is is_lockstep)
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
         flight = Flight(brief, number, 0, tmp_path / name, corpus)
+        assert flight.is_lockstep is is_lockstep
         assert flight.fly(300) == 300
         assert flight.found == []
         said.append([one for one in flight.said if topic_of(one[0]) is not None])
