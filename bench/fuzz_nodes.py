@@ -70,8 +70,8 @@ from secondlook.storm.fleets import draw_fleet
 
 BRIEF = Path(__file__).parents[1] / "tests" / "support" / "brief.yaml"
 LONGEST_STEP_S = 2.0
-LATEST_S = (115.0, 400.0)  # of the mission: so late the fuzz begins at the latest; of `brief.yaml`, and of others
-AT_ONCE = 12  # messages, at most
+LATEST_S = (90.0, 90.0, 250.0)  # of the mission: so late the fuzz begins at the latest
+AT_ONCE = 30  # messages, at most
 FACTORS = (1.0, 20.0)  # of the wall clock
 TOLD_EVERY = 20  # flights, where there is no terminal
 WITHOUT_CLOCK_S = 15.0  # so long the others go on when the clock has ended: over Zenoh the launcher ends them then
@@ -107,7 +107,7 @@ class Flight:
         self.turns = Turns()
         self._strange, self._clocks, self._factor = rng.random() < 0.3, rng.random() < 0.1, rng.choice(FACTORS)
         self._lasts = not self.is_lockstep and rng.random() < 0.3
-        self._density, spared = rng.choice((0.05, 0.2, 0.5)), rng.choice((0.0, 0.3, 0.7))
+        self._density, spared = rng.choice((0.05, 0.3, 0.8)), rng.choice((0.0, 0.3, 0.7))
         self._goes_on_s = rng.choice((0.0, 20.0, 20.0, 1000.0))
         self._reports = rng.random() < REPORTED
         self._rng = rng
@@ -142,7 +142,9 @@ class Flight:
             clock = self.turns.processes[0]
             try:
                 while self.turns.alive and not self.found and self.turns.now_s < over_s:
-                    if not self.turns.take_turn():
+                    # By the wall clock time passes when nobody has anything to do any more, in lockstep with each turn.
+                    all_wait = not self.turns.take_turn()
+                    if all_wait:
                         self.turns.pass_time()
                     self._look()
                     if clock.ended:
@@ -150,7 +152,7 @@ class Flight:
                     if gone_out >= messages:
                         if self._now_ms >= ends_ms:
                             break
-                    elif self._fuzzer.can_draw and self._now_ms >= self.begin_ms and self._rng.random() < self._density:
+                    elif (all_wait or self.is_lockstep) and self._may_fuzz():
                         count = min(messages - gone_out, self._rng.randint(1, AT_ONCE))
                         self._fuzz(count)
                         gone_out += count
@@ -248,6 +250,9 @@ class Flight:
             self._fuzzer.announced |= below == RUN.key()
             if not below.startswith("clock/"):
                 self._now_ms = max(self._now_ms, header_of(payload).sent_ms)
+
+    def _may_fuzz(self) -> bool:
+        return self._fuzzer.can_draw and self._now_ms >= self.begin_ms and self._rng.random() < self._density
 
     def _fuzz(self, count: int) -> None:
         for _ in range(count):
