@@ -15,6 +15,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from comms.errors import WordsError
 from comms.result import BusResult, Ending, LastWord, summed_up
 from comms.said.codec import SCHEMA_VERSION
 from comms.wall.words import Hello, pack_finish
@@ -124,10 +125,14 @@ class WallClock:
         return [host for host, known in self._hosts.items() if not known.ready]
 
     def hello(self, host: str, hello: Hello, now_s: float) -> None:
-        """A host says that it is there."""
+        """A host says that it is there. Raises WordsError where a process that takes part is said to be another than it
+        was: it would be sent away for words that cannot be its own."""
         known = self._hosts.get(host)
+        fits = hello.schema == SCHEMA_VERSION and hello.scenario_sha256 == self._scenario_sha256
         if known is None:
             self._refuse(host, hello, f"{host} is none of the scenario's nodes that the router knows")
+        elif known.instance == hello.instance and not fits:
+            raise WordsError("a hello that is not like those before")
         elif hello.schema != SCHEMA_VERSION:
             self._refuse(
                 host, hello, f"the fleet speaks schema version {SCHEMA_VERSION}, {host} version {hello.schema}"

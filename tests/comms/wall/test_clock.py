@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from comms.errors import WordsError
 from comms.result import Ending, LastWord
 from comms.said.codec import SCHEMA_VERSION
 from comms.wall.clock import HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, Phase, WallClock
@@ -90,6 +91,17 @@ def test_who_does_not_fit_is_refused_with_the_reason(host: str, said: Hello, sen
     assert (name, instance) == ("refused", said.instance)
     assert re.fullmatch(sentence, reason)
     assert "alpha" in told.missing
+
+
+@pytest.mark.parametrize(
+    "another", [hello(sha="b" * 64), Hello("1", 99, SHA, True, None)], ids=["scenario", "schema version"]
+)
+def test_who_takes_part_is_not_sent_away_by_a_hello_that_cannot_be_its_own(another: Hello) -> None:
+    told = under_way()
+    with pytest.raises(WordsError, match="not like those before"):
+        told.hello("alpha", another, 2.0)
+    told.hello("alpha", hello(), 2.0)
+    assert (words(told), told.silent(2.5, 1.0)) == ([], ["beta", "observer"])
 
 
 def test_a_host_that_is_gone_or_silent_may_be_replaced() -> None:
