@@ -277,8 +277,10 @@ class Flight:
     def _may_end(self, process: Process) -> bool:
         """Whether a process has ended as it is said to, or by a sentence for what the docs say ends a run."""
         match process.error:
-            case None | TurnsClosed() | RunawayError() | RefusedError():
+            case None | TurnsClosed() | RunawayError():
                 return True
+            case RefusedError():
+                return self._clocks
             case NodeError() as error:
                 return " floods " in str(error)
             case FleetError():
