@@ -228,7 +228,7 @@ class Agent:
         if (incarnation, look.number) in self._looks_taken:  # a look that comes twice was one look
             return
         self._looks_taken.add((incarnation, look.number))
-        if not _makes_sense(look):
+        if not makes_sense(look):
             if not self._complained:
                 self._complained = True
                 log.warning("%s: dropped a look that makes no sense (said once)", self.vehicle)
@@ -255,7 +255,8 @@ def _next_word_due_ms(status: ManeuverStatus) -> int | None:
     return status.ends_ms + REPORT_EVERY_MS
 
 
-def _makes_sense(look: Look) -> bool:
+def makes_sense(look: Look) -> bool:
+    """Whether a look has sides, bins and places that a sonar can have; no other counts."""
     sides, along_bins, range_bins = look.p_detect.shape
     if sides != 2 or along_bins == 0 or range_bins < 2 or look.along_bin_m <= 0 or look.range_bin_m <= 0:
         return False

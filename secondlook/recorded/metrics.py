@@ -33,6 +33,7 @@ from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
 from secondlook.recorded.closest_approach import ClosestApproaches
+from vehicle_agent.agent import makes_sense
 
 RISK_AT_FACTORS = (1.0, 1.05)
 
@@ -85,7 +86,8 @@ class Metrics:
     books: StripBooks = field(default_factory=StripBooks)
 
     def hear(self, received: Received) -> None:
-        """Folds one message in. What contradicts the run's announcement is counted in `misfits`."""
+        """Folds one message in. What contradicts the run's announcement, and looks that make no sense, are counted in
+        `misfits`."""
         message = received.message
         if received.header.sent_ms > self.now_ms:
             self._pass_time(received.header.sent_ms)
@@ -99,7 +101,10 @@ class Metrics:
         elif isinstance(message, TruthPose) and vehicle is not None:
             self.approaches.hear(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
-            vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
+            if makes_sense(message):
+                vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
+            else:
+                self.misfits += 1
         elif isinstance(message, CoverageTile):
             self._hear_tile(received, message)
         elif isinstance(message, Plan) and vehicle is not None:

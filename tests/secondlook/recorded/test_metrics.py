@@ -16,6 +16,7 @@ from comms.said.announcement import RunInfo
 from comms.said.messages import (
     AgentState,
     CoverageTile,
+    Look,
     Maneuver,
     ManeuverKind,
     Message,
@@ -29,6 +30,8 @@ from comms.said.messages import (
     TruthTarget,
     TruthTargets,
 )
+from planner.footprints import footprint_of
+from planner.types import SonarShape
 from secondlook.recorded.metrics import Metrics
 
 RUN = run_info(40, 20, cell_m=10)  # 5 columns at 0, 10, ... 40 m; 2 rows at 5 and 15 m
@@ -171,6 +174,15 @@ class TestRisk:
         stream = begun()
         stream.tile(1, PRIMARY, [[10] * 6] * 2)
         assert (stream.metrics.misfits, stream.metrics.summary()["risk"]["mean"]) == (1, 1.0)
+
+    @pytest.mark.parametrize("footprint", ["side", "wedge"])
+    def test_a_look_that_makes_no_sense_is_counted_and_left_out(self, footprint: str) -> None:
+        stream = begun()
+        stream.metrics.vehicles[PRIMARY].footprint = footprint_of(SonarShape(footprint, 5, 40, 0.5))
+        for along_bin_m in (0.0, -5.0):
+            geometry = (0.0, 0.0, 0.0, 0.0, along_bin_m, 1.0)
+            stream.say(1, f"veh/{PRIMARY}/look", Look(1, 1, *geometry, np.zeros((2, 4, 50)), 15.0, 0.0, True, ()))
+        assert (stream.metrics.misfits, stream.metrics.vehicles[PRIMARY].looked_m) == (2, 0.0)
 
     def test_an_announcement_repeated_does_not_begin_anew(self) -> None:
         stream = begun()
