@@ -20,6 +20,8 @@ STEP_S = 2.0
 """Courses are sampled at the whole multiples of this, so that any two are at the same times."""
 AHEAD_S = 900.0
 """A course is laid so far beyond its paths' end."""
+LONGEST_S = 86_400.0
+"""A course is laid no farther ahead, whatever a vehicle says of when it will be where."""
 ON_TRACK_M = 2.0
 
 
@@ -50,9 +52,10 @@ class Course:
 
 
 def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, paths: Sequence[DubinsPath]) -> Course:
-    """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard."""
+    """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard; of paths
+    that take longer than LONGEST_S no more than that."""
     first = math.ceil(start_s / STEP_S)
-    lasts_s = sum(path.length_m for path in paths) / speed_mps + AHEAD_S
+    lasts_s = min(sum(path.length_m for path in paths) / speed_mps + AHEAD_S, LONGEST_S)
     times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
     way_m: FloatArray = speed_mps * (times_s - start_s)
     parts, done, done_m, pose = [], 0, 0.0, start

@@ -93,6 +93,15 @@ class TestCourses:
         surveys_last = laid.poses[(np.abs(laid.poses[:, 0] - 250) < 1e-6) & (np.abs(laid.poses[:, 2] - SOUTH) < 1e-6)]
         assert len(surveys_last) * STEP_S == pytest.approx(1000, abs=2 * STEP_S + entry.run_in_m)
 
+    def test_nothing_is_laid_beyond_a_day_whatever_a_primary_says(self) -> None:
+        tracks = (PlannedTrack(1, 0, 0, 0, 0, 1e7, False), PlannedTrack(2, 0, 1e7, 1e7, -1e7, -1e7, False))
+        for says_ms in (0, 2**53):
+            state = AgentState(Mode.SURVEY, 1, 1, says_ms, 0, 0, 0)
+            laid = survey_course(vehicle("primary", Role.SURVEY), state, Plan(1, tracks, (), (), ""), 10)
+            assert len(laid.poses) == 86_400 / STEP_S
+            assert laid.arrives_s > 86_400
+            assert np.isfinite(laid.poses).all()
+
     def test_a_primary_that_looks_ahead_is_where_its_track_is_flown_earlier(self) -> None:
         # Its swath begins 30 m ahead of it, see tests/planner/footprints/test_wedge.py.
         shape = {"footprint": "wedge", "near_m": 3.0, "far_m": 50.0, "half_angle_rad": math.pi / 4, "look_m": 10.0}
