@@ -372,7 +372,9 @@ def fuzz(
             tally.add(flight, flight.fly(min(each, messages - tally.messages)))
             flight.take_up()
             flight.sum_up()
-            tally.found += [one for one in flight.found if one not in tally.found]
+            for one in flight.found:
+                print(one, flush=True)
+                tally.found += [] if one in tally.found else [one]
         del flight
         gc.collect()
         tally.rss_mb.append(rss_mb())
@@ -402,8 +404,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scenario = load_scenario(options.scenario, (), None) if options.scenario else None
         flights = range(options.first, options.first + options.flights)
         tally = fuzz(scenario, options.seed, options.messages, options.each, flights, progress)
-    for one in tally.found:
-        print(one)
     print(f"{tally.messages} messages in {tally.flights} flights, {len(tally.found)} found")
     print("opened: " + ", ".join(f"{reason} dropped {count}" for reason, count in sorted(tally.opened.items())))
     print("longest step: " + ", ".join(f"{name} {step_s:.2f} s" for name, step_s in tally.step_s.items()))
