@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from bench import turns
-from bench.fuzz_nodes import BRIEF, Flight, Said, corpus_of, fuzz
+from bench.fuzz_flight import Flight, Said
+from bench.fuzz_nodes import BRIEF, corpus_of, fuzz
 from bench.turns import HangsError, Turns
 from comms.said.messages import Contact
 from comms.said.topics import topic_of
