@@ -6,7 +6,6 @@ Clock to all: the time signal. Node to all: its beat, with the tallies of what i
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,10 +13,11 @@ from comms.errors import WordsError
 from comms.result import BusResult, Ending
 from comms.said.codec import LARGEST_INCARNATION
 from comms.said.routing import Routing
-from comms.said.wire import LARGEST_MS
 from comms.words import are_counts, are_latencies, pack
 
 LONGEST_ID = 64  # characters, of what a hello is told apart by
+LARGEST_FACTOR = 1000.0  # by which mission time runs faster than the wall clock
+LATEST_MS = 2**35  # of a mission, whose time limit is at most 10 million seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ def unpack_time(words: list[Any]) -> tuple[int | None, float, bool]:
     """The three words of a time signal; raises WordsError."""
     match words:
         case ["time", None | int() as now_ms, float(factor), bool(taken_up)]:
-            if _is_time(now_ms) and 0 < factor < math.inf:
+            if _is_time(now_ms) and 0 < factor <= LARGEST_FACTOR:
                 return now_ms, factor, taken_up
     raise WordsError("a time signal that is none")
 
@@ -112,4 +112,4 @@ def unpack_finish(words: list[Any]) -> BusResult:
 
 
 def _is_time(now_ms: int | None) -> bool:
-    return now_ms is None or 0 <= now_ms <= LARGEST_MS
+    return now_ms is None or 0 <= now_ms <= LATEST_MS

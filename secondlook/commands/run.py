@@ -17,6 +17,7 @@ import typer
 from comms.lockstep.drive import Lockstep
 from comms.said.announcement import LARGEST_SEED
 from comms.wall.drive import ByWallClock
+from comms.wall.words import LARGEST_FACTOR
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
@@ -65,7 +66,6 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
 
 MISSION_FAILED = 1
 REAL_TIME = "--real-time"
-LARGEST_FACTOR = 1000.0
 
 
 class BusName(StrEnum):

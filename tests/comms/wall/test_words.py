@@ -88,13 +88,13 @@ def test_only_words_that_can_be_said_again_are_taken(name: str, rest: list[objec
         assert pack_finish(unpack_finish(words)) == pack(*words)
 
 
-@pytest.mark.parametrize("factor", [0.0, -1.0, math.inf, math.nan])
+@pytest.mark.parametrize("factor", [0.0, -1.0, 1000.5, 1e300, math.inf, math.nan])
 def test_a_factor_by_which_no_time_runs_is_refused(factor: float) -> None:
     with pytest.raises(WordsError):
         unpack_time(["time", 5, factor, False])
 
 
-@pytest.mark.parametrize("now_ms", [-1, 2**53 + 1, 2**64 - 1])
+@pytest.mark.parametrize("now_ms", [-1, 2**35 + 1, 2**64 - 1])
 def test_a_time_beyond_all_missions_is_refused(now_ms: int) -> None:
     for unpack_one, words in (
         (unpack_time, ["time", now_ms, 1.0, False]),
