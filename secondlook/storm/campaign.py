@@ -110,4 +110,6 @@ def flown_again(plan: TroublePlan, number: int, outcome: Outcome, again: int) ->
 
 def quietly() -> None:
     """From now on this process tells nobody what nodes log: of thousands of missions what matters outcomes tell."""
-    logging.getLogger("secondlook").propagate = False
+    log = logging.getLogger("secondlook")
+    log.propagate = False
+    log.addHandler(logging.NullHandler())

@@ -11,7 +11,7 @@ from comms.errors import NodeError
 from secondlook.launch.mission import Bus
 from secondlook.launch.processes import RunFailedError
 from secondlook.storm.invariants import check_failed, check_flight
-from secondlook.storm.sometimes import NotedFaults, reached
+from secondlook.storm.sometimes import DISK_FULL, NotedFaults, reached
 from secondlook.storm.witness import Violation, Witness
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.flight import Flight
@@ -82,7 +82,7 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
         None if flight is None else flight.digest,
         end_s,
         time.perf_counter() - began_s,
-        frozenset() if flight is None else reached(flight, witness),
+        frozenset({DISK_FULL} if not violations else ()) if flight is None else reached(flight, witness),
         Truth() if flight is None else _truth_of(flight, plan),
     )
 

@@ -194,6 +194,7 @@ REFUSALS: Mapping[str, str] = MappingProxyType(
         "a helper at a strip hears that the mission is over": "the mission is over",
     }
 )
+DISK_FULL = "a mission fails as its disk is full"
 ENDINGS: Mapping[str, str] = MappingProxyType(
     {
         "the mission ends with nothing left": "every primary has finished and no strip is left",
@@ -276,6 +277,7 @@ SOMETIMES: Mapping[str, Sign] = MappingProxyType(
         "a hotspot is merged into another": lambda seen: seen.is_merged,
         "a strip of a coordinator that is gone is given back": lambda seen: seen.gives_old_back,
         "a primary is not waited for any more": lambda seen: seen.is_given_up,
+        DISK_FULL: lambda seen: False,  # there is no flight to look at: the mission has failed
     }
 )
 """By name in plain words whether a flight has reached it."""

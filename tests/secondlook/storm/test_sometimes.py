@@ -12,7 +12,7 @@ import pytest
 from comms.lockstep.faults import FaultKind
 from comms.said.messages import StripState, TaskAction, TaskState
 from coordinator.ledger import ALLOWED
-from secondlook.storm.sometimes import LOGGED, REASONS, REFUSALS, SOMETIMES, WHYS
+from secondlook.storm.sometimes import DISK_FULL, LOGGED, REASONS, REFUSALS, SOMETIMES, WHYS
 from secondlook.testing.plan import KINDS
 
 ROOT = Path(__file__).parents[3]
@@ -156,6 +156,7 @@ ROWS = {
     "an agent's answer or a tile is lost": ("a helper's word that it is done is lost", "a tile is said again"),
     "a node is killed and goes on by its memory": ("a primary goes on by its memory",),
     "the coordinator is killed and started anew": ("a strip of a coordinator that is gone is given back",),
+    "a file cannot be written, as the disk is full": (DISK_FULL,),
     "a helper hears late that the mission is over": ("a helper at a strip hears that the mission is over",),
 }
 

@@ -19,7 +19,7 @@ from secondlook.storm import campaign
 from secondlook.storm.campaign import agreement, flown_again, storm_of, times_reached
 from secondlook.storm.canaries import CANARIES, Find, find_canary
 from secondlook.storm.fly import Outcome, Truth, fly_storm
-from secondlook.storm.sometimes import SOMETIMES
+from secondlook.storm.sometimes import DISK_FULL, SOMETIMES
 from secondlook.storm.witness import Violation
 from secondlook.testing import Fleet
 from secondlook.testing.plan import DiskFull, TroublePlan, load_plan
@@ -100,7 +100,7 @@ def test_a_full_disk_is_told_and_what_is_on_it_is_read_back(tmp_path: Path) -> N
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     outcome = fly_storm(full_disk(80.0), folder=tmp_path)
     assert (outcome.violations, outcome.digest) == ((), None)
-    assert outcome.end_s >= 80
+    assert (outcome.end_s >= 80, outcome.reached) == (True, {DISK_FULL})
     assert resource.getrlimit(resource.RLIMIT_FSIZE) == before
     last = max(one.t_s for one in secondlook.load(tmp_path / "flight-1").messages())
     assert 0 < last <= outcome.end_s
