@@ -9,7 +9,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from secondlook.recorded.geojson import GeographicOrigin, to_geojson
+    from secondlook.geography import GeographicOrigin
+    from secondlook.recorded.geojson import to_geojson
     from secondlook.recorded.ground import RiskMap, TargetRecord
     from secondlook.recorded.mission import RecordedMission, load_run
     from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import shapely
-from hypothesis import given
-from hypothesis import strategies as st
 from shapely.geometry import shape
 
 import secondlook
@@ -78,47 +74,6 @@ def test_with_an_origin_places_are_degrees(mission: RecordedMission) -> None:
     assert (north - south) * 111_115 == pytest.approx(100, abs=0.1)
 
 
-@pytest.mark.parametrize(
-    ("latitude_deg", "metres_a_degree_north", "metres_a_degree_east"),
-    # Tables of the ellipsoid; at the equator a degree east is pi / 180 of the semi-major axis.
-    [(0.0, 110_574.3, 111_319.5), (45.0, 111_131.7, 78_846.8), (-60.0, 111_412.3, 55_800.0)],
-)
-def test_degrees_are_as_long_as_the_tables_say(
-    latitude_deg: float, metres_a_degree_north: float, metres_a_degree_east: float
-) -> None:
-    here = GeographicOrigin(latitude_deg, 20.0)
-    east_deg, _ = here.to_degrees(np.array([100.0]), np.array([0.0]))
-    _, north_deg = here.to_degrees(np.array([0.0]), np.array([100.0]))
-    assert 100 / (east_deg[0] - 20) == pytest.approx(metres_a_degree_east, rel=1e-5)
-    assert 100 / (north_deg[0] - latitude_deg) == pytest.approx(metres_a_degree_north, rel=1e-5)
-
-
-def earth_centred(longitude_deg: float, latitude_deg: float) -> np.ndarray[Any, np.dtype[np.float64]]:
-    a_m, e2 = 6_378_137.0, 0.00669437999014
-    longitude, latitude = math.radians(longitude_deg), math.radians(latitude_deg)
-    n_m = a_m / math.sqrt(1 - e2 * math.sin(latitude) ** 2)
-    out_m = n_m * math.cos(latitude)
-    return np.array([
-        out_m * math.cos(longitude), out_m * math.sin(longitude), n_m * (1 - e2) * math.sin(latitude)
-    ])  # fmt: skip
-
-
-@given(st.floats(-85, 85), st.floats(-180, 180), st.floats(0, 10_000), st.floats(0, 2 * math.pi))
-def test_places_lie_where_the_tangent_plane_has_them(
-    latitude_deg: float, longitude_deg: float, distance_m: float, bearing_rad: float
-) -> None:
-    x_m, y_m = distance_m * math.sin(bearing_rad), distance_m * math.cos(bearing_rad)
-    found = GeographicOrigin(latitude_deg, longitude_deg).to_degrees(np.array([x_m]), np.array([y_m]))
-    moved_m = earth_centred(found[0][0], found[1][0]) - earth_centred(longitude_deg, latitude_deg)
-    longitude, latitude = math.radians(longitude_deg), math.radians(latitude_deg)
-    east = np.array([-math.sin(longitude), math.cos(longitude), 0.0])
-    up = np.array([
-        math.cos(latitude) * math.cos(longitude), math.cos(latitude) * math.sin(longitude), math.sin(latitude)
-    ])  # fmt: skip
-    north = np.cross(up, east)
-    assert (moved_m @ east, moved_m @ north) == pytest.approx((x_m, y_m), abs=0.02)
-
-
 def test_what_crosses_the_antimeridian_is_cut_there() -> None:
     # 0.001 degrees of longitude at 10 N are 109.6 m.
     here = GeographicOrigin(10.0, 179.999)
@@ -131,12 +86,6 @@ def test_what_crosses_the_antimeridian_is_cut_there() -> None:
     assert drawn(shapely.LineString([(-500, 0), (500, 0)]), here)["type"] == "MultiLineString"
     assert shape(drawn(shapely.box(200, 0, 500, 300), here)).bounds[2] < -179.99
     assert shape(drawn(shapely.box(-500, 0, 0, 300), here)).bounds[0] > 179.99
-
-
-@pytest.mark.parametrize("place", [(89.5, 0.0), (0.0, 181.0), (math.nan, 0.0), (0.0, math.inf)])
-def test_an_origin_that_is_none_is_refused(place: tuple[float, float]) -> None:
-    with pytest.raises(ValueError, match="is not allowed; must be a number of degrees from -"):
-        GeographicOrigin(*place)
 
 
 def test_the_scenario_may_hold_the_origin(write: Callable[[str], str], valid_text: str, brief_copy: Path) -> None:
