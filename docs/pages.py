@@ -38,6 +38,7 @@ from secondlook.scenario import (
     UniformSeabed,
 )
 from secondlook.scenario.area import Priority
+from secondlook.scenario.degrees import AreaInDegrees, PriorityInDegrees, StartInDegrees
 from secondlook.scenario.sensor import SENSORS, SensorBase
 from secondlook.scenario.vehicle import VehicleBase
 
@@ -56,8 +57,8 @@ def table(head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[str]:
 
 SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("The whole file", "", (Scenario,)),
-    ("Area", "`area`", (Area,)),
-    ("Priorities", "each of `area.priorities`", (Priority,)),
+    ("Area", "`area`", (Area, AreaInDegrees)),
+    ("Priorities", "each of `area.priorities`", (Priority, PriorityInDegrees)),
     ("Origin", "`origin`", (Origin,)),
     ("Mission", "`mission`", (Mission,)),
     ("Seabed", "`seabed`", (UniformSeabed, PatchySeabed)),
@@ -65,7 +66,7 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("Targets", "`targets`", (Targets,)),
     ("Every vehicle", "`vehicles.ID`", (SurveyVehicle, RevisitVehicle)),
     ("Vehicles that survey", "`vehicles.ID`", (SurveyVehicle,)),
-    ("Start", "`vehicles.ID.start`", (Start,)),
+    ("Start", "`vehicles.ID.start`", (Start, StartInDegrees)),
     ("Settling", "`vehicles.ID.settling`", (Settling,)),
     ("Sensor", "`vehicles.ID.sensor`", tuple(SENSORS.values())),
     ("Detection curve", "`vehicles.ID.sensor.curve` and `vehicles.ID.prior_curve`", (Curve,)),
@@ -137,7 +138,8 @@ def _value(schema: dict[str, Any], anchors: dict[str, str], *, many: bool = Fals
         (inner,) = schema["patternProperties"].values()
         return f"{_value(inner, anchors)} for each id"
     if kind == "array" and "prefixItems" in schema:
-        return f"pair{s} of {_value(schema['prefixItems'][0], anchors, many=True)}"
+        members = dict.fromkeys(_value(one, anchors, many=True) for one in schema["prefixItems"])
+        return f"pair{s} of {' and '.join(members)}"
     if kind == "array":
         least, most = schema.get("minItems", 0), schema.get("maxItems")
         count = "" if most is None else f"{least} to {most} " if least else f"up to {most} "

@@ -41,7 +41,9 @@ class GeographicOrigin:
         longitude_deg, latitude_deg = _projection(self)(np.array(x_m, float), np.array(y_m, float), inverse=True)
         return self.longitude_deg + (longitude_deg - self.longitude_deg + 180) % 360 - 180, latitude_deg
 
-    def to_metres(self, longitude_deg: FloatArray, latitude_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def to_metres(
+        self, longitude_deg: FloatArray | float, latitude_deg: FloatArray | float
+    ) -> tuple[FloatArray, FloatArray]:
         """X and y in the mission frame of places on Earth, by longitude and latitude; the inverse of `to_degrees`."""
         x_m, y_m = _projection(self)(np.array(longitude_deg, float), np.array(latitude_deg, float))
         return x_m, y_m

@@ -4,13 +4,13 @@ Use `load_scenario`, `make_scenario`, `bundled_scenarios`, `scenario_hash` and t
 """
 
 from secondlook.scenario.area import Area
+from secondlook.scenario.degrees import Origin
 from secondlook.scenario.errors import Place, Problem, ScenarioError
 from secondlook.scenario.load import bundled_scenarios, load_scenario, make_scenario
 from secondlook.scenario.model import (
     Coordinator,
     Current,
     Mission,
-    Origin,
     PatchySeabed,
     Scenario,
     Targets,

@@ -17,6 +17,7 @@ from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapp
 
 LARGEST_GRID_CELLS = 20_000_000
 SMALLEST_PRIORITY_M2 = 1.0
+SMALLEST_EXTENT_M = 1.0  # what is less is most probably in degrees
 
 Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(check_pair), Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
@@ -29,6 +30,8 @@ def _check_outline(corners: tuple[Point, ...]) -> tuple[Point, ...]:
             raise refused(f"must be the corners in order, each once, but ({point[0]:g}, {point[1]:g}) is repeated")
     if MultiPoint(corners).convex_hull.area < TOLERANCE:
         raise refused("must have an area, but all corners lie on one line")
+    if np.ptp(corners, axis=0).max() < SMALLEST_EXTENT_M:
+        raise refused(f"must be metres, {SMALLEST_EXTENT_M:g} or more across; degrees go under a key that ends in _deg")
     if not Polygon(corners).is_valid:
         raise refused("must be the corners in order, but its sides cross")
     return corners
@@ -54,7 +57,7 @@ class Priority(Mapping):
     """Ground whose residual risk counts `weight` times when second looks are planned."""
 
     polygon_m: Outline
-    """The corners in order, each once; it shares ground with what is surveyed."""
+    """The corners in order, each once; it shares ground with what is surveyed. Or `polygon_deg`."""
     weight: Annotated[float, Field(ge=0, le=100)]
     """How often its residual risk counts. Only how weights compare matters."""
 
@@ -71,7 +74,7 @@ class Area(Mapping):
     map's cell; and ground that counts more in second looks."""
 
     polygon_m: Outline
-    """The corners in order, each once; convex or not."""
+    """The corners in order, each once; convex or not. Or `polygon_deg`."""
     holes_m: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] = ()
     """The corners of each piece that lies in it and is not surveyed."""
     track_heading_deg: TrackHeading = 0.0
@@ -98,7 +101,7 @@ class Area(Mapping):
             return holes_m
         holes = [Polygon(hole) for hole in holes_m]
         if not all(Polygon(info.data["polygon_m"]).contains_properly(hole) for hole in holes):
-            raise refused("must lie inside polygon_m, without touching it")
+            raise refused("must lie inside the area, without touching its edge")
         if not MultiPolygon(holes).is_valid or any(
             one.intersects(other) for index, one in enumerate(holes) for other in holes[:index]
         ):

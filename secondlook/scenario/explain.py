@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
+from secondlook.scenario.degrees import IN_DEGREES
 from secondlook.scenario.errors import KeyPath, Place, Problem, dotted, shown
 from secondlook.scenario.model import PatchySeabed, UniformSeabed
 from secondlook.scenario.sensor import SENSORS
@@ -58,6 +60,7 @@ def explain(
     places: Mapping[KeyPath, Place],
     classes: Mapping[int, type[BaseModel]],
     tags: Iterable[str] = (),
+    written: Mapping[KeyPath, tuple[KeyPath, Value]] = MappingProxyType({}),
 ) -> list[Problem]:
     """One problem for each error.
 
@@ -67,9 +70,10 @@ def explain(
         places: where each value of `data` stands, the whole under `()`.
         classes: for the `id()` of a mapping within `data`, the class it was taken for.
         tags: what tells the members of unions apart that are no scenario's.
+        written: for a path within `data` whose value was made from another, the path of that and what was given there.
     """
     mistakes = (error for error in errors if error["type"] != _FOLLOWS)
-    problems = (_problem(error, data, places, classes, _TAGS.union(tags)) for error in mistakes)
+    problems = (_problem(error, data, places, classes, _TAGS.union(tags), written) for error in mistakes)
     return [problem for problem in problems if problem]
 
 
@@ -92,6 +96,7 @@ def _problem(
     places: Mapping[KeyPath, Place],
     classes: Mapping[int, type[BaseModel]],
     tags: frozenset[str],
+    written: Mapping[KeyPath, tuple[KeyPath, Value]],
 ) -> Problem | None:
     kind, context = error["type"], error.get("ctx", {})
     path, holder, value = _locate(error["loc"], data, tags)
@@ -100,6 +105,11 @@ def _problem(
         tag = context["discriminator"].strip("'()")
         path, holder = (*path, tag), value
         value = value.get(tag) if isinstance(value, dict) else None
+    made_from = next((written[path[:end]] for end in range(len(path), 0, -1) if path[:end] in written), None)
+    if made_from is not None and kind == "missing":
+        if made_from[1] is not None:
+            return None  # what is wrong with the value it is made from is told by itself
+        path = made_from[0]
     if kind in {"missing", "union_tag_not_found"}:
         return Problem(place_of(path, places), f"{dotted(path)}: missing; must be given")
     if kind == "extra_forbidden":
@@ -111,8 +121,10 @@ def _problem(
         value, what = path[-1], _allowed(error)
     else:
         what = _allowed(error)
+    if made_from is not None:
+        path, value = made_from
     text = shown(value)
-    if kind == "refused" and isinstance(holder, dict) and path[-1] not in holder:
+    if kind == "refused" and made_from is None and isinstance(holder, dict) and path[-1] not in holder:
         text = f"{shown(error['input'])}, the default,"
     return Problem(place_of(path, places), f"{dotted(path)}: {text} is not allowed; {what}")
 
@@ -143,7 +155,7 @@ def _listed(choices: str) -> str:
 
 
 def _unknown_key(key: str, taken_for: type[BaseModel] | None) -> str:
-    known = list(taken_for.model_fields) if taken_for else []
+    known = [key for one in (taken_for, IN_DEGREES.get(taken_for)) if one for key in one.model_fields]
     other, whose = _FULLER.get(taken_for, (None, ""))
     if other and key in other.model_fields:
         return f"only {whose} has this key"

@@ -10,6 +10,7 @@ from pathlib import Path
 from pydantic import BaseModel, ValidationError
 
 from secondlook.scenario import bundled
+from secondlook.scenario.degrees import in_metres
 from secondlook.scenario.errors import KeyPath, Place, Problem, ScenarioError, dotted, shown
 from secondlook.scenario.explain import explain, nearest
 from secondlook.scenario.model import Scenario
@@ -104,11 +105,12 @@ def bundled_scenarios() -> list[tuple[str, str]]:
 
 def _validated(document: Document) -> Scenario:
     classes: dict[int, type[BaseModel]] = {}
-    problems = document.problems
+    turned = in_metres(document.data)
+    problems = document.problems + explain(turned.errors, document.data, document.places, classes)
     try:
-        scenario = Scenario.model_validate(document.data, context=classes)
+        scenario = Scenario.model_validate(turned.data, context=classes)
     except ValidationError as error:
-        problems = problems + explain(error.errors(), document.data, document.places, classes)
+        problems = problems + explain(error.errors(), turned.data, document.places, classes, written=turned.written)
     if problems:
         raise ScenarioError(problems)
     return scenario

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME
 from secondlook.scenario.area import Area
+from secondlook.scenario.degrees import Origin
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
 from secondlook.scenario.values import (
@@ -26,20 +27,8 @@ from secondlook.scenario.values import (
 )
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
-# Beyond, a metre of easting is more degrees than a map can show.
 DEADLINE_FACTOR = 1.05
-Latitude = Annotated[float, Field(ge=-89, le=89)]
-Longitude = Annotated[float, Field(ge=-180, le=180)]
 Headings = Annotated[tuple[Heading, Heading], BeforeValidator(check_pair), Field(strict=False)]
-
-
-class Origin(Mapping):
-    """The mission frame's origin, WGS84: x points east there, y north."""
-
-    latitude_deg: Latitude
-    """Degrees north."""
-    longitude_deg: Longitude
-    """Degrees east."""
 
 
 class Mission(Mapping):
@@ -204,7 +193,7 @@ class Scenario(Mapping):
     area: Area
     """What is surveyed."""
     origin: Origin | None = None
-    """Where x 0, y 0 is on Earth; for maps alone."""
+    """Where x 0, y 0 is on Earth: for maps, and for what is given in degrees."""
     mission: Mission = Mission()
     """When the mission ends, and how its risk is computed."""
     seabed: Annotated[UniformSeabed | PatchySeabed, Field(discriminator="kind")] = UniformSeabed()

@@ -51,9 +51,9 @@ class Start(Mapping):
     """Where a vehicle is when the mission starts: mission frame, compass heading."""
 
     x_m: Coordinate
-    """East."""
+    """East. Or `longitude_deg`."""
     y_m: Coordinate
-    """North."""
+    """North. Or `latitude_deg`."""
     heading_deg: Heading = 0.0
     """Compass heading."""
 

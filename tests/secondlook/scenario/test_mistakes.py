@@ -258,7 +258,7 @@ MISTAKES = {
         POLYGON + "\n  holes_m: [[[10, 10], [20, 10], [15, 20]], [[490, 10], [510, 10], [490, 20]]]",
         [
             "bad.yaml:4: area.holes_m: [[[10, 10], [20, 10], [15, 20]], [[490, 10], [510, 10], [... is not allowed; "
-            "must lie inside polygon_m, without touching it"
+            "must lie inside the area, without touching its edge"
         ],
     ),
     "holes that touch": (

@@ -1,0 +1,169 @@
+"""Degrees in a scenario: they become metres of the mission frame before the whole is validated."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
+
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic_core import ErrorDetails
+
+from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
+from secondlook.geography import GeographicOrigin
+from secondlook.scenario.area import Area, Priority
+from secondlook.scenario.errors import KeyPath
+from secondlook.scenario.text import Value
+from secondlook.scenario.values import Mapping, check_pair
+from secondlook.scenario.vehicle import Start
+
+FARTHEST_KM = 100
+
+Latitude = Annotated[float, Field(ge=-90, le=90)]
+Longitude = Annotated[float, Field(ge=-180, le=180)]
+# Beyond, a metre of easting is more degrees than a map can show.
+OriginLatitude = Annotated[float, Field(ge=-89, le=89)]
+
+Point = Annotated[tuple[Latitude, Longitude], BeforeValidator(check_pair), Field(strict=False)]
+Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
+HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
+
+
+class Origin(Mapping):
+    """The mission frame's origin, WGS84: x points east there, y north."""
+
+    latitude_deg: OriginLatitude
+    """Degrees north."""
+    longitude_deg: Longitude
+    """Degrees east."""
+
+
+class AreaInDegrees(Mapping):
+    """What of an area may be given in degrees."""
+
+    polygon_deg: Corners | None = None
+    """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
+    holes_deg: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
+    """In place of `holes_m`: the same for each hole."""
+
+
+class PriorityInDegrees(Mapping):
+    """What of ground that counts more may be given in degrees."""
+
+    polygon_deg: Corners | None = None
+    """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
+
+
+class StartInDegrees(Mapping):
+    """What of a start may be given in degrees."""
+
+    latitude_deg: Latitude | None = None
+    """In place of `y_m`, with `longitude_deg`: degrees north, WGS84."""
+    longitude_deg: Longitude | None = None
+    """In place of `x_m`, with `latitude_deg`: degrees east."""
+
+
+IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
+    Area: AreaInDegrees,
+    Priority: PriorityInDegrees,
+    Start: StartInDegrees,
+}
+"""What may be given in degrees in place of keys of a mapping."""
+
+_GIVES = {"polygon_deg": "polygon_m", "holes_deg": "holes_m", "latitude_deg": "y_m", "longitude_deg": "x_m"}
+_BESIDE = {"latitude_deg": ("x_m", "y_m"), "longitude_deg": ("x_m", "y_m")}
+_NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
+
+
+@dataclass(frozen=True)
+class InMetres:
+    """A scenario's data with metres in place of degrees.
+
+    `written` has, for each key of metres that degrees stand for, the key of degrees and its value, None where it is
+    missing; `errors` what is wrong with the degrees, as pydantic would report it of the data as it was given.
+    """
+
+    data: dict[str, Value]
+    written: dict[KeyPath, tuple[KeyPath, Value]] = field(default_factory=dict)
+    errors: list[ErrorDetails] = field(default_factory=list)
+
+
+class _RefusedError(Exception):
+    """Degrees that cannot be used: where they are, what was given, and what is allowed."""
+
+    def __init__(self, path: KeyPath, value: object, allowed: str) -> None:
+        super().__init__(allowed)
+        self.details = ErrorDetails(type="refused", loc=path, msg=allowed, input=value, ctx={"allowed": allowed})
+
+
+def in_metres(data: dict[str, Value]) -> InMetres:
+    """Turns all that is given in degrees into metres about the scenario's origin, to the millimetre."""
+    turned = InMetres(copy.deepcopy(data))
+    for path, holder, model in _holders(turned.data):
+        given = {key: holder.pop(key) for key in model.model_fields if key in holder}
+        if not given:
+            continue
+        for key in model.model_fields:
+            turned.written[*path, _GIVES[key]] = ((*path, key), given.get(key))
+        try:
+            checked = model.model_validate(given)
+            for key, value in given.items():
+                if others := [other for other in _BESIDE.get(key, (_GIVES[key],)) if other in holder]:
+                    raise _RefusedError((*path, key), value, f"must be left out beside {' and '.join(others)}")
+                if data.get("origin") is None:
+                    raise _RefusedError((*path, key), value, _NEEDS_ORIGIN)
+            holder.update(_turned(path, checked, data["origin"]))
+        except ValidationError as error:
+            turned.errors.extend({**one, "loc": (*path, *one["loc"])} for one in error.errors())
+        except _RefusedError as error:
+            if error.details["msg"] != _NEEDS_ORIGIN or not any(one["msg"] == _NEEDS_ORIGIN for one in turned.errors):
+                turned.errors.append(error.details)
+    return turned
+
+
+def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value], type[BaseModel]]]:
+    """The mappings in which degrees may be given."""
+    area, vehicles = data.get("area"), data.get("vehicles")
+    if isinstance(area, dict):
+        yield ("area",), area, AreaInDegrees
+        priorities = area.get("priorities")
+        for index, one in enumerate(priorities if isinstance(priorities, list) else ()):
+            if isinstance(one, dict):
+                yield ("area", "priorities", index), one, PriorityInDegrees
+    for key, vehicle in vehicles.items() if isinstance(vehicles, dict) else ():
+        start = vehicle.get("start") if isinstance(vehicle, dict) else None
+        if isinstance(start, dict):
+            yield ("vehicles", key, "start"), start, StartInDegrees
+
+
+def _turned(path: KeyPath, checked: BaseModel, given_origin: Value) -> dict[str, Value]:
+    """What degrees are in metres, by the keys for metres."""
+    try:
+        origin = GeographicOrigin(**Origin.model_validate(given_origin).model_dump())
+    except ValidationError:
+        return {}  # told when the whole is validated
+    found: dict[str, Value] = {}
+    for key, value in checked.model_dump(exclude_none=True).items():
+        if key == "polygon_deg":
+            found["polygon_m"] = _ring_m((*path, key), value, origin)
+        if key == "holes_deg":
+            found["holes_m"] = [_ring_m((*path, key, index), hole, origin) for index, hole in enumerate(value)]
+    if isinstance(checked, StartInDegrees) and checked.latitude_deg is not None and checked.longitude_deg is not None:
+        place = _place_m((*path, "latitude_deg"), (checked.latitude_deg, checked.longitude_deg), origin)
+        found["x_m"], found["y_m"] = place
+    return found
+
+
+def _ring_m(path: KeyPath, corners: Sequence[tuple[float, float]], origin: GeographicOrigin) -> list[Value]:
+    open_corners = corners[:-1] if len(corners) > 3 and corners[0] == corners[-1] else corners
+    return [_place_m((*path, index), corner, origin) for index, corner in enumerate(open_corners)]
+
+
+def _place_m(path: KeyPath, place: tuple[float, float], origin: GeographicOrigin) -> list[Value]:
+    x_m, y_m = (float(one) for one in origin.to_metres(place[1], place[0]))
+    if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
+        hint = "; latitude comes first" if isinstance(path[-1], int) else ""
+        raise _RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
+    return [round(x_m, 3) + 0.0, round(y_m, 3) + 0.0]

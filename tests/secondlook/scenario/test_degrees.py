@@ -1,0 +1,143 @@
+"""A scenario in degrees is the one in metres that geodesics make of it; mistakes are told where they were made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import pytest
+from pyproj import Geod
+
+from secondlook.scenario import Area, Scenario, ScenarioError, Start, load_scenario, scenario_hash
+
+EARTH = Geod(ellps="WGS84")
+ORIGIN = (59.88, 10.5)
+
+Write = Callable[[str | bytes], str]
+
+
+def degrees(x_m: float, y_m: float) -> str:
+    """[latitude, longitude] of a place of the mission frame, by the geodesic that leads there."""
+    heading_deg = math.degrees(math.atan2(x_m, y_m))
+    longitude, latitude, _ = EARTH.fwd(ORIGIN[1], ORIGIN[0], heading_deg, math.hypot(x_m, y_m))
+    return f"[{latitude:.9f}, {longitude:.9f}]"
+
+
+def ring(*corners_m: tuple[float, float]) -> str:
+    return f"[{', '.join(degrees(*corner) for corner in corners_m)}]"
+
+
+SQUARE_M = ((0.0, 0.0), (500.0, 0.0), (500.0, 400.0), (0.0, 400.0))
+HOLE_M = ((100.0, 100.0), (150.0, 100.0), (100.0, 150.0))
+LANE_M = ((0.0, 0.0), (500.0, 0.0), (500.0, 60.0))
+START_DEG = "{latitude_deg: 59.881, longitude_deg: 10.5, heading_deg: 90}"
+PLACE = "origin: {latitude_deg: 59.88, longitude_deg: 10.5}\n"
+
+
+@pytest.fixture
+def text(valid_text: str) -> str:
+    """The valid text with degrees wherever they are allowed."""
+    holder = "[[0, 0], [500, 0], [500, 400], [0, 400]]"
+    assert holder in valid_text
+    area = (
+        f"polygon_deg: {ring(*SQUARE_M)}\n  holes_deg: [{ring(*HOLE_M)}]\n"
+        f"  priorities: [{{polygon_deg: {ring(*LANE_M)}, weight: 3}}]"
+    )
+    return PLACE + valid_text.replace(f"polygon_m: {holder}", area).replace("{x_m: 0, y_m: -40}", START_DEG, 1)
+
+
+def close(found: tuple[tuple[float, float], ...], wanted: tuple[tuple[float, float], ...]) -> bool:
+    return len(found) == len(wanted) and all(math.dist(*pair) < 0.0015 for pair in zip(found, wanted, strict=True))
+
+
+def test_degrees_become_the_metres_to_the_millimetre(write: Write, text: str) -> None:
+    scenario = load_scenario(write(text))
+    assert close(scenario.area.polygon_m, SQUARE_M)
+    assert close(scenario.area.holes_m[0], HOLE_M)
+    assert close(scenario.area.priorities[0].polygon_m, LANE_M)
+    start = scenario.vehicles["primary"].start
+    # A degree of latitude at 59.88 N is 111.411 km.
+    assert (start.x_m, start.y_m, start.heading_deg) == pytest.approx((0.0, 111.411, 90.0), abs=0.002)
+    assert scenario.vehicles["helper"].start == Start(x_m=0.0, y_m=-40.0)
+
+
+def test_it_is_kept_in_metres_and_loads_as_an_equal_one(write: Write, text: str) -> None:
+    scenario = load_scenario(write(text))
+    kept = scenario.to_yaml()
+    assert "_deg: [[" not in kept
+    again = load_scenario(write(kept))
+    assert again == scenario
+    assert scenario_hash(again) == scenario_hash(scenario)
+
+
+def test_a_ring_may_be_closed(write: Write, text: str) -> None:
+    closed = text.replace(ring(*SQUARE_M), ring(*SQUARE_M, SQUARE_M[0]))
+    assert load_scenario(write(closed)) == load_scenario(write(text))
+
+
+def test_an_area_across_the_antimeridian_is_whole(write: Write, valid_text: str) -> None:
+    corners = "[[10, 179.998], [10, -179.998], [10.003, -179.998], [10.003, 179.998]]"
+    text = valid_text.replace("polygon_m: [[0, 0], [500, 0], [500, 400], [0, 400]]", f"polygon_deg: {corners}")
+    area = load_scenario(write(f"origin: {{latitude_deg: 10, longitude_deg: 180}}\n{text}")).area
+    # 0.004 degrees of longitude at 10 N are 438.6 m, 0.003 of latitude 331.8 m.
+    assert area.extent_m == pytest.approx((438.6, 331.8), abs=0.1)
+
+
+MISTAKES = {
+    "no origin": (PLACE, "", "bad.yaml:3: area.polygon_deg: [[59.88, 10.5], [59.879999698, 10.508928259], "
+        "[59.8835900... is not allowed; must stand with origin, which tells where x 0, y 0 is: "
+        "{latitude_deg: ..., longitude_deg: ...}"),
+    "given both ways": ("  holes_deg", "  polygon_m: [[0, 0], [9, 0], [9, 9]]\n  holes_deg",
+        "bad.yaml:4: area.polygon_deg: [[59.88, 10.5], [59.879999698, 10.508928259], [59.8835900... is not allowed; "
+        "must be left out beside polygon_m"),
+    "a start given half in metres": ("{latitude_deg: 59.881, longitude_deg", "{latitude_deg: 59.881, x_m",
+        "bad.yaml:10: vehicles.primary.start.latitude_deg: 59.881 is not allowed; must be left out beside x_m"),
+    "half a start": ("{latitude_deg: 59.881, longitude_deg: 10.5,", "{latitude_deg: 59.881,",
+        "bad.yaml:10: vehicles.primary.start.longitude_deg: missing; must be given"),
+    "beyond the pole": (degrees(*SQUARE_M[2]), "[95, 10.5]",
+        "bad.yaml:4: area.polygon_deg[2][0]: 95 is not allowed; must be at most 90"),
+    "longitude first": (ring(*LANE_M), "[[10.5, 59.88], [10.508, 59.88], [10.508, 59.881]]",
+        "bad.yaml:6: area.priorities[0].polygon_deg[0]: [10.5, 59.88] is not allowed; must be within 100 km of origin; "
+        "latitude comes first"),
+    "a far start": ("latitude_deg: 59.881", "latitude_deg: -59.881",
+        "bad.yaml:10: vehicles.primary.start.latitude_deg: -59.881 is not allowed; must be within 100 km of origin"),
+    "crossing sides": (ring(*SQUARE_M), "[[59.88, 10.5], [59.89, 10.51], [59.89, 10.5], [59.88, 10.51]]",
+        "bad.yaml:4: area.polygon_deg: [[59.88, 10.5], [59.89, 10.51], [59.89, 10.5], [59.88, 10... is not allowed; "
+        "must be the corners in order, but its sides cross"),
+    "no pair": (degrees(*SQUARE_M[2]), "59.9", "bad.yaml:4: area.polygon_deg[2]: 59.9 is not allowed; "
+        "must be a list of two numbers"),
+    "too few corners": (ring(*SQUARE_M), "[[59.88, 10.5], [59.89, 10.51]]", "bad.yaml:4: area.polygon_deg: "
+        "[[59.88, 10.5], [59.89, 10.51]] is not allowed; must have at least 3 entries"),
+    "a hole outside": (ring(*HOLE_M), "[[59.88, 10.4], [59.881, 10.4], [59.881, 10.401]]", "bad.yaml:5: "
+        "area.holes_deg: [[[59.88, 10.4], [59.881, 10.4], [59.881, 10.401]]] is not allowed; "
+        "must lie inside the area, without touching its edge"),
+    "degrees for metres": (f"polygon_deg: {ring(*LANE_M)}", "polygon_m: [[60, 10.5], [60.01, 10.5], [60, 10.51]]",
+        "bad.yaml:6: area.priorities[0].polygon_m: [[60, 10.5], [60.01, 10.5], [60, 10.51]] is not allowed; "
+        "must be metres, 1 or more across; degrees go under a key that ends in _deg"),
+    "an origin that is none": ("origin: {latitude_deg: 59.88", "origin: {latitude_deg: 91",
+        "bad.yaml:1: origin.latitude_deg: 91 is not allowed; must be at most 89"),
+    "a misspelt key": ("holes_deg", "hole_deg", "bad.yaml:5: area.hole_deg: [[[59.880897571, 10.5017857], "
+        "[59.880897556, 10.50267855]... is not allowed; no such key, did you mean holes_deg?"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said"), MISTAKES.values(), ids=MISTAKES)
+def test_what_is_wrong_is_told_where_it_was_given(write: Write, text: str, old: str, new: str, said: str) -> None:
+    assert old in text
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write(text.replace(old, new, 1)))
+    assert str(caught.value) == said
+
+
+def test_all_that_is_wrong_is_told_at_once(write: Write, text: str) -> None:
+    spoilt = text.replace("speed_mps: 2", "speed_mps: 0").replace("latitude_deg: 59.881", "latitude_deg: 99")
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write(spoilt))
+    assert [problem.text for problem in caught.value.problems] == [
+        "vehicles.primary.start.latitude_deg: 99 is not allowed; must be at most 90",
+        "vehicles.helper.speed_mps: 0 is not allowed; must be greater than 0",
+    ]
+
+
+def test_degrees_have_no_place_in_what_is_loaded() -> None:
+    assert not any("_deg" in key for model in (Area, Scenario) for key in model.model_fields if "heading" not in key)
