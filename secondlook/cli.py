@@ -13,6 +13,7 @@ from secondlook.commands.certificates import certificates
 from secondlook.commands.check import check
 from secondlook.commands.compare import compare
 from secondlook.commands.geojson import geojson
+from secondlook.commands.new import new
 from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
 from secondlook.commands.plan import plan
@@ -71,7 +72,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-for command in (run, scenarios, check, plan, compare, storm, paper, replay, view, report, geojson, certificates):
+for command in (run, scenarios, new, check, plan, compare, storm, paper, replay, view, report, geojson, certificates):
     app.command()(command)
 
 

@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
@@ -14,6 +15,7 @@ from pydantic_core import ErrorDetails
 from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
 from secondlook.geography import GeographicOrigin
 from secondlook.scenario.area import Area, Priority
+from secondlook.scenario.chart import ChartError, read_chart
 from secondlook.scenario.errors import KeyPath
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import Mapping, check_pair
@@ -41,12 +43,15 @@ class Origin(Mapping):
 
 
 class AreaInDegrees(Mapping):
-    """What of an area may be given in degrees."""
+    """What of an area may be given in degrees, or drawn in a file."""
 
     polygon_deg: Corners | None = None
     """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
     holes_deg: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
     """In place of `holes_m`: the same for each hole."""
+    file: str | None = None
+    """In place of polygon and holes: a GeoJSON file that draws them, relative to the scenario's. Its priorities follow
+    those that are given here."""
 
 
 class PriorityInDegrees(Mapping):
@@ -72,8 +77,19 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
 }
 """What may be given in degrees in place of keys of a mapping."""
 
-_GIVES = {"polygon_deg": "polygon_m", "holes_deg": "holes_m", "latitude_deg": "y_m", "longitude_deg": "x_m"}
-_BESIDE = {"latitude_deg": ("x_m", "y_m"), "longitude_deg": ("x_m", "y_m")}
+_GIVES = {
+    "polygon_deg": ("polygon_m",),
+    "holes_deg": ("holes_m",),
+    "latitude_deg": ("y_m",),
+    "longitude_deg": ("x_m",),
+    "file": ("polygon_m", "holes_m"),
+}
+_NOT_BESIDE = {
+    **_GIVES,
+    "latitude_deg": ("x_m", "y_m"),
+    "longitude_deg": ("x_m", "y_m"),
+    "file": ("polygon_m", "holes_m", "polygon_deg", "holes_deg"),
+}
 _NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
 
@@ -98,28 +114,32 @@ class _RefusedError(Exception):
         self.details = ErrorDetails(type="refused", loc=path, msg=allowed, input=value, ctx={"allowed": allowed})
 
 
-def in_metres(data: dict[str, Value]) -> InMetres:
-    """Turns all that is given in degrees into metres about the scenario's origin, to the millimetre."""
+def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
+    """Turns all that is given in degrees into metres about the scenario's origin, to the millimetre; files that draw an
+    area are looked for in the folder."""
     turned = InMetres(copy.deepcopy(data))
     for path, holder, model in _holders(turned.data):
-        given = {key: holder.pop(key) for key in model.model_fields if key in holder}
-        if not given:
-            continue
-        for key in model.model_fields:
-            turned.written[*path, _GIVES[key]] = ((*path, key), given.get(key))
+        given = {key: holder[key] for key in model.model_fields if key in holder}
+        for key in given or ():
+            turned.written.update({(*path, metres): ((*path, key), given[key]) for metres in _GIVES[key]})
+        for key in model.model_fields if given and model is StartInDegrees else ():
+            turned.written.setdefault((*path, *_GIVES[key]), ((*path, key), None))
         try:
             checked = model.model_validate(given)
             for key, value in given.items():
-                if others := [other for other in _BESIDE.get(key, (_GIVES[key],)) if other in holder]:
+                if others := [other for other in _NOT_BESIDE[key] if other in holder]:
                     raise _RefusedError((*path, key), value, f"must be left out beside {' and '.join(others)}")
                 if data.get("origin") is None:
                     raise _RefusedError((*path, key), value, _NEEDS_ORIGIN)
-            holder.update(_turned(path, checked, data["origin"]))
+            if given:
+                _turn(turned, path, holder, checked, folder)
         except ValidationError as error:
             turned.errors.extend({**one, "loc": (*path, *one["loc"])} for one in error.errors())
         except _RefusedError as error:
             if error.details["msg"] != _NEEDS_ORIGIN or not any(one["msg"] == _NEEDS_ORIGIN for one in turned.errors):
                 turned.errors.append(error.details)
+        for key in given:
+            del holder[key]
     return turned
 
 
@@ -138,22 +158,46 @@ def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value]
             yield ("vehicles", key, "start"), start, StartInDegrees
 
 
-def _turned(path: KeyPath, checked: BaseModel, given_origin: Value) -> dict[str, Value]:
-    """What degrees are in metres, by the keys for metres."""
+def _turn(turned: InMetres, path: KeyPath, holder: dict[str, Value], checked: BaseModel, folder: Path) -> None:
+    """Puts into a mapping of the scenario what its degrees are in metres."""
     try:
-        origin = GeographicOrigin(**Origin.model_validate(given_origin).model_dump())
+        origin = GeographicOrigin(**Origin.model_validate(turned.data["origin"]).model_dump())
     except ValidationError:
-        return {}  # told when the whole is validated
-    found: dict[str, Value] = {}
-    for key, value in checked.model_dump(exclude_none=True).items():
-        if key == "polygon_deg":
-            found["polygon_m"] = _ring_m((*path, key), value, origin)
-        if key == "holes_deg":
-            found["holes_m"] = [_ring_m((*path, key, index), hole, origin) for index, hole in enumerate(value)]
-    if isinstance(checked, StartInDegrees) and checked.latitude_deg is not None and checked.longitude_deg is not None:
-        place = _place_m((*path, "latitude_deg"), (checked.latitude_deg, checked.longitude_deg), origin)
-        found["x_m"], found["y_m"] = place
-    return found
+        return  # told when the whole is validated
+    match checked:
+        case StartInDegrees(latitude_deg=float(latitude_deg), longitude_deg=float(longitude_deg)):
+            place = _place_m((*path, "latitude_deg"), (latitude_deg, longitude_deg), origin)
+            holder["x_m"], holder["y_m"] = place
+        case AreaInDegrees(file=str(file)):
+            _take_chart(turned, holder, file, folder, origin)
+        case AreaInDegrees() | PriorityInDegrees():
+            if checked.polygon_deg is not None:
+                holder["polygon_m"] = _ring_m((*path, "polygon_deg"), checked.polygon_deg, origin)
+            holes = checked.holes_deg if isinstance(checked, AreaInDegrees) else None
+            if holes is not None:
+                holder["holes_m"] = [
+                    _ring_m((*path, "holes_deg", index), hole, origin) for index, hole in enumerate(holes)
+                ]
+
+
+def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Path, origin: GeographicOrigin) -> None:
+    """Puts what a file draws into the area."""
+    path: KeyPath = ("area", "file")
+    try:
+        chart = read_chart(folder / file)
+    except ChartError as error:
+        raise _RefusedError(path, file, str(error)) from error
+    if chart.left_out:
+        raise _RefusedError(path, file, f"{chart.left_out[0]}; secondlook new leaves such features out")
+    area["polygon_m"] = _ring_m(path, chart.area, origin)
+    area["holes_m"] = [_ring_m(path, hole, origin) for hole in chart.holes]
+    if chart.priorities and "priorities" not in area:
+        turned.written["area", "priorities"] = (path, file)
+    priorities = area.setdefault("priorities", [])
+    if isinstance(priorities, list):
+        for ring, weight in chart.priorities:
+            turned.written["area", "priorities", len(priorities)] = (path, file)
+            priorities.append({"polygon_m": _ring_m(path, ring, origin), "weight": weight})
 
 
 def _ring_m(path: KeyPath, corners: Sequence[tuple[float, float]], origin: GeographicOrigin) -> list[Value]:
@@ -164,6 +208,9 @@ def _ring_m(path: KeyPath, corners: Sequence[tuple[float, float]], origin: Geogr
 def _place_m(path: KeyPath, place: tuple[float, float], origin: GeographicOrigin) -> list[Value]:
     x_m, y_m = (float(one) for one in origin.to_metres(place[1], place[0]))
     if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
+        if path[:2] == ("area", "file"):
+            said = f"latitude {place[0]:g}, longitude {place[1]:g} is not; GeoJSON has longitude first"
+            raise _RefusedError(path[:2], None, f"all must be within {FARTHEST_KM} km of origin, but {said}")
         hint = "; latitude comes first" if isinstance(path[-1], int) else ""
         raise _RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
     return [round(x_m, 3) + 0.0, round(y_m, 3) + 0.0]

@@ -90,12 +90,12 @@ def load_scenario(
         ScenarioError: there is no such scenario, or it cannot be used; all that is wrong, one sentence a line.
     """
     source = os.fspath(name_or_path)
-    return _validated(override(read(_text(source), source), overrides, seed))
+    return _validated(override(read(_text(source), source), overrides, seed), Path(source).parent)
 
 
 def make_scenario(data: dict[str, Value], overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
     """The scenario that plain data says, as a file's content would; overrides, seed and errors as `load_scenario`."""
-    return _validated(override(Document(data, {(): Place("scenario")}), overrides, seed))
+    return _validated(override(Document(data, {(): Place("scenario")}), overrides, seed), Path())
 
 
 def bundled_scenarios() -> list[tuple[str, str]]:
@@ -103,9 +103,9 @@ def bundled_scenarios() -> list[tuple[str, str]]:
     return [(name, load_scenario(name).description) for name in bundled.scenario_names()]
 
 
-def _validated(document: Document) -> Scenario:
+def _validated(document: Document, folder: Path) -> Scenario:
     classes: dict[int, type[BaseModel]] = {}
-    turned = in_metres(document.data)
+    turned = in_metres(document.data, folder)
     problems = document.problems + explain(turned.errors, document.data, document.places, classes)
     try:
         scenario = Scenario.model_validate(turned.data, context=classes)

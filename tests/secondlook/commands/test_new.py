@@ -1,0 +1,341 @@
+"""From a chart to a scenario that flies, and what is wrong with a chart, in a sentence."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import shapely
+from pyproj import Geod, Transformer
+
+from secondlook import cli
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.scenario import Scenario, ScenarioError, Start, load_scenario
+from secondlook.scenario.chart import ChartError, ChartStart, read_chart
+
+EARTH = Geod(ellps="WGS84")
+
+
+def polygon(*rings: list[tuple[float, float]]) -> dict[str, Any]:
+    return {"type": "Polygon", "coordinates": [[*map(list, ring), list(ring[0])] for ring in rings]}
+
+
+def feature(geometry: dict[str, Any], **properties: Any) -> dict[str, Any]:
+    return {"type": "Feature", "geometry": geometry, "properties": properties}
+
+
+L_SHAPE = [(10.5, 59.88), (10.51, 59.88), (10.51, 59.882), (10.505, 59.882), (10.505, 59.884), (10.5, 59.884)]
+INNER = [(10.501, 59.881), (10.502, 59.881), (10.502, 59.8815)]
+HOLE = [(10.503, 59.881), (10.504, 59.881), (10.504, 59.8815)]
+LANE = [(10.5, 59.882), (10.504, 59.882), (10.504, 59.8825)]
+BAY = {
+    "type": "FeatureCollection",
+    "features": [
+        feature(polygon(L_SHAPE, INNER), role="Area"),
+        feature(polygon(HOLE), name="Hole 1"),
+        feature(polygon(LANE), name="priority lane", weight=4),
+        feature({"type": "Point", "coordinates": [10.5, 59.89, 12.0]}, name="Lighthouse"),
+        feature({"type": "Point", "coordinates": [10.4995, 59.8795]}, role="start", vehicle="primary"),
+        feature({"type": "Point", "coordinates": [10.4995, 59.8792]}, name="start North Boat", heading_deg=90),
+    ],
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def draw(chart: object, name: str = "bay.geojson") -> None:
+    Path(name).write_text(json.dumps(chart))
+
+
+def command(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int | str | None:
+    monkeypatch.setattr("sys.argv", ["secondlook", *arguments])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    return stopped.value.code
+
+
+def geodesic_m2(*rings: list[tuple[float, float]]) -> float:
+    found_m2 = 0.0
+    for ring in rings:
+        longitudes, latitudes = np.array(ring).T
+        found_m2 += abs(EARTH.polygon_area_perimeter(longitudes, latitudes)[0])
+    return found_m2
+
+
+def test_a_chart_has_what_is_drawn_and_names_what_is_left_out(folder: Path) -> None:
+    draw(BAY)
+    chart = read_chart(folder / "bay.geojson")
+    assert chart.area == tuple((latitude, longitude) for longitude, latitude in L_SHAPE)
+    assert [len(hole) for hole in chart.holes] == [3, 3]
+    assert chart.priorities == ((tuple((latitude, longitude) for longitude, latitude in LANE), 4.0),)
+    assert chart.starts == (
+        ChartStart("primary", (59.8795, 10.4995), 0.0),
+        ChartStart("north boat", (59.8792, 10.4995), 90.0),
+    )
+    assert chart.left_out == ("feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, start",)
+
+
+def test_the_only_polygon_is_the_area(folder: Path) -> None:
+    for whole in (polygon(L_SHAPE), feature(polygon(L_SHAPE), name="Bay"), {**BAY, "features": [BAY["features"][0]]}):
+        draw(whole)
+        assert read_chart(folder / "bay.geojson").area[0] == (59.88, 10.5)
+
+
+def test_a_chart_in_a_utm_zone_is_the_same_one(folder: Path) -> None:
+    draw(BAY)
+    to_utm = Transformer.from_crs(4326, 32632, always_xy=True)
+    in_utm = copy.deepcopy(BAY)
+    in_utm["crs"] = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32632"}}  # type: ignore[assignment]
+    for one in in_utm["features"]:
+        shape = shapely.from_geojson(json.dumps(one["geometry"]))  # type: ignore[index]
+        moved = shapely.transform(shapely.force_2d(shape), lambda places: np.column_stack(to_utm.transform(*places.T)))
+        one["geometry"] = json.loads(shapely.to_geojson(moved))  # type: ignore[index]
+    draw(in_utm, "utm.geojson")
+    here, there = read_chart(folder / "bay.geojson"), read_chart(folder / "utm.geojson")
+    for ring, same in zip((here.area, *here.holes), (there.area, *there.holes), strict=True):
+        assert np.array(ring) == pytest.approx(np.array(same), abs=1e-8)
+
+
+@pytest.fixture
+def made(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Scenario:
+    draw(BAY)
+    assert command(monkeypatch, "new", "bay.geojson", "--out", "bay.yaml") == 0
+    told = capsys.readouterr()
+    assert told.err == (
+        "bay.geojson: feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, start; left out\n"
+    )
+    assert told.out.startswith("bay.yaml: 446 m by 560 m from latitude 59.88, longitude 10.5; ")
+    return load_scenario("bay.yaml")
+
+
+def test_the_scenario_that_is_made_is_as_large_as_the_ground(made: Scenario) -> None:
+    area = shapely.Polygon(made.area.polygon_m, made.area.holes_m[:1])
+    assert area.area == pytest.approx(geodesic_m2(L_SHAPE) - geodesic_m2(INNER), rel=1e-5)
+    assert shapely.Polygon(made.area.priorities[0].polygon_m).area == pytest.approx(geodesic_m2(LANE), rel=1e-5)
+    assert (made.area.priorities[0].weight, list(made.vehicles)) == (4, ["primary", "north-boat"])
+    start = made.vehicles["north-boat"].start
+    # Degrees at 59.88 N: 56.03 km of longitude, 111.41 km of latitude.
+    assert (start.x_m, start.y_m, start.heading_deg) == pytest.approx((-28.0, -89.1, 90.0), abs=0.05)
+
+
+def test_the_scenario_that_is_made_passes_and_flies(
+    made: Scenario, folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(monkeypatch, "check", "bay.yaml") == 0
+    assert "in 6 convex parts" in capsys.readouterr().out
+    (folder / "run").mkdir()
+    run_mission(made, RunOptions(folder / "run", bus="local"))
+    Path("bay.geojson").unlink()
+    assert load_scenario(folder / "run" / "scenario.yaml") == made
+    assert json.loads((folder / "run" / "summary.json").read_text())["ending"] == "over"
+
+
+def test_without_starts_there_are_two_vehicles_by_the_corner(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    draw(polygon([(9.8, 44.0), (9.9, 44.0), (9.9, 44.1), (9.8, 44.1)]), "Großer Ort!.json")
+    assert command(monkeypatch, "new", "Großer Ort!.json") == 0
+    Path("made.yaml").write_text(capsys.readouterr().out)
+    scenario = load_scenario("made.yaml")
+    assert {key: vehicle.start for key, vehicle in scenario.vehicles.items()} == {
+        "primary": Start(x_m=-20, y_m=-20),
+        "helper": Start(x_m=-20, y_m=-40),
+    }
+    # 8 km by 11.1 km: a map of at most a million cells, and a limit that the mission can keep.
+    assert (scenario.name, scenario.area.cell_m) == ("gro-er-ort", 10)
+    assert scenario.mission.time_limit_s > 20_000
+
+
+def test_a_file_that_is_there_is_not_written_over(
+    made: Scenario, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert command(monkeypatch, "new", "bay.geojson", "--out", "bay.yaml") == 2
+    assert capsys.readouterr().err == "--out bay.yaml: is there already; must be a new file\n"
+
+
+AREA = feature(polygon(L_SHAPE), role="area")
+CROSSING = [(10.5, 59.88), (10.51, 59.89), (10.51, 59.88), (10.5, 59.89)]
+OPEN = {"type": "Polygon", "coordinates": [[[10.5, 59.88], [10.51, 59.88], [10.51, 59.882], [10.5, 59.881]]]}
+SOUNDING = {"type": "Point", "coordinates": [10.5, 59.88]}
+
+
+def place(longitude_deg: Any, latitude_deg: Any) -> dict[str, Any]:
+    return feature({"type": "Point", "coordinates": [longitude_deg, latitude_deg]}, role="start")
+
+
+def both(one: object) -> dict[str, Any]:
+    return {"type": "FeatureCollection", "features": [AREA, one]}
+
+
+BAD: dict[str, tuple[object, str]] = {
+    "empty": (b"", "the file is empty; must be GeoJSON"),
+    "blank": (b" \n", "the file is empty; must be GeoJSON"),
+    "not JSON": (b'{"type":\n oops}', "line 2, column 2: not JSON; must be GeoJSON"),
+    "not UTF-8": (b'{"type": "\xff"}', "byte 0xff is not allowed; must be UTF-8 text"),
+    "nested without end": (b"[" * 200_000, "not JSON that can be read; must be GeoJSON"),
+    "a list": ([1], "not GeoJSON; must be a FeatureCollection, a Feature or a Polygon"),
+    "other JSON": ({"area": 1}, "not GeoJSON; must be a FeatureCollection, a Feature or a Polygon"),
+    "a bare line": (
+        {"type": "LineString", "coordinates": []},
+        "a LineString is not allowed; must be a FeatureCollection, a Feature or a Polygon",
+    ),
+    "no geometry": (both({"type": "Feature", "geometry": None}), "feature 2: must be a Feature with a geometry"),
+    "no features": (
+        {"type": "FeatureCollection", "features": []},
+        "no feature is the area; must have one polygon whose role or name is area",
+    ),
+    "no area": (
+        {"type": "FeatureCollection", "features": [feature(polygon(HOLE), role="hole")]},
+        "no feature is the area; must have one polygon whose role or name is area",
+    ),
+    "two areas": (both(AREA), "2 features are areas; must have one polygon whose role or name is area"),
+    "unclosed": (
+        feature(OPEN, role="area"),
+        "feature 1 (area): a ring is not closed; must end with its first position",
+    ),
+    "crossing": (
+        feature(polygon(CROSSING), name="Area 51"),
+        "feature 1 (Area 51): a ring's sides cross or touch; must be the corners in order",
+    ),
+    "too short": (
+        feature(polygon(L_SHAPE[:2]), role="area"),
+        "feature 1 (area): a ring is too short; must have three corners and its first position again",
+    ),
+    "too many corners": (
+        both(feature(polygon([(10.5 + index * 1e-5, 59.88 + index**2 * 1e-8) for index in range(60)]), role="hole")),
+        "feature 2 (hole): a ring has 60 corners; must have at most 50",
+    ),
+    "a line for an area": (
+        feature({"type": "LineString", "coordinates": L_SHAPE}, role="area"),
+        "feature 1 (area): a LineString is not allowed; must be a Polygon",
+    ),
+    "two parts": (
+        feature({"type": "MultiPolygon", "coordinates": [[L_SHAPE], [HOLE]]}, role="area"),
+        "feature 1 (area): a MultiPolygon of several parts is not allowed; must be a Polygon",
+    ),
+    "no coordinates": (
+        feature({"type": "Polygon"}, role="area"),
+        "feature 1 (area): no coordinates; must be a list of rings",
+    ),
+    "a hole with a hole": (
+        both(feature(polygon(LANE, HOLE), role="hole")),
+        "feature 2 (hole): rings within it are not allowed; must be one ring",
+    ),
+    "a polygon for a start": (
+        both(feature(polygon(HOLE), role="start")),
+        "feature 2 (start): a Polygon is not allowed; must be a Point",
+    ),
+    "a heading": (
+        both(feature(SOUNDING, role="start", heading_deg=360)),
+        "feature 2 (start): heading_deg 360 is not allowed; must be a number from 0 to less than 360",
+    ),
+    "a weight": (
+        both(feature(polygon(LANE), role="priority", weight="much")),
+        'feature 2 (priority): weight "much" is not allowed; must be a number from 0 to 100',
+    ),
+    "beyond the pole": (
+        both(place(10.5, 95)),
+        "feature 2 (start): latitude 95 is not allowed; must be from -90 to 90; GeoJSON has longitude first",
+    ),
+    "swapped": (
+        feature(polygon([(-33.8, 151.2), (-33.8, 151.3), (-33.7, 151.3)]), role="area"),
+        "feature 1 (area): latitude 151.2 is not allowed; must be from -90 to 90; GeoJSON has longitude first",
+    ),
+    "beyond the antimeridian": (
+        both(place(181, 10)),
+        "feature 2 (start): longitude 181 is not allowed; must be from -180 to 180",
+    ),
+    "text for a number": (
+        both(place("10.5", 59.88)),
+        'feature 2 (start): ["10.5", 59.88] is not allowed; must be longitude and latitude, two numbers',
+    ),
+    "an unknown grid": (
+        {**both(AREA), "crs": {"properties": {"name": "EPSG:27700"}}},
+        "crs EPSG:27700 is not known; must be a UTM zone, such as EPSG:32632",
+    ),
+    "a nameless grid": (
+        {**both(AREA), "crs": {"type": "link"}},
+        "crs has no name; must be WGS84 or a UTM zone by its EPSG code",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("content", "said"), BAD.values(), ids=BAD)
+def test_what_is_wrong_with_a_chart_is_told_in_a_sentence(
+    folder: Path, content: object, said: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("bay.geojson").write_bytes(content if isinstance(content, bytes) else json.dumps(content).encode())
+    assert command(monkeypatch, "new", "bay.geojson", "--out", "bay.yaml") == 2
+    assert capsys.readouterr() == ("", f"bay.geojson: {said}\n")
+    assert not Path("bay.yaml").exists()
+
+
+def test_what_cannot_be_flown_is_told_of_the_scenario_it_would_be(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    draw(both(place(10.5, -59.88)))
+    assert command(monkeypatch, "new", "bay.geojson") == 2
+    assert capsys.readouterr().err == (
+        "bay.geojson: vehicles.primary.start.latitude_deg: -59.88 is not allowed; must be within 100 km of origin\n"
+    )
+
+
+@pytest.mark.parametrize("missing", ["none.geojson", "."])
+def test_a_chart_that_cannot_be_read_is_told(folder: Path, missing: str) -> None:
+    with pytest.raises(ChartError, match=r"^cannot be read: (No such file|Is a directory)"):
+        read_chart(folder / missing)
+
+
+Write = Callable[[str], str]
+DRAWN = {**BAY, "features": [*BAY["features"][:3], *BAY["features"][4:]]}
+ORIGIN = "origin: {latitude_deg: 59.88, longitude_deg: 10.5}\n"
+SQUARE = "polygon_m: [[0, 0], [500, 0], [500, 400], [0, 400]]"
+
+
+def test_a_scenario_may_name_the_chart(write: Write, valid_text: str, tmp_path: Path, made: Scenario) -> None:
+    (tmp_path / "charts").mkdir()
+    draw(DRAWN, "charts/drawn.geojson")
+    text = valid_text.replace(
+        SQUARE, "file: drawn.geojson\n  priorities: [{polygon_m: [[0, 0], [9, 0], [9, 9]], weight: 0}]"
+    )
+    (tmp_path / "charts" / "here.yaml").write_text(ORIGIN + text)
+    scenario = load_scenario("charts/here.yaml")
+    assert (scenario.area.polygon_m, scenario.area.holes_m) == (made.area.polygon_m, made.area.holes_m)
+    assert scenario.area.priorities[1:] == made.area.priorities
+    kept = write(scenario.to_yaml())
+    (tmp_path / "charts" / "drawn.geojson").unlink()
+    assert load_scenario(kept) == scenario
+
+
+@pytest.mark.parametrize(
+    ("chart", "area", "said"),
+    [
+        (BAY, "file: bay.geojson", "feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, "
+            "start; secondlook new leaves such features out"),
+        (b"", "file: bay.geojson", "the file is empty; must be GeoJSON"),
+        (DRAWN, f"file: bay.geojson\n  {SQUARE}", "must be left out beside polygon_m"),
+        (DRAWN, "file: bay.geojson\n  holes_deg: []", "must be left out beside holes_deg"),
+        (polygon([(longitude, latitude) for latitude, longitude in L_SHAPE]), "file: bay.geojson", "all must be within "
+            "100 km of origin, but latitude 10.5, longitude 59.88 is not; GeoJSON has longitude first"),
+        (both(feature(polygon([(10.6, 59.88), (10.61, 59.88), (10.61, 59.881)]), role="hole")), "file: bay.geojson",
+            "must lie inside the area, without touching its edge"),
+        (both(feature(polygon([(10.6, 59.88), (10.61, 59.88), (10.61, 59.881)]), role="priority")), "file: bay.geojson",
+            "must each share ground with what is surveyed"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_chart_is_told_where_it_is_named(
+    write: Write, valid_text: str, folder: Path, chart: object, area: str, said: str
+) -> None:
+    Path("bay.geojson").write_bytes(chart if isinstance(chart, bytes) else json.dumps(chart).encode())
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write(ORIGIN + valid_text.replace(SQUARE, area)))
+    assert str(caught.value) == f'bad.yaml:4: area.file: "bay.geojson" is not allowed; {said}'
