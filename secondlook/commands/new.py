@@ -30,11 +30,11 @@ _NO_ID = re.compile(r"[^a-z0-9_-]+")
 
 
 def new(
-    chart: Annotated[Path, typer.Argument(help="A GeoJSON file.")],
+    chart: Annotated[Path, typer.Argument(help="A GeoJSON or KML file.")],
     out: Annotated[Path | None, typer.Option(help="File to write; standard output if left out.")] = None,
 ) -> None:
-    """Make a scenario from a chart: a GeoJSON file with features whose role or name is area, hole, priority or start.
-    What is not understood is left out, and named. Vehicles are such as in headland, for you to change."""
+    """Make a scenario from a chart: a GeoJSON or KML file with features whose role or name is area, hole, priority or
+    start. What is not understood is left out, and named. Vehicles are such as in headland, for you to change."""
     try:
         drawn = read_chart(chart)
     except ChartError as error:

@@ -1,4 +1,4 @@
-"""Charts: the area, holes, priorities and starts that a GeoJSON file draws, in degrees."""
+"""Charts: the area, holes, priorities and starts that a GeoJSON or KML file draws, in degrees."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import shapely
 
@@ -78,7 +79,7 @@ class _Drawn:
 
 
 def read_chart(path: Path) -> Chart:
-    """The chart in a GeoJSON file: RFC 7946, or with a member `crs` that names WGS84 or a UTM zone.
+    """The chart in a file: KML, or GeoJSON as RFC 7946 has it, or with a member `crs` that names WGS84 or a UTM zone.
 
     A feature's role is told by its property `role`, `kind`, `name` or `title`: area, hole, priority (with `weight`, 3
     if left out) or start (with `vehicle` and `heading_deg`). A file's only polygon is the area whatever it is called.
@@ -109,17 +110,74 @@ def _parsed(path: Path) -> dict[str, Any]:
     if len(content) > LARGEST_CHART_BYTES:
         raise ChartError(f"larger than {LARGEST_CHART_BYTES} bytes; must be smaller")
     if not content.strip():
-        raise ChartError("the file is empty; must be GeoJSON")
+        raise ChartError("the file is empty; must be GeoJSON or KML")
+    if content.removeprefix(b"\xef\xbb\xbf").lstrip().startswith(b"<"):
+        return _kml(content)
     try:
         found = json.loads(content.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise ChartError(f"byte {content[error.start]:#04x} is not allowed; must be UTF-8 text") from None
     except json.JSONDecodeError as error:
-        raise ChartError(f"line {error.lineno}, column {error.colno}: not JSON; must be GeoJSON") from None
+        raise ChartError(f"line {error.lineno}, column {error.colno}: not JSON; must be GeoJSON or KML") from None
     except (ValueError, RecursionError):
-        raise ChartError("not JSON that can be read; must be GeoJSON") from None
+        raise ChartError("not JSON that can be read; must be GeoJSON or KML") from None
     if not isinstance(found, dict) or "type" not in found:
         raise ChartError("not GeoJSON; must be a FeatureCollection, a Feature or a Polygon")
+    return found
+
+
+def _kml(content: bytes) -> dict[str, Any]:
+    """The placemarks of a KML file as GeoJSON has features; names and extended data are their properties."""
+    try:
+        root = ElementTree.fromstring(content)
+    except ElementTree.ParseError as error:
+        line, column = error.position
+        raise ChartError(f"line {line}, column {column + 1}: not XML; must be GeoJSON or KML") from None
+    except (ValueError, LookupError):
+        raise ChartError("not XML that can be read; must be GeoJSON or KML") from None
+    if root.tag.rpartition("}")[2] != "kml":
+        raise ChartError("not KML; must be GeoJSON or KML")
+    features = [
+        {"type": "Feature", "properties": _kml_properties(placemark), "geometry": _kml_geometry(placemark)}
+        for placemark in root.iterfind(".//{*}Placemark")
+    ]
+    return {"type": "FeatureCollection", "features": features}
+
+
+def _kml_properties(placemark: ElementTree.Element) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for one in (*placemark.iterfind(".//{*}Data"), *placemark.iterfind(".//{*}SimpleData")):
+        text = (one.findtext("{*}value") or one.text or "").strip()
+        try:
+            found[one.get("name", "")] = float(text)
+        except ValueError:
+            found[one.get("name", "")] = text
+    return {"name": (placemark.findtext("{*}name") or "").strip(), **found}
+
+
+def _kml_geometry(placemark: ElementTree.Element) -> dict[str, Any] | None:
+    """The geometry of a placemark; one of several parts, or none that charts have, keeps its name alone."""
+    holder = placemark.find("{*}MultiGeometry")
+    drawn = [one for one in (placemark if holder is None else holder) if one.tag.rpartition("}")[2] in _KML_GEOMETRIES]
+    if len(drawn) != 1:
+        return {"type": "MultiGeometry"} if drawn else None
+    kind = drawn[0].tag.rpartition("}")[2]
+    if kind == "Point":
+        return {"type": kind, "coordinates": next(iter(_kml_positions(drawn[0])), None)}
+    boundaries = [*drawn[0].iterfind("{*}outerBoundaryIs"), *drawn[0].iterfind("{*}innerBoundaryIs")]
+    return {"type": kind, "coordinates": [_kml_positions(one) for one in boundaries]}
+
+
+_KML_GEOMETRIES = ("Point", "LineString", "LinearRing", "Polygon", "Model", "Track")
+
+
+def _kml_positions(element: ElementTree.Element) -> list[list[float] | str]:
+    found: list[list[float] | str] = []
+    for word in (element.findtext(".//{*}coordinates") or "").split():
+        try:
+            found.append([float(number) for number in word.split(",")])
+        except ValueError:
+            found.append(word)
     return found
 
 
@@ -136,13 +194,13 @@ def _features(found: dict[str, Any]) -> Iterator[_Feature]:
             raise ChartError(f"a {kind} is not allowed; must be a FeatureCollection, a Feature or a Polygon")
     for number, feature in enumerate(features, start=1):
         match feature:
-            case {"type": "Feature", "geometry": {"type": str()} as geometry}:
+            case {"type": "Feature", "geometry": {"type": str()} | None as geometry}:
                 properties = feature.get("properties")
                 properties = properties if isinstance(properties, dict) else {}
                 role, rest = _role(properties)
                 name = next((str(properties[key]) for key in _ROLE_KEYS if properties.get(key)), "")
                 called = f"feature {number} ({name})" if name else f"feature {number}"
-                yield _Feature(called, role, rest, geometry, properties, epsg)
+                yield _Feature(called, role, rest, geometry or {"type": "missing geometry"}, properties, epsg)
             case _:
                 raise ChartError(f"feature {number}: must be a Feature with a geometry")
 
@@ -242,7 +300,7 @@ def _place(feature: _Feature, position: object) -> Place:
             raise ChartError(f"crs {error}") from error
     for name, value, limit in (("latitude", latitude_deg, 90), ("longitude", longitude_deg, 180)):
         if not -limit <= value <= limit:
-            hint = "; GeoJSON has longitude first" if name == "latitude" and abs(value) <= 180 else ""
+            hint = "; charts have longitude first" if name == "latitude" and abs(value) <= 180 else ""
             raise feature.wrong(f"{name} {value:g} is not allowed; must be from -{limit} to {limit}{hint}")
     return latitude_deg, longitude_deg
 

@@ -50,8 +50,8 @@ class AreaInDegrees(Mapping):
     holes_deg: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
     """In place of `holes_m`: the same for each hole."""
     file: str | None = None
-    """In place of polygon and holes: a GeoJSON file that draws them, relative to the scenario's. Its priorities follow
-    those that are given here."""
+    """In place of polygon and holes: a GeoJSON or KML file that draws them, relative to the scenario's. Its priorities
+    follow those that are given here."""
 
 
 class PriorityInDegrees(Mapping):
@@ -209,7 +209,7 @@ def _place_m(path: KeyPath, place: tuple[float, float], origin: GeographicOrigin
     x_m, y_m = (float(one) for one in origin.to_metres(place[1], place[0]))
     if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
         if path[:2] == ("area", "file"):
-            said = f"latitude {place[0]:g}, longitude {place[1]:g} is not; GeoJSON has longitude first"
+            said = f"latitude {place[0]:g}, longitude {place[1]:g} is not; charts have longitude first"
             raise _RefusedError(path[:2], None, f"all must be within {FARTHEST_KM} km of origin, but {said}")
         hint = "; latitude comes first" if isinstance(path[-1], int) else ""
         raise _RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")

@@ -105,6 +105,34 @@ def test_a_chart_in_a_utm_zone_is_the_same_one(folder: Path) -> None:
         assert np.array(ring) == pytest.approx(np.array(same), abs=1e-8)
 
 
+def kml(*placemarks: str) -> bytes:
+    head = '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document><Folder>'
+    return f"{head}{''.join(f'<Placemark>{one}</Placemark>' for one in placemarks)}</Folder></Document></kml>".encode()
+
+
+def kml_ring(ring: list[tuple[float, float]], side: str = "outer") -> str:
+    words = " ".join(f"{longitude},{latitude},0" for longitude, latitude in [*ring, ring[0]])
+    return f"<{side}BoundaryIs><LinearRing><coordinates>\n{words}\n</coordinates></LinearRing></{side}BoundaryIs>"
+
+
+def extended(**data: object) -> str:
+    inner = "".join(f'<Data name="{key}"><value>{value}</value></Data>' for key, value in data.items())
+    return f"<ExtendedData>{inner}</ExtendedData>"
+
+
+def test_a_chart_in_kml_is_the_same_one(folder: Path) -> None:
+    draw(BAY)
+    area = f"<name>Area</name><Polygon>{kml_ring(L_SHAPE)}{kml_ring(INNER, 'inner')}</Polygon>"
+    hole = f"<name>hole</name><MultiGeometry><Polygon>{kml_ring(HOLE)}</Polygon></MultiGeometry>"
+    lane = f"<name>Lane</name>{extended(role='priority', weight=4)}<Polygon>{kml_ring(LANE)}</Polygon>"
+    light = "<name>Lighthouse</name><Point><coordinates>10.5,59.89</coordinates></Point>"
+    start = "<name>start primary</name><Point><coordinates>10.4995,59.8795,3</coordinates></Point>"
+    north = f"<name>start North Boat</name>{extended(heading_deg=90)}"
+    boat = f"{north}<Point><coordinates>10.4995,59.8792</coordinates></Point>"
+    Path("bay.kml").write_bytes(kml(area, hole, lane, light, start, boat))
+    assert read_chart(folder / "bay.kml") == read_chart(folder / "bay.geojson")
+
+
 @pytest.fixture
 def made(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Scenario:
     draw(BAY)
@@ -177,18 +205,18 @@ def both(one: object) -> dict[str, Any]:
 
 
 BAD: dict[str, tuple[object, str]] = {
-    "empty": (b"", "the file is empty; must be GeoJSON"),
-    "blank": (b" \n", "the file is empty; must be GeoJSON"),
-    "not JSON": (b'{"type":\n oops}', "line 2, column 2: not JSON; must be GeoJSON"),
+    "empty": (b"", "the file is empty; must be GeoJSON or KML"),
+    "blank": (b" \n", "the file is empty; must be GeoJSON or KML"),
+    "not JSON": (b'{"type":\n oops}', "line 2, column 2: not JSON; must be GeoJSON or KML"),
     "not UTF-8": (b'{"type": "\xff"}', "byte 0xff is not allowed; must be UTF-8 text"),
-    "nested without end": (b"[" * 200_000, "not JSON that can be read; must be GeoJSON"),
+    "nested without end": (b"[" * 200_000, "not JSON that can be read; must be GeoJSON or KML"),
     "a list": ([1], "not GeoJSON; must be a FeatureCollection, a Feature or a Polygon"),
     "other JSON": ({"area": 1}, "not GeoJSON; must be a FeatureCollection, a Feature or a Polygon"),
     "a bare line": (
         {"type": "LineString", "coordinates": []},
         "a LineString is not allowed; must be a FeatureCollection, a Feature or a Polygon",
     ),
-    "no geometry": (both({"type": "Feature", "geometry": None}), "feature 2: must be a Feature with a geometry"),
+    "no geometry": (both({"type": "Feature", "geometry": "here"}), "feature 2: must be a Feature with a geometry"),
     "no features": (
         {"type": "FeatureCollection", "features": []},
         "no feature is the area; must have one polygon whose role or name is area",
@@ -244,11 +272,11 @@ BAD: dict[str, tuple[object, str]] = {
     ),
     "beyond the pole": (
         both(place(10.5, 95)),
-        "feature 2 (start): latitude 95 is not allowed; must be from -90 to 90; GeoJSON has longitude first",
+        "feature 2 (start): latitude 95 is not allowed; must be from -90 to 90; charts have longitude first",
     ),
     "swapped": (
         feature(polygon([(-33.8, 151.2), (-33.8, 151.3), (-33.7, 151.3)]), role="area"),
-        "feature 1 (area): latitude 151.2 is not allowed; must be from -90 to 90; GeoJSON has longitude first",
+        "feature 1 (area): latitude 151.2 is not allowed; must be from -90 to 90; charts have longitude first",
     ),
     "beyond the antimeridian": (
         both(place(181, 10)),
@@ -257,6 +285,29 @@ BAD: dict[str, tuple[object, str]] = {
     "text for a number": (
         both(place("10.5", 59.88)),
         'feature 2 (start): ["10.5", 59.88] is not allowed; must be longitude and latitude, two numbers',
+    ),
+    "not XML": (b"<kml>\n <oops", "line 2, column 2: not XML; must be GeoJSON or KML"),
+    "other XML": (b"<svg/>", "not KML; must be GeoJSON or KML"),
+    "an unknown encoding": (
+        b'<?xml version="1.0" encoding="x-none"?><kml/>',
+        "not XML that can be read; must be GeoJSON or KML",
+    ),
+    "KML without an area": (kml(), "no feature is the area; must have one polygon whose role or name is area"),
+    "KML without a geometry": (
+        kml("<name>area</name>"),
+        "feature 1 (area): a missing geometry is not allowed; must be a Polygon",
+    ),
+    "a line in KML": (
+        kml("<name>area</name><LineString><coordinates>1,2 3,4</coordinates></LineString>"),
+        "feature 1 (area): a LineString is not allowed; must be a Polygon",
+    ),
+    "two parts in KML": (
+        kml(f"<name>area</name><MultiGeometry>{2 * f'<Polygon>{kml_ring(HOLE)}</Polygon>'}</MultiGeometry>"),
+        "feature 1 (area): a MultiGeometry is not allowed; must be a Polygon",
+    ),
+    "no numbers in KML": (
+        kml("<name>start</name><Point><coordinates>east,north</coordinates></Point>"),
+        'feature 1 (start): "east,north" is not allowed; must be longitude and latitude, two numbers',
     ),
     "an unknown grid": (
         {**both(AREA), "crs": {"properties": {"name": "EPSG:27700"}}},
@@ -321,11 +372,11 @@ def test_a_scenario_may_name_the_chart(write: Write, valid_text: str, tmp_path: 
     [
         (BAY, "file: bay.geojson", "feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, "
             "start; secondlook new leaves such features out"),
-        (b"", "file: bay.geojson", "the file is empty; must be GeoJSON"),
+        (b"", "file: bay.geojson", "the file is empty; must be GeoJSON or KML"),
         (DRAWN, f"file: bay.geojson\n  {SQUARE}", "must be left out beside polygon_m"),
         (DRAWN, "file: bay.geojson\n  holes_deg: []", "must be left out beside holes_deg"),
         (polygon([(longitude, latitude) for latitude, longitude in L_SHAPE]), "file: bay.geojson", "all must be within "
-            "100 km of origin, but latitude 10.5, longitude 59.88 is not; GeoJSON has longitude first"),
+            "100 km of origin, but latitude 10.5, longitude 59.88 is not; charts have longitude first"),
         (both(feature(polygon([(10.6, 59.88), (10.61, 59.88), (10.61, 59.881)]), role="hole")), "file: bay.geojson",
             "must lie inside the area, without touching its edge"),
         (both(feature(polygon([(10.6, 59.88), (10.61, 59.88), (10.61, 59.881)]), role="priority")), "file: bay.geojson",
