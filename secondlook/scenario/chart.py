@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,6 +14,7 @@ import shapely
 
 from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS
 from secondlook.geography import UnknownGridError, utm_to_degrees
+from secondlook.scenario.errors import shown
 
 LARGEST_CHART_BYTES = 10_000_000
 USUAL_WEIGHT = 3.0
@@ -237,7 +237,7 @@ def _take(feature: _Feature, drawn: _Drawn) -> None:
         case "priority":
             weight = feature.properties.get("weight", USUAL_WEIGHT)
             if not _is_number(weight) or not 0 <= weight <= 100:
-                raise feature.wrong(f"weight {json.dumps(weight)} is not allowed; must be a number from 0 to 100")
+                raise feature.wrong(f"weight {shown(weight)} is not allowed; must be a number from 0 to 100")
             drawn.priorities.append((_rings(feature, holes=False)[0], float(weight)))
         case "start":
             drawn.starts.append(_start(feature))
@@ -251,7 +251,7 @@ def _start(feature: _Feature) -> ChartStart:
         raise feature.wrong(f"a {feature.geometry['type']} is not allowed; must be a Point")
     heading_deg = feature.properties.get("heading_deg", 0.0)
     if not _is_number(heading_deg) or not 0 <= heading_deg < 360:
-        said = json.dumps(heading_deg)
+        said = shown(heading_deg)
         raise feature.wrong(f"heading_deg {said} is not allowed; must be a number from 0 to less than 360")
     vehicle = feature.properties.get("vehicle") or feature.rest
     return ChartStart(str(vehicle), _place(feature, feature.geometry.get("coordinates")), float(heading_deg))
@@ -291,7 +291,7 @@ def _ring(feature: _Feature, ring: object, most: int) -> Ring:
 
 def _place(feature: _Feature, position: object) -> Place:
     if not isinstance(position, list) or len(position) < 2 or not all(map(_is_number, position)):
-        raise feature.wrong(f"{json.dumps(position)[:60]} is not allowed; must be longitude and latitude, two numbers")
+        raise feature.wrong(f"{shown(position)} is not allowed; must be longitude and latitude, two numbers")
     longitude_deg, latitude_deg = float(position[0]), float(position[1])
     if feature.epsg is not None:
         try:
@@ -306,4 +306,4 @@ def _place(feature: _Feature, position: object) -> Place:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e9

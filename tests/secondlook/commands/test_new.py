@@ -282,6 +282,10 @@ BAD: dict[str, tuple[object, str]] = {
         both(place(181, 10)),
         "feature 2 (start): longitude 181 is not allowed; must be from -180 to 180",
     ),
+    "more digits than a float holds": (
+        both(feature(SOUNDING, role="start", heading_deg=10**310)),
+        f"feature 2 (start): heading_deg 1{56 * '0'}... is not allowed; must be a number from 0 to less than 360",
+    ),
     "text for a number": (
         both(place("10.5", 59.88)),
         'feature 2 (start): ["10.5", 59.88] is not allowed; must be longitude and latitude, two numbers',
