@@ -120,10 +120,13 @@ def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
     turned = InMetres(copy.deepcopy(data))
     for path, holder, model in _holders(turned.data):
         given = {key: holder[key] for key in model.model_fields if key in holder}
-        for key in given or ():
-            turned.written.update({(*path, metres): ((*path, key), given[key]) for metres in _GIVES[key]})
-        for key in model.model_fields if given and model is StartInDegrees else ():
-            turned.written.setdefault((*path, *_GIVES[key]), ((*path, key), None))
+        if not given:
+            continue
+        for key, value in given.items():
+            turned.written.update({(*path, metres): ((*path, key), value) for metres in _GIVES[key]})
+        if model is StartInDegrees:  # of which one alone is none
+            for key in model.model_fields.keys() - given.keys():
+                turned.written[*path, *_GIVES[key]] = ((*path, key), None)
         try:
             checked = model.model_validate(given)
             for key, value in given.items():
@@ -131,8 +134,7 @@ def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
                     raise _RefusedError((*path, key), value, f"must be left out beside {' and '.join(others)}")
                 if data.get("origin") is None:
                     raise _RefusedError((*path, key), value, _NEEDS_ORIGIN)
-            if given:
-                _turn(turned, path, holder, checked, folder)
+            _turn(turned, path, holder, checked, folder)
         except ValidationError as error:
             turned.errors.extend({**one, "loc": (*path, *one["loc"])} for one in error.errors())
         except _RefusedError as error:

@@ -114,10 +114,8 @@ class TestTheAnnouncement:
     def test_an_endurance_below_a_millisecond_is_one(self) -> None:
         assert helper(announced("vehicles.helper.endurance_s=0.0001")).endurance_ms == 1
 
-    def test_an_area_smaller_than_a_centimetre_is_refused(self) -> None:
-        scenario = load_scenario(
-            "tellaro", ["area.polygon_m=[[0, 0], [0.004, 0], [0.004, 0.004]]", "area.cell_m=0.001"]
-        )
+    def test_an_area_thinner_than_a_centimetre_is_refused(self) -> None:
+        scenario = load_scenario("tellaro", ["area.polygon_m=[[0, 0], [5, 0], [5, 0.004]]", "area.cell_m=0.001"])
         with pytest.raises(UserError, match="an area that has none in whole centimetres"):
             build_fleet(scenario, record=False)
 
