@@ -19,8 +19,9 @@ class GeographicOrigin:
     """Where the mission frame's origin is, WGS84: latitude from -89 to 89, longitude from -180 to 180.
 
     Raises ValueError outside of that. A place of the mission frame is where the geodesic leads that leaves the origin
-    in the compass direction of x (east) and y (north), and as far away. So distances from the origin are geodesic ones;
-    between two places within 10 km of it the distance in the frame and the geodesic one differ by less than 4 mm.
+    in the compass direction of x (east) and y (north), and as far away. So distances from the origin are geodesic ones,
+    to the millimetre; between two places within 10 km of it the distance in the frame and the geodesic one differ by
+    less than 4 mm.
     """
 
     latitude_deg: float
