@@ -79,7 +79,7 @@ class _Body:
         self._vehicle = SimulatedVehicle(config, world.seed)
         self._looks = Looks(
             exact,
-            sonar=config.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed)),
+            sonar=config.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed), config.vehicle),
             targets=Targets(world.area, 0, 0),
             recogniser=Recogniser(config.sensor.curve, false_alarms_per_km2=0),
             seed=world.seed,

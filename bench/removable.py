@@ -166,7 +166,7 @@ def _leg_sensor(
 ) -> LegSensor:
     curve = body.sensor.curve
     swath = Swath.of(grid, 2 * float(curve.range_m[-1]))
-    sonar = body.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed))
+    sonar = body.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed), body.vehicle)
     x_m, y_m = grid.frame.to_mission(grid.across_m[np.newaxis, :], grid.along_m[:, np.newaxis])
     # Either side looks across the same crests: a leg there and a leg back see alike.
     bearing_rad = grid.frame.heading_rad + (0.0 if across else math.pi / 2)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from traceback import walk_tb
 
 LONGEST_TOLD = 500  # characters of a sentence of others'
 
@@ -36,9 +38,26 @@ NO_FAILURES = (KeyboardInterrupt, Stop)
 """What a call of a part may raise that is no failure of that part; all else is one, also `SystemExit`."""
 
 
+_NO_PARTS = sys.stdlib_module_names | {
+    *("comms", "coordinator", "planner", "secondlook", "sim_world", "vehicle_agent", "viz"),
+    *("numpy", "shapely"),
+}
+"""Packages that are ours or that we call ourselves: all else is a part of a user's own, or called by one."""
+
+
 def in_words(error: BaseException) -> str:
-    """An error's type and text, see `one_line`."""
-    return one_line(" ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":"))
+    """An error's type and text, see `one_line`; and where a part of a user's own has raised it: file, line and function
+    of the last line of that part's own in the traceback, whatever library it called there."""
+    told = one_line(" ".join(f"{type(error).__name__}: {error}".split()).removesuffix(":"))
+    frames = [(frame.f_globals.get("__name__", ""), frame.f_code, line) for frame, line in walk_tb(error.__traceback__)]
+    packages = [name.partition(".")[0] for name, _, _ in frames]
+    own = next((one for one in packages if one not in _NO_PARTS), None)
+    if own is None:
+        return told
+    place = max(index for index, one in enumerate(packages) if one == own)
+    _, code, line = frames[place]
+    within = f", in {code.co_name}" if code.co_name.isidentifier() else ""
+    return f"{told} ({one_line(Path(code.co_filename).name)}, line {line}{within})"
 
 
 class FleetError(Exception):

@@ -16,13 +16,11 @@ import numpy as np
 from comms.said.wire import IDENTIFIER
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.footprints import FOOTPRINTS
-from sim_world.sonar import CurveSonar, Seabed, SonarModel, SufferedSeabed
+from sim_world.sonar import HIGHEST_P_DETECT, CheckedSonar, CurveSonar, Seabed, SonarModel, SufferedSeabed
 
 FARTHEST_M = 1e6
 """No position, run-in or turn radius of the world is larger; what follows from them then fits the wire's metres."""
 FARTHEST_RANGE_M = 1e4
-HIGHEST_P_DETECT = 0.999
-"""The wire refuses P_d above this."""
 LARGEST_LOOK_CELLS = 65_536
 LARGEST_LOOK_TARGETS = 1_000
 LARGEST_NOISE = 2.0
@@ -115,10 +113,12 @@ class SensorConfig:
         half_rad = self.half_at_crab_rad
         _require(half_rad is None or 1e-3 <= half_rad <= math.pi / 2, "half_at_crab_rad", half_rad, "0.001 to pi / 2")
 
-    def sonar_over(self, seabed: Seabed) -> SonarModel:
-        """The true model over a seabed, of which it loses its share."""
+    def sonar_over(self, seabed: Seabed, vehicle: str) -> SonarModel:
+        """The true model of a vehicle's sonar over a seabed, of which it loses its share."""
         suffered = seabed if self.seabed_share == 1.0 else SufferedSeabed(seabed, self.seabed_share)
-        return (self.sonar or CurveSonar)(curve=self.curve, seabed=suffered)
+        if self.sonar is None:
+            return CurveSonar(self.curve, suffered)
+        return CheckedSonar(self.sonar(curve=self.curve, seabed=suffered), vehicle)
 
     @property
     def bins_per_look(self) -> int:

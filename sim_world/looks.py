@@ -8,10 +8,10 @@ import numpy as np
 from comms.node import random_stream
 from comms.said.messages import Look, LookContact, TruthLook
 from planner.types import FloatArray, Point
-from sim_world.config import HIGHEST_P_DETECT, VehicleConfig
+from sim_world.config import VehicleConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
-from sim_world.sonar import SonarModel
+from sim_world.sonar import HIGHEST_P_DETECT, SonarModel
 from sim_world.steadiness import STILL_WATER, Current, Steadiness
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import Stretch

@@ -1,5 +1,5 @@
 """How well a sonar truly sees: what is asked of any, what it asks of the seabed, and the sonar whose P_d follows a
-curve over range."""
+curve over range. What a user's own model answers is checked."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import numpy as np
 
 from planner.types import DetectionCurve, FloatArray
 
+HIGHEST_P_DETECT = 0.999
+"""The wire refuses P_d above this."""
 Position = tuple[FloatArray, FloatArray]
 """x and y, mission frame."""
 
@@ -43,8 +45,8 @@ class SonarModel(Protocol):
         position_m: Position,
         time_s: float,
     ) -> FloatArray:
-        """P_d in [0, 1) of what lies at `position_m` (mission frame, true), seen at the range `range_m` >= 0 over the
-        ground along the compass bearing `look_bearing_rad` from `altitude_m` above the seabed at `time_s`. The
+        """P_d, 0 to 0.999, of what lies at `position_m` (mission frame, true), seen at the range `range_m` >= 0 over
+        the ground along the compass bearing `look_bearing_rad` from `altitude_m` above the seabed at `time_s`. The
         arguments broadcast."""
 
 
@@ -68,3 +70,39 @@ class CurveSonar:
     ) -> FloatArray:
         """The curve at the range times the seabed's factor at the position."""
         return np.multiply(self._curve.at(range_m), self._seabed.factor(*position_m, look_bearing_rad))
+
+
+class CheckedSonar:
+    """A sonar model of a user's own, whose answers are looked at before the world goes on with them: a NaN among them
+    would only show as a map that nobody can explain. `vehicle` is whose sonar it is."""
+
+    def __init__(self, model: SonarModel, vehicle: str) -> None:
+        self._model = model
+        kind = type(model)
+        self._told = f"the sonar model of {vehicle}, {kind.__module__}:{kind.__qualname__},"
+
+    def p_detect(
+        self,
+        range_m: FloatArray,
+        look_bearing_rad: FloatArray | float,
+        altitude_m: float,
+        position_m: Position,
+        time_s: float,
+    ) -> FloatArray:
+        """The model's answer. Raises ValueError, which names the model, where that is no array of P_d in the arguments'
+        common shape."""
+        answer = self._model.p_detect(range_m, look_bearing_rad, altitude_m, position_m, time_s)
+        try:
+            p_detect = np.asarray(answer, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise ValueError(f"{self._told} must answer with an array of P_d, not {answer!r}") from error
+        shape = np.broadcast_shapes(*(np.shape(one) for one in (range_m, look_bearing_rad, *position_m)))
+        if p_detect.shape != shape:
+            raise ValueError(f"{self._told} answers in the shape {p_detect.shape} to what has the shape {shape}")
+        wrong = ~((p_detect >= 0.0) & (p_detect <= HIGHEST_P_DETECT))  # a NaN is not in order with any number
+        if wrong.any():
+            place_m, given = np.broadcast_to(range_m, shape)[wrong].flat[0], p_detect[wrong].flat[0]
+            raise ValueError(
+                f"{self._told} gives a P_d of {given:g} at a range of {place_m:g} m; must be 0 to {HIGHEST_P_DETECT}"
+            )
+        return p_detect

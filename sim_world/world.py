@@ -26,7 +26,7 @@ class Body:
         sensor = config.sensor
         self._looks = Looks(
             config,
-            sonar=sensor.sonar_over(seabed),
+            sonar=sensor.sonar_over(seabed, config.vehicle),
             targets=targets,
             recogniser=Recogniser(sensor.curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
             seed=world.seed,

@@ -19,10 +19,10 @@ from comms.said.announcement import LARGEST_SEED
 from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
 from secondlook.errors import UserError
-from secondlook.launch.mission import RunOptions, check_bodies, run_mission
+from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.run_display import closing_table, progress_display
-from secondlook.launch.run_folder import run_folder
+from secondlook.launch.run_folder import run_folder, traceback_files
 from secondlook.report import write_report
 from secondlook.scenario import load_scenario
 
@@ -162,6 +162,8 @@ def run(
         unreported = "" if no_record or no_report else _report(folder)
         if failure:
             sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
+            for log in traceback_files(folder / LOGS):
+                sys.stderr.write(f"The whole traceback is in {log}\n")
         elif unreported:
             sys.stderr.write(f"{unreported}\n")
         if not failure and as_json:

@@ -47,6 +47,14 @@ class _LogFile(logging.FileHandler):
         pass
 
 
+TRACEBACK = "Traceback (most recent call last):"
+
+
+def traceback_files(folder: Path) -> list[Path]:
+    """Of the logs in a folder those in which somebody has failed and says where."""
+    return [log for log in sorted(folder.glob("*.txt")) if TRACEBACK in log.read_text(errors="replace")]
+
+
 @contextmanager
 def log_to_file(path: Path) -> Iterator[None]:
     """Within it warnings and errors go to the file, which is made when there is one to write; its folder is taken away

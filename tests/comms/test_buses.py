@@ -137,7 +137,9 @@ def test_a_node_that_raises_ends_the_run_with_a_sentence_that_names_it() -> None
 
     alpha = Scripted(starts=lambda now_ms: Step(wake_ms=1500), wakes=break_down)
     notes = Notes()
-    with pytest.raises(NodeError, match=r"^alpha has failed at 1\.500 s: RuntimeError: flooded$"):
+    with pytest.raises(
+        NodeError, match=r"^alpha has failed at 1\.500 s: RuntimeError: flooded \(\w+\.py, line \d+, in \w+\)$"
+    ):
         BUSES["local"]({"alpha": alpha}, notes)
     assert notes.closed == 1
 

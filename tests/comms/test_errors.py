@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comms.errors import LONGEST_TOLD, one_line
+from comms.errors import LONGEST_TOLD, in_words, one_line
 
 
 @pytest.mark.parametrize(
@@ -32,3 +34,15 @@ def test_whatever_comes_is_one_printable_line_of_bounded_length(text: str) -> No
     assert line.isprintable()
     assert len(line.splitlines()) <= 1
     assert len(line) <= 23
+
+
+def test_what_a_part_of_a_users_own_raises_is_told_with_its_last_line_even_in_a_library() -> None:
+    with pytest.raises(ValueError, match="deep") as raised:
+        raises_in_a_library()
+    line = raises_in_a_library.__code__.co_firstlineno + 1
+    told = "ValueError: Invalid literal for Fraction: 'deep'"
+    assert in_words(raised.value) == f"{told} (test_errors.py, line {line}, in raises_in_a_library)"
+
+
+def raises_in_a_library() -> None:
+    Fraction("deep")

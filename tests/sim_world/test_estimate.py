@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim_world.config import HIGHEST_P_DETECT
 from sim_world.looks import LOWEST_SEEN, PDetectEstimate
+from sim_world.sonar import HIGHEST_P_DETECT
 
 TRUTHS = (0.05, 0.3, 0.49, 0.7, 0.9)
 

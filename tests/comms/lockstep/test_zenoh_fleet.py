@@ -139,7 +139,10 @@ def break_down(*_: object) -> Step:
 def test_a_node_that_raises_is_named_with_what_it_raised() -> None:
     alpha = Scripted(starts=lambda now_ms: Step(wake_ms=1500), wakes=break_down)
     notes = Notes()
-    with pytest.raises(FleetError, match=r"^alpha has failed at 1\.500 s: RuntimeError: flooded to the top$"):
+    with pytest.raises(
+        FleetError,
+        match=r"^alpha has failed at 1\.500 s: RuntimeError: flooded to the top \(\w+\.py, line \d+, in \w+\)$",
+    ):
         over_zenoh({"alpha": alpha}, notes)
     assert notes.closed == 1
 
@@ -165,8 +168,8 @@ class FailingToClose(Notes):
 @pytest.mark.parametrize(
     ("listener", "sentence"),
     [
-        (Failing, r"^observer has failed at 0\.001 s: OSError: no space left$"),
-        (FailingToClose, r"^observer has failed: OSError: no space left$"),
+        (Failing, r"^observer has failed at 0\.001 s: OSError: no space left \(\w+\.py, line \d+, in \w+\)$"),
+        (FailingToClose, r"^observer has failed: OSError: no space left \(\w+\.py, line \d+, in \w+\)$"),
     ],
 )
 def test_a_listener_that_raises_is_named_and_closed_once(run_on: Bus, listener: type[Notes], sentence: str) -> None:

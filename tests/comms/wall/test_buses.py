@@ -113,7 +113,10 @@ def test_a_node_that_raises_ends_the_run_and_is_named(bus: Callable[..., BusResu
         raise RuntimeError("flooded")
 
     notes = Notes()
-    with pytest.raises((NodeError, FleetError), match=r"^beta has failed at \d+\.\d{3} s: RuntimeError: flooded$"):
+    with pytest.raises(
+        (NodeError, FleetError),
+        match=r"^beta has failed at \d+\.\d{3} s: RuntimeError: flooded \(\w+\.py, line \d+, in \w+\)$",
+    ):
         bus({"beta": Scripted(hears=fails)}, notes)
     assert notes.closed == 1
 

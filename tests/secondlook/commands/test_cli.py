@@ -143,7 +143,8 @@ def test_a_survey_that_outlasts_its_battery_is_told(
         (("tellaro", "--json", "--geojson"), "--geojson: is not allowed with --json; one form at a time\n"),
         (
             ("tellaro", "--set", "vehicles.primary.spacing=stubborn_spacing:Stubborn"),
-            "stubborn_spacing:Stubborn has failed to lay tracks: RuntimeError: not today\n",
+            "stubborn_spacing:Stubborn has failed to lay tracks: RuntimeError: not today "
+            "(stubborn_spacing.py, line 14, in decide)\n",
         ),
     ],
 )

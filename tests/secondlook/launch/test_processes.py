@@ -214,15 +214,30 @@ def say_nothing(pids: dict[str, int]) -> None:
 @pytest.mark.parametrize(
     ("node", "factory", "config", "sentence"),
     [
-        ("helper", "FailsAtSecond", "raise", r"helper has failed at \d\.\d{3} s: RuntimeError: flooded"),
-        ("world", "FailsAtSecond", "raise", r"world has failed at \d\.\d{3} s: RuntimeError: flooded"),
+        (
+            "helper",
+            "FailsAtSecond",
+            "raise",
+            r"helper has failed at \d\.\d{3} s: RuntimeError: flooded \(\w+\.py, line \d+, in \w+\)",
+        ),
+        (
+            "world",
+            "FailsAtSecond",
+            "raise",
+            r"world has failed at \d\.\d{3} s: RuntimeError: flooded \(\w+\.py, line \d+, in \w+\)",
+        ),
         ("helper", "FailsAtSecond", "7", r"helper has ended with exit code 7 at \d\.\d{3} s of the mission"),
         ("helper", "FailsAtSecond", "0", r"helper has ended with exit code 0 at \d\.\d{3} s of the mission"),
         ("world", "FailsAtSecond", "7", r"world has ended with exit code 7"),
-        ("helper", "CannotBeMade", "", r"helper has failed: ValueError: no such vehicle"),
-        ("world", "CannotBeMade", "", r"world has failed: ValueError: no such vehicle"),
+        ("helper", "CannotBeMade", "", r"helper has failed: ValueError: no such vehicle \(\w+\.py, line \d+, in \w+\)"),
+        ("world", "CannotBeMade", "", r"world has failed: ValueError: no such vehicle \(\w+\.py, line \d+, in \w+\)"),
         ("coordinator", "Missing", "", r"coordinator has failed: AttributeError: .*has no attribute 'Missing'"),
-        ("recorder", "ListenerThatFails", 3, r"recorder has failed at \d\.\d{3} s: OSError: no space left on device"),
+        (
+            "recorder",
+            "ListenerThatFails",
+            3,
+            r"recorder has failed at \d\.\d{3} s: OSError: no space left on device \(\w+\.py, line \d+, in \w+\)",
+        ),
     ],
 )
 def test_a_node_that_fails_in_its_process_is_named_with_its_reason(
@@ -240,7 +255,9 @@ def test_an_observer_that_fails_is_named_with_its_reason(tmp_path: Path, fleet: 
         raise OSError("no space left on device")
 
     said = run_fleet(fleet, tmp_path, Saboteur(), RECORDER_THAT_LISTENS, fail, 20.0)
-    assert re.fullmatch(r"observer has failed at \d+\.\d{3} s: OSError: no space left on device", said)
+    assert re.fullmatch(
+        r"observer has failed at \d+\.\d{3} s: OSError: no space left on device \(\w+\.py, line \d+, in \w+\)", said
+    )
 
 
 @pytest.mark.parametrize("bus", ["zenoh", "local"])
@@ -258,7 +275,9 @@ def test_a_failed_mission_has_exit_code_1_and_its_traceback_in_a_file(
         cli.main()
     printed = capsys.readouterr()
     assert (stopped.value.code, printed.out) == (1, "")
-    assert re.fullmatch(r"helper has failed at \d\.\d{3} s: RuntimeError: flooded; what was .*\n", printed.err)
     log = folder / "logs" / ("helper.txt" if bus == "zenoh" else "launcher.txt")
+    said = r"helper has failed at \d\.\d{3} s: RuntimeError: flooded \(faulty_nodes\.py, line \d+, in \w+\)"
+    told = rf"{said}; what was recorded is in {folder}\nThe whole traceback is in {log}\n"
+    assert re.fullmatch(told, printed.err), printed.err
     assert "Traceback" in log.read_text()
     assert list((folder / "logs").iterdir()) == [log]

@@ -62,6 +62,30 @@ class Deaf(CurveSonar):
     def p_detect(self, range_m, look_bearing_rad, altitude_m, position_m, time_s):
         return 0.1 * super().p_detect(range_m, look_bearing_rad, altitude_m, position_m, time_s)
 
+class Undecided(CurveSonar):
+    def p_detect(self, *asked):
+        return super().p_detect(*asked) * float("nan")
+
+class Certain(CurveSonar):
+    def p_detect(self, *asked):
+        return super().p_detect(*asked) + 1.25
+
+class Negative(CurveSonar):
+    def p_detect(self, *asked):
+        return super().p_detect(*asked) - 1.0
+
+class Narrow(CurveSonar):
+    def p_detect(self, *asked):
+        return super().p_detect(*asked)[..., :1]
+
+class Wordy(CurveSonar):
+    def p_detect(self, *asked):
+        return "well"
+
+class Broken(CurveSonar):
+    def p_detect(self, *asked):
+        return asked[7]
+
 class HalfCharged(SurveyAgent):
     def battery(self, now_ms):
         return 0.5
@@ -201,11 +225,12 @@ def test_what_cannot_be_used_is_refused_before_anything_flies(folder: Path, sett
     [
         (
             "coordinator.allocator=quits:X",
-            'coordinator.allocator: "quits:X" is not allowed; must be importable; SystemExit: 0',
+            'coordinator.allocator: "quits:X" is not allowed; must be importable; SystemExit: 0 (quits.py, line 1)',
         ),
         (
             "vehicles.primary.prior_curve=quits:X",
-            'vehicles.primary.prior_curve: "quits:X" is not allowed; must be importable; SystemExit: 0',
+            'vehicles.primary.prior_curve: "quits:X" is not allowed; must be importable; '
+            "SystemExit: 0 (quits.py, line 1)",
         ),
         (
             "vehicles.primary.prior_curve=sys:exit",
@@ -221,18 +246,32 @@ def test_a_part_that_exits_before_anything_flies_is_refused(folder: Path, settin
 
 def test_a_part_that_exits_when_it_is_made_is_refused(folder: Path) -> None:
     code, _, error = run(folder, "coordinator.allocator=own:NeverMade")
-    assert (code, error) == (2, "own:NeverMade cannot be made: SystemExit: 0\n")
+    assert code == 2
+    line = 1 + OWN.splitlines().index("class NeverMade(Idle):") + 2
+    assert error == f"own:NeverMade cannot be made: SystemExit: 0 (own.py, line {line}, in __init__)\n"
 
 
 @pytest.mark.parametrize("bus", ["local", "zenoh"])
 @pytest.mark.parametrize(
     ("setting", "sentence"),
     [
-        ("coordinator.allocator=own:Quits", r"coordinator has failed at \d+\.\d+ s: SystemExit"),
-        ("coordinator.allocator=own:Leaves", r"coordinator has failed at \d+\.\d+ s: GeneratorExit: no more"),
-        ("vehicles.primary.spacing=own:QuitsPlanning", r"primary has failed at 0\.001 s: SystemExit"),
-        ("vehicles.primary.agent=own:QuitsAtStart", r"primary has failed at 0\.000 s: SystemExit: 0"),
-        ("vehicles.primary.agent=own:AgentNeverMade", "primary has failed: SystemExit: 0"),
+        (
+            "coordinator.allocator=own:Quits",
+            r"coordinator has failed at \d+\.\d+ s: SystemExit \(own\.py, line \d+, in assign\)",
+        ),
+        (
+            "coordinator.allocator=own:Leaves",
+            r"coordinator has failed at \d+\.\d+ s: GeneratorExit: no more \(own.*, in assign\)",
+        ),
+        (
+            "vehicles.primary.spacing=own:QuitsPlanning",
+            r"primary has failed at 0\.001 s: SystemExit \(own.*, in decide\)",
+        ),
+        (
+            "vehicles.primary.agent=own:QuitsAtStart",
+            r"primary has failed at 0\.000 s: SystemExit: 0 \(own.*, in start\)",
+        ),
+        ("vehicles.primary.agent=own:AgentNeverMade", r"primary has failed: SystemExit: 0 \(own.*, in __init__\)"),
     ],
 )
 def test_a_part_that_exits_has_failed(folder: Path, setting: str, sentence: str, bus: str) -> None:
@@ -256,11 +295,35 @@ def test_a_part_that_fails_ends_the_mission_with_one_sentence(
     folder: Path, setting: str, sentence: str, bus: str
 ) -> None:
     code, _, error = run(folder, setting, bus=bus)
-    told = [
-        line for line in error.splitlines() if not line.startswith(("secondlook.comms:", "Traceback", " ", "Runtime"))
-    ]
     assert code == 1
-    assert any(line.startswith(sentence) for line in told), error
+    told, where = error.splitlines()
+    assert told.startswith(sentence)
+    assert where.startswith("The whole traceback is in runs/")
+    whole = (folder / where.removeprefix("The whole traceback is in ")).read_text()
+    assert "Traceback (most recent call last):" in whole
+    assert "\n" + re.findall(r"\w+Error: [^(;]*[^ (;]", told)[0] in whole
+
+
+SONAR = "ValueError: the sonar model of helper, own:"
+
+
+@pytest.mark.parametrize("bus", ["local", "zenoh"])
+@pytest.mark.parametrize(
+    ("model", "sentence"),
+    [
+        ("Undecided", SONAR + r"Undecided, gives a P_d of nan at a range of \d+ m; must be 0 to 0\.999"),
+        ("Certain", SONAR + r"Certain, gives a P_d of 1\.95 at a range of \d+ m; must be 0 to 0\.999"),
+        ("Negative", SONAR + r"Negative, gives a P_d of -0\.3 at a range of \d+ m; must be 0 to 0\.999"),
+        ("Narrow", SONAR + r"Narrow, answers in the shape \(2, 4, 1\) to what has the shape \(2, 4, 26\)"),
+        ("Wordy", SONAR + r"Wordy, must answer with an array of P_d, not 'well'"),
+        ("Broken", r"IndexError: tuple index out of range \(own\.py, line \d+, in p_detect\)"),
+    ],
+)
+def test_a_sonar_model_that_answers_wrongly_is_named(folder: Path, model: str, sentence: str, bus: str) -> None:
+    code, _, error = run(folder, f"vehicles.helper.sensor.sonar=own:{model}", bus=bus)
+    assert code == 1
+    assert re.match(rf"world has failed at \d+\.\d+ s: {sentence}; what was recorded is in ", error), error
+    assert error.count("\n") == 2
 
 
 @pytest.mark.parametrize(
