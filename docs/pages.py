@@ -190,6 +190,19 @@ def _meaning(key: str, models: tuple[type[BaseModel], ...]) -> str:
 VALUES = {"<int range>": "N", "<float range>": "X", "<float>": "X", "<path>": "PATH", "<str>": "TEXT"}
 
 
+EXIT_CODES = (
+    ("0", "done"),
+    (
+        "1",
+        "it was tried and did not come right, and a sentence on standard error or in the output says why: a mission "
+        "failed, was interrupted (Ctrl-C, SIGTERM, SIGHUP) or not over by its time limit; of several missions one was, "
+        "or in one something did not hold; a node does not say the same again; nobody reads what is printed",
+    ),
+    ("2", "wrong use or bad input, told in a sentence: nothing was flown"),
+    ("130", "Ctrl-C in a command that flies nothing, such as `check` or `report`"),
+)
+
+
 def command_line_page() -> str:
     """Every command with its arguments and options."""
     root: Any = typer.main.get_command(app)
@@ -198,8 +211,15 @@ def command_line_page() -> str:
         "",
         MADE,
         "",
-        "`secondlook COMMAND --help` tells the same as this page. Exit codes: 0 done, 1 the mission failed, 2 wrong",
-        "use or bad input. What `secondlook run` leaves behind: [the files of a run](run-files.md).",
+        "`secondlook COMMAND --help` tells the same as this page. What `secondlook run` leaves behind:",
+        "[the files of a run](run-files.md).",
+        "",
+        "`secondlook --install-completion` lets bash, zsh, fish or PowerShell complete commands, options and bundled",
+        "scenarios with the Tab key; `secondlook --show-completion` prints what it would install.",
+        "",
+        "## Exit codes",
+        "",
+        *table(("code", "what it says"), EXIT_CODES),
     ]
     for name, command in _commands("secondlook", root):
         with typer.Context(command, info_name=name) as context:

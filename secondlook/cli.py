@@ -51,7 +51,6 @@ def _is_number(text: str) -> bool:
 app = typer.Typer(
     name="secondlook",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -80,7 +79,7 @@ app.add_typer(node_app, name="node")
 
 
 def main() -> None:
-    """Run the command line, and exit: 0 done, 1 the mission failed, 2 wrong use or bad input."""
+    """Run the command line, and exit: 0 done, 1 failed, 2 wrong use or bad input, 130 Ctrl-C."""
     try:
         app(with_number(sys.argv[1:], REAL_TIME, "1"))
     except UserError as error:

@@ -8,14 +8,23 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.planned_survey import planned_surveys
+from secondlook.commands.scenarios import names_beginning_with
 from secondlook.fleet.build import build_fleet
 from secondlook.scenario import load_scenario
 
 
-def check(scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")]) -> None:
+def check(
+    scenario: Annotated[
+        str,
+        typer.Argument(help="A bundled scenario's name or a YAML file.", autocompletion=names_beginning_with),
+    ],
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
+    ] = None,
+) -> None:
     """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
     battery is too small for that."""
-    valid = load_scenario(scenario)
+    valid = load_scenario(scenario, set_ or ())
     build_fleet(valid, record=False)
     surveys = planned_surveys(valid)
     across_m, along_m = valid.area.extent_m

@@ -14,7 +14,7 @@ import typer
 from rich.console import Console
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
+from secondlook.commands.many_missions import FAILED, Tell, fly_watched
 from secondlook.compare.flights import Flown, contenders, fly_all
 from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
@@ -22,6 +22,7 @@ from secondlook.compare.standings import failures, standings, table
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
+from secondlook.launch.run_folder import make_new_folder
 from secondlook.scenario import load_scenario
 
 MOST_SEEDS = 10_000
@@ -47,7 +48,9 @@ def compare(
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for compare.json and the plot risk.png.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for compare.json and the plot risk.png, new or empty.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
 ) -> None:
     """Fly the same seeds with several allocators, and compare what they leave."""
@@ -98,7 +101,7 @@ def compare(
 def _prepare(folder: Path) -> None:
     if find_spec("matplotlib") is None:
         raise UserError("--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it")
-    make_folder(folder)
+    make_new_folder(folder)
 
 
 def _write(content: str, flown: Flown, title: str, folder: Path) -> None:

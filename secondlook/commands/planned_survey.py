@@ -21,6 +21,7 @@ from planner.sweep import distance_over, pass_over
 from planner.types import Point, Track
 from secondlook.errors import UserError
 from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
+from secondlook.launch.run_display import in_seconds
 from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
 from secondlook.scenario import Scenario, SurveyVehicle
@@ -57,7 +58,9 @@ class PlannedSurvey:
         endurance_s = self.vehicle.endurance_s
         if self.takes_s <= endurance_s:
             return ""
-        return f"{self.name}: its survey takes {self.takes_s:.0f} s, longer than its endurance_s of {endurance_s:g}"
+        return (
+            f"{self.name}: its survey takes {in_seconds(self.takes_s)}, longer than its endurance_s of {endurance_s:g}"
+        )
 
 
 def planned_surveys(scenario: Scenario) -> list[PlannedSurvey]:
@@ -93,7 +96,7 @@ def plan_as_text(surveys: Sequence[PlannedSurvey]) -> str:
     """Each survey's sentence, and a line a track under a heading a part: x east, y north, metres."""
     lines = []
     for survey in surveys:
-        lines.append(f"{survey.sentence}; {survey.takes_s:.0f} s at {survey.vehicle.speed_mps:g} m/s")
+        lines.append(f"{survey.sentence}; {in_seconds(survey.takes_s)} at {survey.vehicle.speed_mps:g} m/s")
         for number, (part, tracks, range_m) in enumerate(_parts(survey), start=1):
             frame = part.frame
             lines.append(

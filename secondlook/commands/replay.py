@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from comms.errors import NodeError
+from comms.said.announcement import ClockMode, RunInfo
+from comms.said.codec import decode
 from comms.said.routing import Routing
+from comms.said.topics import RUN
+from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.recorded.mission_files import read_messages
@@ -16,6 +22,16 @@ from secondlook.recorded.replay import replay_node
 from secondlook.scenario import load_scenario
 
 DIFFERS = 1
+
+
+def _by_wall_clock(recording: Sequence[tuple[str, bytes]]) -> bool:
+    """Whether the run was announced so."""
+    for key, payload in recording:
+        if key == RUN.key():
+            with contextlib.suppress(WireError):  # of a message that is damaged the replay itself tells
+                announced = decode(payload, RunInfo)[1]
+                return isinstance(announced, RunInfo) and announced.mode is ClockMode.WALL
+    return False
 
 
 def replay(
@@ -28,6 +44,11 @@ def replay(
     """Feed one node of a recorded mission what it heard, and tell the first difference in what it says."""
     scenario_file = run / "scenario.yaml"
     recording = read_messages(run / "messages.mpk")
+    if _by_wall_clock(recording):
+        raise UserError(
+            f"{run}: was flown by the wall clock, where what a node hears and when is never quite the same, and so "
+            "cannot be repeated; must be a run in lockstep, without --real-time"
+        )
     fleet = build_fleet(load_scenario(str(scenario_file)), record=False)
     if node not in fleet.specs:
         raise UserError(f"--node {node}: not a node of this mission; must be one of {', '.join(fleet.specs)}")

@@ -18,6 +18,7 @@ from comms.lockstep.drive import Lockstep
 from comms.said.announcement import LARGEST_SEED
 from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
+from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import UserError
 from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
@@ -51,7 +52,7 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
     watched = sys.stderr.isatty()
     with server:
         if web:
-            sys.stderr.write(f"The mission is shown at {server.page}{'' if watched else ' until it is over'}\n")
+            sys.stderr.write(f"The mission is shown{'' if watched else ' until it is over'} at\n{server.page}\n")
         else:
             try:
                 server.open_window()
@@ -60,7 +61,7 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
         yield folder, server.pipe
         if web and watched:
             with contextlib.suppress(KeyboardInterrupt):
-                sys.stderr.write(f"Still shown at {server.page}; Ctrl-C ends it\n")
+                sys.stderr.write(f"Still shown, until Ctrl-C, at\n{server.page}\n")
                 server.wait()
 
 
@@ -126,7 +127,9 @@ Web = Annotated[
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")] = "tellaro",
+    scenario: Annotated[
+        str, typer.Argument(help="A bundled scenario's name or a YAML file.", autocompletion=names_beginning_with)
+    ] = "tellaro",
     out: Out = None,
     seed: Annotated[int | None, typer.Option(min=0, max=LARGEST_SEED, help="Another seed than the scenario's.")] = None,
     bus: Annotated[BusName, typer.Option(help="Real processes over Zenoh, or all in this process.")] = BusName.zenoh,
@@ -149,7 +152,7 @@ def run(
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
-        with progress_display(mission.name, shown=sys.stderr.isatty() and not as_json) as progress:
+        with progress_display(mission.name, quiet=as_json) as progress:
             options = RunOptions(
                 folder, bus.value, processes, drive, record=not no_record, progress=progress, live_pipe=pipe
             )

@@ -38,7 +38,7 @@ def view(
             RecordingViewer(whole, web=web, at_s=at) as viewer,
         ):
             if web:
-                typer.echo(f"The mission is shown at {viewer.page}; Ctrl-C ends it")
+                typer.echo(f"The mission is shown, until Ctrl-C, at\n{viewer.page}")
             viewer.wait()
     except ViewerError as error:
         raise UserError(str(error)) from error

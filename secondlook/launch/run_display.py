@@ -1,52 +1,98 @@
-"""What a person sees of a run: a progress bar while it goes on, a short table at its end."""
+"""What a person sees of a run: how far it is while it goes on, a short table at its end."""
 
 from __future__ import annotations
 
+import shlex
+import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Progress as ProgressFunction
 
+REPORT, RECORDING = "report.html", "mission.rrd"
+LONG_S = 3600.0
+WIDEST = 10_000  # characters
+LINE_EVERY_S = 20.0
+"""Of the wall clock, where nobody watches a bar."""
+
+
+def in_seconds(duration_s: float) -> str:
+    """A duration for people: seconds, as all else is told in, and from an hour on also as h:mm:ss."""
+    told = f"{duration_s:.0f} s"
+    return f"{told} ({_clock(duration_s)})" if duration_s >= LONG_S else told
+
+
+def _clock(duration_s: float) -> str:
+    minutes, seconds = divmod(round(duration_s), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}"
+
 
 @contextmanager
-def progress_display(name: str, *, shown: bool) -> Iterator[ProgressFunction | None]:
-    """A bar on standard error with simulated time, share of the survey flown and residual risk; None if not shown."""
-    if not shown:
+def progress_display(name: str, *, quiet: bool) -> Iterator[ProgressFunction | None]:
+    """On standard error simulated time, share of the survey flown, residual risk, and how long the survey is still
+    expected to take: a bar on a terminal, a line now and then elsewhere; None if `quiet`."""
+    if quiet:
         yield None
-        return
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[told]}"),
-    )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(name, total=1.0, told="starting")
+    elif not sys.stderr.isatty():
+        yield ProgressLines(name).tell
+    else:
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TextColumn("{task.fields[told]}"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+            task = progress.add_task(name, total=1.0, told="starting")
 
-        def tell(metrics: Metrics) -> None:
-            risk = metrics.risk()
-            told = f"{metrics.now_ms / 1000:.0f} s simulated"
-            if risk is not None:
-                told += f", residual risk {risk.mean:.3f}, worst 30 % {risk.worst30_mean:.3f}"
-            progress.update(task, completed=metrics.share_flown(), told=told)
+            def tell(metrics: Metrics) -> None:
+                progress.update(task, completed=metrics.share_flown(), told=_so_far(metrics))
 
-        yield tell
+            yield tell
+
+
+def _so_far(metrics: Metrics) -> str:
+    risk, told = metrics.risk(), f"{in_seconds(metrics.now_ms / 1000)} simulated"
+    return told if risk is None else f"{told}, residual risk {risk.mean:.3f}, worst 30 % {risk.worst30_mean:.3f}"
+
+
+class ProgressLines:
+    """How far a run is, where standard error is no terminal: a line every 20 s of the wall clock, none of a run that is
+    over sooner. `now_s` is the wall time it begins at."""
+
+    def __init__(self, name: str, now_s: float | None = None) -> None:
+        self._name = name
+        self._began_s = self._told_s = time.monotonic() if now_s is None else now_s
+
+    def tell(self, metrics: Metrics, now_s: float | None = None) -> None:
+        """Prints a line if it is time for one."""
+        now_s = time.monotonic() if now_s is None else now_s
+        if now_s - self._told_s < LINE_EVERY_S:
+            return
+        self._told_s = now_s
+        share = metrics.share_flown()
+        left = f", about {_clock((now_s - self._began_s) * (1 / share - 1))} left of it" if 0 < share < 1 else ""
+        sys.stderr.write(f"{self._name}: {share:.0%} of the survey flown{left}; {_so_far(metrics)}\n")
+        sys.stderr.flush()
 
 
 def closing_table(summary: dict[str, Any], folder: Path) -> None:
-    """Prints what came of the mission and where its files are."""
+    """Prints what came of the mission, where its files are, and how to look at it."""
     table = Table(show_header=False, box=None, pad_edge=False)
-    time, risk, alone = summary["time"], summary["risk"], summary["risk_primary_alone"]
+    times, risk, alone = summary["time"], summary["risk"], summary["risk_primary_alone"]
     table.add_row(
         "mission",
-        f"{time['mission_s']:.0f} s simulated in {time['wall_s']:.1f} s: {time['real_time_factor']:.0f} x real time",
+        f"{in_seconds(times['mission_s'])} simulated in {times['wall_s']:.1f} s: "
+        f"{times['real_time_factor']:.0f} x real time",
     )
     for name, vehicle in summary["vehicles"].items():
         told = f"{vehicle['path_m'] / 1000:.1f} km"
@@ -74,5 +120,10 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     if restarts := summary.get("restarts"):
         table.add_row("started again", ", ".join(f"{host} {count} x" for host, count in restarts.items()))
     table.add_row("files", str(folder))
+    if (report := folder / REPORT).exists():
+        table.add_row("report", report.absolute().as_uri())
+    if (folder / RECORDING).exists():
+        table.add_row("recording", f"secondlook view {shlex.quote(str(folder))}")
     console = Console(soft_wrap=True, highlight=False)
+    console.width = max(console.width, Console(width=WIDEST).measure(table).maximum)  # no address is cut off
     console.print(table)

@@ -27,6 +27,12 @@ def run_folder(out: Path | None, name: str) -> Path:
             )
             if not path.exists()
         )
+    make_new_folder(out)
+    return out
+
+
+def make_new_folder(out: Path) -> None:
+    """Makes the folder given with --out, if it is not there. Raises UserError where it cannot be, or holds anything."""
     try:
         out.mkdir(parents=True, exist_ok=True)
         taken = next(out.iterdir(), None)
@@ -34,7 +40,6 @@ def run_folder(out: Path | None, name: str) -> Path:
         raise UserError(f"--out {out}: {error.strerror}; must be a folder that can be written") from error
     if taken is not None:
         raise UserError(f"--out {out}: holds {taken.name} already; must be a new or empty folder")
-    return out
 
 
 class _LogFile(logging.FileHandler):

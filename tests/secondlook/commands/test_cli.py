@@ -1,7 +1,10 @@
 """The command line as a user meets it: what it prints, where, and its exit codes."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -202,6 +205,46 @@ def test_a_survey_of_more_tracks_than_can_be_told_is_refused(
     )
     for command in ("check", "plan"):
         assert secondlook(command, "many.yaml") == (2, "", expected)
+
+
+def test_check_takes_settings(secondlook: SecondLook) -> None:
+    assert (
+        secondlook("check", "tellaro")[1] != secondlook("check", "tellaro", "--set", "vehicles.primary.range_m=130")[1]
+    )
+    code, out, err = secondlook("check", "tellaro", "--set", "vehicles.primary.speed_mps=0")
+    told = "vehicles.primary.speed_mps: 0 is not allowed; must be greater than 0"
+    assert (code, out, err) == (2, "", f"--set vehicles.primary.speed_mps=0: {told}\n")
+
+
+def test_a_bundled_scenario_is_shown_as_its_file_is(secondlook: SecondLook, write: Callable[[str], str]) -> None:
+    code, shown, err = secondlook("scenarios", "--show", "patchy")
+    assert (code, err) == (0, "")
+    assert load_scenario(write(shown)) == load_scenario("patchy")
+    code, out, err = secondlook("scenarios", "--show", "pachy")
+    assert (code, out) == (2, "")
+    assert err.startswith("--show pachy: is no bundled scenario; must be clear, ")
+
+
+def test_a_shell_completes_commands_options_and_bundled_scenarios(tmp_path: Path) -> None:
+    for typed, offered in (("rep", {"replay", "report"}), ("run tw", {"two-helpers"}), ("check --s", {"--set"})):
+        words = f"secondlook {typed}"
+        environment = {
+            **os.environ,
+            "_SECONDLOOK_COMPLETE": "complete_bash",
+            "COMP_WORDS": words,
+            "COMP_CWORD": str(len(words.split()) - 1),
+        }
+        done = subprocess.run(
+            [Path(sys.executable).with_name("secondlook")],
+            env=environment,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+        assert (done.returncode, done.stderr) == (0, "")
+        assert set(done.stdout.split()) == offered
 
 
 def test_check_tells_all_mistakes_without_a_traceback(

@@ -23,7 +23,7 @@ from tests.viz.recordings import verify
 from tests.viz.test_recording_file import counted, ends_of_messages
 from viz.recording_viewer import is_empty
 
-PAGE = re.compile(r"The mission is shown at (http://127\.0\.0\.1:\d+/\S+); Ctrl-C ends it\n")
+PAGE = re.compile(r"The mission is shown, until Ctrl-C, at\n(http://127\.0\.0\.1:\d+/\S+)\n")
 ROOT = Path(__file__).parents[3]
 COMMAND = [sys.executable, "-P", "-c", "from secondlook.installed_command import main; main()", "view"]
 
@@ -36,7 +36,7 @@ def viewing(run: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     )
     try:
         assert process.stdout is not None
-        found = PAGE.fullmatch(process.stdout.readline())
+        found = PAGE.fullmatch(process.stdout.readline() + process.stdout.readline())
         assert found
         yield process, found[1]
         os.killpg(process.pid, signal.SIGINT)

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from comms.said.codec import SCHEMA_VERSION, decode, encode
 from comms.said.messages import StripStatus
+from comms.wall.drive import ByWallClock
 from secondlook.cli import app
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
@@ -54,6 +55,17 @@ def test_every_node_says_the_same_again(run: Path, node: str) -> None:
     said = sum(decode_sender(payload) == node for _, payload in read_messages(run / "messages.mpk"))
     assert said >= 10
     assert (code, output) == (0, f"{node}: all {said} messages are said again, byte for byte\n")
+
+
+def test_a_run_by_the_wall_clock_cannot_be_repeated_and_that_is_said(tmp_path: Path) -> None:
+    (tmp_path / "bay.yaml").write_text(BAY)
+    out = tmp_path / "run"
+    out.mkdir()
+    run_mission(load_scenario(str(tmp_path / "bay.yaml")), RunOptions(out, bus="local", drive=ByWallClock(1000.0)))
+    result = CliRunner().invoke(app, ["replay", str(out)])
+    assert isinstance(result.exception, UserError)
+    assert str(result.exception).startswith(f"{out}: was flown by the wall clock, where ")
+    assert "cannot be repeated" in str(result.exception)
 
 
 def decode_sender(payload: bytes) -> str:

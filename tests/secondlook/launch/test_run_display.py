@@ -1,0 +1,77 @@
+"""What a person sees of a run: durations, lines where there is no terminal, and where to look afterwards."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+from flights import BRIEF
+
+from secondlook.launch.run_display import ProgressLines, in_seconds
+from secondlook.recorded.metrics import Metrics
+
+
+@pytest.mark.parametrize(
+    ("duration_s", "told"),
+    [
+        (0.4, "0 s"),
+        (3599.0, "3599 s"),
+        (3600.0, "3600 s (1:00:00)"),
+        (4424.2, "4424 s (1:13:44)"),
+        (7199.6, "7200 s (2:00:00)"),
+        (100 * 3600 + 62.0, "360062 s (100:01:02)"),
+    ],
+)
+def test_long_durations_are_told_in_hours_too(duration_s: float, told: str) -> None:
+    assert in_seconds(duration_s) == told
+
+
+class Flown(Metrics):
+    """Figures of a mission that is so far."""
+
+    def __init__(self, now_ms: int, share: float) -> None:
+        super().__init__()
+        self.now_ms, self._share = now_ms, share
+
+    def share_flown(self) -> float:
+        """As told."""
+        return self._share
+
+
+def test_without_a_terminal_a_line_comes_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = ProgressLines("bay", now_s=100.0)
+    lines.tell(Flown(10_000, 0.01), now_s=119.9)
+    assert capsys.readouterr().err == ""
+    # A quarter in 20 s: the other three take a minute.
+    lines.tell(Flown(900_000, 0.25), now_s=120.0)
+    told = "bay: 25% of the survey flown, about 0:01:00 left of it; 900 s simulated\n"
+    assert capsys.readouterr().err == told
+    lines.tell(Flown(1_000_000, 0.3), now_s=139.0)
+    assert capsys.readouterr().err == ""
+    lines.tell(Flown(4_424_000, 1.0), now_s=150.0)
+    assert capsys.readouterr().err == "bay: 100% of the survey flown; 4424 s (1:13:44) simulated\n"
+
+
+def test_after_a_run_each_line_says_how_to_open_what_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from secondlook import cli
+
+    def lines_of(folder: Path, *options: str) -> dict[str, str]:
+        arguments = ["secondlook", "run", str(BRIEF), "--bus", "local", "--out", str(folder), *options]
+        monkeypatch.setattr("sys.argv", arguments)
+        with pytest.raises(SystemExit) as stopped:
+            cli.main()
+        assert stopped.value.code == 0
+        return {line[:15].strip(): line[15:].strip() for line in capsys.readouterr().out.splitlines()}
+
+    whole = lines_of(tmp_path / "a run")
+    assert whole["report"] == (tmp_path / "a run" / "report.html").as_uri()
+    assert shlex.split(whole["recording"]) == ["secondlook", "view", str(tmp_path / "a run")]
+    summary = json.loads((tmp_path / "a run" / "summary.json").read_text())
+    assert whole["mission"].startswith(f"{in_seconds(summary['time']['mission_s'])} simulated in ")
+    bare = lines_of(tmp_path / "bare", "--no-record")
+    assert "files" in bare
+    assert not {"report", "recording"} & set(bare)
