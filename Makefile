@@ -59,7 +59,8 @@ test: .venv/.test-ready
 	$(BIN)/lint-imports --no-logo
 	$(BIN)/pytest -n 2 --dist worksteal
 
-# An example's tests, as a user runs them: against the wheel, in an environment of its own, away from this folder.
+# The examples' types and tests, as a user checks them: against the wheel, in an environment of its own, away from this
+# folder.
 example: .venv/.test-ready
 	@set -e; home=$$(mktemp -d); trap 'rm -rf "$$home" build' EXIT; rm -rf build; \
 	echo "Installing the wheel into an environment of its own"; \
@@ -67,8 +68,10 @@ example: .venv/.test-ready
 	sed -n '/^[^ ].*==/s/ *\\$$//p' requirements-dev.lock >"$$home/constraints.txt"; \
 	"$(PYTHON)" -m venv "$$home/venv"; \
 	"$$home/venv/bin/python" -m pip --disable-pip-version-check install --quiet \
-		--constraint "$$home/constraints.txt" "$$(ls "$$home"/*.whl)[testing]"; \
-	cp -R examples/own_allocator "$$home/tests"; cd "$$home/tests"; \
+		--constraint "$$home/constraints.txt" "$$(ls "$$home"/*.whl)[testing]" mypy types-shapely; \
+	cp -R examples "$$home/examples"; cd "$$home/examples/own_allocator"; \
+	printf '[mypy]\nstrict = True\n[mypy-msgpack]\nignore_missing_imports = True\n' >mypy.ini; \
+	"$$home/venv/bin/python" -m mypy . ../vehicle/vehicle.py ../read_a_mission.py; \
 	"$$home/venv/bin/python" -m pytest
 
 # The stamps are what makes a second call start at once.

@@ -1,9 +1,12 @@
 """An allocator of our own, by itself and in the bundled mission, where every fifth message is lost."""
 
+from collections.abc import Callable
+
 import pytest
 from longest_first import LongestFirst
 
 from secondlook.testing import (
+    Fleet,
     assert_all_finished,
     assert_never_assigned_to_lost,
     assert_no_strip_lost,
@@ -15,12 +18,12 @@ from secondlook.testing import (
 pytestmark = pytest.mark.fleet("tellaro", overrides={"coordinator.allocator": LongestFirst})
 
 
-def test_it_keeps_to_what_every_allocator_has_to():
+def test_it_keeps_to_what_every_allocator_has_to() -> None:
     check_allocator(LongestFirst)
 
 
 @pytest.mark.parametrize("fault_seed", [1, 2, 3])
-def test_no_strip_is_lost_where_every_fifth_message_is(make_fleet, fault_seed):
+def test_no_strip_is_lost_where_every_fifth_message_is(make_fleet: Callable[..., Fleet], fault_seed: int) -> None:
     fleet = make_fleet("tellaro", overrides={"coordinator.allocator": LongestFirst}, fault_seed=fault_seed)
     fleet.drop("**", probability=0.2)
     flight = fleet.run()
@@ -31,7 +34,7 @@ def test_no_strip_is_lost_where_every_fifth_message_is(make_fleet, fault_seed):
     assert flight.summary["risk"]["mean"] < flight.summary["risk_primary_alone"]["mean"] - 0.05
 
 
-def test_a_strip_goes_on_when_its_helper_comes_back(fleet):
+def test_a_strip_goes_on_when_its_helper_comes_back(fleet: Fleet) -> None:
     fleet.run_until(lambda heard: heard.last("agent/helper/task_status/*") is not None, timeout_s=1000)
     fleet.kill("helper", at_s=fleet.now_s + 60)
     fleet.join("helper", at_s=fleet.now_s + 200)
@@ -40,6 +43,6 @@ def test_a_strip_goes_on_when_its_helper_comes_back(fleet):
     assert_all_finished(flight)
 
 
-def test_the_mission_is_the_same_over_zenoh(fleet):
+def test_the_mission_is_the_same_over_zenoh(fleet: Fleet) -> None:
     fleet.drop("**", probability=0.2)
     assert_repeats(fleet, ["local", "zenoh"])

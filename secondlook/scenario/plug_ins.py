@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import re
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from coordinator.allocate.allocators import ALLOCATORS
 from planner.profile_spacing import JointSpacing, ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 from secondlook.errors import UserError
+from secondlook.installed_command import ROOMS, hidden_in
 
 _OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
 
@@ -88,6 +91,7 @@ def _import(module: str, name: str) -> Any:
     if here not in sys.path and "" not in sys.path:
         # At the end: a user's own modules are found from where the command is called, and are in nothing's way.
         sys.path.append(here)
+    _check_names(module, Path(here))
     try:
         return getattr(import_module(module), name)
     except AttributeError:
@@ -96,6 +100,24 @@ def _import(module: str, name: str) -> Any:
         raise
     except BaseException as error:
         raise PlugInError(f"must be importable; {in_words(error)}") from error
+
+
+def _check_names(module: str, here: Path) -> None:
+    """Raises PlugInError where beside the module, or where the command is called, lies what is called like a package of
+    ours: the module would silently be given the wrong one."""
+    top = module.partition(".")[0]
+    folder = here
+    if top not in (*ROOMS, "secondlook"):
+        with contextlib.suppress(ImportError, ValueError):  # of a module that is not there its import tells
+            spec = find_spec(top)
+            if spec is None or not spec.has_location or spec.origin is None:
+                return
+            folder = Path(spec.origin).parents[1 if spec.submodule_search_locations else 0]
+    hidden = hidden_in(folder)
+    if hidden is not None:
+        raise PlugInError(
+            f"must not lie beside {hidden}, which has the name of a package of ours and hides it or is hidden"
+        )
 
 
 ALLOCATOR = PlugInKind(

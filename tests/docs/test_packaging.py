@@ -17,6 +17,11 @@ def test_every_package_is_listed_for_the_wheel() -> None:
     assert found == set(find_packages(str(ROOT), include=listed))
 
 
+def test_every_package_tells_type_checkers_that_it_is_typed() -> None:
+    assert [room for room in ROOMS if not (ROOT / room / "py.typed").is_file()] == []
+    assert PYPROJECT["tool"]["setuptools"]["package-data"]["*"] == ["py.typed"]
+
+
 def test_every_room_is_type_checked() -> None:
     assert set(PYPROJECT["tool"]["mypy"]["files"]) >= {*ROOMS, "tests"}
 

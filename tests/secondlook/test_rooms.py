@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 
 import secondlook
+from comms import errors
+from secondlook.installed_command import ROOMS
 
 # As where the project is installed plainly: the finder of an editable installation would put our rooms first.
 PLAIN = """
@@ -35,8 +37,55 @@ def test_a_file_in_the_way_is_named(tmp_path: Path, shadow: str) -> None:
     room = Path(shadow).parts[0].removesuffix(".py")
     assert done.returncode == 2, done.stderr
     assert done.stdout == ""
-    assert done.stderr.startswith(f"the package '{room}' is taken from {tmp_path / shadow} and not from ")
+    assert done.stderr.startswith(f"your {tmp_path / shadow} hides ours, the package '{room}' at ")
     assert done.stderr.count("\n") == 1
+
+
+def test_a_program_of_the_users_that_loads_a_run_is_told_too(tmp_path: Path) -> None:
+    (tmp_path / "planner.py").touch()
+    root = str(Path(secondlook.__file__).parent.parent)
+    program = PLAIN.replace(
+        "from secondlook.installed_command import main\nmain()", "import secondlook; secondlook.load('')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", program.format(shadow=str(tmp_path), root=root)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    told = f"secondlook.errors.UserError: your {tmp_path / 'planner.py'} hides ours, the package 'planner' at "
+    assert done.stderr.splitlines()[-1].startswith(told), done.stderr
+
+
+@pytest.mark.parametrize("part", ["mine.py", "parts/mine.py", "planner.py"])
+@pytest.mark.parametrize("hidden", ["planner.py", "planner/__init__.py"])
+def test_a_part_beside_a_file_that_is_called_like_a_room_is_refused(tmp_path: Path, part: str, hidden: str) -> None:
+    (tmp_path / part).parent.mkdir(exist_ok=True)
+    (tmp_path / part).write_text("class Mine:\n    def assign(self, situation):\n        return {}\n")
+    (tmp_path / hidden).parent.mkdir(exist_ok=True)
+    (tmp_path / hidden).touch()
+    module = part.removesuffix(".py").replace("/", ".")
+    if part.startswith("parts"):
+        (tmp_path / "parts" / "__init__.py").touch()
+    setting = f"coordinator.allocator={module}:Mine"
+    command = [str(Path(sys.executable).with_name("secondlook")), "check", "tellaro", "--set"]
+    done = subprocess.run([*command, setting], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    first = "planner.py" if part == "planner.py" else hidden
+    told = f"must not lie beside {tmp_path / first}, which has the name of a package of ours and hides it or is hidden"
+    assert done.stderr == (f'--set {setting}: coordinator.allocator: "{module}:Mine" is not allowed; {told}\n')
+    for file in (tmp_path / "planner.py", tmp_path / "planner" / "__init__.py"):
+        file.unlink(missing_ok=True)
+    if part != "planner.py":
+        again = subprocess.run(
+            [*command, setting], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
+        )
+        assert (again.returncode, again.stderr) == (0, "")
+
+
+def test_failures_are_told_of_parts_but_never_of_a_room() -> None:
+    assert set(ROOMS) | {"secondlook"} <= set(errors._NO_PARTS)
 
 
 def test_with_nothing_in_the_way_the_command_runs(tmp_path: Path) -> None:

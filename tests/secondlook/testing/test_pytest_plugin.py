@@ -131,7 +131,9 @@ def test_marks_that_make_no_sense_and_a_room_in_the_way_are_told(tmp_path: Path)
     printed = pytest_in(tmp_path, "--continue-on-collection-errors")
     assert [sentence for sentence in told.values() if sentence not in printed] == []
     (tmp_path / "planner.py").write_text("")
-    assert "UserError: the package 'planner' is taken from" in pytest_in(tmp_path, "test_0.py")
+    assert f"UserError: your {tmp_path / 'planner.py'} hides ours, the package 'planner' at" in pytest_in(
+        tmp_path, "test_0.py"
+    )
 
 
 def test_it_imports_nothing_of_ours_until_a_fleet_is_used(tmp_path: Path) -> None:
