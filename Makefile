@@ -114,7 +114,9 @@ lock: .venv-lock/.uv-$(UV_VERSION)
 	@.venv-lock/bin/python -m pip --disable-pip-version-check install --quiet uv==$(UV_VERSION)
 	@touch $@
 
+# What the targets above have made, but for the missions in runs/, and nothing else.
+SOURCES := bench comms coordinator docs examples planner secondlook sim_world tests vehicle_agent viz
 clean:
-	rm -rf .venv .venv-lock build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis \
-		site
-	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+	rm -rf .venv .venv-lock build secondlook.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache \
+		.hypothesis site runs/golden runs/pictures
+	find $(SOURCES) -name __pycache__ -type d -prune -exec rm -rf {} +

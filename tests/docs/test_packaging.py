@@ -1,5 +1,8 @@
 """pyproject.toml and the folders of the repository say the same."""
 
+import re
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -37,3 +40,26 @@ def test_every_locked_package_has_one_exact_version_and_hashes() -> None:
         for entry in entries:
             assert "==" in entry.split()[0], f"{name}: {entry}"
             assert "--hash=sha256:" in entry, f"{name}: {entry}"
+
+
+def test_make_clean_removes_what_was_made_and_nothing_else(tmp_path: Path) -> None:
+    made = [
+        *(".venv/bin/python", ".venv-lock/bin/uv", "build/lib/a.py", "secondlook.egg-info/PKG-INFO", "site/index.html"),
+        *(".mypy_cache/a", ".ruff_cache/a", ".pytest_cache/a", ".import_linter_cache/a", ".hypothesis/a"),
+        *("runs/golden/a", "runs/pictures/a"),
+        *(f"{room}/deep/__pycache__/a.pyc" for room in (*ROOMS, "bench", "docs", "examples", "tests")),
+    ]
+    kept = ["runs/tellaro-1/summary.json", "dist/mine.whl", "mine.egg-info/a", "mine/__pycache__/a.pyc", "planner/a.py"]
+    for name in (*made, *kept):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    subprocess.run(["make", "clean"], cwd=tmp_path, capture_output=True, check=True, timeout=60)
+    left = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
+    assert left == {"Makefile", *kept}
+
+
+def test_whatever_git_ignores_but_missions_make_clean_removes() -> None:
+    (rule,) = re.findall(r"^clean:\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    ignored = [line.strip("/*") for line in (ROOT / ".gitignore").read_text().split()]
+    assert [name for name in ignored if name not in rule and name not in ("runs", "dist")] == []
