@@ -6,6 +6,8 @@ import math
 from random import Random
 from typing import Any
 
+from secondlook.errors import UserError
+from secondlook.fleet.build import build_fleet
 from secondlook.scenario import Scenario, make_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR, SPACING
 
@@ -32,19 +34,23 @@ def draw_fleet(number: int) -> Scenario:
         vehicles[name] = _primary(rng, width_m, height_m) | part
     for place in range(helpers):
         vehicles["helper" if helpers == 1 else f"helper-{place + 1}"] = _helper(rng, width_m, height_m)
-    return make_scenario(
-        {
-            "name": f"storm-{number}",
-            "seed": number % 2**31,
-            "area": _area(rng, width_m, height_m, cells_m=(5, 5, 10) if helpers < 4 else (10,)),
-            "mission": _mission(rng),
-            "seabed": _seabed(rng),
-            "targets": {"count": rng.choice((0, 20, 60))},
-            "vehicles": vehicles,
-            "coordinator": _coordinator(rng),
-            **({"current": {"speed_mps": _m(rng.uniform(0.1, 1)), "toward_deg": 45.0}} if rng.random() < 0.1 else {}),
-        }
-    )
+    drawn: dict[str, Any] = {
+        "name": f"storm-{number}",
+        "seed": number % 2**31,
+        "area": _area(rng, width_m, height_m, cells_m=(5, 5, 10) if helpers < 4 else (10,)),
+        "mission": _mission(rng),
+        "seabed": _seabed(rng),
+        "targets": {"count": rng.choice((0, 20, 60))},
+        "vehicles": vehicles,
+        "coordinator": _coordinator(rng),
+        **({"current": {"speed_mps": _m(rng.uniform(0.1, 1)), "toward_deg": 45.0}} if rng.random() < 0.1 else {}),
+    }
+    scenario = make_scenario(drawn)
+    try:
+        build_fleet(scenario, record=False)
+    except UserError:  # a hole, seldom, cuts a primary's share in two
+        scenario = make_scenario(drawn | {"area": drawn["area"] | {"holes_m": []}})
+    return scenario
 
 
 def _area(rng: Random, width_m: float, height_m: float, cells_m: tuple[int, ...]) -> dict[str, Any]:

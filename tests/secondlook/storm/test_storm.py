@@ -50,6 +50,10 @@ def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time() -> 
     assert 15 <= calm <= 50  # a tenth of 300
 
 
+def test_a_fleet_with_a_hole_that_cuts_a_share_in_two_is_drawn_without_it() -> None:
+    assert storm_of(None, 302000039).scenario.area.holes_m == ()
+
+
 def test_a_storm_of_a_given_scenario_keeps_its_fleet() -> None:
     brief = load_scenario(Path(__file__).parents[2] / "support" / "brief.yaml")
     plan = storm_of(brief, 4)
