@@ -17,6 +17,11 @@ settings.register_profile("secondlook", deadline=None, suppress_health_check=[He
 settings.load_profile("secondlook")
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """The longest comes first, as at the end one process would wait for the other to be done with it."""
+    items.sort(key=lambda item: "both_buses[wide]" not in item.name)
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Says loudly what this machine could not test, and why."""
     skipped = [one.longrepr for one in terminalreporter.stats.get("skipped", [])]

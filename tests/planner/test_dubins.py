@@ -76,7 +76,7 @@ def shortest_word_m(start: Pose, end: Pose, radius_m: float) -> float:
                     joins = compass(line) - bend + math.pi + first * math.pi / 2
                     candidates.append((leaves, -first, wrap(-first * (joins - leaves)), joins))
         elif between_m >= 2 * radius_m:
-            straight_m = math.sqrt(between_m**2 - 4 * radius_m**2)
+            straight_m = math.sqrt(max(0.0, between_m**2 - 4 * radius_m**2))
             heading = compass(line) + first * math.atan2(2 * radius_m, straight_m)
             candidates.append((heading, 0, straight_m, heading))
         for leaves, turn, middle, joins in candidates:
