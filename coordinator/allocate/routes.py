@@ -14,7 +14,7 @@ what brings most a second, and of all that come of it the best is taken.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -108,25 +108,35 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
     if not helpers or not strips:
         return Routes(0.0, {one.vehicle: () for one in helpers}, {})
     team = _Team(strips, helpers, deadline_s)
-    plans = _Plans.begun(team)
-    best = plans.completed(team)
-    while (plans := plans.grown(team, beam)).routes:
-        one = plans.completed(team)
-        if one.counts_m2(team)[0] > best.counts_m2(team)[0] + TOLERANCE_M2:
-            best = one
+    beams = [_Plans.begun(team)]
+    while (plans := beams[-1].grown(team, beam)).count:
+        beams.append(plans)
+    completed = _Plans.joined(beams).to_deadline(team)
+    best = _best(completed.counts_m2(team), [plans.count for plans in beams])
     # Who had left the rest to others takes what those leave.
-    (routes,) = replace(best, is_done=np.zeros_like(best.is_done)).to_deadline(team).routes
+    plan = completed.chosen([best])
+    routes = replace(plan, is_done=np.zeros_like(plan.is_done)).to_deadline(team).routes()
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
     removed_m2, shares = team.flown(routes)
     return Routes(removed_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)), shares)
 
 
+def _best(counts_m2: FloatArray, sizes: Sequence[int]) -> int:
+    """The plan that counts most; of those that hardly differ one of an earlier beam. `sizes`: of the beams."""
+    best = first = 0
+    for size in sizes:
+        one = first + int(counts_m2[first : first + size].argmax())
+        best = one if counts_m2[one] > counts_m2[best] + TOLERANCE_M2 else best
+        first += size
+    return best
+
+
 class _Team:
     """What each helper finds at each strip, from its start and from behind each other strip.
 
-    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `way`: shape (helpers, nodes,
-    strips): how long it is from there until the sonar is on at a strip, flown the way that is shortest, as a helper's
-    agent does, and the node that this is. `sonar_on_s`: shape (helpers, nodes). `worth_m2`: (helpers, strips).
+    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `way`, `sweep_s`: shape (helpers,
+    nodes, strips): how long it is from there until the sonar is on at a strip, flown the way that is shortest, as a
+    helper's agent does, the node that this is, and how long the sonar is on then. `worth_m2`: (helpers, strips).
     `alone_s`: what a strip takes by itself, and `alone_m2`: what it brings at most, shape (strips,). `later_m2ps`: what
     a second is worth for which no strip is left.
     """
@@ -139,7 +149,7 @@ class _Team:
         self.start = count * ways
         places = np.arange(count)
         shape = (len(helpers), self.start + 1, count)
-        self.to_begin_s, self.sonar_on_s = np.full(shape, np.inf), np.zeros(shape[:2])
+        self.to_begin_s, self.sweep_s = np.full(shape, np.inf), np.ones(shape)
         self.way = np.zeros(shape, dtype=np.intp)
         for number, (helper, table) in enumerate(zip(helpers, tables, strict=True)):
             own = table.sonar_on_s.shape[1]
@@ -148,7 +158,7 @@ class _Team:
             rows = np.append(nodes, self.start)
             self.to_begin_s[number, rows], chosen = table.shortest_from(poses)
             self.way[number, rows] = places * ways + chosen
-            self.sonar_on_s[number, nodes] = table.sonar_on_s.ravel()
+            self.sweep_s[number, rows] = table.sonar_on_s[places, chosen]
         self.worth_m2 = np.array([one.worth_m2 for one in tables])
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
         self.lasts_s = np.array([one.lasts_until_s for one in helpers])
@@ -168,8 +178,8 @@ class _Team:
         for one, route in enumerate(routes):
             at, now_s = self.start, self.helpers[one].free_s
             for place in route:
-                begins_s, at = now_s + self.to_begin_s[one, at, place], self.way[one, at, place]
-                sweep_s = self.sonar_on_s[one, at]
+                begins_s, sweep_s = now_s + self.to_begin_s[one, at, place], self.sweep_s[one, at, place]
+                at = self.way[one, at, place]
                 share = min(1.0, max(0.0, float((self.deadline_s - begins_s) / sweep_s)))
                 shares[self.strips[place].strip.number] = share
                 total_m2 += float(self.worth_m2[one, place]) * share
@@ -197,73 +207,91 @@ def _most_promising(strips: Sequence[OpenStrip], helpers: Sequence[Helper]) -> l
 
 @dataclass(frozen=True, eq=False)
 class _Ahead:
-    """Who goes on in every plan, `next`, shape (plans,), and by every strip, shape (plans, strips): when the sonar goes
-    on there, when the helper is free again, and what is gained by the deadline."""
+    """Who goes on in every plan, `next`, shape (plans,), and by every strip, shape (plans, strips): when the helper is
+    free again, and what is gained by the deadline."""
 
     next: np.ndarray
-    begins_s: FloatArray
     ends_s: FloatArray
     gained_m2: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
 class _Plans:
-    """The beam. `nodes`, `free_s`, `is_done`: shape (plans, helpers), where each helper is, when it is free, whether it
-    finds nothing any more or leaves the rest to others; `used`: shape (plans, strips); `removed_m2`: shape (plans,)."""
+    """Some plans. `nodes`, `free_s`, `is_done`: shape (plans, helpers), where each helper is, when it is free, whether
+    it finds nothing any more or leaves the rest to others; `turn`, `who`: shape (plans, strips), as the how manieth of
+    the plan a strip is served, from 0, and by which helper, -1 where by none; `removed_m2`: shape (plans,)."""
 
     nodes: np.ndarray
     free_s: FloatArray
     is_done: BoolArray
-    used: BoolArray
+    turn: np.ndarray
+    who: np.ndarray
     removed_m2: FloatArray
-    routes: list[tuple[tuple[int, ...], ...]]
 
     @classmethod
     def begun(cls, team: _Team) -> _Plans:
         """One plan, in which nobody has begun."""
         helpers, strips = len(team.helpers), len(team.strips)
         free_s = np.array([[one.free_s for one in team.helpers]], dtype=np.float64)
-        nodes = np.full((1, helpers), team.start)
-        is_done, used = np.zeros((1, helpers), dtype=np.bool_), np.zeros((1, strips), dtype=np.bool_)
-        return cls(nodes, free_s, is_done, used, np.zeros(1), [((),) * helpers])
+        nodes, by_none = np.full((1, helpers), team.start), np.full((1, strips), -1)
+        return cls(nodes, free_s, np.zeros((1, helpers), dtype=np.bool_), by_none, by_none.copy(), np.zeros(1))
 
-    def ahead(self, team: _Team) -> _Ahead:
-        """What each plan may go on with; a helper that finds nothing drops out, and the next one goes on."""
-        plans = np.arange(len(self.removed_m2))
+    @classmethod
+    def joined(cls, beams: Sequence[_Plans]) -> _Plans:
+        """The plans of several beams, one after the other."""
+        return cls(*(np.concatenate([getattr(one, field.name) for one in beams]) for field in fields(cls)))
+
+    def chosen(self, rows: Sequence[int] | np.ndarray) -> _Plans:
+        """Some of these, to be changed by themselves."""
+        places = np.asarray(rows, dtype=np.intp)
+        return _Plans(*(getattr(self, field.name)[places] for field in fields(self)))
+
+    @property
+    def count(self) -> int:
+        """How many plans these are."""
+        return len(self.removed_m2)
+
+    def routes(self) -> list[list[int]]:
+        """Of each helper of the one plan that this is, the strips it serves, in order."""
+        (turn,), (who,) = self.turn, self.who
+        in_order = np.argsort(turn, kind="stable")
+        return [in_order[who[in_order] == one].tolist() for one in range(self.nodes.shape[1])]
+
+    def ahead(self, team: _Team, rows: np.ndarray) -> _Ahead:
+        """What some of these plans may go on with; a helper that finds nothing drops out, and the next one goes on."""
+        shape, places = (rows.size, len(team.strips)), np.arange(rows.size)
+        ahead = _Ahead(np.zeros(rows.size, dtype=np.intp), np.zeros(shape), np.zeros(shape))
         for _ in team.helpers:
-            one = np.where(self.is_done, np.inf, self.free_s).argmin(axis=1)
-            now_s, is_done = self.free_s[plans, one], self.is_done[plans, one]
-            at = self.nodes[plans, one]
-            begins_s = now_s[:, np.newaxis] + team.to_begin_s[one, at]
-            sweeps_s = team.sonar_on_s[one[:, np.newaxis], team.way[one, at]]
-            share = np.clip((team.deadline_s - begins_s) / sweeps_s, 0.0, 1.0)
-            lasts = begins_s + sweeps_s <= team.lasts_s[one][:, np.newaxis]
-            gained_m2 = np.where(lasts & ~self.used, team.worth_m2[one] * share, 0.0)
+            one = np.where(self.is_done[rows], np.inf, self.free_s[rows]).argmin(axis=1)
+            is_done, at = self.is_done[rows, one], self.nodes[rows, one]
+            begins_s, sweep_s = self.free_s[rows, one][:, np.newaxis] + team.to_begin_s[one, at], team.sweep_s[one, at]
+            ends_s = begins_s + sweep_s
+            share = np.clip((team.deadline_s - begins_s) / sweep_s, 0.0, 1.0)
+            may = (ends_s <= team.lasts_s[one][:, np.newaxis]) & (self.turn[rows] < 0) & ~is_done[:, np.newaxis]
+            gained_m2 = np.where(may, team.worth_m2[one] * share, 0.0)
+            ahead.next[places], ahead.gained_m2[places] = one, gained_m2
+            ahead.ends_s[places] = ends_s + team.run_out_s[one][:, np.newaxis]
             idle = (gained_m2.max(axis=1) <= 0.0) & ~is_done
             if not idle.any():
                 break
-            self.is_done[plans[idle], one[idle]] = True
-        gained_m2 = np.where(is_done[:, np.newaxis], 0.0, gained_m2)
-        return _Ahead(one, begins_s, begins_s + sweeps_s + team.run_out_s[one][:, np.newaxis], gained_m2)
-
-    def completed(self, team: _Team) -> _Plans:
-        """Of these plans, each gone on with to the deadline by what brings most a second, the one that counts most."""
-        plans = self.to_deadline(team)
-        return plans.chosen([int(plans.counts_m2(team).argmax())])
+            places, rows = places[idle], rows[idle]
+            self.is_done[rows, one[idle]] = True
+        return ahead
 
     def to_deadline(self, team: _Team) -> _Plans:
         """Each gone on with by what brings most a second, until nothing can be gained any more."""
-        plans, rows = self.chosen(range(len(self.routes))), np.arange(len(self.routes))
-        while True:
-            ahead = plans.ahead(team)
+        rows = np.arange(self.count)
+        plans = self.chosen(rows)
+        while rows.size:
+            ahead = plans.ahead(team, rows)
             gains = ahead.gained_m2 > 0
-            if not gains.any():
-                return plans
             now_s = plans.free_s[rows, ahead.next][:, np.newaxis]
             spent_s = np.where(gains, np.minimum(ahead.ends_s, team.deadline_s) - now_s, 1.0)
             strips = (ahead.gained_m2 / spent_s).argmax(axis=1)
-            served = np.flatnonzero(gains[rows, strips])
-            plans.serve(team, ahead, served, served, strips[served])
+            going = np.flatnonzero(gains.any(axis=1))
+            rows = rows[going]
+            plans.serve(team, ahead, rows, going, strips[going])
+        return plans
 
     def counts_m2(self, team: _Team) -> FloatArray:
         """What is removed, and what may be later in the time that is left to those who are done; shape (plans,)."""
@@ -274,7 +302,7 @@ class _Plans:
     def grown(self, team: _Team, beam: int) -> _Plans:
         """The most promising plans that go on from these by one strip; of those that serve the same strips and leave
         helpers at the same places one. None where nothing can be gained any more."""
-        ahead = self.ahead(team)
+        ahead = self.ahead(team, np.arange(self.count))
         has_others = (~self.is_done).sum(axis=1, keepdims=True) > 1
         goes_on = np.hstack([ahead.gained_m2 > 0, has_others])
         so_far_m2 = np.hstack([ahead.gained_m2, np.zeros_like(has_others)]) + self.counts_m2(team)[:, np.newaxis]
@@ -283,14 +311,14 @@ class _Plans:
         rows, strips = np.divmod(order, ranks.shape[1])
         plans = self.gone_on(team, ahead, rows, strips)
         seen = dict[bytes, int]()
-        for row, (nodes, used, is_done) in enumerate(zip(plans.nodes, plans.used, plans.is_done, strict=True)):
-            seen.setdefault(nodes.tobytes() + used.tobytes() + is_done.tobytes(), row)
+        for row, (nodes, turn, is_done) in enumerate(zip(plans.nodes, plans.turn, plans.is_done, strict=True)):
+            seen.setdefault(nodes.tobytes() + (turn < 0).tobytes() + is_done.tobytes(), row)
         return plans.chosen(list(seen.values())[:beam])
 
     def gone_on(self, team: _Team, ahead: _Ahead, rows: np.ndarray, strips: np.ndarray) -> _Plans:
         """Some of these plans, each gone on with by a strip; by none, a number beyond the last one's, where who is next
         leaves the rest to the others."""
-        plans, serves = self.chosen(rows.tolist()), strips < len(team.strips)
+        plans, serves = self.chosen(rows), strips < len(team.strips)
         plans.is_done[~serves, ahead.next[rows[~serves]]] = True
         plans.serve(team, ahead, np.flatnonzero(serves), rows[serves], strips[serves])
         return plans
@@ -300,17 +328,9 @@ class _Plans:
         one = ahead.next[rows]
         self.nodes[own, one] = team.way[one, self.nodes[own, one], strips]
         self.free_s[own, one] = ahead.ends_s[rows, strips]
-        self.used[own, strips] = True
+        self.turn[own, strips] = self.turn[own].max(axis=1) + 1
+        self.who[own, strips] = one
         self.removed_m2[own] += ahead.gained_m2[rows, strips]
-        for place, helper, strip in zip(own.tolist(), one.tolist(), strips.tolist(), strict=True):
-            routes = self.routes[place]
-            self.routes[place] = *routes[:helper], (*routes[helper], strip), *routes[helper + 1 :]
-
-    def chosen(self, rows: Sequence[int]) -> _Plans:
-        """Some of these, to be changed by themselves."""
-        places, routes = list(rows), [self.routes[row] for row in rows]
-        nodes, free_s, is_done = self.nodes[places], self.free_s[places], self.is_done[places]
-        return _Plans(nodes, free_s, is_done, self.used[places], self.removed_m2[places], routes)
 
     def _still_m2(self, team: _Team, ahead: _Ahead) -> FloatArray:
         """What the strips that are left may bring in the time that is left, shape (plans, strips + 1), if a plan goes
@@ -319,7 +339,7 @@ class _Plans:
         left_s = np.where(self.is_done, 0.0, np.maximum(team.until_s - self.free_s, 0.0))
         others_s = left_s.sum(axis=1) - left_s[np.arange(len(one)), one]
         time_s = others_s[:, np.newaxis] + np.maximum(team.until_s[one][:, np.newaxis] - ahead.ends_s, 0.0)
-        there = ~self.used[:, team.by_rate]
+        there = self.turn[:, team.by_rate] < 0
         seconds = np.cumsum(there * team.alone_s[team.by_rate], axis=1)
         worth_m2 = np.cumsum(there * team.alone_m2[team.by_rate], axis=1)
         before_s = (seconds - there * team.alone_s[team.by_rate])[:, team.rank]
