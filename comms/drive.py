@@ -42,7 +42,7 @@ class Setup:
 
     def routing(self) -> Routing:
         """Who writes and reads what."""
-        return Routing(self.roster)
+        return Routing(self.roster, self.run_info)
 
     def store_of(self, node_id: str, name: str) -> Store:
         """The memory of a node, in a file of that name. Raises StoreRefusedError."""

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 from comms.errors import NO_FAILURES, NodeError, in_words, one_line
 from comms.node import Listener, Node, Publication, Received, Step
+from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
 from comms.said.messages import Message
 from comms.said.routing import Route, Routing
@@ -104,6 +105,7 @@ class Intake:
     def __init__(self, routing: Routing) -> None:
         self.dropped: Counter[str] = Counter()
         self._routing = routing
+        self._announced = None if routing.announced is None else body_of(routing.announced)
         self._told: set[tuple[str, str]] = set()
         self._lock = threading.Lock()
 
@@ -123,6 +125,9 @@ class Intake:
             return None
         if header.sender != route.writer:
             self.drop("wrong sender", route.writer, f"{key}: says it is from {header.sender}")
+            return None
+        if isinstance(message, RunInfo) and self._announced not in (None, body_of(message)):
+            self.drop("another run", route.writer, f"{key}: announces a run that is not this one")
             return None
         return Received(key, route.topic, route.vehicle, header, message, payload)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from comms.said.announcement import Role
+from comms.said.announcement import Role, RunInfo
 from comms.said.topics import TOPICS, Reach, Topic, topic_of
 from comms.said.wire import IDENTIFIER
 
@@ -40,11 +40,13 @@ class Route:
 
 
 class Routing:
-    """Answers for a fixed roster; keys are below the run id. Raises ValueError for an id that is no identifier, for two
+    """Answers for a fixed roster; keys are below the run id. `announced`: how the run is announced, where that is known
+    beforehand: then nobody believes another announcement. Raises ValueError for an id that is no identifier, for two
     nodes with one id, and for two that may write one topic of one vehicle."""
 
-    def __init__(self, roster: tuple[RosterNode, ...]) -> None:
+    def __init__(self, roster: tuple[RosterNode, ...], announced: RunInfo | None = None) -> None:
         self.roster = roster
+        self.announced = announced
         self.nodes = {node.node_id: node for node in roster}
         for name in (*self.nodes, *(vehicle for node in roster for vehicle in node.vehicles)):
             if not IDENTIFIER.fullmatch(name):  # a `*` or `/` would let a node write and read what is not its own

@@ -10,7 +10,7 @@ import shapely
 
 from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex
 from comms.said.codec import SCHEMA_VERSION
-from comms.said.routing import RosterNode
+from comms.said.routing import RosterNode, Routing
 from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of
 from planner.region import Region
@@ -53,6 +53,10 @@ class Fleet:
     roster: tuple[RosterNode, ...]
     specs: dict[str, NodeSpec]
     time_limit_ms: int
+
+    def routing(self) -> Routing:
+        """Who writes and reads what in this run, and no other."""
+        return Routing(self.roster, self.run_info)
 
 
 def build_fleet(scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode.LOCKSTEP) -> Fleet:

@@ -17,7 +17,6 @@ from comms.memory.store import Store
 from comms.node import Node
 from comms.result import BusResult, Ending
 from comms.said.announcement import ClockMode, Role
-from comms.said.routing import Routing
 from comms.session import Certificates, open_guest, open_router
 from comms.wall.access import access_rules
 from comms.wall.host import WallHost
@@ -66,7 +65,7 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
     _log_to_stderr()
     end_with_supervisor()
     fleet = build_fleet(scenario, record=record, mode=ClockMode.WALL)
-    routing, keys = Routing(fleet.roster), RunKeys(link.run)
+    routing, keys = fleet.routing(), RunKeys(link.run)
     hosts = hosts_when_spread(fleet.roster)
     rules = None
     if link.certificates is not None:
@@ -126,7 +125,7 @@ def run_node(scenario: Scenario, link: Link, node_id: str, state: Path | None = 
 
 
 def _seat(nodes: Mapping[str, Node], node_id: str, fleet: Fleet, link: Link, state: Path | None) -> NodeSeat:
-    routing = Routing(fleet.roster)
+    routing = fleet.routing()
     if state is None:
         return NodeSeat(nodes, routing)
     try:
@@ -154,7 +153,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     outcome = _Outcome()
     try:
         listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
-        outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, Routing(fleet.roster)))
+        outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, fleet.routing()))
         tell_supervisor(OVER)
         failure = outcome.failure(scenario)
     except NodeError as error:
@@ -226,7 +225,7 @@ def _run_as_guest(fleet: Fleet, link: Link, host: str, seat: Seat) -> _Outcome:
             RunKeys(link.run),
             host,
             seat,
-            Routing(fleet.roster),
+            fleet.routing(),
             fleet.run_info.scenario_sha256,
             fleet.time_limit_ms,
             answer_within_s=link.wait_s,

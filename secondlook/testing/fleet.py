@@ -14,7 +14,6 @@ from typing import Any
 
 from comms.lockstep.drive import Lockstep
 from comms.node import Node, Received
-from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
@@ -122,7 +121,7 @@ class Fleet(Trouble):
         made: Made | None = None,
     ) -> None:
         self.scenario = scenario_from(scenario, overrides, seed)
-        super().__init__(Routing(build_fleet(self.scenario, record=False).roster), fault_seed)
+        super().__init__(build_fleet(self.scenario, record=False).routing(), fault_seed)
         self.bus = _checked(bus)
         self.folder = folder
         self._processes = processes

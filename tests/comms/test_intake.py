@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import pytest
-from fleets import ROSTER, nav, state
+from fleets import ROSTER, RUN_INFO, nav, state
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from same_message import assert_same
@@ -13,9 +14,9 @@ from same_message import assert_same
 from comms.node import Received
 from comms.runner import Intake, Stamp
 from comms.said.announcement import Role
-from comms.said.codec import Header, encode, sealed
+from comms.said.codec import CLOCK, Header, encode, sealed
 from comms.said.routing import Routing
-from comms.said.topics import NAV, STATE, TOPICS, Topic
+from comms.said.topics import NAV, RUN, STATE, TOPICS, Topic
 from comms.said.wire import LARGEST_MS
 from secondlook.testing.checks.any_mail import any_message
 
@@ -74,6 +75,20 @@ def test_what_does_not_fit_is_counted_and_said_once(
     assert caplog.records[0].levelno == logging.WARNING
     assert said in caplog.messages[0]
     assert intake.open("veh/alpha/nav", GOOD) is not None
+
+
+def test_a_run_that_is_announced_otherwise_is_not_believed(caplog: pytest.LogCaptureFixture) -> None:
+    """Who may write the clock's key could have everyone begin another mission."""
+    intake = Intake(Routing(ROSTER, RUN_INFO))
+    other = encode(Header(CLOCK, 0, 0, 0), replace(RUN_INFO, seed=RUN_INFO.seed + 1))
+    assert intake.open(RUN.key(), other) is None
+    assert intake.dropped == {"another run": 1}
+    assert caplog.messages == [
+        "dropped a message from clock: another run: run: announces a run that is not this one (said once)"
+    ]
+    received = intake.open(RUN.key(), encode(Header(CLOCK, 0, 0, 0), RUN_INFO))
+    assert received is not None
+    assert received.message == RUN_INFO
 
 
 def test_each_sender_and_each_reason_is_said_for_itself(intake: Intake, caplog: pytest.LogCaptureFixture) -> None:

@@ -198,14 +198,16 @@ UNTIL_S = {
 
 @pytest.mark.parametrize("name", scenario_names())
 def test_every_bundled_mission_has_one_digest_on_both_buses(tmp_path: Path, name: str) -> None:
-    overrides = (f"mission.time_limit_s={UNTIL_S[name]}",) if name in UNTIL_S else ()
+    overrides = [f"mission.time_limit_s={UNTIL_S[name]}"] if name in UNTIL_S else []
     if name == "wide":
-        overrides += ("area.cell_m=10",)  # of which it has a quarter as many
+        overrides.append("area.cell_m=10")  # of which it has a quarter as many
     summaries = []
     for bus in ("local", "zenoh"):
         (tmp_path / bus).mkdir()
         with contextlib.suppress(RunFailedError) if overrides else contextlib.nullcontext():
-            run_mission(load_scenario(name, overrides, seed=11), RunOptions(tmp_path / bus, bus=bus, record=False))
+            run_mission(
+                load_scenario(name, tuple(overrides), seed=11), RunOptions(tmp_path / bus, bus=bus, record=False)
+            )
         summaries.append(json.loads((tmp_path / bus / "summary.json").read_text()))
     assert summaries[0]["digest"] == summaries[1]["digest"]
     assert (summaries[0]["hotspots"]["revisited"] >= 3) == (name != "paper")
