@@ -120,12 +120,14 @@ class Drive(Protocol):
         *,
         carry_out: Callable[[str, str], None],
         alive: Callable[[int], None],
+        held: Callable[[], bool] = lambda: False,
     ) -> Callable[[], BusResult]:
         """The hub, which hears whoever connects from now on; to be called to run the fleet to its end.
 
         `hosts`: the other processes. `nodes`: those of the hub's own. `carry_out`: told a change, such as `kill`, and a
         host, returns when that is done. `alive`: called with the mission time every half second of wall time and
-        sooner. Raises FleetError, NodeError and RunawayError when it is called.
+        sooner. `held`: whether the launcher is stopped; then nobody is given up for being silent. Raises FleetError,
+        NodeError and RunawayError when it is called.
         """
 
     def acting(self, session: zenoh.Session, setup: Setup, spec: HostSpec, nodes: Mapping[str, Node]) -> Host:

@@ -28,7 +28,8 @@ MOST_PACKETS = 16  # that may wait to be sent; the most there may be
 MOST_MAIL = 1 << 14  # that may wait in a mailbox, each holding a packet
 MOST_AT_THE_DOOR = 1000  # connections that have not proved yet who they are; each is a file to the system
 AT_THE_DOOR_S = 3.0  # so long they may take: whoever is of the fleet tries again, for longer than this
-LEASE_S = 4.0  # a link of which nothing is heard for so long, not even a sign of life, is given up
+LEASE_PATIENCE = 10.0  # times the patience: so long a fleet on one host may be stopped, and goes on
+LEASE_S = 4.0  # on several hosts: a link of which nothing is heard for so long, not even a sign of life, is given up
 BLOCK_S = 1.0  # so long a message waits for a link that takes nothing, before that is given up
 DROP_S = 0.1  # so long what may be left out waits for room: on a busy machine it takes a while to be made
 RETRY_S = (0.2, 1.0)  # a lost link is tried again after the first of these, in the end every second one
@@ -180,11 +181,11 @@ def _needed(expressions: Iterable[str]) -> list[zenoh.KeyExpr]:
 def _on_one_host(
     mode: str, patience_s: float, *, listen: Iterable[str] = (), connect: Iterable[str] = ()
 ) -> dict[str, Any]:
-    """Settings. `patience_s`: wall time after which the other side gives up a session from which nothing comes, not
-    even a sign of life, and for which a put waits for one that takes nothing. An end of the process is noticed at
-    once."""
+    """Settings. `patience_s`: wall time for which a put waits for one that takes nothing. An end of the process is
+    noticed at once; one that is silent the hub gives up, as it knows whether it was itself awake. A link outlasts
+    that."""
     return _basic(mode, listen, connect) | {
-        "transport/link/tx/lease": round(patience_s * 1000),
+        "transport/link/tx/lease": round(LEASE_PATIENCE * patience_s * 1000),
         "transport/link/tx/batch_size": PACKET_BYTES,
         "transport/link/tx/queue/size/real_time": MOST_PACKETS,
         "transport/link/tx/queue/congestion_control/block/wait_before_close": round(patience_s * 1e6),

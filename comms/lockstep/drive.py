@@ -81,6 +81,7 @@ class Lockstep:
         *,
         carry_out: Callable[[str, str], None],
         alive: Callable[[int], None],
+        held: Callable[[], bool] = lambda: False,
     ) -> Callable[[], BusResult]:
         """See `comms.drive.Drive`."""
         hub = Hub(
@@ -95,6 +96,7 @@ class Lockstep:
             carry_out=lambda change, host: carry_out(change.value, host),
             patience_s=setup.patience_s,
             alive=alive,
+            held=held,
         )
         return partial(hub.run, setup.run_info)
 

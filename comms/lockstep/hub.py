@@ -11,6 +11,7 @@ from typing import Any
 
 import zenoh
 
+from comms.awake_clock import AwakeClock
 from comms.errors import FleetError, HostLostError, NodeError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
 from comms.lockstep.clock import Grant, LockstepClock, Round, result_of
@@ -61,12 +62,14 @@ class Hub:
         patience_s: float = PATIENCE_S,
         most_behind_bytes: int = MOST_BEHIND_BYTES,
         alive: Callable[[int], None] = lambda now_ms: None,
+        held: Callable[[], bool] = lambda: False,
     ) -> None:
         self._session = session
         self._keys = keys
         self._routing = routing
         self._patience_s = patience_s
         self._alive = alive
+        self._now = AwakeClock(held=held)
         self._alive_at_s = time.monotonic()
         self._change = carry_out
         self._clock = LockstepClock(routing, time_limit_ms, events)
@@ -188,18 +191,18 @@ class Hub:
 
     def _wait(self, done: Callable[[], bool], missing: Callable[[], str]) -> None:
         """Handles what arrives until `done()`; FleetError when nothing arrives for too long."""
-        heard_at_s = time.monotonic()
+        heard_at_s = self._now()
         while not done():
             try:
                 event = self._queue.get(timeout=min(SIGN_OF_LIFE_EVERY_S, self._patience_s))
             except queue.Empty:
-                if time.monotonic() - heard_at_s >= self._patience_s:
+                if self._now() - heard_at_s >= self._patience_s:
                     at_s = self._clock.now_ms / 1000
                     raise FleetError(
                         f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission: {missing()}"
                     ) from None
             else:
-                heard_at_s = time.monotonic()
+                heard_at_s = self._now()
                 self._handle(*event)
             self._show_life()
 

@@ -29,13 +29,14 @@ class MissionTime:
 
     A signal tells the mission time at which it was sent, and by how much that runs faster than the wall. It is heard a
     little later, so that of the last signals the one that was least under way is the right one. Local times are those
-    of a monotonic clock, in seconds. Mission time never goes back.
+    of a monotonic clock, in seconds. Mission time never goes back; it stands still while it is held.
     """
 
     def __init__(self) -> None:
         self.factor = 1.0
         self._zeros_ms: deque[float] = deque(maxlen=SIGNALS_KEPT)
         self._latest_ms = 0
+        self._held = False
 
     @property
     def known(self) -> bool:
@@ -44,19 +45,32 @@ class MissionTime:
 
     def hear(self, told_ms: float, factor: float, local_s: float) -> None:
         """A signal has arrived at this local time."""
-        if factor != self.factor:
+        if factor != self.factor or self._held:
             self._zeros_ms.clear()
-            self.factor = factor
+            self.factor, self._held = factor, False
         self._zeros_ms.append(told_ms - local_s * 1000 * factor)
+
+    def hold(self, local_s: float) -> None:
+        """It stands still until the next signal."""
+        if self.known:
+            self.now_ms(local_s)
+            self._held = True
+
+    @property
+    def is_held(self) -> bool:
+        """Whether it stands still."""
+        return self._held
 
     def now_ms(self, local_s: float) -> int:
         """Mission time in whole milliseconds; to be asked once it is known."""
+        if self._held:
+            return self._latest_ms
         self._latest_ms = max(self._latest_ms, math.floor(max(self._zeros_ms) + local_s * 1000 * self.factor))
         return self._latest_ms
 
     def local_s(self, mission_ms: int) -> float:
-        """When by the local clock a mission time comes."""
-        return (mission_ms - max(self._zeros_ms)) / 1000 / self.factor
+        """When by the local clock a mission time comes; never as long as it stands still."""
+        return math.inf if self._held else (mission_ms - max(self._zeros_ms)) / 1000 / self.factor
 
 
 WRAP_UP_S = 0.5  # wall time in which the fleet's last words are said after the mission is over
@@ -157,6 +171,11 @@ class WallClock:
         if known is not None and known.instance == instance and known.last_word is None:
             known.instance, known.ready = "", False
             self.notices.append(f"{host} is gone")
+
+    @property
+    def unfinished(self) -> list[str]:
+        """The listeners that have not said that they have heard all there was."""
+        return [host for host, listens in self._listens.items() if listens and not self.is_done(host)]
 
     def is_done(self, host: str) -> bool:
         """Whether a host has given its last word."""

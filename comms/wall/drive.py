@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import zenoh
 
+from comms.awake_clock import AwakeClock
 from comms.drive import Host, ListeningHost, Setup
 from comms.keys import HostSpec
 from comms.node import Listener, Node
@@ -24,10 +26,12 @@ from comms.wall.seats import ListenerSeat, NodeSeat, Seat
 @dataclass(frozen=True)
 class ByWallClock:
     """See `comms.drive.Drive`. `factor`: > 0. Whoever is lost ends the run, unless with `keeps_going` it is started
-    again: then nodes keep their memories in files, and go on by what is in them."""
+    again: then nodes keep their memories in files, and go on by what is in them. `may_be_late_s`: so late, of the
+    mission, nodes may be: of a fleet that is later nothing is believed, and the run fails."""
 
     factor: float
     keeps_going: bool = False
+    may_be_late_s: float = math.inf
 
     mode = ClockMode.WALL
 
@@ -39,7 +43,8 @@ class ByWallClock:
         self, setup: Setup, nodes: Mapping[str, Callable[[], Node]], listeners: Mapping[str, Listener]
     ) -> BusResult:
         """See `comms.drive.Drive`."""
-        return run_local_by_wall(setup.routing(), nodes, listeners, setup.run_info, setup.time_limit_ms, self.factor)
+        limit_ms, late_ms = setup.time_limit_ms, self.may_be_late_s * 1000
+        return run_local_by_wall(setup.routing(), nodes, listeners, setup.run_info, limit_ms, self.factor, late_ms)
 
     def access_rules(self, setup: Setup, hosts: tuple[HostSpec, ...]) -> dict[str, Any]:
         """See `comms.drive.Drive`."""
@@ -54,6 +59,7 @@ class ByWallClock:
         *,
         carry_out: Callable[[str, str], None],
         alive: Callable[[int], None],
+        held: Callable[[], bool] = lambda: False,
     ) -> Callable[[], BusResult]:
         """See `comms.drive.Drive`; nothing is to be carried out."""
         routing = setup.routing()
@@ -68,8 +74,10 @@ class ByWallClock:
             self.factor,
             strict=True,
             forgiving=self.keeps_going,
+            may_be_late_ms=self.may_be_late_s * 1000,
             patience_s=setup.patience_s,
             alive=alive,
+            now=AwakeClock(held=held),
         )
         return hub.run
 
@@ -88,4 +96,5 @@ class ByWallClock:
 
 
 def _host(session: zenoh.Session, setup: Setup, host: str, seat: Seat, routing: Routing) -> WallHost:
-    return WallHost(session, setup.keys, host, seat, routing, setup.run_info.scenario_sha256, setup.time_limit_ms)
+    sha256, limit_ms = setup.run_info.scenario_sha256, setup.time_limit_ms
+    return WallHost(session, setup.keys, host, seat, routing, sha256, limit_ms, now=AwakeClock())

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import math
 import secrets
-import time
 from collections.abc import Callable
 from typing import Any
 
 import zenoh
 
+from comms.awake_clock import AwakeClock
 from comms.errors import Interrupted, NodeError, RefusedError, WordsError, one_line
 from comms.keys import RunKeys
 from comms.node import Received
@@ -23,7 +23,7 @@ from comms.wall.gate import Gate
 from comms.wall.line import WallLine
 from comms.wall.post import WallPost, Words
 from comms.wall.seats import Seat
-from comms.wall.words import Hello, pack_hello, unpack_finish, unpack_time
+from comms.wall.words import Hello, TimeSignal, pack_hello, unpack_finish, unpack_time
 from comms.words import pack, pack_last_word
 
 HELLO_EVERY_S = 1.0
@@ -41,7 +41,8 @@ class WallHost:
 
     `host`: under which it speaks with the clock, which is to answer within `answer_within_s`. A while after the time
     limit it ends by itself, where a clock that is not heard any more cannot end it. `notice`: told in words what a
-    person should know. `interrupted`: whether someone has ended it.
+    person should know. `now`: of a fleet that is simulated, whose time stands still while this process is stopped.
+    `interrupted`: whether someone has ended it.
     """
 
     def __init__(
@@ -56,8 +57,11 @@ class WallHost:
         *,
         answer_within_s: float = math.inf,
         notice: Callable[[str], None] = lambda sentence: None,
+        now: AwakeClock | None = None,
     ) -> None:
         self.interrupted = False
+        self._now = AwakeClock(math.inf) if now is None else now
+        self._times_stopped = 0
         self._keys = keys
         self._host = host
         self._seat = seat
@@ -72,8 +76,8 @@ class WallHost:
         self._result: BusResult | None = None
         self._finish_by_s = 0.0
         self._hello_at_s = self._beat_at_s = 0.0
-        self._answer_by_s = time.monotonic() + answer_within_s
-        self._clock_heard_s = time.monotonic()
+        self._answer_by_s = self._now() + answer_within_s
+        self._clock_heard_s = self._now()
         self._clock_is_heard = True
         self._catch_up_by_s = 0.0
         self._to_me = f"clock/to/{host}"
@@ -99,7 +103,7 @@ class WallHost:
     @property
     def now_ms(self) -> int:
         """The mission's time; 0 as long as it is not known."""
-        return self._time.now_ms(time.monotonic()) if self._time.known else 0
+        return self._time.now_ms(self._now()) if self._time.known else 0
 
     def interrupt(self) -> None:
         """From another thread: ends the run here early; listeners keep what they have."""
@@ -128,7 +132,10 @@ class WallHost:
 
     def _live(self) -> None:
         while True:
-            now_s = time.monotonic()
+            now_s = self._now()
+            if self._now.times_stopped > self._times_stopped:
+                self._times_stopped = self._now.times_stopped
+                self._time.hold(now_s)  # the clock says how long all have been
             self._speak(now_s)
             self._listen_for_clock(now_s)
             if not self._welcomed and now_s >= self._answer_by_s:
@@ -147,7 +154,7 @@ class WallHost:
             ):
                 self._seat.end()
                 return
-            event = self._line.get(self._next_s(now_s) - time.monotonic())
+            event = self._line.get(self._next_s(now_s) - self._now())
             if event is None:
                 continue
             for item in self._post.receive(event, self._seat.kept.values):
@@ -175,15 +182,19 @@ class WallHost:
     def _speak(self, now_s: float) -> None:
         if now_s >= self._hello_at_s:
             self._hello_at_s = now_s + (HELLO_EVERY_S if self._welcomed else FIRST_HELLO_EVERY_S)
-            # Who is not welcomed yet tells until when it remembers: a clock that begins goes by it for want of better.
-            remembers_ms = None if self._welcomed else self._seat.taken_up_at_ms
-            now_ms = self._time.now_ms(now_s) if self._time.known else remembers_ms
-            hello = Hello(self._instance, SCHEMA_VERSION, self._scenario_sha256, self._welcomed, now_ms)
-            self._say(pack_hello(hello))
+            self._say_hello(now_s)
         if now_s >= self._beat_at_s:
             self._beat_at_s = now_s + BEAT_EVERY_S
             if self._time.known:
                 self._post.beat(self._seat.kept)
+
+    def _say_hello(self, now_s: float) -> None:
+        # Who is not welcomed yet tells until when it remembers: a clock that begins goes by it for want of better.
+        remembers_ms = None if self._welcomed else self._seat.taken_up_at_ms
+        now_ms = self._time.now_ms(now_s) if self._time.known else remembers_ms
+        late_ms = self._seat.late_ms() if self._welcomed else 0
+        hello = Hello(self._instance, SCHEMA_VERSION, self._scenario_sha256, self._welcomed, now_ms, late_ms)
+        self._say(pack_hello(hello))
 
     def _listen_for_clock(self, now_s: float) -> None:
         heard = now_s - self._clock_heard_s < CLOCK_LOST_AFTER_S
@@ -192,46 +203,50 @@ class WallHost:
             self._notice("the router is heard again" if heard else "the router is not heard")
 
     def _pass_on(self, received: Received) -> None:
-        if not self._time.known:
+        if not self._time.known or self._time.is_held:  # by no time it could be told whether it is ahead of that
             self._early.append(received)
             return
-        now_ms = self._time.now_ms(time.monotonic())
+        now_ms = self._time.now_ms(self._now())
         if self._post.is_in_time(received, now_ms):
             self._post.publish(self._seat.hear(received, now_ms))
 
     def _hear(self, key: str, words: list[Any]) -> None:
         try:
             if key == "clock/time":
-                self._hear_time(*unpack_time(words))
+                self._hear_time(unpack_time(words))
             elif key == self._to_me:
                 self._hear_clock(words)
         except WordsError as error:
             self._post.intake.drop("senseless words", "clock", str(error))
 
-    def _hear_time(self, now_ms: int | None, factor: float, taken_up: bool) -> None:
-        self._clock_heard_s = time.monotonic()
+    def _hear_time(self, told: TimeSignal) -> None:
+        self._clock_heard_s = self._now()
+        now_ms = told.now_ms
         if now_ms is None:
             self._waits_for_start = True
             return
         if not self._welcomed:  # nobody acts who may yet be refused
             return
+        if told.held:
+            self._time.hold(self._now())
+            return
         first = not self._time.known
-        self._gate.factor = factor
-        self._time.hear(now_ms, factor, time.monotonic())
+        self._gate.factor = told.factor
+        self._time.hear(now_ms, told.factor, self._now())
         if first:
             # Who was there before the start is the first of its name; later ones are told apart by when they came. The
             # wait for a clock that takes up a mission's time was no wait for the start.
-            is_first = self._waits_for_start and not taken_up
-            self._seat.begin(0 if is_first else incarnation_at(now_ms, self._time_limit_ms), factor)
+            is_first = self._waits_for_start and not told.taken_up
+            self._seat.begin(0 if is_first else incarnation_at(now_ms, self._time_limit_ms), told.factor)
             at = f"the mission is at {now_ms / 1000:.0f} s"
             if self._seat.taken_up_at_ms is not None:
-                self._catch_up_by_s = time.monotonic() + CATCH_UP_WITHIN_S
+                self._catch_up_by_s = self._now() + CATCH_UP_WITHIN_S
                 self._notice(f"goes on from {self._seat.taken_up_at_ms / 1000:.0f} s; {at}")
             else:
                 self._notice("the mission begins" if is_first else at)
-            early, self._early = self._early, []
-            for received in early:
-                self._pass_on(received)
+        early, self._early = self._early, []
+        for received in early:
+            self._pass_on(received)
 
     def _hear_clock(self, words: list[Any]) -> None:
         match words:
@@ -243,15 +258,16 @@ class WallHost:
                 raise RefusedError(f"refused by the router: {one_line(sentence)}")
             case ["finish", *_]:
                 self._result = unpack_finish(words)
-                self._finish_by_s = self._finish_by_s or time.monotonic() + COMPLETE_WITHIN_S
+                self._finish_by_s = self._finish_by_s or self._now() + COMPLETE_WITHIN_S
 
     def _leave(self) -> None:
         """Gives the last word; returns when the clock has heard it, or is gone. The session may be closed then: the
         news of its end cannot overtake the word."""
+        self._say_hello(self._now())
         self._post.beat(self._seat.kept)
         self._say(pack_last_word(self._seat.last_word(self._post.intake.dropped)))
-        deadline_s = time.monotonic() + GOODBYE_WITHIN_S
-        while (left_s := deadline_s - time.monotonic()) > 0:
+        deadline_s = self._now() + GOODBYE_WITHIN_S
+        while (left_s := deadline_s - self._now()) > 0:
             event = self._line.get(left_s)
             if event is None:
                 return

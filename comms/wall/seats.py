@@ -105,6 +105,9 @@ class Seat(Protocol):
     def next_ms(self) -> int | None:
         """When time is to be told next, None for any time."""
 
+    def late_ms(self) -> int:
+        """By how much a wake-up or a message here was late since this was last asked, at most."""
+
     @property
     def kept(self) -> Mapping[str, Journal]:
         """By node id, what is kept for others."""
@@ -142,6 +145,7 @@ class NodeSeat:
         }
         times_ms = [one.node.now_ms for one in self._nodes.values() if one.node.is_taken_up]
         self.taken_up_at_ms = max(times_ms, default=None)
+        self._late_ms = 0
         self._latency = StripLatency()
         self._is_coordinators = any(routing.nodes[node_id].role is Role.COORDINATOR for node_id in nodes)
 
@@ -156,13 +160,16 @@ class NodeSeat:
         if self._is_coordinators:
             self._latency.arrived(received, time.perf_counter())
         route = self._routing.route(received.key)
-        readers = () if route is None else route.readers
-        return self._noted(
-            [one for name in readers if name in self._nodes for one in self._nodes[name].hear(received, now_ms)]
-        )
+        readers = [] if route is None else [self._nodes[name] for name in route.readers if name in self._nodes]
+        if readers:
+            self._late_ms = max(self._late_ms, now_ms - received.header.sent_ms)
+        return self._noted([one for node in readers for one in node.hear(received, now_ms)])
 
     def act(self, now_ms: int) -> list[Outgoing]:
         """Wakes the nodes for whom it is time."""
+        for one in self._nodes.values():
+            if one.node.is_due(now_ms):
+                self._late_ms = max(self._late_ms, now_ms - (one.node.wake_ms or 0))
         return self._noted([one for node in self._nodes.values() for one in node.wake(now_ms)])
 
     @property
@@ -170,6 +177,11 @@ class NodeSeat:
         """When the next wake-up is due."""
         wakes_ms = (one.node.wake_ms for one in self._nodes.values())
         return min((wake_ms for wake_ms in wakes_ms if wake_ms is not None), default=None)
+
+    def late_ms(self) -> int:
+        """See `Seat`."""
+        late_ms, self._late_ms = self._late_ms, 0
+        return late_ms
 
     def handled(self) -> HeardMessages:
         """Where there is one node, all that it has handled; one of several may have been the only one to handle it."""
@@ -231,6 +243,10 @@ class ListenerSeat:
     def next_ms(self) -> int | None:
         """When the next message is due."""
         return self._window.due_ms
+
+    def late_ms(self) -> int:
+        """Listeners may be late: nobody waits for them."""
+        return 0
 
     def handled(self) -> HeardMessages:
         """Nothing: all that is kept is to come."""

@@ -26,7 +26,7 @@ class Hello:
 
     `instance`: made up by the process, so that two of one name are told apart. `now_ms`: the mission time it goes by,
     None as long as it knows none; of one that is not welcomed yet until when it remembers the mission, None where it
-    does not. `welcomed`: whether it has heard the clock.
+    does not. `welcomed`: whether it has heard the clock. `late_ms`: see `Pace.hear`.
     """
 
     instance: str
@@ -34,6 +34,18 @@ class Hello:
     scenario_sha256: str
     welcomed: bool
     now_ms: int | None
+    late_ms: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSignal:
+    """Mission time, None before the start, and by how much it runs faster than the wall. `taken_up`: the clock has it
+    from others, as one that was started anew. `held`: it stands still until the next signal."""
+
+    now_ms: int | None
+    factor: float
+    taken_up: bool = False
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,31 +59,30 @@ class Beat:
 def pack_hello(hello: Hello) -> bytes:
     """A host's `hello`."""
     return pack(
-        "hello", hello.instance, hello.schema, hello.scenario_sha256, hello.welcomed, hello.now_ms,
+        "hello", hello.instance, hello.schema, hello.scenario_sha256, hello.welcomed, hello.now_ms, hello.late_ms,
     )  # fmt: skip
 
 
 def unpack_hello(words: list[Any]) -> Hello:
     """The `hello` of a host; raises WordsError."""
     match words:
-        case ["hello", str(instance), int(schema), str(sha), bool(welcomed), None | int() as now_ms]:
-            if max(len(instance), len(sha)) <= LONGEST_ID and _is_time(now_ms):
-                return Hello(instance, schema, sha, welcomed, now_ms)
+        case ["hello", str(instance), int(schema), str(sha), bool(welcomed), None | int() as now_ms, int(late_ms)]:
+            if max(len(instance), len(sha)) <= LONGEST_ID and _is_time(now_ms) and _is_time(late_ms):
+                return Hello(instance, schema, sha, welcomed, now_ms, late_ms)
     raise WordsError("a hello that is none")
 
 
-def pack_time(now_ms: int | None, factor: float, *, taken_up: bool) -> bytes:
-    """The time signal: mission time, None before the start, its factor, and whether the clock has taken it up from
-    others, as one that was started anew."""
-    return pack("time", now_ms, factor, taken_up)
+def pack_time(told: TimeSignal) -> bytes:
+    """The clock's time signal."""
+    return pack("time", told.now_ms, told.factor, told.taken_up, told.held)
 
 
-def unpack_time(words: list[Any]) -> tuple[int | None, float, bool]:
-    """The three words of a time signal; raises WordsError."""
+def unpack_time(words: list[Any]) -> TimeSignal:
+    """What a time signal tells; raises WordsError."""
     match words:
-        case ["time", None | int() as now_ms, float(factor), bool(taken_up)]:
+        case ["time", None | int() as now_ms, float(factor), bool(taken_up), bool(held)]:
             if _is_time(now_ms) and 0 < factor <= LARGEST_FACTOR:
-                return now_ms, factor, taken_up
+                return TimeSignal(now_ms, factor, taken_up=taken_up, held=held)
     raise WordsError("a time signal that is none")
 
 

@@ -73,7 +73,8 @@ def _wherever_laid(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:
     run_along = bool(np.abs(ends - starts)[1].sum() >= np.abs(ends - starts)[0].sum())
     offsets_m = ((starts + ends) / 2)[0 if run_along else 1]
     apart_m = float(np.ptp(offsets_m)) / max(1, len(plan.tracks) - 1)
-    return -np.log(sliding_mean(np.exp(-nats), round(apart_m / 2 / grid.cell_m), 1 if run_along else 0))
+    left = sliding_mean(np.exp(-nats), round(apart_m / 2 / grid.cell_m), 1 if run_along else 0)
+    return -np.log(np.maximum(left, np.finfo(np.float64).tiny))  # of more looks than there are numbers for
 
 
 def curve_of(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> DetectionCurve:

@@ -78,8 +78,8 @@ class ForwardLooking:
         return math.ceil(round(self.shape.far_m, 2) / along_bin_m - TOLERANCE)
 
     def track_length_m(self, look: LookGeometry) -> float:
-        """What the bins are more than the sonar sees ahead."""
-        return (look.along_bins - self.bins_ahead(look.along_bin_m)) * look.along_bin_m
+        """What the bins are more than the sonar sees ahead; 0 of a look that has fewer, as none of this sonar has."""
+        return max(0, look.along_bins - self.bins_ahead(look.along_bin_m)) * look.along_bin_m
 
     def sees(self, ahead_m: FloatArray, lateral_m: FloatArray) -> BoolArray:
         """Which places lie in the sector, by how far they lie ahead of the vehicle and to its side."""

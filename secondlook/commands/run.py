@@ -149,7 +149,7 @@ def run(
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
-    drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going)
+    drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
         with progress_display(mission.name, quiet=as_json) as progress:

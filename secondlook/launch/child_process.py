@@ -21,6 +21,7 @@ from secondlook.files import CannotWriteError
 from secondlook.fleet.nodes import NodeSpec
 from secondlook.launch.verdict import Fate
 
+SIGN_OF_LIFE = b"."  # to the hub, from its launcher, some times a second
 STATUS_FD = "SECONDLOOK_STATUS_FD"  # environment variable: the file descriptor for words to the launcher
 
 
@@ -163,6 +164,12 @@ class ChildProcess:
         """Writes a line to its standard input."""
         with contextlib.suppress(OSError):
             self._stdin.write(f"{line}\n".encode())
+            self._stdin.flush()
+
+    def show_life(self) -> None:
+        """Tells it that the launcher is not stopped."""
+        with contextlib.suppress(OSError):
+            self._stdin.write(SIGN_OF_LIFE)
             self._stdin.flush()
 
     def fate(self) -> Fate | None:

@@ -17,7 +17,9 @@ import queue
 import signal
 import sys
 import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from typing import IO, Any
 
@@ -32,10 +34,11 @@ from comms.errors import (
 )
 from comms.session import open_client, open_hub, read_where_packets_are_awaited
 from secondlook.fleet.nodes import make_nodes
-from secondlook.launch.child_process import STATUS_FD, ChildSetup, receive_setup
+from secondlook.launch.child_process import SIGN_OF_LIFE, STATUS_FD, ChildSetup, receive_setup
 
 FAILED = 1  # exit codes: after a sentence for the launcher, and when the launcher is gone
 ORPHANED = 3
+STOPPED_AFTER_S = 2.0  # without a sign of life the launcher is stopped
 
 YOUNG_OBJECTS = 20_000  # so many are looked through for garbage together: hardly any is, as messages hold no circles
 
@@ -51,18 +54,32 @@ def main() -> int:
 
     child = receive_setup(sys.stdin.buffer)
     try:
-        if child.hosts:
-            _be_hub(child, tell)
-        else:
-            read_where_packets_are_awaited()
-            _be_host(child)
-    except HostLostError as error:
-        tell(lost=error.host, at_ms=error.at_ms)
-        return FAILED
-    except (NodeError, FleetError, RunawayError, ConnectionFailedError, RefusedError, StoreRefusedError) as error:
-        tell(failed=str(error))
+        with _told(tell):
+            if child.hosts:
+                _be_hub(child, tell)
+            else:
+                read_where_packets_are_awaited()
+                _be_host(child)
+    except _ToldError:
         return FAILED
     return 0
+
+
+class _ToldError(Exception):
+    """The process has failed, and the launcher knows why."""
+
+
+@contextmanager
+def _told(tell: Callable[..., None]) -> Iterator[None]:
+    """Tells why what is done within it has failed; raises _ToldError then."""
+    try:
+        yield
+    except HostLostError as error:
+        tell(lost=error.host, at_ms=error.at_ms)
+        raise _ToldError from error
+    except (NodeError, FleetError, RunawayError, ConnectionFailedError, RefusedError, StoreRefusedError) as error:
+        tell(failed=str(error))
+        raise _ToldError from error
 
 
 def _read_endpoint(pipe: IO[bytes]) -> str:
@@ -75,20 +92,27 @@ def _read_endpoint(pipe: IO[bytes]) -> str:
 class _LauncherWatch:
     """Acts when the launcher's pipe closes: ends the process at once, unless `act` is set to something milder.
 
-    `lines`: an item for each line that has come through the pipe.
+    `lines`: an item for each line that has come through the pipe. A dot is a sign of life: who is stopped gives none.
     """
 
     def __init__(self) -> None:
         self.act: Callable[[], None] = lambda: os._exit(ORPHANED)
         self.lines: queue.SimpleQueue[None] = queue.SimpleQueue()
+        self._heard_s = time.monotonic()
         threading.Thread(target=self._wait, daemon=True).start()
 
     def _wait(self) -> None:
         # Not through sys.stdin: a thread blocked inside its buffer would break the interpreter's shutdown.
         while byte := os.read(sys.stdin.fileno(), 1):
-            if byte == b"\n":
+            if byte == SIGN_OF_LIFE:
+                self._heard_s = time.monotonic()
+            elif byte == b"\n":
                 self.lines.put(None)
         self.act()
+
+    def is_stopped(self) -> bool:
+        """Whether the launcher has been silent for longer than one that runs."""
+        return time.monotonic() - self._heard_s > STOPPED_AFTER_S
 
 
 def _make_nodes(child: ChildSetup) -> dict[str, Any]:
@@ -108,9 +132,15 @@ def _be_hub(child: ChildSetup, tell: Callable[..., None]) -> None:
     nodes, setup = _make_nodes(child), child.setup
     rules = child.drive.access_rules(setup, child.hosts)
     session, endpoint = open_hub(child.passwords, rules, patience_s=setup.patience_s)
-    with session:
+    with session, _told(tell):  # first told: a session is not closed as long as the other end of a link is stopped
         run = child.drive.hub(
-            session, setup, child.hosts, nodes, carry_out=carry_out, alive=lambda now_ms: tell(alive_ms=now_ms)
+            session,
+            setup,
+            child.hosts,
+            nodes,
+            carry_out=carry_out,
+            alive=lambda now_ms: tell(alive_ms=now_ms),
+            held=watch.is_stopped,
         )
         tell(endpoint=endpoint)  # now that the hub hears whoever connects
         result = run()

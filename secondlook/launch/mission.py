@@ -14,7 +14,7 @@ from typing import Any, Literal
 import shapely
 
 from comms.drive import Drive, Setup
-from comms.errors import NodeError, RunawayError
+from comms.errors import FleetError, NodeError, RunawayError
 from comms.lockstep.drive import Lockstep
 from comms.node import Node
 from comms.result import BusResult, Ending
@@ -159,7 +159,7 @@ class _Run:
         try:
             with signals_interrupt():
                 result = self._on_local() if self._options.bus == "local" else self._on_zenoh()
-        except (NodeError, RunawayError, RunFailedError) as error:
+        except (FleetError, NodeError, RunawayError, RunFailedError) as error:
             return None, "failed", str(error)
         except RunStopped:
             return None, "stopped", None

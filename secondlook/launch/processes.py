@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from comms.awake_clock import AwakeClock
 from comms.drive import Drive, Setup
 from comms.keys import HostSpec
 from comms.lockstep.events import Change
@@ -73,6 +74,7 @@ class Processes:
         self._passwords = {spec.host: secrets.token_hex(16) for spec in self._hosts}
         self._patience_s = patience_s
         self._children: dict[str, ChildProcess] = {}
+        self._now = AwakeClock()
         self._verdict = Verdict(HUB)
         self._hub_heard_s = 0.0
         self._hub_alive_ms = 0
@@ -103,8 +105,9 @@ class Processes:
     def run(self) -> BusResult:
         """Starts all, waits for the run's end; raises RunFailedError, and RunStopped where the observer does."""
         self._start_all()
-        self._hub_heard_s = time.monotonic()
+        self._hub_heard_s = self._now()
         while True:
+            self._children[HUB].show_life()
             # Before they are heard: what a process said before it ended is not to come after the news of its end.
             fates = {host: child.fate() for host, child in self._children.items() if host not in self._killed}
             for child, words in self._hear():
@@ -113,7 +116,7 @@ class Processes:
                 self._act_on(child, words)
             if self._listening.stopped:
                 raise RunStopped
-            now_s = time.monotonic()
+            now_s = self._now()
             for host, fate in fates.items():
                 if fate is not None and host not in self._killed:
                     self._bury(host, fate, now_s)
@@ -187,7 +190,7 @@ class Processes:
                 self._selector.unregister(child.status)
                 continue
             if child.host == HUB:
-                self._hub_heard_s = time.monotonic()
+                self._hub_heard_s = self._now()
             for one in words:
                 yield child, one
 
@@ -209,7 +212,7 @@ class Processes:
             case {"failed": sentence}:
                 self._verdict.says(sentence)
             case {"lost": host, "at_ms": at_ms}:
-                self._verdict.loses(host, at_ms, time.monotonic())
+                self._verdict.loses(host, at_ms, self._now())
 
     def _change(self, change: Change, child: ChildProcess) -> None:
         """What the hub has asked for, as planned."""

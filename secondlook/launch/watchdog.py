@@ -10,9 +10,9 @@ import os
 import signal
 import sys
 import threading
-import time
 from types import FrameType
 
+from comms.awake_clock import AwakeClock
 from comms.errors import Stop
 from comms.node import Node, Received, Step
 
@@ -66,9 +66,10 @@ class Watchdog:
         self._what = None
 
     def _check(self) -> None:
-        seen, since_s = 0, time.monotonic()
+        now = AwakeClock(most_s=2 * self._patience_s / _LOOKS)
+        seen, since_s = 0, now()
         while not self._done.wait(self._patience_s / _LOOKS):
-            what, now_s = self._what, time.monotonic()
+            what, now_s = self._what, now()
             if what is None or self._calls != seen:
                 seen, since_s = self._calls, now_s
             elif now_s - since_s >= self._patience_s + GRACE_S:

@@ -49,13 +49,15 @@ def has_ended(pid: int, timeout_s: float) -> bool:
 
 
 class Flight:
-    """`secondlook run` as a user starts it, with standard output and error in pipes."""
+    """`secondlook run` as a user starts it, with standard output and error in pipes; or another program, which is given
+    the folder and the arguments."""
 
-    def __init__(self, folder: Path, *arguments: str) -> None:
+    def __init__(self, folder: Path, *arguments: str, program: Path | None = None) -> None:
         self.folder = folder
         self._mark = uuid.uuid4().hex
+        ours: list[str | Path] = [Path(sys.executable).with_name("secondlook"), "run", BRIEF, "--out"]
         self.process = subprocess.Popen(
-            [Path(sys.executable).with_name("secondlook"), "run", BRIEF, "--out", folder, *arguments],
+            [*(ours if program is None else [sys.executable, program]), folder, *arguments],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -92,9 +94,9 @@ class Flight:
 
 
 @contextmanager
-def flight(folder: Path, *arguments: str) -> Iterator[Flight]:
+def flight(folder: Path, *arguments: str, program: Path | None = None) -> Iterator[Flight]:
     """A flight that is gone afterwards, whatever has become of the test."""
-    flying = Flight(folder, *arguments)
+    flying = Flight(folder, *arguments, program=program)
     try:
         yield flying
     finally:

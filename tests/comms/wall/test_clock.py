@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from comms.errors import WordsError
 from comms.result import Ending, LastWord
 from comms.said.codec import SCHEMA_VERSION
-from comms.wall.clock import HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, Phase, WallClock
+from comms.wall.clock import HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, MissionTime, Phase, WallClock
 from comms.wall.words import Hello, unpack_finish
 from comms.words import unpack
 
@@ -236,3 +237,16 @@ def test_who_is_gone_at_the_end_is_waited_for_a_while_as_it_may_be_started_again
     assert phase(told) == Phase.ENDING
     told.pass_time(1.0 + HERE_S)
     assert phase(told) == Phase.CLOSING
+
+
+def test_mission_time_stands_still_from_a_hold_to_the_next_signal() -> None:
+    time = MissionTime()
+    time.hold(3.0)
+    assert not time.known
+    time.hear(5_000, 10.0, 100.0)
+    assert time.now_ms(101.0) == 15_000
+    assert time.local_s(25_000) == pytest.approx(102.0)
+    time.hold(101.5)
+    assert (time.now_ms(101.5), time.now_ms(180.0), time.local_s(25_000)) == (20_000, 20_000, math.inf)
+    time.hear(19_000, 10.0, 180.0)  # it has run on for a little before it was told to stand still: it never goes back
+    assert (time.now_ms(180.0), time.now_ms(180.1), time.now_ms(180.2)) == (20_000, 20_000, 21_000)

@@ -20,7 +20,7 @@ from comms.said.topics import RUN
 from comms.session import open_client, open_hub, put, subscribe
 from comms.wall.host import WallHost, incarnation_at
 from comms.wall.seats import NodeSeat
-from comms.wall.words import pack_finish, pack_time
+from comms.wall.words import TimeSignal, pack_finish, pack_time
 from comms.words import pack, unpack
 
 SOON_S = 10.0
@@ -85,11 +85,11 @@ def test_only_who_waited_for_a_mission_to_begin_is_the_first_of_its_name(
     beta: Beta, waits: bool, taken_up: bool, incarnation: int
 ) -> None:
     if waits:
-        put(beta.session, WALL_KEYS.time, pack_time(None, 1.0, taken_up=False))
+        put(beta.session, WALL_KEYS.time, pack_time(TimeSignal(None, 1.0)))
     beta.say(pack("welcome"))
     while unpack(beta.hears("clock/from/beta", "hello"))[4] is not True:
         pass
-    put(beta.session, WALL_KEYS.time, pack_time(5_000, 1.0, taken_up=taken_up))
+    put(beta.session, WALL_KEYS.time, pack_time(TimeSignal(5_000, 1.0, taken_up=taken_up)))
     announced = Stamp(CLOCK, ROUTING)(RUN.key(), WALL_RUN, 0)
     put(beta.session, WALL_KEYS.topic(announced.key), announced.payload)
     assert header_of(beta.hears("agent/beta/state")).incarnation == incarnation
@@ -103,7 +103,7 @@ def test_only_who_waited_for_a_mission_to_begin_is_the_first_of_its_name(
 
 def test_who_is_not_welcome_does_nothing_and_heeds_a_refusal_of_its_own_alone(beta: Beta) -> None:
     beta.say(pack("refused", "another", "not for you"))
-    put(beta.session, WALL_KEYS.time, pack_time(5_000, 1.0, taken_up=False))
+    put(beta.session, WALL_KEYS.time, pack_time(TimeSignal(5_000, 1.0)))
     instance = unpack(beta.hears("clock/from/beta", "hello"))[1]
     beta.say(pack("refused", instance, "there is no room"))
     beta.thread.join(SOON_S)

@@ -19,7 +19,7 @@ from comms.session import open_hub
 from comms.wall.gate import FLOOD, Gate
 from comms.wall.line import Answered, Asked, Event, Mail, WallLine
 from comms.wall.post import AHEAD_MS, WallPost, Words
-from comms.wall.words import Beat, pack_beat, pack_time
+from comms.wall.words import Beat, TimeSignal, pack_beat, pack_time
 from comms.words import pack
 
 STATES, CONTACTS = STATE.expression("alpha"), CONTACT.expression("alpha")
@@ -128,8 +128,8 @@ def test_who_asks_is_given_what_is_kept() -> None:
 
 def test_words_are_passed_on_and_senseless_ones_dropped() -> None:
     post = post_over(FakeLine())
-    assert post.receive(Mail("clock/time", pack_time(5, 2.0, taken_up=True)), list) == [
-        Words("clock/time", ["time", 5, 2.0, True])
+    assert post.receive(Mail("clock/time", pack_time(TimeSignal(5, 2.0, taken_up=True))), list) == [
+        Words("clock/time", ["time", 5, 2.0, True, False])
     ]
     for payload in (b"\xc1", pack("beat", "no number", {}), pack("beat", 0, {"state": "many"})):
         assert post.receive(Mail("clock/beat/alpha", payload), list) == []

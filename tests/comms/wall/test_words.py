@@ -80,8 +80,7 @@ def test_only_words_that_can_be_said_again_are_taken(name: str, rest: list[objec
     with contextlib.suppress(WordsError):
         assert pack_hello(unpack_hello(words)) == pack(*words)
     with contextlib.suppress(WordsError):
-        now_ms, factor, taken_up = unpack_time(words)
-        assert pack_time(now_ms, factor, taken_up=taken_up) == pack(*words)
+        assert pack_time(unpack_time(words)) == pack(*words)
     with contextlib.suppress(WordsError):
         assert pack_beat(unpack_beat(words, "alpha", ROUTING)) == pack(*words)
     with contextlib.suppress(WordsError):
@@ -91,14 +90,15 @@ def test_only_words_that_can_be_said_again_are_taken(name: str, rest: list[objec
 @pytest.mark.parametrize("factor", [0.0, -1.0, 1000.5, 1e300, math.inf, math.nan])
 def test_a_factor_by_which_no_time_runs_is_refused(factor: float) -> None:
     with pytest.raises(WordsError):
-        unpack_time(["time", 5, factor, False])
+        unpack_time(["time", 5, factor, False, False])
 
 
 @pytest.mark.parametrize("now_ms", [-1, 2**35 + 1, 2**64 - 1])
 def test_a_time_beyond_all_missions_is_refused(now_ms: int) -> None:
     for unpack_one, words in (
-        (unpack_time, ["time", now_ms, 1.0, False]),
-        (unpack_hello, ["hello", "1", 1, "0", True, now_ms]),
+        (unpack_time, ["time", now_ms, 1.0, False, False]),
+        (unpack_hello, ["hello", "1", 1, "0", True, now_ms, 0]),
+        (unpack_hello, ["hello", "1", 1, "0", True, 0, now_ms]),
         (unpack_finish, ["finish", "over", now_ms, {}, {}, {}]),
     ):
         with pytest.raises(WordsError):
@@ -106,11 +106,11 @@ def test_a_time_beyond_all_missions_is_refused(now_ms: int) -> None:
 
 
 def test_a_hello_with_a_name_without_end_is_refused() -> None:
-    hello = Hello("1" * 64, 1, "0" * 64, True, None)
+    hello = Hello("1" * 64, 1, "0" * 64, True, None, 7)
     assert unpack_hello(unpack(pack_hello(hello))) == hello
     for instance, sha in (("1" * 65, "0"), ("1", "0" * 65)):
         with pytest.raises(WordsError):
-            unpack_hello(["hello", instance, 1, sha, True, None])
+            unpack_hello(["hello", instance, 1, sha, True, None, 0])
 
 
 def test_an_end_with_counts_that_are_none_is_refused() -> None:

@@ -86,6 +86,9 @@ class TestALook:
         assert found.bins_ahead(5) == ahead
         assert found.track_length_m(self.LOOK) == 5 * (12 - ahead)
 
+    def test_with_fewer_bins_than_the_sonar_sees_ahead_stands_for_no_track(self) -> None:
+        assert sonar(3, 100, QUARTER, 20).track_length_m(self.LOOK) == 0  # 12 bins, and 20 ahead
+
     def test_adds_up_with_those_before_and_behind(self) -> None:
         # Two bins a stretch. What lies in the first of them has been 4 bins ahead, then 2, then beside the vehicle.
         look = LookGeometry((0.0, 0.0), 0.0, 0.0, 5.0, 1.0, along_bins=5, range_bins=2)

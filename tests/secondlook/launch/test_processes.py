@@ -190,8 +190,8 @@ def run_fleet(
 @pytest.mark.parametrize(
     ("host", "nth", "sentence"),
     [
-        ("primary", 150, r"primary has fallen silent at .*|nothing heard for 3 s at .*: no answer from primary"),
-        ("recorder", 150, r"recorder has fallen silent at .* s of the mission"),
+        ("primary", 150, r"nothing heard for 3 s at .* s of the mission: no answer from primary"),
+        ("recorder", 150, r"nothing heard for 3 s at .* s of the mission: no acknowledgement from recorder"),
         # Late enough for the hub to have given signs of life in mid-mission.
         ("world", 4000, r"world has fallen silent, last heard at [1-9]\d*\.\d{3} s of the mission"),
     ],

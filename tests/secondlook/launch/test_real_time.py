@@ -107,6 +107,30 @@ def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path) ->
     assert summary_of(flying.folder)["ending"] == "time_limit"
 
 
+SLEEPER = """
+import threading
+
+class Sleeper:
+    def assign(self, situation):
+        threading.Event().wait(1.5)
+        return {}
+"""
+
+
+@pytest.mark.parametrize("bus", ["zenoh", "local"])
+def test_a_factor_that_the_machine_does_not_keep_fails_and_is_told_with_one_that_it_could(
+    tmp_path: Path, bus: str
+) -> None:
+    (tmp_path / "sleeper.py").write_text(SLEEPER)
+    slow = ("--bus", bus, "--real-time", "40", "--set", "coordinator.allocator=sleeper:Sleeper", "--no-record")
+    with flight(tmp_path / "out", *slow) as flying:
+        code, out, err = flying.finish()
+    assert (code, out) == (1, "")
+    told = r"too fast for this machine: with --real-time 40 [\w ]+ is \d+ s of the mission late, and 30 s are allowed"
+    assert re.fullmatch(rf"(brief: .*\n)*{told}; it could keep --real-time \d+; what was recorded is in \S+\n", err)
+    assert summary_of(flying.folder)["ending"] == "failed"
+
+
 @pytest.mark.parametrize("factor", ["0", "-1", "nan", "inf", "1001"])
 def test_a_factor_must_be_a_number_that_a_clock_can_run_by(
     factor: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
