@@ -16,6 +16,7 @@ from secondlook.commands.geojson import geojson
 from secondlook.commands.new import new
 from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
+from secondlook.commands.picture import picture, video
 from secondlook.commands.plan import plan
 from secondlook.commands.replay import replay
 from secondlook.commands.report import report
@@ -71,6 +72,8 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
+app.command()(picture)
+app.command()(video)
 for command in (run, scenarios, new, check, plan, compare, storm, paper, replay, view, report, geojson, certificates):
     app.command()(command)
 

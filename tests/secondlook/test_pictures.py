@@ -1,0 +1,97 @@
+"""Pictures of a mission, still and moving, by what of the map they show as seen."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import secondlook
+from secondlook.cli import main
+from secondlook.pictures import UNSEEN, MissionPicture, write_video
+
+SMALL_PX = 640
+
+
+def unseen(picture: Image.Image) -> int:
+    """How many pixels are as grey as ground that nobody has looked at."""
+    pixels = np.asarray(picture.convert("RGB"), dtype=np.int64)
+    return int((np.abs(pixels - np.rint(np.array(UNSEEN) * 255)).max(axis=2) <= 2).sum())
+
+
+def test_ground_that_is_not_seen_is_grey_and_grows_less(brief_run: Path) -> None:
+    mission = secondlook.load(brief_run)
+    picture = MissionPicture(mission, SMALL_PX)
+    shown = [Image.open(io.BytesIO(picture.png(share * mission.end_s))) for share in (0.0, 0.5, 1.0)]
+    assert [one.size for one in shown] == [(640, 360)] * 3
+    first, middle, last = map(unseen, shown)
+    # The area is three by one, nearly as wide as its panel: 0.6 of the picture.
+    assert 0.2 * 640 * 0.2 * 360 < first < 0.7 * 640 * 0.7 * 360
+    assert 0.05 * first < middle < 0.8 * first
+    assert last < 0.05 * first
+
+
+def test_the_picture_at_a_time_is_the_same_whatever_was_drawn_before(brief_run: Path) -> None:
+    mission = secondlook.load(brief_run)
+    after_others = MissionPicture(mission, SMALL_PX)
+    for t_s in (0.0, 10.0, 30.0):
+        after_others.png(t_s)
+    assert after_others.png(60.0) == MissionPicture(mission, SMALL_PX).png(60.0)
+
+
+def test_a_video_goes_from_the_first_second_to_the_last(brief_run: Path, tmp_path: Path) -> None:
+    mission, path, told = secondlook.load(brief_run), tmp_path / "video.webp", list[float]()
+    write_video(mission, path, SMALL_PX, lasts_s=3.0, frames_hz=2.0, told=told.append)
+    assert told == pytest.approx([1 / 6, 2 / 6, 3 / 6, 4 / 6, 5 / 6, 1])
+    with Image.open(path) as video:
+        assert (video.format, video.size, getattr(video, "n_frames", 0)) == ("WEBP", (640, 360), 6)
+        grey = []
+        for frame in range(6):
+            video.seek(frame)
+            video.load()
+            grey.append(unseen(video))
+            assert video.info["duration"] == (2500 if frame == 5 else 500)
+    assert grey == sorted(grey, reverse=True)
+    assert grey[-1] < 0.1 * grey[0]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["picture", "RUN", "--time", "20", "--width", "640"], 0, "picture.png\n"),
+        (["picture", "RUN", "--time", "9999"], 2, "--time 9999: is not within the mission; must be from 0 to 1"),
+        (["picture", "nowhere"], 2, "nowhere"),
+        (["video", "RUN", "--seconds", "0"], 2, "--seconds"),
+    ],
+)
+def test_the_commands_write_into_the_runs_folder_and_refuse_what_cannot_be(
+    brief_copy: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    code: int,
+    said: str,
+) -> None:
+    monkeypatch.setattr("sys.argv", ["secondlook", *(str(brief_copy) if one == "RUN" else one for one in arguments)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert (stopped.value.code or 0) == code
+    told = capsys.readouterr()
+    assert said in told.out + told.err
+    assert (brief_copy / "picture.png").exists() is (code == 0)
+
+
+def test_without_matplotlib_the_extra_is_named(
+    brief_run: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("secondlook.commands.picture.find_spec", lambda name: None)
+    monkeypatch.setattr("sys.argv", ["secondlook", "video", str(brief_run)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err == (
+        "secondlook video: needs matplotlib, not installed here; the extra secondlook[plots] has it\n"
+    )
