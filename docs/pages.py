@@ -38,7 +38,7 @@ from secondlook.scenario import (
     UniformSeabed,
 )
 from secondlook.scenario.area import Priority
-from secondlook.scenario.degrees import AreaInDegrees, PriorityInDegrees, StartInDegrees
+from secondlook.scenario.degrees import AreaInDegrees, OriginInUtm, PriorityInDegrees, StartInDegrees
 from secondlook.scenario.sensor import SENSORS, SensorBase
 from secondlook.scenario.vehicle import VehicleBase
 
@@ -59,7 +59,7 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("The whole file", "", (Scenario,)),
     ("Area", "`area`", (Area, AreaInDegrees)),
     ("Priorities", "each of `area.priorities`", (Priority, PriorityInDegrees)),
-    ("Origin", "`origin`", (Origin,)),
+    ("Origin", "`origin`", (Origin, OriginInUtm)),
     ("Mission", "`mission`", (Mission,)),
     ("Seabed", "`seabed`", (UniformSeabed, PatchySeabed)),
     ("Current", "`current`", (Current,)),

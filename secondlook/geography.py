@@ -62,19 +62,25 @@ class UnknownGridError(ValueError):
     """An EPSG code that is no UTM zone."""
 
 
-def utm_to_degrees(epsg: int, easting_m: float, northing_m: float) -> tuple[float, float]:
-    """Longitude and latitude of a place in a UTM zone of WGS84 (EPSG 32601 to 32660 and 32701 to 32760) or of ETRS89
-    (25828 to 25838), which are taken for the same: they are less than a metre apart.
+def utm_zone(epsg: int) -> tuple[int, bool]:
+    """The number of a UTM zone, and whether it is a southern one, of WGS84 (EPSG 32601 to 32660 and 32701 to 32760) or
+    of ETRS89 (25828 to 25838), which are taken for the same: they are less than a metre apart.
 
     Raises:
         UnknownGridError: the code is none of these.
     """
+    datum, zone = divmod(epsg, 100)
+    if not (datum in {326, 327} and 1 <= zone <= 60) and not (datum == 258 and 28 <= zone <= 38):
+        raise UnknownGridError(f"EPSG:{epsg} is not known; must be a UTM zone, such as EPSG:32632")
+    return zone, datum == 327
+
+
+def utm_to_degrees(epsg: int, easting_m: float, northing_m: float) -> tuple[float, float]:
+    """Longitude and latitude of a place in a UTM zone. Raises UnknownGridError as `utm_zone`."""
     from pyproj import Proj  # noqa: PLC0415
 
-    zone = epsg % 100
-    if not (epsg // 100 in {326, 327} and 1 <= zone <= 60) and not (epsg // 100 == 258 and 28 <= zone <= 38):
-        raise UnknownGridError(f"EPSG:{epsg} is not known; must be a UTM zone, such as EPSG:32632")
-    longitude_deg, latitude_deg = Proj(proj="utm", zone=zone, south=epsg // 100 == 327, ellps="WGS84")(
+    zone, south = utm_zone(epsg)
+    longitude_deg, latitude_deg = Proj(proj="utm", zone=zone, south=south, ellps="WGS84")(
         easting_m, northing_m, inverse=True
     )
     return float(longitude_deg), float(latitude_deg)

@@ -57,7 +57,8 @@ class Priority(Mapping):
     """Ground whose residual risk counts `weight` times when second looks are planned."""
 
     polygon_m: Outline
-    """The corners in order, each once; it shares ground with what is surveyed. Or `polygon_deg`."""
+    """The corners in order, each once; it shares ground with what is surveyed. Or `polygon_deg`, or
+    `polygon_utm_m`."""
     weight: Annotated[float, Field(ge=0, le=100)]
     """How often its residual risk counts. Only how weights compare matters."""
 
@@ -74,7 +75,7 @@ class Area(Mapping):
     map's cell; and ground that counts more in second looks."""
 
     polygon_m: Outline
-    """The corners in order, each once; convex or not. Or `polygon_deg`."""
+    """The corners in order, each once; convex or not. Or `polygon_deg`, or `polygon_utm_m`."""
     holes_m: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] = ()
     """The corners of each piece that lies in it and is not surveyed."""
     track_heading_deg: TrackHeading = 0.0

@@ -1,24 +1,24 @@
-"""Degrees in a scenario: they become metres of the mission frame before the whole is validated."""
+"""Degrees and UTM metres in a scenario: they become metres of the mission frame before the whole is validated."""
 
 from __future__ import annotations
 
 import copy
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
 from pydantic_core import ErrorDetails
 
 from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
-from secondlook.geography import GeographicOrigin
+from secondlook.geography import GeographicOrigin, UnknownGridError, utm_to_degrees, utm_zone
 from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
 from secondlook.scenario.errors import KeyPath
 from secondlook.scenario.text import Value
-from secondlook.scenario.values import Mapping, check_pair
+from secondlook.scenario.values import Mapping, check_pair, refused
 from secondlook.scenario.vehicle import Start
 
 FARTHEST_KM = 100
@@ -33,21 +33,55 @@ Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_len
 HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
 
 
+def _check_zone(epsg: int) -> int:
+    try:
+        utm_zone(epsg)
+    except UnknownGridError:
+        raise refused("must be a UTM zone of WGS84 or ETRS89, such as 32632") from None
+    return epsg
+
+
+Epsg = Annotated[int, AfterValidator(_check_zone)]
+Easting = Annotated[float, Field(ge=0, le=1_000_000)]
+Northing = Annotated[float, Field(ge=0, le=10_000_000)]
+UtmPoint = Annotated[tuple[Easting, Northing], BeforeValidator(check_pair), Field(strict=False)]
+UtmCorners = Annotated[tuple[UtmPoint, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
+UtmHoleCorners = Annotated[tuple[UtmPoint, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
+
+
 class Origin(Mapping):
-    """The mission frame's origin, WGS84: x points east there, y north."""
+    """The mission frame's origin, WGS84: x points east there, y to true north."""
 
     latitude_deg: OriginLatitude
-    """Degrees north."""
+    """Degrees north. Or `northing_m`."""
     longitude_deg: Longitude
-    """Degrees east."""
+    """Degrees east. Or `easting_m`."""
+
+
+class OriginInUtm(Mapping):
+    """The origin in UTM metres."""
+
+    epsg: Epsg | None = None
+    """The UTM zone of `easting_m` and `northing_m`; the area's if left out."""
+    easting_m: Easting | None = None
+    """In place of `longitude_deg`, with `northing_m`."""
+    northing_m: Northing | None = None
+    """In place of `latitude_deg`, with `easting_m`."""
 
 
 class AreaInDegrees(Mapping):
-    """What of an area may be given in degrees, or drawn in a file."""
+    """What of an area may be given in degrees or in UTM metres, or drawn in a file."""
 
     polygon_deg: Corners | None = None
     """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
     holes_deg: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
+    """In place of `holes_m`: the same for each hole."""
+    epsg: Epsg | None = None
+    """The UTM zone of all that is given in UTM metres and names none itself: the EPSG code of a zone of WGS84, 32601 to
+    32660 and 32701 to 32760, or of ETRS89, 25828 to 25838."""
+    polygon_utm_m: UtmCorners | None = None
+    """In place of `polygon_m`: the corners as [easting, northing]; the last may repeat the first."""
+    holes_utm_m: Annotated[tuple[UtmHoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
     """In place of `holes_m`: the same for each hole."""
     file: str | None = None
     """In place of polygon and holes: a GeoJSON or KML file that draws them, relative to the scenario's. Its priorities
@@ -55,40 +89,68 @@ class AreaInDegrees(Mapping):
 
 
 class PriorityInDegrees(Mapping):
-    """What of ground that counts more may be given in degrees."""
+    """What of ground that counts more may be given in degrees or in UTM metres."""
 
     polygon_deg: Corners | None = None
     """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
+    epsg: Epsg | None = None
+    """The UTM zone of `polygon_utm_m`; the area's if left out."""
+    polygon_utm_m: UtmCorners | None = None
+    """In place of `polygon_m`: the corners as [easting, northing]; the last may repeat the first."""
 
 
 class StartInDegrees(Mapping):
-    """What of a start may be given in degrees."""
+    """What of a start may be given in degrees or in UTM metres."""
 
     latitude_deg: Latitude | None = None
     """In place of `y_m`, with `longitude_deg`: degrees north, WGS84."""
     longitude_deg: Longitude | None = None
     """In place of `x_m`, with `latitude_deg`: degrees east."""
+    epsg: Epsg | None = None
+    """The UTM zone of `easting_m` and `northing_m`; the area's if left out."""
+    easting_m: Easting | None = None
+    """In place of `x_m`, with `northing_m`."""
+    northing_m: Northing | None = None
+    """In place of `y_m`, with `easting_m`."""
 
 
 IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
+    Origin: OriginInUtm,
     Area: AreaInDegrees,
     Priority: PriorityInDegrees,
     Start: StartInDegrees,
 }
-"""What may be given in degrees in place of keys of a mapping."""
+"""What may be given in degrees or UTM metres in place of keys of a mapping."""
 
-_GIVES = {
+_GIVES: dict[str, tuple[str, ...]] = {
     "polygon_deg": ("polygon_m",),
+    "polygon_utm_m": ("polygon_m",),
     "holes_deg": ("holes_m",),
+    "holes_utm_m": ("holes_m",),
     "latitude_deg": ("y_m",),
     "longitude_deg": ("x_m",),
+    "easting_m": ("x_m",),
+    "northing_m": ("y_m",),
+    "epsg": (),
     "file": ("polygon_m", "holes_m"),
+}
+_GIVES_ORIGIN = {"easting_m": ("longitude_deg",), "northing_m": ("latitude_deg",), "epsg": ()}
+_PARTNER = {
+    "latitude_deg": "longitude_deg",
+    "longitude_deg": "latitude_deg",
+    "easting_m": "northing_m",
+    "northing_m": "easting_m",
 }
 _NOT_BESIDE = {
     **_GIVES,
+    "polygon_utm_m": ("polygon_m", "polygon_deg"),
+    "holes_utm_m": ("holes_m", "holes_deg"),
     "latitude_deg": ("x_m", "y_m"),
     "longitude_deg": ("x_m", "y_m"),
-    "file": ("polygon_m", "holes_m", "polygon_deg", "holes_deg"),
+    "easting_m": ("x_m", "y_m", "latitude_deg", "longitude_deg"),
+    "northing_m": ("x_m", "y_m", "latitude_deg", "longitude_deg"),
+    "epsg": ("polygon_m", "x_m", "y_m"),
+    "file": ("polygon_m", "holes_m", "polygon_deg", "holes_deg", "polygon_utm_m", "holes_utm_m"),
 }
 _NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
@@ -107,36 +169,70 @@ class InMetres:
 
 
 class _RefusedError(Exception):
-    """Degrees that cannot be used: where they are, what was given, and what is allowed."""
+    """What cannot be used: where it is, what was given, and what is allowed; or that it is missing."""
 
-    def __init__(self, path: KeyPath, value: object, allowed: str) -> None:
+    def __init__(self, path: KeyPath, value: object, allowed: str, kind: str = "refused") -> None:
         super().__init__(allowed)
-        self.details = ErrorDetails(type="refused", loc=path, msg=allowed, input=value, ctx={"allowed": allowed})
+        self.details = ErrorDetails(type=kind, loc=path, msg=allowed, input=value, ctx={"allowed": allowed})
+
+
+class _ToldError(Exception):
+    """Nothing can be turned, for a reason that is told elsewhere."""
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """What places are turned about: the origin, and the UTM zone of eastings and northings, None for degrees."""
+
+    origin: GeographicOrigin
+    epsg: int | None = None
+
+    def place_m(self, path: KeyPath, place: tuple[float, float]) -> list[Value]:
+        """Of latitude and longitude, or of easting and northing."""
+        longitude_deg, latitude_deg = place[::-1] if self.epsg is None else utm_to_degrees(self.epsg, *place)
+        x_m, y_m = (float(one) for one in self.origin.to_metres(longitude_deg, latitude_deg))
+        if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
+            if path[:2] == ("area", "file"):
+                said = f"latitude {place[0]:g}, longitude {place[1]:g} is not; charts have longitude first"
+                raise _RefusedError(path[:2], None, f"all must be within {FARTHEST_KM} km of origin, but {said}")
+            hint = "; latitude comes first" if isinstance(path[-1], int) else ""
+            if self.epsg is not None:
+                hint = f"; easting comes first, and the zone is that of EPSG:{self.epsg}"
+            raise _RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
+        return [round(x_m, 3) + 0.0, round(y_m, 3) + 0.0]
+
+    def ring_m(self, path: KeyPath, corners: Sequence[tuple[float, float]]) -> list[Value]:
+        """Of a ring, whose last corner may be its first again."""
+        open_corners = corners[:-1] if len(corners) > 3 and corners[0] == corners[-1] else corners
+        return [self.place_m((*path, index), corner) for index, corner in enumerate(open_corners)]
 
 
 def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
-    """Turns all that is given in degrees into metres about the scenario's origin, to the millimetre; files that draw an
-    area are looked for in the folder."""
+    """Turns all that is given in degrees or UTM metres into metres about the scenario's origin, to the millimetre;
+    files that draw an area are looked for in the folder."""
     turned = InMetres(copy.deepcopy(data))
     for path, holder, model in _holders(turned.data):
         given = {key: holder[key] for key in model.model_fields if key in holder}
         if not given:
             continue
+        gives = _GIVES_ORIGIN if model is OriginInUtm else _GIVES
         for key, value in given.items():
-            turned.written.update({(*path, metres): ((*path, key), value) for metres in _GIVES[key]})
-        if model is StartInDegrees:  # of which one alone is none
-            for key in model.model_fields.keys() - given.keys():
-                turned.written[*path, *_GIVES[key]] = ((*path, key), None)
+            turned.written.update({(*path, metres): ((*path, key), value) for metres in gives[key]})
+            partner = _PARTNER.get(key)
+            if partner is not None and partner not in given:  # one alone is none
+                turned.written[*path, *gives[partner]] = ((*path, partner), None)
         try:
             checked = model.model_validate(given)
             for key, value in given.items():
                 if others := [other for other in _NOT_BESIDE[key] if other in holder]:
                     raise _RefusedError((*path, key), value, f"must be left out beside {' and '.join(others)}")
-                if data.get("origin") is None:
+                if data.get("origin") is None and key != "epsg":
                     raise _RefusedError((*path, key), value, _NEEDS_ORIGIN)
-            _turn(turned, path, holder, checked, folder)
+            _turn(turned, path, holder, checked, data, folder)
         except ValidationError as error:
             turned.errors.extend({**one, "loc": (*path, *one["loc"])} for one in error.errors())
+        except _ToldError:
+            pass
         except _RefusedError as error:
             if error.details["msg"] != _NEEDS_ORIGIN or not any(one["msg"] == _NEEDS_ORIGIN for one in turned.errors):
                 turned.errors.append(error.details)
@@ -146,8 +242,10 @@ def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
 
 
 def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value], type[BaseModel]]]:
-    """The mappings in which degrees may be given."""
-    area, vehicles = data.get("area"), data.get("vehicles")
+    """The mappings in which degrees or UTM metres may be given, the origin first."""
+    origin, area, vehicles = data.get("origin"), data.get("area"), data.get("vehicles")
+    if isinstance(origin, dict):
+        yield ("origin",), origin, OriginInUtm
     if isinstance(area, dict):
         yield ("area",), area, AreaInDegrees
         priorities = area.get("priorities")
@@ -160,29 +258,64 @@ def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value]
             yield ("vehicles", key, "start"), start, StartInDegrees
 
 
-def _turn(turned: InMetres, path: KeyPath, holder: dict[str, Value], checked: BaseModel, folder: Path) -> None:
-    """Puts into a mapping of the scenario what its degrees are in metres."""
+def _epsg(data: dict[str, Value], path: KeyPath, own: int | None) -> int:
+    """The UTM zone that holds at a path: its own, or the area's."""
+    area = data.get("area")
+    found: Any = own if own is not None or not isinstance(area, dict) else area.get("epsg")
+    if found is None:
+        missing = ("area",) if isinstance(area, dict) and "polygon_utm_m" in area else path
+        raise _RefusedError((*missing, "epsg"), None, "must be given", kind="missing")
+    try:
+        utm_zone(found)
+    except (UnknownGridError, TypeError):
+        raise _ToldError from None
+    return int(found)
+
+
+def _turn(
+    turned: InMetres,
+    path: KeyPath,
+    holder: dict[str, Value],
+    checked: BaseModel,
+    data: dict[str, Value],
+    folder: Path,
+) -> None:
+    """Puts into a mapping of the scenario what its degrees or UTM metres are in metres; into the origin degrees."""
+    if isinstance(checked, OriginInUtm):
+        if checked.easting_m is not None and checked.northing_m is not None:
+            epsg = _epsg(data, path, checked.epsg)
+            place_deg = utm_to_degrees(epsg, checked.easting_m, checked.northing_m)
+            holder["longitude_deg"], holder["latitude_deg"] = (round(one, 9) for one in place_deg)
+        return
     try:
         origin = GeographicOrigin(**Origin.model_validate(turned.data["origin"]).model_dump())
-    except ValidationError:
-        return  # told when the whole is validated
+    except (KeyError, ValidationError):
+        return  # told when the whole is validated, or needed by none
+    frame = _Frame(origin)
     match checked:
         case StartInDegrees(latitude_deg=float(latitude_deg), longitude_deg=float(longitude_deg)):
-            place = _place_m((*path, "latitude_deg"), (latitude_deg, longitude_deg), origin)
+            place = frame.place_m((*path, "latitude_deg"), (latitude_deg, longitude_deg))
             holder["x_m"], holder["y_m"] = place
+        case StartInDegrees(easting_m=float(easting_m), northing_m=float(northing_m)):
+            frame = replace(frame, epsg=_epsg(data, path, checked.epsg))
+            holder["x_m"], holder["y_m"] = frame.place_m((*path, "easting_m"), (easting_m, northing_m))
         case AreaInDegrees(file=str(file)):
-            _take_chart(turned, holder, file, folder, origin)
+            _take_chart(turned, holder, file, folder, frame)
         case AreaInDegrees() | PriorityInDegrees():
-            if checked.polygon_deg is not None:
-                holder["polygon_m"] = _ring_m((*path, "polygon_deg"), checked.polygon_deg, origin)
-            holes = checked.holes_deg if isinstance(checked, AreaInDegrees) else None
-            if holes is not None:
-                holder["holes_m"] = [
-                    _ring_m((*path, "holes_deg", index), hole, origin) for index, hole in enumerate(holes)
-                ]
+            for ending in ("deg", "utm_m"):
+                outline = getattr(checked, f"polygon_{ending}")
+                holes = getattr(checked, f"holes_{ending}", None)
+                if ending == "utm_m" and (outline is not None or holes is not None):
+                    frame = replace(frame, epsg=_epsg(data, path, checked.epsg))
+                if outline is not None:
+                    holder["polygon_m"] = frame.ring_m((*path, f"polygon_{ending}"), outline)
+                if holes is not None:
+                    holder["holes_m"] = [
+                        frame.ring_m((*path, f"holes_{ending}", index), hole) for index, hole in enumerate(holes)
+                    ]
 
 
-def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Path, origin: GeographicOrigin) -> None:
+def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Path, frame: _Frame) -> None:
     """Puts what a file draws into the area."""
     path: KeyPath = ("area", "file")
     try:
@@ -191,28 +324,12 @@ def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Pat
         raise _RefusedError(path, file, str(error)) from error
     if chart.left_out:
         raise _RefusedError(path, file, f"{chart.left_out[0]}; secondlook new leaves such features out")
-    area["polygon_m"] = _ring_m(path, chart.area, origin)
-    area["holes_m"] = [_ring_m(path, hole, origin) for hole in chart.holes]
+    area["polygon_m"] = frame.ring_m(path, chart.area)
+    area["holes_m"] = [frame.ring_m(path, hole) for hole in chart.holes]
     if chart.priorities and "priorities" not in area:
         turned.written["area", "priorities"] = (path, file)
     priorities = area.setdefault("priorities", [])
     if isinstance(priorities, list):
         for ring, weight in chart.priorities:
             turned.written["area", "priorities", len(priorities)] = (path, file)
-            priorities.append({"polygon_m": _ring_m(path, ring, origin), "weight": weight})
-
-
-def _ring_m(path: KeyPath, corners: Sequence[tuple[float, float]], origin: GeographicOrigin) -> list[Value]:
-    open_corners = corners[:-1] if len(corners) > 3 and corners[0] == corners[-1] else corners
-    return [_place_m((*path, index), corner, origin) for index, corner in enumerate(open_corners)]
-
-
-def _place_m(path: KeyPath, place: tuple[float, float], origin: GeographicOrigin) -> list[Value]:
-    x_m, y_m = (float(one) for one in origin.to_metres(place[1], place[0]))
-    if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
-        if path[:2] == ("area", "file"):
-            said = f"latitude {place[0]:g}, longitude {place[1]:g} is not; charts have longitude first"
-            raise _RefusedError(path[:2], None, f"all must be within {FARTHEST_KM} km of origin, but {said}")
-        hint = "; latitude comes first" if isinstance(path[-1], int) else ""
-        raise _RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
-    return [round(x_m, 3) + 0.0, round(y_m, 3) + 0.0]
+            priorities.append({"polygon_m": frame.ring_m(path, ring), "weight": weight})

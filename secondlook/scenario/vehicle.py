@@ -51,9 +51,9 @@ class Start(Mapping):
     """Where a vehicle is when the mission starts: mission frame, compass heading."""
 
     x_m: Coordinate
-    """East. Or `longitude_deg`."""
+    """East. Or `longitude_deg`, or `easting_m`."""
     y_m: Coordinate
-    """North. Or `latitude_deg`."""
+    """North. Or `latitude_deg`, or `northing_m`."""
     heading_deg: Heading = 0.0
     """Compass heading."""
 

@@ -1,4 +1,5 @@
-"""A scenario in degrees is the one in metres that geodesics make of it; mistakes are told where they were made."""
+"""A scenario in degrees or UTM metres is the one in metres that geodesics make of it; mistakes are told where they
+were made."""
 
 from __future__ import annotations
 
@@ -6,7 +7,7 @@ import math
 from collections.abc import Callable
 
 import pytest
-from pyproj import Geod
+from pyproj import Geod, Transformer
 
 from secondlook.scenario import Area, Scenario, ScenarioError, Start, load_scenario, scenario_hash
 
@@ -137,6 +138,87 @@ def test_all_that_is_wrong_is_told_at_once(write: Write, text: str) -> None:
         "vehicles.primary.start.latitude_deg: 99 is not allowed; must be at most 90",
         "vehicles.helper.speed_mps: 0 is not allowed; must be greater than 0",
     ]
+
+
+def utm(x_m: float, y_m: float, latitude_deg: float = 59.88, longitude_deg: float = 10.5) -> tuple[float, float]:
+    """Easting and northing in zone 32 north, by the registry's own definition of it, of a place that the geodesic from
+    the origin leads to."""
+    there = EARTH.fwd(longitude_deg, latitude_deg, math.degrees(math.atan2(x_m, y_m)), math.hypot(x_m, y_m))
+    return Transformer.from_crs(4326, 32632, always_xy=True).transform(*there[:2])
+
+
+def utm_ring(*corners_m: tuple[float, float]) -> str:
+    return f"[{', '.join(f'[{east:.4f}, {north:.4f}]' for east, north in (utm(*one) for one in corners_m))}]"
+
+
+@pytest.fixture
+def in_utm(valid_text: str) -> str:
+    """The valid text with UTM metres wherever they are allowed; one start has a zone of its own."""
+    area = (
+        f"polygon_utm_m: {utm_ring(*SQUARE_M)}\n  epsg: 32632\n  holes_utm_m: [{utm_ring(*HOLE_M)}]\n"
+        f"  priorities: [{{polygon_utm_m: {utm_ring(*LANE_M)}, weight: 3}}]"
+    )
+    east, north = utm(30.0, -40.0)
+    start = f"{{easting_m: {east:.4f}, northing_m: {north:.4f}"
+    text = valid_text.replace("polygon_m: [[0, 0], [500, 0], [500, 400], [0, 400]]", area)
+    text = text.replace("{x_m: 0, y_m: -40", f"{start}, epsg: 25832", 1).replace("{x_m: 0, y_m: -40", start, 1)
+    east, north = utm(0.0, 0.0)
+    return f"origin: {{easting_m: {east:.4f}, northing_m: {north:.4f}}}\n{text}"
+
+
+def test_utm_metres_become_the_metres_to_the_millimetre(write: Write, in_utm: str) -> None:
+    scenario = load_scenario(write(in_utm))
+    assert scenario.origin is not None
+    assert (scenario.origin.latitude_deg, scenario.origin.longitude_deg) == pytest.approx(ORIGIN, abs=2e-9)
+    assert close(scenario.area.polygon_m, SQUARE_M)
+    assert close(scenario.area.holes_m[0], HOLE_M)
+    assert close(scenario.area.priorities[0].polygon_m, LANE_M)
+    for vehicle in ("primary", "helper"):
+        start = scenario.vehicles[vehicle].start
+        assert (start.x_m, start.y_m) == pytest.approx((30.0, -40.0), abs=0.0015)
+    assert "utm" not in scenario.to_yaml()
+
+
+def test_a_southern_zone_counts_northings_from_the_pole(write: Write, valid_text: str) -> None:
+    # At the zone's middle, 9 degrees east, a metre on the ground is 0.9996 m of the grid; the equator is at 10000 km.
+    square = "[[500000, 10000000], [500499.8, 10000000], [500499.8, 9999800.08], [500000, 9999800.08]]"
+    text = valid_text.replace(
+        "polygon_m: [[0, 0], [500, 0], [500, 400], [0, 400]]", f"polygon_utm_m: {square}\n  epsg: 32732"
+    )
+    area = load_scenario(write(f"origin: {{latitude_deg: 0, longitude_deg: 9}}\n{text}")).area
+    assert close(area.polygon_m, ((0, 0), (500, 0), (500, -200), (0, -200)))
+
+
+UTM_MISTAKES = {
+    "no zone": ("  epsg: 32632\n", "", ["area.epsg: missing; must be given"]),
+    "no zone of UTM": ("32632", "4326", [
+        "area.epsg: 4326 is not allowed; must be a UTM zone of WGS84 or ETRS89, such as 32632"]),
+    "another zone": ("epsg: 25832", "epsg: 25833", ["vehicles.primary.start.easting_m: {primary} is not allowed; "
+        "must be within 100 km of origin; easting comes first, and the zone is that of EPSG:25833"]),
+    "a ring in metres beside": ("  epsg: 32632\n", "  epsg: 32632\n  polygon_m: [[0, 0], [9, 0], [9, 9]]\n", [
+        "area.epsg: 32632 is not allowed; must be left out beside polygon_m"]),
+    "an origin given both ways": ("origin: {", "origin: {latitude_deg: 59.88, ", [
+        "origin.easting_m: {origin} is not allowed; must be left out beside latitude_deg"]),
+    "half an origin": ("origin: {easting_m", "origin: {esting_m", [
+        "origin.esting_m: {origin} is not allowed; no such key, did you mean easting_m?",
+        "origin.easting_m: missing; must be given"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said"), UTM_MISTAKES.values(), ids=UTM_MISTAKES)
+def test_what_is_wrong_with_utm_metres_is_told_where_it_was_given(
+    write: Write, in_utm: str, old: str, new: str, said: list[str]
+) -> None:
+    assert old in in_utm
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write(in_utm.replace(old, new, 1)))
+    shown = {
+        "{origin}": f"{utm(0.0, 0.0)[0]:.4f}".rstrip("0"),
+        "{primary}": f"{utm(30.0, -40.0)[0]:.4f}".rstrip("0"),
+    }
+    for word, value in shown.items():
+        said = [one.replace(word, value) for one in said]
+    assert sorted(problem.text for problem in caught.value.problems) == sorted(said)
 
 
 def test_degrees_have_no_place_in_what_is_loaded() -> None:
