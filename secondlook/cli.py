@@ -12,7 +12,7 @@ import typer
 from secondlook.commands.certificates import certificates
 from secondlook.commands.check import check
 from secondlook.commands.compare import compare
-from secondlook.commands.geojson import geojson
+from secondlook.commands.export import export, geojson
 from secondlook.commands.new import new
 from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
@@ -72,9 +72,9 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-app.command()(picture)
-app.command()(video)
-for command in (run, scenarios, new, check, plan, compare, storm, paper, replay, view, report, geojson, certificates):
+_MISSIONS = (run, scenarios, new, check, plan, compare, storm, paper)
+_OF_A_RUN = (replay, view, report, geojson, export, picture, video)
+for command in (*_MISSIONS, *_OF_A_RUN, certificates):
     app.command()(command)
 
 

@@ -34,6 +34,12 @@ class GeographicOrigin:
                     f"{name} {value:g} is not allowed; must be a number of degrees from -{limit} to {limit}"
                 )
 
+    @property
+    def projection(self) -> str:
+        """The mission frame as PROJ has it: a projection and its parameters."""
+        place = f"+lat_0={self.latitude_deg!r} +lon_0={self.longitude_deg!r}"
+        return f"+proj=aeqd {place} +datum=WGS84 +units=m +no_defs"
+
     def to_degrees(self, x_m: FloatArray, y_m: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Longitude and latitude of places in the mission frame.
 
@@ -55,7 +61,7 @@ def _projection(origin: GeographicOrigin) -> Proj:
     # Imported here: it takes a tenth of a second, and most of a fleet's processes never need it.
     from pyproj import Proj  # noqa: PLC0415
 
-    return Proj(proj="aeqd", ellps="WGS84", lat_0=origin.latitude_deg, lon_0=origin.longitude_deg)
+    return Proj(origin.projection)
 
 
 class UnknownGridError(ValueError):

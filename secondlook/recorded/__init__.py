@@ -11,20 +11,21 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from secondlook.geography import GeographicOrigin
     from secondlook.recorded.geojson import to_geojson
-    from secondlook.recorded.ground import RiskMap, TargetRecord
+    from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord
     from secondlook.recorded.mission import RecordedMission, load_run
     from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord
     from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord
 
 _NAMES = {
     "geojson": ("GeographicOrigin", "to_geojson"),
-    "ground": ("RiskMap", "TargetRecord"),
+    "ground": ("ContactRecord", "RiskMap", "TargetRecord"),
     "mission": ("RecordedMission", "load_run"),
     "second_looks": ("HotspotRecord", "StripEvent", "StripRecord"),
     "vehicles": ("Activity", "PathRecord", "TrackRecord"),
 }
 __all__ = [
     "Activity",
+    "ContactRecord",
     "GeographicOrigin",
     "HotspotRecord",
     "PathRecord",

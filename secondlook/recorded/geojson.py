@@ -1,7 +1,9 @@
-"""A mission's area, tracks, paths, hotspots and strips as GeoJSON, in metres or in degrees on the WGS84 ellipsoid."""
+"""A mission's ground, tracks, paths, hotspots, strips, contacts and missed targets as GeoJSON, in metres or in degrees
+on the WGS84 ellipsoid."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import Any
 
@@ -11,30 +13,30 @@ from shapely.geometry import mapping
 from shapely.geometry.base import BaseGeometry
 
 from secondlook.geography import GeographicOrigin
+from secondlook.recorded.ground import polygon_of
 from secondlook.recorded.mission import RecordedMission
 
 LOCAL_FRAME = "local: metres, x east, y north of the mission frame's origin; not WGS84"
-LOCAL_DECIMALS, DEGREE_DECIMALS = 2, 7  # a centimetre
+LOCAL_DECIMALS, DEGREE_DECIMALS = 3, 8  # a millimetre
 PATH_STEP_M = 0.5  # how far a simplified path may lie off the positions that were told
 
 
-Features = Iterable[tuple[BaseGeometry, dict[str, Any]]]
-"""Geometries of the mission frame, and the properties of each."""
+Feature = tuple[BaseGeometry, dict[str, Any]]
+"""A geometry of the mission frame and its properties."""
 
 
 def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None) -> dict[str, Any]:
-    """A FeatureCollection; each feature's property `kind` is area, track, path, hotspot or strip.
+    """A FeatureCollection; each feature's property `kind` is area, priority, track, path, hotspot, strip, contact or
+    missed_target. Beside a time in seconds stands the same in UTC where the scenario says when the mission began.
 
     Without an origin, given or in the scenario, coordinates are metres of the mission frame, and the member `frame`
     says so: most programs would take them for degrees. With one the collection is as RFC 7946 asks: WGS84, longitude
     first, outer rings counterclockwise, cut at the antimeridian; `frame` tells origin and projection.
     """
-    if origin is None and "origin" in mission.scenario:
-        origin = GeographicOrigin(**mission.scenario["origin"])
-    return collection(_features(mission), origin)
+    return collection(features_of(mission), origin or mission.origin)
 
 
-def collection(features: Features, origin: GeographicOrigin | None) -> dict[str, Any]:
+def collection(features: Iterable[Feature], origin: GeographicOrigin | None) -> dict[str, Any]:
     """A FeatureCollection as `to_geojson` tells; what is empty is left out."""
     frame = LOCAL_FRAME
     if origin is not None:
@@ -51,9 +53,30 @@ def collection(features: Features, origin: GeographicOrigin | None) -> dict[str,
     }
 
 
-def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
+def features_of(mission: RecordedMission) -> Iterator[Feature]:
+    """All that was planned, flown and found, and, to evaluate it, the targets that were missed."""
+    for geometry, properties in (*_ground(mission), *_flown(mission), *_second_looks(mission), *_targets(mission)):
+        times = {key: value for key, value in properties.items() if key.endswith("_s")}
+        if mission.start_utc is not None:
+            for key, t_s in times.items():
+                properties[f"{key[:-2]}_utc"] = None if t_s is None else mission.utc(t_s)
+        yield geometry, properties
+
+
+def _ground(mission: RecordedMission) -> Iterator[Feature]:
     run = mission.run
     yield mission.area, {"kind": "area", "scenario": run.scenario, "seed": run.seed}
+    if not mission.priorities:
+        return
+    risk = mission.risk()
+    for number, priority in enumerate(mission.priorities, start=1):
+        ground = polygon_of(priority)
+        mean = risk.mean_within(ground)
+        properties = {"weight": priority.weight, "mean_risk": None if math.isnan(mean) else round(mean, 4)}
+        yield ground, {"kind": "priority", "number": number, **properties}
+
+
+def _flown(mission: RecordedMission) -> Iterator[Feature]:
     for track in mission.tracks:
         yield (
             track.line,
@@ -70,7 +93,19 @@ def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str
         )
     for path in mission.paths.values():
         line = path.line.simplify(PATH_STEP_M)
-        yield line, {"kind": "path", "vehicle": path.vehicle, "length_m": round(path.length_m, 1)}
+        yield (
+            line,
+            {
+                "kind": "path",
+                "vehicle": path.vehicle,
+                "length_m": round(path.length_m, 1),
+                "begun_s": float(path.t_s[0]),
+                "ended_s": float(path.t_s[-1]),
+            },
+        )
+
+
+def _second_looks(mission: RecordedMission) -> Iterator[Feature]:
     for hotspot in mission.hotspots:
         yield (
             hotspot.polygon,
@@ -100,6 +135,24 @@ def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str
                 "foreseen": strip.foreseen,
             },
         )
+
+
+def _targets(mission: RecordedMission) -> Iterator[Feature]:
+    for contact in mission.contacts:
+        yield (
+            contact.point,
+            {
+                "kind": "contact",
+                "vehicle": contact.vehicle,
+                "number": contact.number,
+                "score": round(contact.score, 3),
+                "sigma_m": round(contact.sigma_m, 3),
+                "found_s": contact.found_s,
+            },
+        )
+    for target in mission.targets:
+        if target.found_by is None:
+            yield target.point, {"kind": "missed_target", "number": target.number, "evaluation": True}
 
 
 def drawn(geometry: BaseGeometry, origin: GeographicOrigin | None) -> dict[str, Any]:

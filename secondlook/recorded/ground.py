@@ -1,5 +1,5 @@
 """What is known of the ground: the residual-risk map at one moment, ground that counts for more or less,
-and the targets."""
+contacts, and the targets."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pydantic import TypeAdapter, ValidationError
 from shapely.geometry.base import BaseGeometry
 
 from comms.node import Received
-from comms.said.messages import TruthLook, TruthTargets
+from comms.said.messages import Contact, TruthLook, TruthTargets
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from secondlook.errors import UserError
@@ -111,6 +111,14 @@ def _span(places: FloatArray, count: int) -> slice:
     return slice(max(0, math.floor(places.min())), max(0, min(count, math.ceil(places.max()) + 1)))
 
 
+def polygon_of(priority: PriorityGround) -> BaseGeometry:
+    """The ground of a priority as a polygon, or several."""
+    ground: BaseGeometry = shapely.Polygon()
+    for outline in priority.outlines_m:
+        ground = ground.symmetric_difference(shapely.Polygon(outline))
+    return ground
+
+
 _PRIORITIES = TypeAdapter(list[Priority])
 
 
@@ -125,6 +133,37 @@ def priorities(scenario: Mapping[str, Any], area: shapely.Polygon, folder: Path)
     except ValidationError:
         raise UserError(f"{folder / 'scenario.yaml'}: area.priorities must be as the run wrote them") from None
     return priority_grounds(area, read)
+
+
+@dataclass(frozen=True)
+class ContactRecord:
+    """What a vehicle took for a target: where it is by its own account, mission frame, with its standard deviation,
+    and the recogniser's score from 0 to 1."""
+
+    vehicle: str
+    number: int
+    found_s: float
+    score: float
+    sigma_m: float
+    point: shapely.Point
+
+
+def contacts(said: Iterable[Received[Contact]]) -> list[ContactRecord]:
+    """Every contact, each as it was first told, in the order of finding."""
+    first: dict[tuple[str, int], Received[Contact]] = {}
+    for one in said:
+        first.setdefault((one.key, one.header.incarnation), one)
+    return [
+        ContactRecord(
+            one.vehicle,
+            one.number,
+            one.t_s,
+            one.message.score,
+            one.message.sigma_m,
+            shapely.Point(one.message.x_m, one.message.y_m),
+        )
+        for one in first.values()
+    ]
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import math
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from datetime import datetime, timedelta
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
@@ -21,6 +22,7 @@ from comms.said.codec import decode, header_of
 from comms.said.key_expressions import KeyExpression, key_expression
 from comms.said.messages import (
     AgentState,
+    Contact,
     CoverageTile,
     Hotspot,
     Message,
@@ -35,8 +37,9 @@ from comms.strip_books import StripBooks
 from planner.fleet_map import FleetMap
 from planner.types import PriorityGround
 from secondlook.errors import UserError
+from secondlook.geography import GeographicOrigin
 from secondlook.recorded.closest_approach import Closest
-from secondlook.recorded.ground import RiskMap, TargetRecord, priorities, targets
+from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord, contacts, priorities, targets
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
@@ -169,6 +172,11 @@ class Mission(ABC):
         return hotspots(self.said(Hotspot))
 
     @cached_property
+    def contacts(self) -> list[ContactRecord]:
+        """What the vehicles took for targets, in the order of finding."""
+        return contacts(self.said(Contact))
+
+    @cached_property
     def targets(self) -> list[TargetRecord]:
         """The targets and which of them were found; none where the truth is not known."""
         return targets(self.said(TruthTargets), self.said(TruthLook))
@@ -215,6 +223,23 @@ class RecordedMission(Mission):
     def priorities(self) -> list[PriorityGround]:
         """Ground of the area whose risk counts for more or less in second looks, as the scenario says."""
         return priorities(self.scenario, self.area, self.folder)
+
+    @cached_property
+    def origin(self) -> GeographicOrigin | None:
+        """Where the mission frame is on Earth; None where the scenario does not say."""
+        return GeographicOrigin(**self.scenario["origin"]) if "origin" in self.scenario else None
+
+    @cached_property
+    def start_utc(self) -> datetime | None:
+        """When second 0 is; None where the scenario does not say."""
+        said = (self.scenario.get("mission") or {}).get("start_utc")
+        return None if said is None else datetime.fromisoformat(said)
+
+    def utc(self, t_s: float) -> str | None:
+        """A time of the mission in UTC, ISO 8601, to the second; None where the scenario does not say when it began."""
+        if self.start_utc is None:
+            return None
+        return f"{self.start_utc + timedelta(seconds=round(t_s)):%Y-%m-%dT%H:%M:%SZ}"
 
     @cached_property
     def _vehicles(self) -> tuple[str, ...]:

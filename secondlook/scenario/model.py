@@ -6,7 +6,7 @@ import hashlib
 import json
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME
 from secondlook.scenario.area import Area
@@ -22,6 +22,7 @@ from secondlook.scenario.values import (
     Share,
     Speed,
     check_pair,
+    check_utc,
     plug_in,
     refused,
 )
@@ -49,6 +50,9 @@ class Mission(Mapping):
     """Correlation of looks in the residual risk: 0 independent, as in the paper, 1 only the best look counts."""
     separation_m: Annotated[float, Field(ge=0, le=1000)] = 12.0
     """Helpers give way to whom they would come nearer; 0: they need not."""
+    start_utc: Annotated[str, AfterValidator(check_utc)] | None = None
+    """When second 0 is, ISO 8601, such as `2026-08-01T09:30:00Z`: report and exported files then tell times in UTC,
+    too. Nothing in the mission depends on it."""
 
     def ends_s(self, survey_s: float) -> float:
         """When the mission is over at the latest, if the last survey ends at `survey_s`."""

@@ -6,6 +6,7 @@ float.
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
@@ -46,6 +47,18 @@ def plug_in(kind: PlugInKind) -> AfterValidator:
         return text
 
     return AfterValidator(check)
+
+
+def check_utc(text: str) -> str:
+    """Accepts a time by ISO 8601, in UTC where it names no zone, and writes it in UTC."""
+    try:
+        time = datetime.fromisoformat(text)
+        time = time.replace(tzinfo=UTC) if time.tzinfo is None else time.astimezone(UTC)
+    except (ValueError, OverflowError):
+        raise refused("must be a time such as 2026-08-01T09:30:00Z") from None
+    if not 1900 <= time.year < 3000:
+        raise refused("must be a time from 1900 to 2999")
+    return time.isoformat().replace("+00:00", "Z")
 
 
 def check_pair(value: object) -> object:

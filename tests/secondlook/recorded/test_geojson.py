@@ -44,7 +44,10 @@ def test_every_kind_is_there_and_every_ring_is_closed_and_counterclockwise(
         "path": 2,
         "hotspot": len(mission.hotspots),
         "strip": len(mission.strips),
+        "contact": len(mission.contacts),
+        "missed_target": sum(target.found_by is None for target in mission.targets),
     }
+    assert not any(key.endswith("_utc") for feature in collection["features"] for key in feature["properties"])
     closed = 0
     for feature in collection["features"]:
         assert feature.keys() == {"type", "geometry", "properties"}

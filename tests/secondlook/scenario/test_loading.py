@@ -46,6 +46,21 @@ def load_text(folder: Path, text: str) -> Scenario:
     return load_scenario(path)
 
 
+@pytest.mark.parametrize(
+    ("said", "kept"),
+    [
+        ("2026-08-01T09:30:00Z", "2026-08-01T09:30:00Z"),
+        ("2026-08-01T09:30", "2026-08-01T09:30:00Z"),
+        ("2026-08-01T01:30:00+02:00", "2026-07-31T23:30:00Z"),
+    ],
+)
+def test_the_start_is_kept_in_utc_as_a_text(tmp_path: Path, said: str, kept: str) -> None:
+    scenario = load_scenario("tellaro", [f"mission.start_utc={said}"])
+    assert scenario.mission.start_utc == kept
+    assert yaml.safe_load(scenario.to_yaml())["mission"]["start_utc"] == kept
+    assert load_text(tmp_path, scenario.to_yaml()) == scenario
+
+
 def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
     assert BUNDLED == [
         "clear",

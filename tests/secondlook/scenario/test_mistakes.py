@@ -508,6 +508,16 @@ MISTAKES = {
         "name: trial\nmission: {deadline_s: 30000}",
         ["bad.yaml:2: mission.time_limit_s: 20000.0, the default, is not allowed; must be at least deadline_s, 30000"],
     ),
+    "start that is no time": (
+        "name: trial",
+        "name: trial\nmission: {start_utc: soon}",
+        ['bad.yaml:2: mission.start_utc: "soon" is not allowed; must be a time such as 2026-08-01T09:30:00Z'],
+    ),
+    "start before there were vehicles": (
+        "name: trial",
+        "name: trial\nmission: {start_utc: 0026-08-01T09:30:00Z}",
+        ['bad.yaml:2: mission.start_utc: "0026-08-01T09:30:00Z" is not allowed; must be a time from 1900 to 2999'],
+    ),
     "unknown seabed": (
         "name: trial",
         "name: trial\nseabed: {kind: rocky}",

@@ -1,0 +1,89 @@
+"""`secondlook geojson` and `secondlook export`: a mission for a map."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from secondlook import load
+from secondlook.errors import UserError
+from secondlook.export.kml import to_kml
+from secondlook.export.risk_levels import qgis_style, risk_levels
+from secondlook.files import CannotWriteError, whole_file, write_whole
+from secondlook.recorded import GeographicOrigin, RecordedMission, to_geojson
+from secondlook.recorded.geojson import collection, features_of
+
+Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
+Origin = Annotated[
+    tuple[float, float] | None,
+    typer.Option(metavar="LAT LON", help="Where x 0, y 0 is, degrees WGS84; the scenario's origin if left out."),
+]
+
+
+def geojson(
+    run: Run,
+    origin: Origin = None,
+    out: Annotated[Path | None, typer.Option(help="File to write; standard output if left out.")] = None,
+) -> None:
+    """Write area, tracks, paths, hotspots, strips, contacts and missed targets as GeoJSON: in degrees with an origin,
+    else in local metres."""
+    place = _place(origin)
+    text = json.dumps(to_geojson(load(run), place))
+    if out is None:
+        typer.echo(text)
+        return
+    try:
+        write_whole(out, f"{text}\n")
+    except CannotWriteError as error:
+        raise UserError(f"--out {error}") from error
+
+
+def export(
+    run: Run,
+    origin: Origin = None,
+    out: Annotated[Path | None, typer.Option(help="Folder to write to; RUN/export if left out.")] = None,
+) -> None:
+    """Write a mission for a geographic information system, in degrees: mission.geojson and mission.kml, the residual
+    risk by levels as risk-levels.geojson with its style for QGIS, and cell by cell as risk.tif.
+
+    risk.tif needs secondlook[geotiff].
+    """
+    mission, place = load(run), _place(origin)
+    place = place or mission.origin
+    if place is None:
+        raise UserError(f"{run}: the scenario has no origin; must be given: --origin LAT LON")
+    folder = out or run / "export"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+    for name, content in _files(mission, place):
+        with whole_file(folder / name) as file:
+            file.write(content)
+        typer.echo(folder / name)
+    if find_spec("rasterio") is None:
+        typer.echo("risk.tif is left out: it needs rasterio, which the extra secondlook[geotiff] has", err=True)
+
+
+def _files(mission: RecordedMission, origin: GeographicOrigin) -> Iterator[tuple[str, bytes]]:
+    features = list(features_of(mission))
+    yield "mission.geojson", json.dumps(collection(features, origin)).encode() + b"\n"
+    yield "mission.kml", to_kml(mission.run.scenario, features, origin)
+    risk = mission.risk()
+    yield "risk-levels.geojson", json.dumps(collection(risk_levels(risk), origin)).encode() + b"\n"
+    yield "risk-levels.qml", qgis_style()
+    if find_spec("rasterio") is not None:
+        yield "risk.tif", import_module("secondlook.export.geotiff").to_geotiff(risk, origin)
+
+
+def _place(origin: tuple[float, float] | None) -> GeographicOrigin | None:
+    try:
+        return None if origin is None else GeographicOrigin(*origin)
+    except ValueError as error:
+        raise UserError(f"--origin: {error}") from error
