@@ -9,6 +9,15 @@ from comms.node import Received
 from comms.said.messages import MissionOver, StripState, StripStatus, Task
 
 GONE = "its coordinator is gone"
+LEFT = "left when the mission was over"
+"""How the reason begins of a strip that nothing becomes of any more, though it has not ended."""
+
+
+def state_in_words(strip: StripStatus) -> str:
+    """A strip's state for people: that of its message, or left."""
+    if strip.state is StripState.OPEN and strip.reason.startswith(LEFT):
+        return "left"
+    return strip.state.value.replace("_", " ")
 
 
 class StripBooks:

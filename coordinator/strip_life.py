@@ -11,6 +11,7 @@ from dataclasses import replace
 
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, StripState, TaskAction, TaskState, TaskStatus
+from comms.strip_books import LEFT
 from coordinator.agenda import Agenda, Item
 from coordinator.allocate.service import Service
 from coordinator.cut.strips import Cut
@@ -170,7 +171,7 @@ class StripLife:
         """Leaves what has not ended open for good: the mission is over."""
         for record in self.unended:
             who = f"{record.vehicle} has not ended it" if record.vehicle else "nobody has served it"
-            self.ledger.leave(record, now_ms, f"left when the mission was over: {who}")
+            self.ledger.leave(record, now_ms, f"{LEFT}: {who}")
             self._outbox.add_strip(record)
 
     def _hear_at_work(

@@ -9,6 +9,7 @@ import rerun as rr
 
 from comms.node import Received
 from comms.said.messages import Hotspot, HotspotState, StripState, StripStatus
+from comms.strip_books import state_in_words
 from viz import palette, paths
 from viz.canvas import Canvas, Pace
 from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_ring
@@ -153,5 +154,5 @@ def _more(strip: StripStatus) -> str:
 def _words(strip: StripStatus, number: int) -> str:
     if strip.state is StripState.DONE:
         return str(number)
-    state = "" if strip.state is StripState.OPEN else f" {strip.state.value.replace('_', ' ')}"
-    return f"strip {number}{state}: {strip.removable_m2:.0f} m²"
+    state = state_in_words(strip)
+    return f"strip {number}{'' if state == 'open' else f' {state}'}: {strip.removable_m2:.0f} m²"

@@ -11,12 +11,14 @@ import rerun as rr
 from comms.node import Received
 from comms.said.announcement import RunInfo
 from comms.said.messages import StripState, StripStatus, TaskState, TaskStatus
+from comms.strip_books import state_in_words
 from viz import paths
 from viz.canvas import Canvas, Pace
 
 MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
 IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
-COUNTED = (StripState.OPEN, StripState.DONE, StripState.WITHDRAWN, StripState.FAILED)
+STRIP_IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
+STANDING = ("open", "in hand", "left", "failed")
 HEAD = "| vehicle | strip | state | risk to remove | ends |\n|---|---|---|---|---|"
 
 
@@ -35,8 +37,8 @@ class TaskTable:
         self._in_hand: dict[str, _Row | None] = {one.vehicle: None for one in run.vehicles if one.role.revisits}
         self._ended: deque[_Row] = deque(maxlen=MOST_ENDED)
         self._strips: dict[int, StripStatus] = {}
-        self._counts: Counter[StripState] = Counter()
-        self._foreseen: Counter[StripState] = Counter()
+        self._counts: Counter[str] = Counter()
+        self._foreseen: Counter[str] = Counter()
         self._pace = Pace(0)
         self._pace.note(0)
 
@@ -45,16 +47,16 @@ class TaskTable:
         number = received.number
         before = self._strips.get(number)
         self._strips[number] = strip
-        if before is None or (before.state, before.foreseen) != (strip.state, strip.foreseen):
+        if before is None or (_word(before), before.foreseen) != (_word(strip), strip.foreseen):
             self._count(strip, 1)
             if before is not None:
                 self._count(before, -1)
             self._pace.note(received.header.sent_ms)
 
     def _count(self, strip: StripStatus, more: int) -> None:
-        self._counts[strip.state] += more
+        self._counts[_word(strip)] += more
         if strip.foreseen:
-            self._foreseen[strip.state] += more
+            self._foreseen[_word(strip)] += more
 
     def on_task_status(self, received: Received, status: TaskStatus) -> None:
         """Takes the vehicle's word on its task."""
@@ -87,15 +89,14 @@ class TaskTable:
     def _words(self) -> str:
         if not self._in_hand:
             return "No vehicle takes a second look."
-        counts = ", ".join(f"{self._counts[state]} {state.value}" for state in COUNTED)
         rows = [
             f"| {vehicle} | | free | | |" if row is None else self._line(row)
             for vehicle, row in sorted(self._in_hand.items())
         ]
         rows += map(self._line, self._ended)
-        head = [f"Strips: {counts}", ""]
+        head = [f"Strips: {_counted(self._counts)}", ""]
         if self._foreseen:
-            of_them = ", ".join(f"{self._foreseen[state]} {state.value}" for state in COUNTED)
+            of_them = _counted(self._foreseen)
             head += [f"Foreseen, expected to be badly seen and not found so, blue while open: {of_them}", ""]
         return "\n".join([*head, HEAD, *rows])
 
@@ -106,6 +107,17 @@ class TaskTable:
         ends = f"about {status.ends_ms / 1000:.0f} s" if status.state in IN_HAND else f"{row.time_ms / 1000:.0f} s"
         state = status.state.value.replace("_", " ")
         return f"| {row.vehicle} | {status.strip} | {state} | {risk} | {ends} |"
+
+
+def _word(strip: StripStatus) -> str:
+    return "in hand" if strip.state in STRIP_IN_HAND else state_in_words(strip)
+
+
+def _counted(counts: Counter[str]) -> str:
+    """As a person counts: what was withdrawn is no place any more, or one with others."""
+    places = sum(counts[word] for word in (*STANDING, "done"))
+    rest = "".join(f", {counts[word]} {word}" for word in STANDING if counts[word])
+    return f"{counts['done']} of {places} places seen again{rest}"
 
 
 def _documents(texts: Sequence[str]) -> rr.ComponentColumnList:

@@ -143,7 +143,7 @@ def table(standings: Sequence[Standing], title: str, objective: str) -> Table:
     if any(one.targets_found for one in standings):
         add("targets\nexpected", [_share(one.targets_expected) for one in standings])
         add("targets\nfound", [_share(one.targets_found) for one in standings])
-    add("strips\nserved", [f"{one.served.mean:.1f}" for one in standings])
+    add("seen\nagain", [f"{one.served.mean:.1f}" for one in standings])
     if any(abs(one.ends_at.mean - standings[0].ends_at.mean) > 0.005 for one in standings):
         add("ends\nat", [f"{one.ends_at.mean:.2f}" for one in standings])
     pairs = [pair for one in standings for pair in one.against_first.values()]

@@ -103,8 +103,8 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     hotspots = summary["hotspots"]
     table.add_row(
         "strips",
-        f"{hotspots['published']} cut, {hotspots['revisited']} revisited ({hotspots['foreseen_revisited']} foreseen), "
-        f"{hotspots['open']} open, {hotspots['withdrawn']} withdrawn, {hotspots['failed']} failed",
+        f"{hotspots['revisited']} of {hotspots['places']} places seen again, {hotspots['foreseen_revisited']} of them "
+        f"foreseen; {hotspots['left']} left, {hotspots['failed']} failed",
     )
     table.add_row("residual risk", f"{risk['mean']:.3f}, primary alone {alone['mean']:.3f}")
     table.add_row("worst 30 %", f"{risk['worst30_mean']:.3f}, primary alone {alone['worst30_mean']:.3f}")

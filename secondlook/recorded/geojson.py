@@ -125,7 +125,7 @@ def _second_looks(mission: RecordedMission) -> Iterator[Feature]:
             {
                 "kind": "strip",
                 "number": strip.number,
-                "state": strip.state.value,
+                "state": strip.fate,
                 "vehicle": strip.vehicle or None,
                 "expected_m2": strip.expected_m2,
                 "published_s": strip.history[0].t_s,

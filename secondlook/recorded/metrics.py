@@ -264,8 +264,9 @@ class Metrics:
         accepted = [strip.accepted_ms for strip in self.strips.values() if strip.accepted_ms is not None]
         return {
             "published": len(states),
+            "places": len(states) - states.count(StripState.WITHDRAWN),
             "revisited": states.count(StripState.DONE),
-            "open": sum(not state.has_ended for state in states),
+            "left": sum(not state.has_ended for state in states),
             "withdrawn": states.count(StripState.WITHDRAWN),
             "failed": states.count(StripState.FAILED),
             "foreseen": foreseen.total(),

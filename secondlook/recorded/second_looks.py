@@ -89,6 +89,11 @@ class StripRecord:
         """Its number."""
         return self.strip.number
 
+    @property
+    def fate(self) -> str:
+        """What became of it: `done`, `failed` or `withdrawn`, else `left`."""
+        return self.state.value if self.state.has_ended else "left"
+
     @cached_property
     def polygon(self) -> shapely.Polygon:
         """Its rectangle, mission frame."""

@@ -11,8 +11,8 @@ from secondlook.recorded.story import Line, Story
 
 # The classes under which the style sheet knows the states.
 FATE_CLASS = {
-    StripState.OPEN: "open",
-    StripState.OFFERED: "open",
+    StripState.OPEN: "left",
+    StripState.OFFERED: "left",
     StripState.ACCEPTED: "begun",
     StripState.UNDER_WAY: "begun",
     StripState.DONE: "done",
@@ -20,10 +20,10 @@ FATE_CLASS = {
     StripState.WITHDRAWN: "withdrawn",
 }
 _IN_WORDS = {
-    StripState.OPEN: "left open",
-    StripState.OFFERED: "left open",
-    StripState.ACCEPTED: "given to {vehicle}, not begun",
-    StripState.UNDER_WAY: "cut short by the mission's end",
+    StripState.OPEN: "left",
+    StripState.OFFERED: "left",
+    StripState.ACCEPTED: "left: given to {vehicle}, not begun",
+    StripState.UNDER_WAY: "left: begun by {vehicle}, and cut short",
     StripState.DONE: "seen again by {vehicle}",
     StripState.FAILED: "failed",
     StripState.WITHDRAWN: "withdrawn",

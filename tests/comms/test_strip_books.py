@@ -7,7 +7,7 @@ from one_node import received
 
 from comms.node import Received
 from comms.said.messages import Message, MissionOver, StripState, StripStatus, Task, TaskAction
-from comms.strip_books import GONE, StripBooks
+from comms.strip_books import GONE, StripBooks, state_in_words
 
 LEFT = [state for state in StripState if not state.has_ended]
 ENDED = [StripState.DONE, StripState.FAILED, StripState.WITHDRAWN]
@@ -72,3 +72,15 @@ def test_one_that_goes_on_with_a_strip_has_it_open_again() -> None:
         (50, 1, StripState.WITHDRAWN, GONE),
         (50, 1, StripState.OPEN, "as said"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("state", "reason", "words"),
+    [
+        (StripState.OPEN, "given back by helper", "open"),
+        (StripState.OPEN, "left when the mission was over: nobody has served it", "left"),
+        (StripState.UNDER_WAY, "as said", "under way"),
+    ],
+)
+def test_a_strip_that_was_left_is_told_apart_from_one_that_is_open(state: StripState, reason: str, words: str) -> None:
+    assert state_in_words(StripStatus(1, state, 10, 20, 0, 100, 30, 500, "", reason, "why", foreseen=True)) == words

@@ -42,6 +42,7 @@ from comms.said.messages import (
     TruthTargets,
 )
 from comms.said.topics import TOPICS
+from comms.strip_books import state_in_words
 from planner.region import Region
 from planner.types import PriorityGround
 from secondlook.recorded.story import Story
@@ -459,7 +460,7 @@ def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated:
 
 def test_the_table_tells_who_has_which_strip(messages: list[Received], recording: Path) -> None:
     tables = [(time_ms, text[0]) for time_ms, text in rows(recording, "/tasks", "TextDocument:text")]
-    assert tables[0] == (0, f"Strips: 0 open, 0 done, 0 withdrawn, 0 failed\n\n{HEAD}\n| {HELPER} | | free | | |")
+    assert tables[0] == (0, f"Strips: 0 of 0 places seen again\n\n{HEAD}\n| {HELPER} | | free | | |")
     under_way = [(ms, s) for ms, s in of(messages, TaskStatus) if s.strip == 1 and s.state.value == "under_way"]
     time_ms, status = under_way[0]
     told = next(text for at_ms, text in tables if at_ms == time_ms)
@@ -468,10 +469,11 @@ def test_the_table_tells_who_has_which_strip(messages: list[Received], recording
     ended = [line for line in tables[-1][1].splitlines() if "| done |" in line]
     assert ended == [f"| {HELPER} | {s.strip} | done |  | {ms / 1000:.0f} s |"
                      for ms, s in reversed(states)]  # fmt: skip
-    latest = {key: strip.state.value for key, strip in ((r.key, r.message) for r in messages
-              if isinstance(r.message, StripStatus))}  # fmt: skip
-    counts = [list(latest.values()).count(state) for state in ("open", "done", "withdrawn", "failed")]
-    assert tables[-1][1].startswith("Strips: {} open, {} done, {} withdrawn, {} failed\n".format(*counts))
+    latest = {r.key: state_in_words(r.message) for r in messages if isinstance(r.message, StripStatus)}
+    places = Counter(state for state in latest.values() if state != "withdrawn")
+    assert places.keys() <= {"done", "open", "left", "failed"}
+    rest = "".join(f", {places[word]} {word}" for word in ("open", "left", "failed") if places[word])
+    assert tables[-1][1].startswith(f"Strips: {places['done']} of {places.total()} places seen again{rest}\n")
 
 
 def test_r_eff_and_threshold_are_told(messages: list[Received], tmp_path: Path) -> None:

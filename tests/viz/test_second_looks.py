@@ -110,7 +110,7 @@ def test_what_a_coordinator_that_is_gone_has_left_disappears(record: Record, tmp
     assert not rows(path, "/strips/2", "Clear:is_recursive")
     tables = rows(path, "/tasks", "TextDocument:text")
     assert tables[-1][0] == 50_000
-    assert tables[-1][1][0].startswith("Strips: 0 open, 1 done, 1 withdrawn, 0 failed\n")
+    assert tables[-1][1][0].startswith("Strips: 1 of 1 places seen again\n")
 
 
 def test_what_is_foreseen_is_told_apart_and_why(record: Record, tmp_path: Path) -> None:
@@ -134,7 +134,7 @@ def test_what_is_foreseen_is_told_apart_and_why(record: Record, tmp_path: Path) 
     assert [colour for _, (colour,) in rows(path, "/strips/1", "LineStrips3D:colors")] == colours
     tables = [text for _, (text,) in rows(path, "/tasks", "TextDocument:text")]
     assert "Foreseen" not in tables[0]
-    assert "blue while open: 1 open, 0 done, 0 withdrawn, 0 failed\n" in tables[1]
+    assert "blue while open: 0 of 1 places seen again, 1 open\n" in tables[1]
     assert "blue while open: 0 open, 0 done, 0 withdrawn, 0 failed\n" in tables[-1]
 
 

@@ -143,9 +143,16 @@ class TestStandings:
 
     def test_columns_that_say_nothing_are_left_out(self) -> None:
         alone = standings({"first": FLOWN["first"]})
-        assert columns(alone) == ["", "mean risk", "worst 30 %", "targets expected", "targets found", "strips served"]
+        assert columns(alone) == [
+            "",
+            "mean risk",
+            "worst 30 %",
+            "targets expected",
+            "targets found",
+            "seen again",
+        ]
         assert columns(standings({"first": {1: result(1, 0.4, found=None, expected=None)}})) == [
-            "", "mean risk", "worst 30 %", "strips served",
+            "", "mean risk", "worst 30 %", "seen again",
         ]  # fmt: skip
         assert columns(standings(FLOWN))[6:] == [
             "mean: above the first's", "worst 30 %: above the first's", "better, worse", " failed",

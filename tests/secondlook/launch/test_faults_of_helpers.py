@@ -236,8 +236,8 @@ def check_of_last(flight: Flight) -> None:
             last[one.number] = one.message
     assert last
     figures = flight.summary["hotspots"]
-    assert figures["open"] == sum(status.state is StripState.OPEN for status in last.values())
-    assert figures["published"] == sum(figures[one] for one in ("revisited", "open", "withdrawn", "failed"))
+    assert figures["left"] == sum(status.state is StripState.OPEN for status in last.values())
+    assert figures["published"] == sum(figures[one] for one in ("revisited", "left", "withdrawn", "failed"))
     counted = Counter(one.state for one in flight.strips)
     assert counted[StripState.DONE] == figures["revisited"]
     assert counted[StripState.WITHDRAWN] == figures["withdrawn"]

@@ -70,7 +70,7 @@ class TestEveryMission:
             last[received.number] = status
         figures = mission.summary["hotspots"]
         assert sorted(last) == list(range(1, figures["published"] + 1))
-        counted = [figures[name] for name in ("revisited", "open", "withdrawn", "failed")]
+        counted = [figures[name] for name in ("revisited", "left", "withdrawn", "failed")]
         assert sum(counted) == figures["published"]
         assert figures["revisited"] == sum(status.state is StripState.DONE for status in last.values()) > 5
         done = {(r.vehicle, s.strip) for r, s in mission.all(TaskStatus) if s.state is TaskState.DONE}
@@ -187,7 +187,7 @@ class TestABadLink:
         primary_s, figures = mission.summary["primary_s"], mission.summary["hotspots"]
         assert mission.result.ending is Ending.OVER
         assert primary_s * 1000 <= mission.result.mission_ms <= 1.05 * (primary_s * 1000 + 300_000)
-        assert sum(figures[name] for name in ("revisited", "open", "withdrawn", "failed")) == figures["published"] > 5
+        assert sum(figures[name] for name in ("revisited", "left", "withdrawn", "failed")) == figures["published"] > 5
         assert mission.summary["risk"]["mean"] < mission.summary["risk_primary_alone"]["mean"] - 0.02
 
     def test_a_helper_cut_off_in_mid_strip_goes_on_with_it_when_it_is_heard_again(self) -> None:
@@ -282,5 +282,5 @@ class TestTheTrial:
         figures = mission.summary["hotspots"]
         assert mission.all(Task) == []
         assert (figures["revisited"], figures["first_assigned_s"]) == (0, None)
-        assert figures["open"] > 5
+        assert figures["left"] > 5
         assert mission.summary["risk"] == mission.summary["risk_primary_alone"]

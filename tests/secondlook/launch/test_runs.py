@@ -145,7 +145,7 @@ def test_the_summary_has_all_that_is_promised(landed: Landed) -> None:
     )
     assert summary["truth"].keys() == {"targets", "missed_share", "predicted_missed_share"}
     strips = summary["hotspots"]
-    assert strips["published"] == sum(strips[name] for name in ("revisited", "open", "withdrawn", "failed")) > 0
+    assert strips["published"] == sum(strips[name] for name in ("revisited", "left", "withdrawn", "failed")) > 0
     assert strips["revisited"] > 0
     assert strips["first_published_s"] <= strips["first_assigned_s"]
     latency = summary["latency_ms"]["strip_to_task"]

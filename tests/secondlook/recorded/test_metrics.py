@@ -245,8 +245,9 @@ class TestStrips:
             stream.strip(at_s, number, state, foreseen=number in (1, 2) or at_s in (450, 460))
         assert stream.metrics.summary()["hotspots"] == {
             "published": 5,
+            "places": 4,
             "revisited": 1,
-            "open": 2,
+            "left": 2,
             "withdrawn": 1,
             "failed": 1,
             "foreseen": 3,
@@ -268,7 +269,7 @@ class TestStrips:
             stream.strip(at_s, number, state)
         figures = stream.metrics.summary()["hotspots"]
         assert figures["published"] == len({number for number, _ in changes})
-        assert sum(figures[name] for name in ("revisited", "open", "withdrawn", "failed")) == figures["published"]
+        assert sum(figures[name] for name in ("revisited", "left", "withdrawn", "failed")) == figures["published"]
         assert (figures["first_published_s"] is None) is (not changes)
 
     def test_a_coordinator_started_anew_that_cuts_no_strip_closes_the_books_of_the_one_before(self) -> None:
@@ -277,4 +278,4 @@ class TestStrips:
         stream.strip(20, 2, StripState.OPEN)
         stream.say(30, "coord/mission_over", MissionOver("survey over"), incarnation=1)
         figures = stream.metrics.summary()["hotspots"]
-        assert (figures["revisited"], figures["open"], figures["withdrawn"]) == (1, 0, 1)
+        assert (figures["revisited"], figures["left"], figures["withdrawn"]) == (1, 0, 1)

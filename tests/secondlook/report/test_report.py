@@ -108,10 +108,10 @@ def test_what_it_says_is_what_the_summary_says(page: Page, mission: RecordedMiss
 
 def test_every_strip_is_told_with_its_fate(page: Page, mission: RecordedMission) -> None:
     words = {
-        StripState.OPEN: "left open",
-        StripState.OFFERED: "left open",
-        StripState.ACCEPTED: "given to helper, not begun",
-        StripState.UNDER_WAY: "cut short by the mission's end",
+        StripState.OPEN: "left",
+        StripState.OFFERED: "left",
+        StripState.ACCEPTED: "left: given to helper, not begun",
+        StripState.UNDER_WAY: "left: begun by helper, and cut short",
         StripState.DONE: "seen again by helper",
         StripState.FAILED: "failed: ",
         StripState.WITHDRAWN: "withdrawn: ",
