@@ -135,7 +135,7 @@ def test_what_is_foreseen_is_told_apart_and_why(record: Record, tmp_path: Path) 
     tables = [text for _, (text,) in rows(path, "/tasks", "TextDocument:text")]
     assert "Foreseen" not in tables[0]
     assert "blue while open: 0 of 1 places seen again, 1 open\n" in tables[1]
-    assert "blue while open: 0 open, 0 done, 0 withdrawn, 0 failed\n" in tables[-1]
+    assert "blue while open: 0 of 0 places seen again\n" in tables[-1]
 
 
 def test_what_is_held_back_is_drawn_when_its_minute_is_over(record: Record, tmp_path: Path) -> None:
