@@ -156,7 +156,8 @@ class Result:
     `at_end`: when the mission was over. `survey_alone`: mean residual risk without any second look. `removed_m2`: what
     second looks removed of it, times the area. `served`: strips done. `targets_found`: the share that some vehicle has
     detected, and `targets_expected` what the map lets expect of that, None without targets. `over_time`: about every
-    10 s.
+    10 s. `in_priorities`: the mean residual risk at the end within each of `area.priorities`, None where no cell lies
+    in it.
     """
 
     seed: int
@@ -171,6 +172,7 @@ class Result:
     targets_found: float | None
     targets_expected: float | None
     over_time: tuple[Risk, ...]
+    in_priorities: tuple[float | None, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -209,6 +211,7 @@ def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
         targets_found=None if not truth["targets"] else 1 - truth["missed_share"],
         targets_expected=None if not truth["targets"] else 1 - truth["predicted_missed_share"],
         over_time=(*notes.taken, at_end),
+        in_priorities=tuple(one["mean"] for one in summary["priorities"]),
     )
 
 

@@ -27,8 +27,8 @@ class Standing:
 
     Residual risk, mean over the area and over the worst 30 % of it, when the last primary had surveyed all, at 1.05
     times that, and at the mission's end, which is `ends_at` times that. `served`: strips done. `removed_m2`,
-    `targets_found`, `targets_expected`: see `Result`. `failed`: missions that failed. `against_first`: by objective, as
-    far as both have flown the same seeds; empty for the first contender itself.
+    `targets_found`, `targets_expected`, `in_priorities`: see `Result`. `failed`: missions that failed.
+    `against_first`: by objective, as far as both have flown the same seeds; empty for the first contender itself.
     """
 
     name: str
@@ -47,6 +47,7 @@ class Standing:
     targets_found: Spread | None
     targets_expected: Spread | None
     against_first: dict[str, Paired]
+    in_priorities: tuple[Spread | None, ...] = ()
 
 
 def standings(flown: Flown) -> list[Standing]:
@@ -119,6 +120,10 @@ def _standing(name: str, by_seed: dict[int, Result], failed: int, first: dict[in
         targets_found=spread_if_any(lambda one: one.targets_found),
         targets_expected=spread_if_any(lambda one: one.targets_expected),
         against_first={key: found for key, found in compared.items() if found is not None},
+        in_priorities=tuple(
+            spread_if_any(lambda one, place=place: one.in_priorities[place])  # type: ignore[misc]
+            for place in range(len(results[0].in_priorities))
+        ),
     )
 
 
@@ -140,6 +145,8 @@ def table(standings: Sequence[Standing], title: str, objective: str) -> Table:
 
     add("mean\nrisk", [f"{one.mean_end.mean:.3f}" for one in standings])
     add("worst\n30 %", [f"{one.worst30_mean_end.mean:.3f}" for one in standings])
+    for place in range(max((len(one.in_priorities) for one in standings), default=0)):
+        add(f"priority\n{place + 1}", [_share(one.in_priorities[place]) for one in standings])
     if any(one.targets_found for one in standings):
         add("targets\nexpected", [_share(one.targets_expected) for one in standings])
         add("targets\nfound", [_share(one.targets_found) for one in standings])

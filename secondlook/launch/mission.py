@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -87,7 +88,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     sentence, when a node fails or dies, when a file cannot be written, when the mission is not over by its time limit,
     and when the run is interrupted; what was recorded until then is readable, and summary.json tells how it ended.
     """
-    began_s = time.perf_counter()
+    began_s, begun_utc = time.perf_counter(), datetime.now(UTC)
     check_bodies(scenario)
     fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode)
     options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
@@ -105,6 +106,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
             wall_s=time.perf_counter() - began_s,
             ending=ending,
             failure=failure,
+            begun_utc=begun_utc,
             factor=options.drive.factor,
             restarts=run.restarts,
         )

@@ -111,6 +111,10 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     table.add_row(
         "not seen", f"{risk['uncovered_share']:.2%} of the area, primary alone {alone['uncovered_share']:.2%}"
     )
+    for number, one in enumerate(summary["priorities"], start=1):
+        if one["mean"] is not None:
+            told = f"{one['mean']:.3f}, primary alone {one['mean_primary_alone']:.3f}; counts {one['weight']:g} times"
+            table.add_row(f"priority {number}", told)
     least_m = summary["separation"]["least_m"]
     for pair in summary["separation"]["closest"]:
         if pair["closest_m"] < least_m:

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 
 from comms.drive import identity_of
@@ -145,7 +146,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     cannot take part."""
     _log_to_stderr()
     end_with_supervisor()
-    began_s = time.perf_counter()
+    began_s, begun_utc = time.perf_counter(), datetime.now(UTC)
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     write_whole(folder / "scenario.yaml", scenario.to_yaml())
     observer = Observer(folder, with_messages=True)
@@ -167,6 +168,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
         wall_s=time.perf_counter() - began_s,
         ending=outcome.ending,
         failure=failure,
+        begun_utc=begun_utc,
         factor=outcome.factor,
     )
     if failure is None and summary["risk"] is None:  # of one that was started again at the very end, say

@@ -119,6 +119,27 @@ def polygon_of(priority: PriorityGround) -> BaseGeometry:
     return ground
 
 
+@dataclass(frozen=True)
+class PriorityRisk:
+    """Ground that counts for more or less, and the mean residual risk within it, by the primaries alone and by all; NaN
+    where no cell has its centre there."""
+
+    weight: float
+    area_m2: float
+    before: float
+    after: float
+
+
+def risk_in_priorities(grounds: Iterable[PriorityGround], before: RiskMap, after: RiskMap) -> list[PriorityRisk]:
+    """Of each ground; `before` and `after`: the risk by the primaries alone and by all."""
+    found = []
+    for one in grounds:
+        polygon = polygon_of(one)
+        cells = after.cells_within(polygon)
+        found.append(PriorityRisk(one.weight, float(polygon.area), before.mean_of(cells), after.mean_of(cells)))
+    return found
+
+
 _PRIORITIES = TypeAdapter(list[Priority])
 
 

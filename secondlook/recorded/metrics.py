@@ -153,14 +153,17 @@ class Metrics:
 
     def risk_primary_alone(self) -> RiskStatistics | None:
         """The same without second looks: the primaries' layers, of one that takes strips itself as it was before."""
-        if self.map is None:
-            return None
+        return None if self.map is None else risk_statistics(*self.map_primary_alone(), self.inside)
+
+    def map_primary_alone(self) -> tuple[FloatArray, BoolArray]:
+        """Risk and what is seen of each cell without second looks; the mission has been announced."""
+        assert self.map is not None
         layers = [
             one.surveyed or self.map.layers[name]
             for name, one in self.vehicles.items()
             if one.role.surveys and name in self.map.layers
         ]
-        return risk_statistics(*self.map.risk_of_layers(layers), self.inside)
+        return self.map.risk_of_layers(layers)
 
     def targets_met(self) -> tuple[FloatArray, BoolArray]:
         """Of each target the fleet's residual risk where it lies, and whether nobody has detected it; both of shape

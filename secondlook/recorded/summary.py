@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
+from datetime import datetime
 from importlib.metadata import version
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import shapely
 
 from comms.result import STRIP_TO_TASK, BusResult
+from secondlook.recorded.ground import RiskMap, risk_in_priorities
+from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Observer
 from secondlook.scenario import Scenario
+from secondlook.scenario.area import priority_grounds
 
 
 def summarise(
@@ -25,6 +32,7 @@ def summarise(
     wall_s: float,
     ending: str,
     failure: str | None = None,
+    begun_utc: datetime | None = None,
     factor: float | None = None,
     restarts: Mapping[str, int] = MappingProxyType({}),
 ) -> dict[str, Any]:
@@ -32,8 +40,9 @@ def summarise(
 
     `result` is None for a run that was cut off: then digest and rounds are not known, and the rest is what the observer
     has heard until then. `ending`: a `comms.result.Ending`, or `failed` or `interrupted`. `failure`: the sentence that
-    the run failed with. `wall_s`: start-up included. `factor`: of a run by the wall clock; None for lockstep.
-    `restarts`: how often processes that died were started again, by host.
+    the run failed with. `begun_utc`: when the run was begun, on the clock of the wall. `wall_s`: start-up included.
+    `factor`: of a run by the wall clock; None for lockstep. `restarts`: how often processes that died were started
+    again, by host.
     """
     told = observer.metrics.summary()
     closest = told.pop("closest")
@@ -42,6 +51,7 @@ def summarise(
         "scenario": scenario.name,
         "seed": scenario.seed,
         "version": version("secondlook"),
+        "begun_utc": None if begun_utc is None else f"{begun_utc:%Y-%m-%dT%H:%M:%SZ}",
         "bus": bus,
         "processes": processes,
         "factor": factor,
@@ -51,6 +61,7 @@ def summarise(
         **({"restarts": dict(restarts)} if restarts else {}),
         "time": _times(mission_s, told.pop("primary_s"), wall_s),
         **told,
+        "priorities": _priorities(scenario, observer.metrics),
         "separation": {
             "least_m": scenario.mission.separation_m,
             "pairs_closer": sum(pair["closest_m"] < scenario.mission.separation_m for pair in closest),
@@ -63,6 +74,26 @@ def summarise(
         "messages": dict(sorted((observer.messages if result is None else result.messages).items())),
         "dropped": _dropped(observer, result, factor),
     }
+
+
+def _priorities(scenario: Scenario, metrics: Metrics) -> list[dict[str, float | None]]:
+    """The mean residual risk within each ground that counts for more or less."""
+    if metrics.map is None or not scenario.area.priorities:
+        return []
+    after = RiskMap.of(metrics.now_ms / 1000, metrics)
+    risk, seen = metrics.map_primary_alone()
+    grounds = priority_grounds(
+        shapely.Polygon(scenario.area.polygon_m, scenario.area.holes_m), scenario.area.priorities
+    )
+    return [
+        {
+            "weight": one.weight,
+            "area_m2": round(one.area_m2, 1),
+            "mean": None if math.isnan(one.after) else one.after,
+            "mean_primary_alone": None if math.isnan(one.before) else one.before,
+        }
+        for one in risk_in_priorities(grounds, replace(after, risk=risk, seen=seen), after)
+    ]
 
 
 def _times(mission_s: float, primary_s: float | None, wall_s: float) -> dict[str, float | None]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -205,8 +206,15 @@ IN_WORDS = {
 }
 
 
-def timeline(vehicles: Sequence[str], helpers: Sequence[str], done: Sequence[Activity], width_px: float) -> Element:
-    """`done`: what they did, of all vehicles. What a helper did at a strip leads to the strip's fate."""
+def timeline(
+    vehicles: Sequence[str],
+    helpers: Sequence[str],
+    done: Sequence[Activity],
+    width_px: float,
+    classes: Mapping[str, str] = MappingProxyType({}),
+) -> Element:
+    """`done`: what they did, of all vehicles. What a helper did at a strip leads to the strip's fate. `classes`: under
+    which the style sheet knows the vehicles' colours."""
     end_s = max((one.ended_s for one in done), default=0.0) or 1.0
     plot_px = width_px - 2 * SIDE_PX
     lane_px = NAME_PX + BAR_PX + GAP_PX
@@ -214,8 +222,8 @@ def timeline(vehicles: Sequence[str], helpers: Sequence[str], done: Sequence[Act
     children = list(_axis(end_s, plot_px, bottom))
     for lane, vehicle in enumerate(vehicles):
         top = lane * lane_px
-        children.append(element("text", vehicle, x=SIDE_PX, y=top + NAME_PX - 5, class_="lane"))
-        children += [
+        bars = [element("text", vehicle, x=SIDE_PX, y=top + NAME_PX - 5, class_="lane")]
+        bars += [
             _bar(
                 one,
                 SIDE_PX + plot_px * one.begun_s / end_s,
@@ -226,6 +234,7 @@ def timeline(vehicles: Sequence[str], helpers: Sequence[str], done: Sequence[Act
             for one in done
             if one.vehicle == vehicle
         ]
+        children.append(element("g", *bars, class_=classes.get(vehicle, "")))
     return drawing(width_px, bottom + AXIS_PX, "Who did what when", children, class_="chart timeline")
 
 

@@ -94,17 +94,19 @@ def risk_map(mission: RecordedMission, risk: RiskMap, label: str) -> Element:
     west_m, south_m, east_m, north_m = mission.area.bounds
     frame = MapFrame.around(mission.area, MARGIN_SHARE * max(east_m - west_m, north_m - south_m))
     outline = element("path", d=frame.line(mission.area), class_="area")
-    return drawing(frame.width_m, frame.height_m, label, [frame.risk(risk), outline], class_="map")
+    corner = {"data_west": frame.west_m, "data_north": frame.north_m}
+    return drawing(frame.width_m, frame.height_m, label, [frame.risk(risk), outline], class_="map", **corner)
 
 
 WIDTH_PX, HEIGHT_PX = 900.0, 620.0  # of the picture on a desk: what text and margins are measured by
 MARGIN_PX = 30.0
 PATH_STEP_PX = 0.5  # how far a drawn path may lie off the flown one
-LABEL_PX, LINE_PX = 40.0, 14.0
+LABEL_PX, LINE_PX, NAMES_APART_PX = 40.0, 14.0, 24.0
 ALONG = (0.5, 0.35, 0.65, 0.2, 0.8)  # where on a strip its number may stand, the best first
 NUMBER_PX = 20.0  # nearer to each other numbers cannot be read
 NAME_PX = 70.0  # what a vehicle's name takes up
-MOST_STRIPS = 100  # with numbers; of more those that were withdrawn would hide the others
+MOST_STRIPS = 100  # with numbers
+HELPER_COLOURS = 5  # in the style sheet
 ROUND_NUMBERS = 8  # the scale bar is about an eighth of the width
 
 
@@ -114,28 +116,36 @@ def are_many(strips: Sequence[StripRecord]) -> bool:
 
 
 def strips_on_map(strips: Sequence[StripRecord]) -> list[StripRecord]:
-    """Those that the map shows."""
-    return [one for one in strips if one.state is not StripState.WITHDRAWN or not are_many(strips)]
+    """Those that the map shows: what was withdrawn is no place any more, or part of another, and would hide others."""
+    return [one for one in strips if one.state is not StripState.WITHDRAWN]
+
+
+def vehicle_classes(mission: RecordedMission) -> dict[str, str]:
+    """By vehicle the class under which the style sheet knows its colour: helpers have each their own, as far as they
+    go."""
+    helpers = [one for one in mission.helpers if one not in mission.primaries]
+    return dict.fromkeys(mission.primaries, "primary") | {
+        one: f"helper helper-{number % HELPER_COLOURS + 1}" for number, one in enumerate(helpers)
+    }
 
 
 def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     """What was flown over the risk that is left. A strip's element has the id `ids` with its number."""
     paths, tracks = mission.paths, mission.tracks
-    many = are_many(mission.strips)
-    # What was withdrawn lies below the others, and has its number where they leave room.
-    strips = sorted(strips_on_map(mission.strips), key=lambda strip: strip.state is not StripState.WITHDRAWN)
-    numbered = [] if many else sorted(strips, key=lambda strip: strip.state is StripState.WITHDRAWN)
+    strips = strips_on_map(mission.strips)
+    many = are_many(strips)
+    numbered = [] if many else strips
     all_of_it = [mission.area, *(path.line for path in paths.values()), *(strip.polygon for strip in strips)]
     shown = shapely.GeometryCollection(all_of_it)
     west_m, south_m, east_m, north_m = shown.bounds
     unit_m = max((east_m - west_m) / WIDTH_PX, (north_m - south_m) / HEIGHT_PX)
     frame = MapFrame.around(shown, MARGIN_PX * unit_m)
-    kinds = dict.fromkeys(mission.primaries, "primary")
+    classes = vehicle_classes(mission)
     children = [
         frame.risk(risk),
         element("path", d=frame.line(mission.area), class_="area"),
         *(_priority(frame, one) for one in mission.priorities),
-        *(_path(frame, path, kinds.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
+        *(_path(frame, path, classes.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
         *(_strip(frame, strip, ids) for strip in strips),
         *(
@@ -143,7 +153,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
             for strip, place_m in number_places(numbered, NUMBER_PX * unit_m, LABEL_PX * unit_m)
         ),
         *(_weight(frame, one, unit_m) for one in mission.priorities),
-        *_names(frame, [(path, kinds.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
+        *_names(frame, [(path, classes.get(vehicle, "helper")) for vehicle, path in paths.items()], unit_m),
         *_scale(frame, unit_m),
     ]
     label = "The area from above with tracks, paths and strips"
@@ -154,6 +164,8 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         children,
         class_="map flown many" if many else "map flown",
         style=f"--u:{unit_m:.4g}",
+        data_west=frame.west_m,
+        data_north=frame.north_m,
     )
 
 
@@ -173,8 +185,11 @@ def _weight(frame: MapFrame, priority: PriorityGround, unit_m: float) -> Element
     corners = (corner for outline in priority.outlines_m for corner in outline)
     x_m, y_m = min(corners, key=lambda corner: (-corner[1], corner[0]))
     x, y = frame.place(x_m, y_m)
-    text = element("text", f"× {priority.weight:g}", x=x + 5 * unit_m, y=y + LINE_PX * unit_m)
-    return element("g", element("title", _counts(priority)), text, class_="priority")
+    has_room = x + NAME_PX * unit_m <= frame.width_m - MARGIN_PX * unit_m
+    place = {"x": x + (5 if has_room else -5) * unit_m, "y": y + LINE_PX * unit_m}
+    text = element("text", f"× {priority.weight:g}", **place)
+    title = element("title", _counts(priority))
+    return element("g", title, text, class_="priority" if has_room else "priority before")
 
 
 def _counts(priority: PriorityGround) -> str:
@@ -244,7 +259,7 @@ def _names(frame: MapFrame, paths: Sequence[tuple[PathRecord, str]], unit_m: flo
     lowest: list[tuple[float, float]] = []
     for path, kind in sorted(paths, key=lambda one: -one[0].y_m[0]):
         x, y = frame.place(path.x_m[0], path.y_m[0])
-        text_y = max([y, *(below + LINE_PX * unit_m for near, below in lowest if abs(near - x) < 80 * unit_m)])
+        text_y = max([y, *(below + NAMES_APART_PX * unit_m for near, below in lowest if abs(near - x) < 80 * unit_m)])
         lowest.append((x, text_y))
         has_room = x + NAME_PX * unit_m <= frame.width_m
         yield element(
@@ -260,4 +275,4 @@ def _scale(frame: MapFrame, unit_m: float) -> Iterator[Element]:
     x, y = frame.width_m - 12 * unit_m, frame.height_m - 10 * unit_m
     yield element("path", d=f"M{x - length_m:.1f},{y:.1f}H{x:.1f}", class_="scale")
     yield element("text", f"{length_m:g} m", x=x - length_m / 2, y=y - 5 * unit_m, class_="scale-text")
-    yield element("text", "N ↑", x=x, y=16 * unit_m, class_="north")
+    yield element("text", "N ↑", x=x - length_m - 10 * unit_m, y=y, class_="north")

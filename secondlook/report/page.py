@@ -3,12 +3,14 @@ run's folder."""
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import os
 import statistics
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -21,10 +23,11 @@ from comms.said.messages import StripState
 from planner.footprints import footprint_of
 from secondlook.files import write_whole
 from secondlook.recorded import RecordedMission, RiskMap, StripRecord, load_run
+from secondlook.recorded.ground import risk_in_priorities
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
-from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map
-from secondlook.report.words import fate, log_lines, moments
+from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map, vehicle_classes
+from secondlook.report.words import degrees_by_place, fate, log_lines, moments, place_in_words
 from secondlook.scenario import load_scenario, scenario_hash
 from secondlook.scenario.bundled import scenario_names
 
@@ -62,11 +65,11 @@ class TargetFigures:
 
 @dataclass(frozen=True)
 class KindFigures:
-    """Strips of a kind, foreseen or found: how many were `cut`, how many `served`, and the residual risk that is less
-    over these by all second looks, summed over their cells and times their area. A cell of several counts for each in
-    equal parts."""
+    """Strips of a kind, foreseen or found: how many `places` there were, how many were `served`, and the residual risk
+    that is less over these by all second looks, summed over their cells and times their area. A cell of several counts
+    for each in equal parts."""
 
-    cut: int
+    places: int
     served: int
     removed_m2: float
 
@@ -81,7 +84,8 @@ def kind_figures(strips: Sequence[StripRecord], before: RiskMap, after: RiskMap)
     figures = {}
     for word, kind in (("foreseen", True), ("found", False)):
         removed_m2 = [float(less_m2[cells].sum()) for one, cells in served if one.foreseen is kind]
-        figures[word] = KindFigures(sum(one.foreseen is kind for one in strips), len(removed_m2), sum(removed_m2))
+        places = sum(one.foreseen is kind for one in strips_on_map(strips))
+        figures[word] = KindFigures(places, len(removed_m2), sum(removed_m2))
     return figures
 
 
@@ -95,6 +99,8 @@ def report_page(mission: RecordedMission) -> str:
         settings=_settings(mission),
         command=command_to_reproduce(mission),
         style=Markup(_text("style.css")),
+        script=Markup(_text("pointer.js")),
+        script_hash=base64.b64encode(hashlib.sha256(_text("pointer.js").encode()).digest()).decode(),
         **flown,
     )
 
@@ -107,6 +113,8 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
     done = mission.activities
     vehicles = [one.vehicle for one in mission.run.vehicles]
     helped = bool(mission.helpers)
+    classes = vehicle_classes(mission)
+    fates = [fate(strip, before, after) for strip in mission.strips]
     return {
         "helped": helped,
         "before": before.statistics,
@@ -116,15 +124,19 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "scale": Markup(data_url(indexed_png(np.arange(LEVELS, dtype=np.uint8)[np.newaxis], palette()))),
         "flown_map": markup(flown_map(mission, after, STRIP_ON_MAP)),
         "on_map": STRIP_ON_MAP,
-        "shown_strips": {strip.number for strip in strips_on_map(mission.strips)},
-        "many_strips": are_many(mission.strips),
+        "many_strips": are_many(strips_on_map(mission.strips)),
         "moments": mattered,
         "risk_chart": _at_both_widths(lambda width_px: risk_chart(series.samples, mattered, width_px)),
         "histogram": _at_both_widths(lambda width_px: histogram(before, after if helped else None, width_px)),
-        "timeline": _at_both_widths(lambda width_px: timeline(vehicles, mission.helpers, done, width_px)),
+        "timeline": _at_both_widths(lambda width_px: timeline(vehicles, mission.helpers, done, width_px, classes)),
+        "classes": classes,
+        "place": partial(place_in_words, mission.origin),
+        "degrees": None if mission.origin is None else degrees_by_place(mission.origin, mission.area),
+        "priorities": risk_in_priorities(mission.priorities, before, after),
         "tracks": mission.tracks,
         "paths": mission.paths,
-        "fates": [fate(strip, before, after) for strip in mission.strips],
+        "fates": [one for one in fates if one.css != "withdrawn"],
+        "withdrawn": [one for one in fates if one.css == "withdrawn"],
         "kinds": kind_figures(mission.strips, before, after),
         "targets": _targets(mission, after),
         "log": log,
@@ -163,6 +175,8 @@ def _template() -> jinja2.Template:
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=jinja2.StrictUndefined
     )
     environment.filters["seconds"] = lambda t_s: "–" if t_s is None else f"{t_s:.0f} s"
+    environment.filters["day"] = lambda utc: utc[:10]
+    environment.filters["clock"] = lambda utc: utc[11:19]
     environment.filters["minutes"] = lambda t_s: f"{t_s / 60:.0f} minutes"
     environment.filters["footprint"] = footprint_of
     environment.filters["share"] = lambda share: f"{100 * share:.0f} %"

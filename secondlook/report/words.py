@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
 from comms.said.messages import Hotspot, MissionOver, Mode, Plan, StripState
+from planner.types import Point
+from secondlook.geography import GeographicOrigin
 from secondlook.recorded import RecordedMission, RiskMap, StripRecord
 from secondlook.recorded.story import Line, Story
 
@@ -34,7 +39,7 @@ _TELLS_WHY = (StripState.FAILED, StripState.WITHDRAWN)
 @dataclass(frozen=True)
 class Fate:
     """A strip's line in the report. `risk_before` and `risk_after`: mean residual risk over it, by the primaries alone
-    and by the whole fleet. Times are None where it never came so far."""
+    and by the whole fleet. Times are None where it never came so far. `ends_m`: of its centre line."""
 
     number: int
     css: str
@@ -50,6 +55,7 @@ class Fate:
     history: list[tuple[float, str]]
     why: str
     foreseen: bool
+    ends_m: tuple[Point, Point]
 
 
 def fate_in_words(strip: StripRecord) -> str:
@@ -78,7 +84,31 @@ def fate(strip: StripRecord, before: RiskMap, after: RiskMap) -> Fate:
         history=[(event.t_s, event.reason or event.state.value.replace("_", " ")) for event in strip.history],
         why=strip.why,
         foreseen=strip.foreseen,
+        ends_m=(strip.strip.start, strip.strip.end),
     )
+
+
+def place_in_words(origin: GeographicOrigin | None, x_m: float, y_m: float) -> str:
+    """A place of the mission frame: its latitude and longitude where there is an origin, else its metres."""
+    if origin is None:
+        return f"x {x_m:.1f} m, y {y_m:.1f} m"
+    longitude_deg, latitude_deg = (float(one) for one in origin.to_degrees(np.array(x_m), np.array(y_m)))
+    longitude_deg = (longitude_deg + 180) % 360 - 180
+    north, east = "N" if latitude_deg >= 0 else "S", "E" if longitude_deg >= 0 else "W"
+    return f"{abs(latitude_deg):.6f}° {north} {abs(longitude_deg):.6f}° {east}"
+
+
+def degrees_by_place(origin: GeographicOrigin, geometry: BaseGeometry) -> tuple[list[float], list[float]]:
+    """Latitude and longitude over 1, x, y, x², xy and y², as they are over a geometry's bounding box: what differs
+    within 10 km of the origin is less than a decimetre, but near the poles."""
+    west_m, south_m, east_m, north_m = geometry.bounds
+    x_m, y_m = (one.ravel() for one in np.meshgrid(np.linspace(west_m, east_m, 9), np.linspace(south_m, north_m, 9)))
+    terms = np.column_stack([np.ones_like(x_m), x_m, y_m, x_m**2, x_m * y_m, y_m**2])
+    scale = np.abs(terms).max(axis=0)
+    longitude_deg, latitude_deg = origin.to_degrees(x_m, y_m)
+    found = np.linalg.lstsq(terms / scale, np.column_stack([latitude_deg, longitude_deg]), rcond=None)[0]
+    latitude, longitude = (found / scale[:, np.newaxis]).T.tolist()
+    return latitude, longitude
 
 
 MOST_WARNINGS = 6

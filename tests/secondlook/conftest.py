@@ -5,12 +5,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import yaml
 from browser import chromium
 from flights import BRIEF
 from playwright.sync_api import Browser
 
 from secondlook.launch.mission import RunOptions, run_mission
-from secondlook.scenario import load_scenario
+from secondlook.scenario import load_scenario, make_scenario
 
 VALID = """\
 name: trial
@@ -34,6 +35,13 @@ vehicles:
     endurance_s: 14400
     sensor: {p_detect: 0.7, range_m: 25}
 """
+
+CHARTED = (
+    "origin={latitude_deg: 44.08, longitude_deg: 9.83}",
+    "area.track_heading_deg=30",
+    "area.priorities=[{polygon_m: [[200, 0], [300, 0], [300, 100]], weight: 3}]",
+    "mission.start_utc=2026-07-31T23:59:30+00:00",
+)
 
 
 @pytest.fixture
@@ -59,6 +67,16 @@ def brief_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a brief mission that was flown and recorded; not to be changed."""
     folder = tmp_path_factory.mktemp("brief-run")
     run_mission(load_scenario(str(BRIEF)), RunOptions(folder, bus="local"))
+    return folder
+
+
+@pytest.fixture(scope="session")
+def charted_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same of a mission with an origin, a start by the clock, a priority, two helpers and tracks askew."""
+    folder = tmp_path_factory.mktemp("charted-run")
+    data = yaml.safe_load(BRIEF.read_text())
+    data["vehicles"]["other"] = data["vehicles"]["helper"] | {"start": {"x_m": 310, "y_m": 110}}
+    run_mission(make_scenario(data, CHARTED), RunOptions(folder, bus="local"))
     return folder
 
 

@@ -137,6 +137,22 @@ class TestStandings:
         (none,) = standings({"first": {1: result(1, 0.4, found=None, expected=None)}})
         assert (none.targets_found, none.targets_expected) == (None, None)
 
+    def test_the_risk_within_each_priority_is_told(self) -> None:
+        flown: Flown = {
+            "first": {
+                1: replace(result(1, 0.4), in_priorities=(0.2, None)),
+                2: replace(result(2, 0.4), in_priorities=(0.3, None)),
+            }
+        }
+        stood = standings(flown)
+        spread, none = stood[0].in_priorities
+        assert none is None
+        assert spread is not None
+        assert (spread.mean, spread.deviation) == pytest.approx((0.25, 0.1 / math.sqrt(2)))
+        assert columns(stood)[3:5] == ["priority 1", "priority 2"]
+        told = table(stood, "", "mean")
+        assert [list(column.cells) for column in told.columns[3:5]] == [["0.250"], [""]]
+
     def test_what_failed_is_counted_and_told(self) -> None:
         assert standings(FLOWN)[1].failed == 1
         assert failures(FLOWN) == ["other, seed 3: it failed"]

@@ -72,6 +72,13 @@ def test_after_a_run_each_line_says_how_to_open_what_there_is(
     assert shlex.split(whole["recording"]) == ["secondlook", "view", str(tmp_path / "a run")]
     summary = json.loads((tmp_path / "a run" / "summary.json").read_text())
     assert whole["mission"].startswith(f"{in_seconds(summary['time']['mission_s'])} simulated in ")
-    bare = lines_of(tmp_path / "bare", "--no-record")
+    strips = summary["hotspots"]
+    assert whole["strips"].startswith(f"{strips['revisited']} of {strips['places']} places seen again, ")
+    assert not any(line.startswith("priority") for line in whole)
+    north = "area.priorities=[{polygon_m: [[0, 50], [300, 50], [300, 100], [0, 100]], weight: 2}]"
+    bare = lines_of(tmp_path / "bare", "--no-record", "--set", north)
     assert "files" in bare
+    (priority,) = json.loads((tmp_path / "bare" / "summary.json").read_text())["priorities"]
+    told = f"{priority['mean']:.3f}, primary alone {priority['mean_primary_alone']:.3f}; counts 2 times"
+    assert bare["priority 1"] == told
     assert not {"report", "recording"} & set(bare)

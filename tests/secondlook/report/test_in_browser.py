@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import pytest
 from browser import risk_colours, visit
 from playwright.sync_api import Browser, Page
+from pyproj import Geod
 
 import secondlook
 from comms.said.messages import StripState
@@ -109,6 +111,78 @@ def test_of_many_strips_the_table_is_folded_and_opens_for_the_one_asked_for(
         row.wait_for(state="visible")
         page.locator("#strips summary").click()
         row.wait_for(state="hidden")
+
+
+@pytest.fixture(scope="module")
+def charted(charted_run: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The address of the report of a mission with an origin, a priority and two helpers."""
+    path = tmp_path_factory.mktemp("charted") / "report.html"
+    path.write_text(report_page(secondlook.load(charted_run)), encoding="utf-8")
+    return path.as_uri()
+
+
+def test_it_tells_the_coordinates_under_the_pointer(browser: Browser, charted: str, charted_run: Path) -> None:
+    path = secondlook.load(charted_run).paths["primary"]
+    with visit(browser, charted) as seen:
+        page = seen.page
+        told = page.locator(".flown .pointer")
+        assert told.inner_text() == "Coordinates of the place under the pointer"
+        page.locator(".flown .start.primary circle").hover(force=True)
+        words = re.fullmatch(r"([0-9.]+)° N ([0-9.]+)° E \(x (-?[0-9.]+) m, y (-?[0-9.]+) m\)", told.inner_text())
+        assert words is not None
+        latitude_deg, longitude_deg, x_m, y_m = map(float, words.groups())
+        assert (x_m, y_m) == pytest.approx((path.x_m[0], path.y_m[0]), abs=0.5)
+        azimuth_deg, _, distance_m = Geod(ellps="WGS84").inv(9.83, 44.08, longitude_deg, latitude_deg)
+        azimuth_rad = math.radians(azimuth_deg)
+        found_m = (distance_m * math.sin(azimuth_rad), distance_m * math.cos(azimuth_rad))
+        assert found_m == pytest.approx((x_m, y_m), abs=0.3)
+        page.locator("h1").hover()
+        assert told.inner_text() == "Coordinates of the place under the pointer"
+        assert seen.complaints == []
+
+
+def test_without_an_origin_the_pointer_tells_metres_alone(browser: Browser, report: str) -> None:
+    with visit(browser, report) as seen:
+        seen.page.locator(".flown .start.primary circle").hover(force=True)
+        told = seen.page.locator(".flown .pointer").inner_text()
+        assert re.fullmatch(r"x -?[0-9.]+ m, y -?[0-9.]+ m", told)
+
+
+STROKE, FILL, COLOUR = (f"(node) => getComputedStyle(node).{name}" for name in ("stroke", "fill", "color"))
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_helpers_are_told_apart_by_colour_and_name(browser: Browser, charted: str, scheme: Any) -> None:
+    with visit(browser, charted, scheme=scheme) as seen:
+        page = seen.page
+        colours: list[str] = []
+        for number, name in ((1, "helper"), (2, "other")):
+            own = f".helper-{number}"
+            drawn = {
+                page.locator(f".flown svg path.path{own}").evaluate(STROKE),
+                page.locator(f".together .legend path.path{own}").evaluate(STROKE),
+                page.locator(f".start{own} text").evaluate(FILL),
+                page.locator(f".wide {own} .bar.revisit rect").first.evaluate(FILL),
+                page.locator(f"#flown table {own} .own").evaluate(COLOUR),
+            }
+            assert len(drawn) == 1
+            colours += drawn
+            assert page.locator(f".start{own} text").text_content() == name
+            assert page.locator(f".together .legend span:has(> svg path.path{own})").inner_text().strip() == name
+        assert len(set(colours)) == 2
+
+
+def test_what_is_told_in_degrees_fits_a_phone(browser: Browser, charted: str) -> None:
+    with visit(browser, charted, width=390, height=800) as seen:
+        page = seen.page
+        for summary in page.locator("#contacts summary, #strips summary").all():
+            summary.click()
+        assert page.evaluate("document.documentElement.scrollWidth") == 390
+        for row in page.locator(".contacts tbody tr").all()[:5]:
+            last = row.locator("td").last.bounding_box()
+            assert last is not None
+            assert last["x"] + last["width"] <= 390
+        assert page.locator(".tracks").evaluate("(node) => node.scrollWidth <= node.parentElement.clientWidth")
 
 
 LUMINANCE = """

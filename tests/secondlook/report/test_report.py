@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
 import math
 import re
 import struct
 import zlib
 from collections import Counter
+from datetime import UTC, datetime, timedelta
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -18,6 +21,7 @@ import yaml
 from flights import BRIEF
 from hypothesis import given
 from hypothesis import strategies as st
+from pyproj import Geod
 
 import secondlook
 from comms.said.codec import Header, encode
@@ -26,6 +30,7 @@ from planner.types import GridSpec, Strip, SweepFrame
 from secondlook import cli
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
+from secondlook.geography import GeographicOrigin
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
 from secondlook.report import report_page
@@ -33,7 +38,7 @@ from secondlook.report.charts import MARK_PX, RiskSample, risk_chart, risk_serie
 from secondlook.report.drawing import LEVELS, OUTSIDE, UNSEEN, as_pixels, indexed_png, palette, ticks, viridis
 from secondlook.report.maps import MOST_PIXELS, MapFrame, number_places
 from secondlook.report.page import command_to_reproduce, kind_figures
-from secondlook.report.words import Moment, log_lines, moments
+from secondlook.report.words import Moment, degrees_by_place, log_lines, moments, place_in_words
 from secondlook.scenario import load_scenario
 
 
@@ -71,14 +76,17 @@ def page(mission: RecordedMission) -> Page:
     return Page(report_page(mission))
 
 
-def test_the_page_needs_no_other_file_and_runs_no_program(page: Page) -> None:
-    assert {tag for tag, _ in page.tags} & {"script", "link", "iframe", "object", "embed", "form"} == set()
+def test_the_page_needs_no_other_file_and_runs_one_program(page: Page, mission: RecordedMission) -> None:
+    assert {tag for tag, _ in page.tags} & {"link", "iframe", "object", "embed", "form"} == set()
     addresses = page.all("src") + page.all("href")
     assert addresses
     assert [one for one in addresses if not one.startswith(("#", "data:image/png;base64,"))] == []
     assert [name for _, attributes in page.tags for name in attributes if name.startswith("on")] == []
     policy = next(one["content"] for tag, one in page.tags if tag == "meta" and "http-equiv" in one)
-    assert policy == "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
+    # The one that tells where the pointer is, and no other: it has its hash.
+    (program,) = re.findall(r"<script>(.*?)</script>", report_page(mission), re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(program.encode()).digest()).decode()
+    assert policy == f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
 
 
 def test_every_link_leads_somewhere_and_back(page: Page, mission: RecordedMission) -> None:
@@ -86,9 +94,11 @@ def test_every_link_leads_somewhere_and_back(page: Page, mission: RecordedMissio
     assert [one for one, count in Counter(ids).items() if count > 1] == []
     links = {one.removeprefix("#") for one in page.all("href") if one.startswith("#")}
     assert links - set(ids) == set()
-    numbers = {strip.number for strip in mission.strips}
-    assert numbers
-    assert {f"strip-{number}" for number in numbers} | {f"on-map-{number}" for number in numbers} <= links
+    shown = {strip.number for strip in mission.strips if strip.state is not StripState.WITHDRAWN}
+    assert shown
+    assert {f"strip-{number}" for number in shown} == {one for one in links if one.startswith("strip-")}
+    assert {f"on-map-{number}" for number in shown} == {one for one in links if one.startswith("on-map-")}
+    assert {f"strip-{strip.number}" for strip in mission.strips} <= set(ids)
 
 
 def test_what_it_says_is_what_the_summary_says(page: Page, mission: RecordedMission) -> None:
@@ -96,7 +106,7 @@ def test_what_it_says_is_what_the_summary_says(page: Page, mission: RecordedMiss
     before, after = summary["risk_primary_alone"]["mean"], summary["risk"]["mean"]
     assert f"from {before:.2f} down to {after:.2f}" in page.told
     strips, tracks = summary["hotspots"], summary["vehicles"]["primary"]["tracks"]
-    assert f"took a second look at {strips['revisited']} of {strips['published']}" in page.told
+    assert f"took a second look at {strips['revisited']} of {strips['places']} places." in page.told
     assert f"on {tracks} of {tracks} tracks" in page.told
     missed = round(summary["truth"]["missed_share"] * summary["truth"]["targets"])
     assert f"{missed} were missed, which is {summary['truth']['missed_share']:.0%}".replace("%", " %") in page.told
@@ -125,6 +135,70 @@ def test_every_strip_is_told_with_its_fate(page: Page, mission: RecordedMission)
             assert f"{event.t_s:.0f} s {event.reason}" in page.told
 
 
+@pytest.fixture(scope="module")
+def charted(charted_run: Path) -> RecordedMission:
+    return secondlook.load(charted_run)
+
+
+def test_places_are_told_in_degrees_and_times_in_utc(charted: RecordedMission) -> None:
+    page = Page(report_page(charted))
+    begun = datetime.fromisoformat(charted.summary["begun_utc"])
+    assert abs(datetime.now(UTC) - begun) < timedelta(hours=1)
+    version, end_utc = charted.summary["version"], charted.utc(charted.end_s)
+    assert end_utc is not None
+    assert (
+        f"Mission report · 2026-07-31 23:59:30 to 2026-08-01 {end_utc[11:19]} UTC · simulated on {begun:%Y-%m-%d} · "
+        f"secondlook {version}"
+    ) in page.told
+    earth = Geod(ellps="WGS84")
+    for contact in charted.contacts:
+        x_m, y_m = contact.point.x, contact.point.y
+        place = earth.fwd(9.83, 44.08, math.degrees(math.atan2(x_m, y_m)), math.hypot(x_m, y_m))
+        found = charted.utc(contact.found_s)
+        assert found is not None
+        assert (
+            f"{contact.vehicle} {contact.number}{contact.found_s:.0f} s {found[11:19]}"
+            f"{place[1]:.6f}° N {place[0]:.6f}° E{contact.sigma_m:.1f} m{contact.score:.2f}"
+        ) in page.told.replace(" </td>", "")
+    strip = charted.strips[0].strip
+    assert (
+        f"{place_in_words(charted.origin, *strip.start)} to {place_in_words(charted.origin, *strip.end)}" in page.told
+    )
+
+
+def test_the_risk_within_each_priority_is_told(charted: RecordedMission) -> None:
+    before, after = charted.risk(vehicles=charted.primaries), charted.risk()
+    triangle = (after.x_m < 300) & (after.y_m > 0) & (after.y_m < after.x_m - 200) & after.inside
+    means = [float(one.risk[triangle].mean()) for one in (before, after)]
+    (told,) = charted.summary["priorities"]
+    assert told == {
+        "weight": 3.0,
+        "area_m2": 5000.0,
+        "mean": pytest.approx(means[1]),
+        "mean_primary_alone": pytest.approx(means[0]),
+    }
+    page = Page(report_page(charted))
+    assert f"priority 1: 3 times0.005 km²{means[0]:.2f} → {means[1]:.2f}" in page.told
+
+
+def test_west_and_south_are_told_by_their_letters() -> None:
+    assert place_in_words(None, 12.04, -3.0) == "x 12.0 m, y -3.0 m"
+    assert place_in_words(GeographicOrigin(-10.5, -45.25), 0.0, 0.0) == "10.500000° S 45.250000° W"
+    assert place_in_words(GeographicOrigin(0.0, 180.0), 1000.0, 0.0).endswith("° W")
+
+
+@given(st.floats(-80, 80), st.floats(-180, 180), st.tuples(st.floats(-1e4, 1e4), st.floats(-1e4, 1e4)))
+def test_degrees_by_place_are_right_to_a_decimetre(
+    latitude_deg: float, longitude_deg: float, place_m: tuple[float, float]
+) -> None:
+    origin = GeographicOrigin(latitude_deg, longitude_deg)
+    x, y = place_m
+    terms = np.array([1, x, y, x * x, x * y, y * y])
+    latitude, longitude = (float(terms @ one) for one in degrees_by_place(origin, shapely.box(-1e4, -1e4, 1e4, 1e4)))
+    back = origin.to_metres(longitude, latitude)
+    assert math.hypot(float(back[0]) - x, float(back[1]) - y) < 0.2
+
+
 def test_what_others_wrote_is_shown_and_not_obeyed(brief_copy: Path) -> None:
     hostile = "</pre><script>alert(1)</script><img src=http://example.org/x>"
     scenario = yaml.safe_load((brief_copy / "scenario.yaml").read_text())
@@ -133,7 +207,7 @@ def test_what_others_wrote_is_shown_and_not_obeyed(brief_copy: Path) -> None:
     (brief_copy / "summary.json").write_text(json.dumps(summary | {"failure": hostile, "ending": "failed"}))
     page = Page(report_page(secondlook.load(brief_copy)))
     assert page.words.count(hostile) == 3
-    assert "script" not in {tag for tag, _ in page.tags}
+    assert [tag for tag, _ in page.tags].count("script") == 1  # our own
     assert [one for one in page.all("src") if not one.startswith("data:")] == []
 
 
@@ -354,7 +428,7 @@ def test_risk_removed_is_told_by_kind_and_no_cell_counts_twice() -> None:
     # The first cell, of 100 m2, is foreseen alone, the last found alone, of that between each has a half.
     figures = kind_figures([*done, *left], before, after)
     assert list(figures) == ["foreseen", "found"]
-    assert [(one.cut, one.served) for one in figures.values()] == [(2, 1), (1, 1)]
+    assert [(one.places, one.served) for one in figures.values()] == [(2, 1), (1, 1)]
     assert [one.removed_m2 for one in figures.values()] == pytest.approx([20.0 + 40.0 / 2, 80.0 + 40.0 / 2])
 
 
@@ -362,10 +436,10 @@ def test_the_page_tells_which_strips_are_foreseen_and_why(page: Page, mission: R
     assert any(strip.foreseen for strip in mission.strips)
     for strip in mission.strips:
         assert strip.why in page.told
-    kinds = Counter(strip.foreseen for strip in mission.strips)
+    kinds = Counter(strip.foreseen for strip in mission.strips if strip.state is not StripState.WITHDRAWN)
     figures = kind_figures(mission.strips, mission.risk(vehicles=mission.primaries), mission.risk())
     for word, kind in (("foreseen", True), ("found", False)):
-        assert figures[word].cut == kinds[kind]
+        assert figures[word].places == kinds[kind]
         assert f"{word}{kinds[kind]}{figures[word].served}{figures[word].removed_m2:.0f} m²" in page.told
     shown = [one for one in page.all("class") if re.fullmatch(r"strip \w+ foreseen", one)]
     assert len(shown) == kinds[True]
