@@ -22,7 +22,7 @@ from planner.tiles import TILE_CELLS
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from viz import palette, paths
 from viz.canvas import Canvas, Pace
-from viz.shapes import OUTLINE_Z_M, UNSEEN_Z_M, Extent, ring
+from viz.shapes import OUTLINE_Z_M, Extent, ring
 
 SMALLEST_CELLS = 2 * TILE_CELLS  # every drawing costs some 2 kB beside its cells
 MOST_BLOCKS = 500  # each is an entity of its own, which the viewer has to find
@@ -103,7 +103,9 @@ class RiskTally:
 
 
 SCALE_CELLS = 64
-DEPTH_SHARE = 0.001  # how far the map lies below what covers it, of the area's longer side
+# How far the cover of the map lies below all lines, of the area's longer side, and the map a quarter more: in a browser
+# the viewer tells heights apart by some thousandths of the camera's, and lines that lie nearer are hidden in places.
+DEPTH_SHARE = 0.004
 LARGE_EVERY_MS = 60_000
 RISK_OPACITY = 0.8  # over the dark background, so that lines stand out on the brightest cells
 COVER_OPACITY = 0.999  # the viewer ignores transparent cells in a map that is fully opaque
@@ -217,7 +219,7 @@ class RiskMap:
         turn = rr.RotationAxisAngle([0.0, 0.0, 1.0], radians=-spec.frame.heading_rad)
         # The larger the area, the higher is the camera, and the less it tells heights apart.
         below_m = -DEPTH_SHARE * max(extent.width_m, extent.height_m)
-        for path, height_m in ((paths.RISK, below_m), (paths.UNSEEN, UNSEEN_Z_M)):
+        for path, height_m in ((paths.RISK, 1.25 * below_m), (paths.UNSEEN, below_m)):
             place = rr.Transform3D(translation=[float(corner_x_m), float(corner_y_m), height_m], rotation=turn)
             self._canvas.put_static(path, place)
         rings = [ring(one, OUTLINE_Z_M) for one in (run.area, *(hole.outline for hole in run.holes))]

@@ -13,9 +13,7 @@ from comms.said.announcement import RunInfo, Vertex
 from planner.types import FloatArray, Strip
 
 # Heights in metres, far enough apart for the depth buffer, too little to shift anything seen from above.
-UNSEEN_Z_M, OUTLINE_Z_M, PLAN_Z_M, HOTSPOT_Z_M, STRIP_Z_M, FLOWN_Z_M, POINT_Z_M, VEHICLE_Z_M = (
-    0.2 * step for step in range(1, 9)
-)
+OUTLINE_Z_M, PLAN_Z_M, HOTSPOT_Z_M, STRIP_Z_M, FLOWN_Z_M, POINT_Z_M, VEHICLE_Z_M = (0.2 * step for step in range(2, 9))
 
 Line = npt.NDArray[np.float32]  # as the viewer takes them, so that it need not look at each point
 

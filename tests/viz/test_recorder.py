@@ -515,3 +515,13 @@ def test_on_a_large_area_only_strips_in_hand_have_a_number(
     assert {text for _, (text,) in rows(path, "/strips/1/label", "Points3D:labels")} == {"1"}
     assert "/strips/10" in entities(path)
     assert "/strips/10/label" not in entities(path)
+
+
+def test_the_map_lies_so_far_below_the_lines_that_a_browser_tells_them_apart(recording: Path) -> None:
+    # In a browser lines that lie less than 0.003 of the area's longer side above it are hidden in places.
+    (cover,), (risk,) = (static(recording, f"/area/{one}", "Transform3D:translation") for one in ("unseen", "risk"))
+    _, tracks = rows(recording, f"/plan/{PRIMARY}", "LineStrips3D:strips")[0]
+    (outline, *_) = static(recording, "/area/outline", "LineStrips3D:strips")
+    longer_m = float(np.ptp(np.array(outline), axis=0).max())
+    assert min(z_m for track in tracks for _, _, z_m in track) - cover[2] >= 0.0035 * longer_m
+    assert cover[2] - risk[2] >= 0.0005 * longer_m
