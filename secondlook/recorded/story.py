@@ -23,7 +23,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.strip_books import StripBooks
+from comms.strip_books import LEFT, StripBooks, state_in_words
 from planner.types import Point
 
 MOST_NAMED = 3
@@ -128,6 +128,8 @@ class Story:
         self._removable_m2[number] = strip.removable_m2
         if not self._is_news(received.key, strip.state):
             return None
+        if (word := state_in_words(strip)) == "left":
+            return f"strip {number} {strip.reason.replace(LEFT, word)}", False
         if strip.state is StripState.OPEN:
             size = f"{strip.length_m:.0f} m x {strip.width_m:.0f} m"
             why = f"{strip.why}; " if strip.why else ""

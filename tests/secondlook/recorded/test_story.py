@@ -201,3 +201,11 @@ def test_telling_needs_nothing_that_takes_long_to_import() -> None:
     program = "import sys, secondlook.recorded.story; print(sorted({'pydantic', 'shapely', 'yaml'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"  # the recorder's process would be late
+
+
+def test_a_strip_that_is_taken_from_a_vehicle_at_the_end_is_left() -> None:
+    story = Story()
+    story.tell(strip(StripState.UNDER_WAY))
+    left = strip(StripState.OPEN, "left when the mission was over: helper has not ended it")
+    assert story.tell(left) == line("strip 3 left: helper has not ended it")
+    assert story.tell(left) == []
