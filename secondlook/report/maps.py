@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import shapely
@@ -106,6 +106,7 @@ ALONG = (0.5, 0.35, 0.65, 0.2, 0.8)  # where on a strip its number may stand, th
 NUMBER_PX = 20.0  # nearer to each other numbers cannot be read
 NAME_PX = 70.0  # what a vehicle's name takes up
 MOST_STRIPS = 100  # with numbers
+SCALE_PX = 24.0  # below all else, for the scale bar
 HELPER_COLOURS = 5  # in the style sheet
 ROUND_NUMBERS = 8  # the scale bar is about an eighth of the width
 
@@ -140,6 +141,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     west_m, south_m, east_m, north_m = shown.bounds
     unit_m = max((east_m - west_m) / WIDTH_PX, (north_m - south_m) / HEIGHT_PX)
     frame = MapFrame.around(shown, MARGIN_PX * unit_m)
+    frame = replace(frame, south_m=frame.south_m - SCALE_PX * unit_m)
     classes = vehicle_classes(mission)
     children = [
         frame.risk(risk),

@@ -182,7 +182,8 @@ def test_what_is_told_in_degrees_fits_a_phone(browser: Browser, charted: str) ->
             last = row.locator("td").last.bounding_box()
             assert last is not None
             assert last["x"] + last["width"] <= 390
-        assert page.locator(".tracks").evaluate("(node) => node.scrollWidth <= node.parentElement.clientWidth")
+        for table in (".tracks", ".vehicles", ".priorities", ".kinds"):
+            assert page.locator(table).evaluate("(node) => node.scrollWidth <= node.parentElement.clientWidth"), table
 
 
 LUMINANCE = """
