@@ -232,8 +232,12 @@ class RecordedMission(Mission):
     @cached_property
     def start_utc(self) -> datetime | None:
         """When second 0 is; None where the scenario does not say."""
-        said = (self.scenario.get("mission") or {}).get("start_utc")
-        return None if said is None else datetime.fromisoformat(said)
+        told = self.scenario.get("mission")
+        said = told.get("start_utc") if isinstance(told, dict) else None
+        try:
+            return None if said is None else datetime.fromisoformat(str(said))
+        except ValueError:
+            raise UserError(f"{self.folder / 'scenario.yaml'}: mission.start_utc must be as the run wrote it") from None
 
     def utc(self, t_s: float) -> str | None:
         """A time of the mission in UTC, ISO 8601, to the second; None where the scenario does not say when it began."""

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+import yaml
 from html_page import Page
 from hypothesis import given
 from hypothesis import strategies as st
 from pyproj import Geod
 
 import secondlook
+from secondlook.errors import UserError
 from secondlook.geography import GeographicOrigin
 from secondlook.recorded import RecordedMission
 from secondlook.report import report_page
@@ -83,3 +85,11 @@ def test_degrees_by_place_are_right_to_a_decimetre(
     latitude, longitude = (float(terms @ one) for one in degrees_by_place(origin, shapely.box(-1e4, -1e4, 1e4, 1e4)))
     back = origin.to_metres(longitude, latitude)
     assert math.hypot(float(back[0]) - x, float(back[1]) - y) < 0.2
+
+
+def test_a_start_that_is_no_time_is_told_in_one_sentence(brief_copy: Path) -> None:
+    scenario = yaml.safe_load((brief_copy / "scenario.yaml").read_text())
+    scenario["mission"]["start_utc"] = "soon"
+    (brief_copy / "scenario.yaml").write_text(yaml.safe_dump(scenario))
+    with pytest.raises(UserError, match=r"scenario\.yaml: mission\.start_utc must be as the run wrote it$"):
+        report_page(secondlook.load(brief_copy))
