@@ -152,6 +152,7 @@ _NOT_BESIDE = {
     "epsg": ("polygon_m", "x_m", "y_m"),
     "file": ("polygon_m", "holes_m", "polygon_deg", "holes_deg", "polygon_utm_m", "holes_utm_m"),
 }
+_SEVERAL = ("holes",)  # keys, without their ending, that hold several rings
 _NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
 
@@ -303,16 +304,16 @@ def _turn(
             _take_chart(turned, holder, file, folder, frame)
         case AreaInDegrees() | PriorityInDegrees():
             for ending in ("deg", "utm_m"):
-                outline = getattr(checked, f"polygon_{ending}")
-                holes = getattr(checked, f"holes_{ending}", None)
-                if ending == "utm_m" and (outline is not None or holes is not None):
+                given = {key: getattr(checked, f"{key}_{ending}", None) for key in ("polygon", *_SEVERAL)}
+                if ending == "utm_m" and any(one is not None for one in given.values()):
                     frame = replace(frame, epsg=_epsg(data, path, checked.epsg))
-                if outline is not None:
+                if (outline := given.pop("polygon")) is not None:
                     holder["polygon_m"] = frame.ring_m((*path, f"polygon_{ending}"), outline)
-                if holes is not None:
-                    holder["holes_m"] = [
-                        frame.ring_m((*path, f"holes_{ending}", index), hole) for index, hole in enumerate(holes)
-                    ]
+                for key, rings in given.items():
+                    if rings is not None:
+                        holder[f"{key}_m"] = [
+                            frame.ring_m((*path, f"{key}_{ending}", index), ring) for index, ring in enumerate(rings)
+                        ]
 
 
 def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Path, frame: _Frame) -> None:
