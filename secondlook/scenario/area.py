@@ -18,8 +18,18 @@ from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapp
 LARGEST_GRID_CELLS = 20_000_000
 SMALLEST_PRIORITY_M2 = 1.0
 SMALLEST_EXTENT_M = 1.0  # what is less is most probably in degrees
+LEAST_NORTHING_M, MOST_NORTHING_M = 1e6, 1e7  # between them it is most probably in UTM metres
 
-Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(check_pair), Field(strict=False)]
+
+def _check_metres(value: object) -> object:
+    pair = check_pair(value)
+    northing = pair[1] if isinstance(pair, list | tuple) else None
+    if isinstance(northing, int | float) and LEAST_NORTHING_M < northing < MOST_NORTHING_M:
+        raise refused("must be metres of the mission frame; UTM metres go under a key that ends in _utm_m")
+    return pair
+
+
+Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(_check_metres), Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
 HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
 

@@ -221,5 +221,15 @@ def test_what_is_wrong_with_utm_metres_is_told_where_it_was_given(
     assert sorted(problem.text for problem in caught.value.problems) == sorted(said)
 
 
+def test_utm_metres_that_are_given_for_metres_of_the_frame_are_recognised(write: Write, valid_text: str) -> None:
+    square = "[[583900, 6638600], [584400, 6638600], [584400, 6639000]]"
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(write(valid_text.replace("[[0, 0], [500, 0], [500, 400], [0, 400]]", square)))
+    assert caught.value.problems[0].text == (
+        "area.polygon_m[0]: [583900, 6638600] is not allowed; must be metres of the mission frame; UTM metres go under "
+        "a key that ends in _utm_m"
+    )
+
+
 def test_degrees_have_no_place_in_what_is_loaded() -> None:
     assert not any("_deg" in key for model in (Area, Scenario) for key in model.model_fields if "heading" not in key)
