@@ -26,7 +26,7 @@ from comms.said.messages import (
 )
 from comms.said.routing import Routing
 from comms.said.topics import Topic
-from comms.strip_books import GONE, StripBooks
+from comms.strip_books import GONE, LEFT, StripBooks
 from coordinator.ledger import ALLOWED
 from coordinator.reasons import BEST, BEYOND, NADIR_GAP, RANGE_END
 from secondlook.fleet.nodes import COORDINATOR
@@ -175,7 +175,7 @@ REASONS: Mapping[str, str] = MappingProxyType(
         "a helper is done with a strip": " of it seen by ",
         "a helper says done, and the map says no": " says done, but saw ",
         "a strip is no longer worth it": "no longer worth a second look, or part of another strip",
-        "a strip is left when the mission is over": "left when the mission was over: ",
+        "a strip is left when the mission is over": f"{LEFT}: ",
         "a strip is left that nobody has served": "nobody has served it",
         "a strip is left that a helper has not ended": " has not ended it",
         "a strip stands as withdrawn, as its coordinator is gone": GONE,
