@@ -12,6 +12,7 @@ from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.types import Strip
+from planner.way_home import MARGIN_S, WayHome
 
 
 class Briefing:
@@ -69,7 +70,7 @@ class Briefing:
     def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
         """A helper as an allocator sees it; None where it is lost or can be given nothing."""
         state, entry = vehicle.state, vehicle.entry
-        stays_away = vehicle.is_finished and not vehicle.is_idle
+        stays_away = vehicle.is_finished and not vehicle.is_idle  # or on its way home
         if not entry.role.revisits or vehicle.lost or state is None or stays_away or not vehicle.is_trusted:
             return None
         records = [one for one in self._ledger.in_state(*WITH_A_VEHICLE) if one.vehicle == entry.vehicle]
@@ -85,6 +86,7 @@ class Briefing:
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
         open_strips = self._ledger.in_state(StripState.OPEN)
         sees = footprint_of(entry.sonar)
+        way_home = WayHome((entry.home_x_m, entry.home_y_m), entry.speed_mps, entry.turn_radius_m)
         return Helper(
             vehicle=entry.vehicle,
             pose=pose,
@@ -97,8 +99,9 @@ class Briefing:
             swath_m=sees.reach.strip_width_m,
             beside_m=sees.reach.beside_m,
             lead_m=sees.lead_m,
+            way_home=way_home,
             p_detect=entry.p_detect,
-            lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
+            lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
         )

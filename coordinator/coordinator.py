@@ -9,7 +9,7 @@ from itertools import chain
 from comms.node import Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.codec import Header
-from comms.said.messages import AgentState, CoverageTile, Curve, Hotspot, Plan, TaskState, TaskStatus
+from comms.said.messages import AgentState, CoverageTile, Curve, Hotspot, Mode, Plan, TaskState, TaskStatus
 from coordinator.agenda import Agenda, Item
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
@@ -153,7 +153,8 @@ class Coordinator:
         name = vehicle.entry.vehicle
         if was_lost:
             log.info("%s is heard again", name)
-        if before is None or (vehicle.is_finished and not was_finished):
+        comes_home = before is not None and before.mode is Mode.RETURNING and state.mode.has_ended
+        if before is None or (vehicle.is_finished and not was_finished) or comes_home:
             self._agenda.add(Item.CUT, now_ms)
         if vehicle.is_idle and not was_idle:
             self._agenda.add(Item.ASSIGN, now_ms)

@@ -18,8 +18,9 @@ SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
 
 class MissionEnd:
-    """The mission is over when every primary has finished, all of which states tell has arrived and was cut by, and no
-    strip is left, at the latest at the deadline, by the last primary's end or by the clock. `over`: what was said of
+    """The mission is over when every primary has finished, all of which states tell has arrived and was cut by, no
+    strip is left and nobody is on its way home, at the latest at the deadline, by the last primary's end or by the
+    clock. Who ends its survey early, as its battery is low, has finished when it is home. `over`: what was said of
     that, None until then."""
 
     def __init__(
@@ -39,8 +40,11 @@ class MissionEnd:
         left, surveying = self._strips.unended, self._fleet.surveying
         lacking = [] if surveying else self._fleet.lacking(now_ms)
         self._ask(lacking, now_ms)
-        if not left and not surveying and not lacking and not self._cut_is_left(now_ms):
-            reason = "every primary has finished and no strip is left"
+        returning = any(one.is_returning for one in self._fleet.vehicles.values())
+        if not left and not surveying and not lacking and not returning and not self._cut_is_left(now_ms):
+            early = [name for name, one in self._fleet.primaries.items() if one.ended_early]
+            cut_short = f", the survey of {', '.join(early)} not for want of battery," if early else ""
+            reason = f"every primary has finished{cut_short} and no strip is left"
         elif now_ms >= self._deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
             end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"

@@ -102,7 +102,7 @@ class StripLife:
         if vehicle.is_at_a_strip:
             if vehicle.tells_news_of(state.works_on, header):
                 self._hear_at_work(state.works_on, vehicle, header, now_ms, under_way=state.mode is Mode.REVISIT)
-        elif was_idle and vehicle.is_idle:
+        elif (was_idle and vehicle.is_idle) or state.mode.is_out_of_work:
             self._hear_no_work(vehicle, header, now_ms)
 
     def hear_status(self, vehicle: KnownVehicle, header: Header, status: TaskStatus, now_ms: int) -> None:

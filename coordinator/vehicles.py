@@ -27,12 +27,14 @@ log = logging.getLogger("secondlook.coordinator")
 def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int) -> int | None:
     """Milliseconds since the mission's start; None where that cannot be told.
 
-    The track that the state tells it works on ends when the state expects; each further one is reached the
-    shortest way, with run-in and run-out. `heard_ms`: when the state was sent. Tracks that a later plan adds or drops
-    are not known.
+    On its way home it has done when it is there. The track that the state tells it works on ends when the state
+    expects; each further one is reached the shortest way, with run-in and run-out. `heard_ms`: when the state was sent.
+    Tracks that a later plan adds or drops are not known.
     """
-    if state is None or plan is None or state.mode is Mode.FINISHED:
+    if state is None or plan is None or state.mode.has_ended:
         return None
+    if state.mode is Mode.RETURNING:
+        return max(heard_ms, state.expected_end_ms)
     ahead = [track for track in plan.tracks if not track.flown]
     at_ms, pose = heard_ms, Pose(state.x_m, state.y_m, state.heading_rad)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
@@ -85,7 +87,8 @@ class KnownVehicle:
     """One vehicle of the fleet.
 
     `heard_ms`: when its newest state was sent; `stirred_ms`: when the newest that told of another place or work than
-    the one before. `finished_ms`: when it had surveyed all, or was given up; for a primary.
+    the one before. `finished_ms`: when it had surveyed all, or was home or given up before; for a primary.
+    `ended_early`: its battery did not last for all of its survey.
     `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
@@ -110,6 +113,7 @@ class KnownVehicle:
     curves: dict[int, DetectionCurve] = field(default_factory=dict)
     arrivals: Arrivals = field(default_factory=Arrivals)
     stirred_ms: int = 0
+    ended_early: bool = False
     _plan_order: Order = _NONE_YET
     _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
@@ -138,7 +142,12 @@ class KnownVehicle:
     @property
     def is_finished(self) -> bool:
         """Whether it has said that it will do no more."""
-        return self.state is not None and self.state.mode is Mode.FINISHED
+        return self.state is not None and (self.state.mode.has_ended or self.state.mode.is_out_of_work)
+
+    @property
+    def is_returning(self) -> bool:
+        """Whether it is on its way home, as far as is known."""
+        return not self.lost and self.state is not None and self.state.mode is Mode.RETURNING
 
     def hear_state(self, header: Header, state: AgentState, now_ms: int) -> bool:
         """Hears its state; returns False, and changes nothing, for one that is not newer than the newest."""
@@ -153,7 +162,9 @@ class KnownVehicle:
         self.heard_ms = header.sent_ms
         self.stirred_ms = header.sent_ms if stirs else self.stirred_ms
         self.lost = False
-        if state.mode is Mode.FINISHED:
+        if state.mode.is_out_of_work and self.finished_ms is None:
+            self.ended_early = True
+        if state.mode.has_ended:
             self._surveyed_in = header.incarnation
             self.finished_ms = now_ms if self.finished_ms is None else self.finished_ms
         elif self._surveyed_in != header.incarnation and stirs:  # given up too early, or started anew

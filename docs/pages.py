@@ -38,7 +38,7 @@ from secondlook.scenario import (
     UniformSeabed,
 )
 from secondlook.scenario.area import Priority
-from secondlook.scenario.degrees import AreaInDegrees, OriginInUtm, PriorityInDegrees, StartInDegrees
+from secondlook.scenario.degrees import AreaInDegrees, OriginInUtm, PlaceInDegrees, PriorityInDegrees
 from secondlook.scenario.sensor import SENSORS, SensorBase
 from secondlook.scenario.vehicle import VehicleBase
 
@@ -66,7 +66,7 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("Targets", "`targets`", (Targets,)),
     ("Every vehicle", "`vehicles.ID`", (SurveyVehicle, RevisitVehicle)),
     ("Vehicles that survey", "`vehicles.ID`", (SurveyVehicle,)),
-    ("Start", "`vehicles.ID.start`", (Start, StartInDegrees)),
+    ("Start", "`vehicles.ID.start`", (Start, PlaceInDegrees)),
     ("Settling", "`vehicles.ID.settling`", (Settling,)),
     ("Sensor", "`vehicles.ID.sensor`", tuple(SENSORS.values())),
     ("Detection curve", "`vehicles.ID.sensor.curve` and `vehicles.ID.prior_curve`", (Curve,)),

@@ -171,7 +171,8 @@ class VehicleConfig:
     `position_error_m`: the constant distance, in a random direction, between where the vehicle is and where it
     believes it is. `position_drift_mps`: what comes to that, growing with the mission's time, in a random direction of
     its own. The start pose is the believed one. `settling`: how it settles after a turn; None for one that is steady at
-    once.
+    once. `endurance_ms`: how long its battery lasts from the mission's start, unless it lies at `home` before; where
+    that is None, where it starts. None for a battery without end.
     """
 
     vehicle: str
@@ -185,6 +186,8 @@ class VehicleConfig:
     position_error_m: float = 0.0
     position_drift_mps: float = 0.0
     settling: SettlingConfig | None = None
+    endurance_ms: int | None = None
+    home: Point | None = None
 
     def __post_init__(self) -> None:
         _require(bool(IDENTIFIER.fullmatch(self.vehicle)), "vehicle", self.vehicle, f"a match of {IDENTIFIER.pattern}")

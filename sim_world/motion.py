@@ -127,8 +127,12 @@ class Motion:
 
     @property
     def speed_mps(self) -> float:
-        """The speed since the last manoeuvre's start: 0 before the first."""
+        """The speed since the last manoeuvre's start: 0 before the first, and where it lies still."""
         return 0.0 if self._path is None else self._speed_mps
+
+    def stop(self, now_ms: int) -> None:
+        """Lies where it is, until the next manoeuvre."""
+        self._start, self._path = self.pose_at(now_ms), None
 
     def hold(self, now_ms: int) -> None:
         """Loiters from here."""

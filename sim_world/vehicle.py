@@ -11,6 +11,7 @@ from comms.node import random_stream
 from comms.said.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
 from planner.dubins import Pose
 from planner.types import Point
+from planner.way_home import THERE_M
 from sim_world.config import FARTHEST_M, VehicleConfig
 from sim_world.motion import FollowedTrack, Motion, bearing_rad
 
@@ -29,13 +30,15 @@ class Stretch:
 
 
 Event = ManeuverStatus | Stretch
+EMPTY = "the battery is empty"
 
 
 class SimulatedVehicle:
     """One vehicle's body. It steers by its believed pose; the true one lies beside it, see `offset_at`.
 
     A vehicle does what it was told last. Of a manoeuvre that is replaced nothing more is heard, and the stretch of
-    track it was on is not looked at.
+    track it was on is not looked at. Where it was sent home it lies when it is there, and needs no battery. When that
+    is empty it lies where it is, and says so.
     """
 
     def __init__(self, config: VehicleConfig, seed: int) -> None:
@@ -50,6 +53,11 @@ class SimulatedVehicle:
             turn_radius_m=config.turn_radius_m,
         )
         self._to_come: deque[tuple[int, Event]] = deque()
+        self._home = (config.start_x_m, config.start_y_m) if config.home is None else config.home
+        self._is_home = self._is_at_home((config.start_x_m, config.start_y_m))
+        self._goes_home = False
+        self._number = 0
+        self._emptied_ms: int | None = None
 
     def offset_at(self, now_ms: int) -> Point:
         """How far the true position lies east and north of the believed one."""
@@ -80,13 +88,17 @@ class SimulatedVehicle:
     def command(self, maneuver: Maneuver, now_ms: int) -> ManeuverStatus:
         """Begins a manoeuvre, or refuses it and goes on with what it does.
 
-        A hold has no end: it is accepted with `ends_ms` 0 and never done.
+        A hold has no end: it is accepted with `ends_ms` 0 and never done. With an empty battery it can do nothing.
         """
+        if self._emptied_ms is not None:
+            return ManeuverStatus(maneuver.number, ManeuverState.EMPTY, self._emptied_ms, EMPTY)
         reason = _reason_to_refuse(maneuver)
         if reason:
             return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, reason)
         start, end = (maneuver.start_x_m, maneuver.start_y_m), (maneuver.end_x_m, maneuver.end_y_m)
         ends_ms = 0
+        self._number = maneuver.number
+        self._is_home, self._goes_home = False, maneuver.kind is ManeuverKind.GOTO and self._is_at_home(end)
         match maneuver.kind:
             case ManeuverKind.HOLD:
                 self._motion.hold(now_ms)
@@ -104,7 +116,9 @@ class SimulatedVehicle:
     @property
     def next_event_ms(self) -> int | None:
         """When `pop_event` has something next, None for never."""
-        return self._to_come[0][0] if self._to_come else None
+        to_come_ms = self._to_come[0][0] if self._to_come else None
+        empty_ms = None if self._is_home or self._emptied_ms is not None else self.config.endurance_ms
+        return min((at_ms for at_ms in (to_come_ms, empty_ms) if at_ms is not None), default=None)
 
     def pop_event(self) -> Event:
         """The next event, once its time has come.
@@ -112,9 +126,25 @@ class SimulatedVehicle:
         Raises:
             LookupError: there is none.
         """
-        if not self._to_come:
+        at_ms = self.next_event_ms
+        if at_ms is None:
             raise LookupError("nothing is to come")
-        return self._to_come.popleft()[1]
+        if not self._to_come or at_ms < self._to_come[0][0]:
+            return self._run_empty(at_ms)
+        event = self._to_come.popleft()[1]
+        if self._goes_home:
+            self._is_home, self._goes_home = True, False
+            self._motion.stop(at_ms)
+        return event
+
+    def _run_empty(self, at_ms: int) -> ManeuverStatus:
+        self._emptied_ms = at_ms
+        self._to_come.clear()
+        self._motion.stop(at_ms)
+        return ManeuverStatus(self._number, ManeuverState.EMPTY, at_ms, EMPTY)
+
+    def _is_at_home(self, place: Point) -> bool:
+        return math.dist(place, self._home) <= THERE_M
 
     def _on_track(self, maneuver: Maneuver, track: FollowedTrack, heading_rad: float) -> Iterator[tuple[int, Event]]:
         sensor = self.config.sensor

@@ -22,11 +22,14 @@ from comms.said.messages import (
     TaskAction,
 )
 from comms.said.topics import CONTACT, MANEUVER, STATE
+from planner.dubins import Pose
 from planner.footprints.footprint import Footprint
 from planner.region import Region
-from planner.sweep import pass_over
+from planner.sweep import pass_over, shifted
 from planner.types import Point, Strip, SweepFrame, Track
+from vehicle_agent.config import Homing
 from vehicle_agent.coverage import CoverageLayer
+from vehicle_agent.endurance import Endurance
 
 log = logging.getLogger("secondlook.agent")
 
@@ -34,6 +37,7 @@ REPORT_EVERY_MS = 10_000
 REPORTS_A_TILE = 2  # with every so many reports a tile goes out that has not changed, as it may have been lost
 FARTHEST_M = 1e6  # a look farther away is none: what follows from its places would not fit the wire's metres
 FARTHEST_RANGE_M = 1e4
+STRAIGHT_IN_M = 100.0  # behind home lies the start of the way there, which tells the heading of arrival
 
 
 class Agent:
@@ -43,8 +47,9 @@ class Agent:
     manoeuvre's end and each task.
     """
 
-    def __init__(self, vehicle: str, footprint: Footprint, endurance_ms: int) -> None:
+    def __init__(self, vehicle: str, footprint: Footprint, endurance_ms: int, homing: Homing | None = None) -> None:
         self.vehicle = vehicle
+        self.endurance = Endurance(endurance_ms, homing)
         self.footprint = footprint
         self.mode = Mode.IDLE
         self.works_on = 0
@@ -57,7 +62,6 @@ class Agent:
         self._looks_taken: set[tuple[int, int]] = set()
         self._started_ms = 0
         self._now_ms = 0
-        self._endurance_ms = endurance_ms
         self._maneuvers = 0
         self._reports = 0
         self._contacts = 0
@@ -88,9 +92,7 @@ class Agent:
                 if received.header.sent_ms >= self._started_ms:  # else its predecessor's, who has told of it
                     self._hear_look(message, received.header.incarnation, now_ms)
             elif isinstance(message, ManeuverStatus):
-                if self.maneuver is not None and message.number == self.maneuver.number:
-                    self._word_due_ms = _next_word_due_ms(message)
-                    self.on_maneuver(message, now_ms)
+                self._hear_status(message, now_ms)
             elif isinstance(message, Task):
                 if self._is_for_now(received.header):
                     self._hear_task(message, now_ms)
@@ -111,7 +113,11 @@ class Agent:
         self._wake_ms = now_ms + REPORT_EVERY_MS
         if self._word_due_ms is not None and now_ms >= self._word_due_ms:
             self._send_maneuver()
-        self.report(now_ms)
+        pose, circles = self.pose, self.mode in (Mode.IDLE, Mode.FINISHED)
+        if pose is not None and not self.mode.is_out_of_work and self.endurance.is_low(pose, now_ms, circles=circles):
+            self.turn_home(now_ms)
+        else:
+            self.report(now_ms)
         self._reports += 1
         if self._reports % REPORTS_A_TILE == 0:
             assert self.coverage is not None
@@ -140,6 +146,9 @@ class Agent:
     def on_over(self, now_ms: int) -> None:
         """The mission is over; the last report follows."""
 
+    def leave_work(self, now_ms: int) -> None:
+        """The battery lasts for no more of the present work: it ends here."""
+
     def publish(self, key: str, message: object) -> None:
         """Puts a message into the present step."""
         self._outbox.append(Publication(key, message))  # type: ignore[arg-type]
@@ -158,6 +167,25 @@ class Agent:
         """Commands the vehicle to stay where it is."""
         here = (self.nav.x_m, self.nav.y_m) if self.nav else (0.0, 0.0)  # a hold needs no place
         self._command(ManeuverKind.HOLD, here, here, 0.0)
+
+    @property
+    def pose(self) -> Pose | None:
+        """Where the vehicle is; None before it has said so."""
+        return None if self.nav is None else Pose(self.nav.x_m, self.nav.y_m, self.nav.heading_rad)
+
+    def turn_home(self, now_ms: int) -> None:
+        """Leaves what it does, and commands the vehicle home."""
+        homing, pose = self.endurance.homing, self.pose
+        assert homing is not None
+        assert pose is not None
+        self.leave_work(now_ms)
+        self.mode = Mode.RETURNING
+        self.works_on = 0
+        way_s, heading_rad = homing.way.from_pose(pose)
+        self.expected_end_ms = now_ms + round(way_s * 1000)
+        begin = shifted(homing.way.home, heading_rad, -STRAIGHT_IN_M)
+        self._command(ManeuverKind.GOTO, begin[:2], homing.way.home, 0.0)
+        self.report(now_ms)
 
     def report(self, now_ms: int) -> None:
         """Publishes the tiles that changed and the state."""
@@ -190,13 +218,33 @@ class Agent:
 
     def battery(self, now_ms: int) -> float:
         """Share of the endurance that is left."""
-        return max(0.0, 1.0 - now_ms / self._endurance_ms)
+        return self.endurance.left(now_ms)
 
     def _hear_nav(self, nav: Nav, now_ms: int) -> None:
         first = self.nav is None
         self.nav = nav
         if first and self.coverage is not None and not self._over:
             self.report_state(now_ms)
+
+    def _hear_status(self, status: ManeuverStatus, now_ms: int) -> None:
+        if status.state is ManeuverState.EMPTY:  # whatever it was told
+            if self.mode is not Mode.EMPTY:
+                self.leave_work(now_ms)
+                self._rest(Mode.EMPTY, now_ms)
+        elif self.maneuver is not None and status.number == self.maneuver.number:
+            self._word_due_ms = _next_word_due_ms(status)
+            if not self.mode.is_out_of_work:
+                self.on_maneuver(status, now_ms)
+            elif status.state is ManeuverState.DONE:
+                self._rest(Mode.HOME, now_ms)
+
+    def _rest(self, mode: Mode, now_ms: int) -> None:
+        """The vehicle lies, at home or where its battery has run empty."""
+        self.mode = mode
+        self.works_on = self.expected_end_ms = 0
+        self._word_due_ms = None
+        self.endurance.rest(now_ms)
+        self.report(now_ms)
 
     def _hear_task(self, task: Task, now_ms: int) -> None:
         if task.action is TaskAction.TELL_AGAIN:

@@ -7,8 +7,17 @@ from dataclasses import dataclass
 from planner.footprints.footprint import Footprint
 from planner.spacing_planners import SpacingPlanner
 from planner.types import DetectionCurve
+from planner.way_home import WayHome
 
 WHOLE = (0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Homing:
+    """How a vehicle comes home, and with what of its battery: by its reckoning it lasts for `reserve_ms` more then."""
+
+    way: WayHome
+    reserve_ms: int
 
 
 @dataclass(frozen=True)
@@ -18,7 +27,7 @@ class SurveyConfig:
     hotspot. `run_in_m`: straight run before and after each track. `endurance_ms`: mission time on one battery. `prior`:
     P(y) of earlier missions, which holds until the first track is flown (paper, section III-B). `share`: from which to
     which share of the area's width it surveys, see `planner.region.Region.share`. `wanted_risk`: see
-    `planner.profile_spacing.SpacingTerms`."""
+    `planner.profile_spacing.SpacingTerms`. `homing`: None for a vehicle that need not come home."""
 
     vehicle: str
     spacing: SpacingPlanner
@@ -32,11 +41,13 @@ class SurveyConfig:
     prior: DetectionCurve | None = None
     share: tuple[float, float] = WHOLE
     wanted_risk: float | None = None
+    homing: Homing | None = None
 
 
 @dataclass(frozen=True)
 class RevisitConfig:
-    """A revisit agent. `footprint`: its sonar's. Speeds and turns are those of its vehicle."""
+    """A revisit agent. `footprint`: its sonar's. Speeds and turns are those of its vehicle. `homing`: None for one that
+    need not come home."""
 
     vehicle: str
     footprint: Footprint
@@ -44,6 +55,7 @@ class RevisitConfig:
     turn_radius_m: float
     run_in_m: float
     endurance_ms: int
+    homing: Homing | None = None
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,16 @@ import math
 from comms.said.announcement import RunInfo
 from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
 from comms.said.topics import TASK_STATUS
-from planner.dubins import Pose
 from planner.region import share_within
-from planner.sweep import shortest_sweep, sweeps_by
+from planner.sweep import Pass, length_over, shortest_sweep, sweeps_by
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
+from vehicle_agent.endurance import MARGIN_MS, ON_ITS_WAY_HOME
 
 SWEPT_SHARE = 0.5
 BATTERY_TOO_LOW = "the battery does not last"
+THE_MISSION_IS_OVER = "the mission is over"
 
 
 class SecondLooks:
@@ -31,6 +32,7 @@ class SecondLooks:
         self._agent = agent
         self._rest = rest
         self._legs: list[Track] = []
+        self._passes: list[Pass] = []
         self._length_m = 0.0
         self._swept_m = 0.0
         self._answers: dict[int, tuple[Strip, TaskState]] = {}
@@ -44,7 +46,8 @@ class SecondLooks:
         if task.action is TaskAction.GIVE_BACK:
             self._give_back(task.strip, now_ms)
         elif task.action is TaskAction.STAND_ASIDE:
-            if self.strip is None and not busy and all(abs(place_m) <= FARTHEST_M for place_m in strip.start):
+            may = self.strip is None and not busy and not agent.mode.is_out_of_work
+            if may and all(abs(place_m) <= FARTHEST_M for place_m in strip.start):
                 agent.go_to(strip.start)
         elif self.strip is not None and self.strip.number == task.strip:
             under_way = agent.mode is Mode.REVISIT
@@ -52,8 +55,8 @@ class SecondLooks:
         elif known is not None and answer is TaskState.DONE and _is_done_with(known, strip):
             agent.report_again(known)  # whoever offers it again does not know what was seen there
             self._tell(task.strip, TaskState.DONE, now_ms)
-        elif busy:
-            self._tell(task.strip, TaskState.REFUSED, 0, busy)
+        elif busy or agent.mode.is_out_of_work:
+            self._tell(task.strip, TaskState.REFUSED, 0, busy or ON_ITS_WAY_HOME)
         else:
             self._consider(strip, now_ms)
 
@@ -67,13 +70,17 @@ class SecondLooks:
         agent = self._agent
         if self.strip is None or not self._legs:
             return
-        if status.state is ManeuverState.ON_TRACK:
+        if status.state is ManeuverState.ACCEPTED:
+            if not self._battery_lasts(status.ends_ms):
+                agent.turn_home(now_ms)
+        elif status.state is ManeuverState.ON_TRACK:
             if agent.mode is not Mode.REVISIT:
                 agent.mode = Mode.REVISIT
                 self._tell(self.strip.number, TaskState.UNDER_WAY, agent.expected_end_ms)
                 agent.report_state(now_ms)
         elif status.state is ManeuverState.DONE:
             self._legs.pop(0)
+            self._passes.pop(0)
             if self._legs:
                 agent.follow(self._legs[0], self.config.run_in_m)
             else:
@@ -81,10 +88,10 @@ class SecondLooks:
         elif status.state is ManeuverState.REFUSED:
             self._leave(TaskState.FAILED, now_ms, status.reason)
 
-    def on_over(self, now_ms: int) -> None:
-        """The mission is over: what is not done is left."""
+    def leave(self, now_ms: int, why: str) -> None:
+        """What is not done of a strip under way is left."""
         if self.strip is not None:
-            self._leave(TaskState.FAILED, now_ms, "the mission is over")
+            self._leave(TaskState.FAILED, now_ms, why)
 
     def tell_progress(self) -> None:
         """Says how far the strip under way is swept."""
@@ -108,18 +115,19 @@ class SecondLooks:
         least_ms = round(
             (strip.length_m + strip.width_m - agent.footprint.reach.strip_width_m) / config.speed_mps * 1000
         )
-        if agent.battery(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
+        if agent.endurance.left(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
-        pose = Pose(agent.nav.x_m, agent.nav.y_m, agent.nav.heading_rad)
+        assert agent.pose is not None
         ways = sweeps_by(agent.footprint, strip, config.turn_radius_m, config.run_in_m)
-        sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
+        sweep, way_m = shortest_sweep(ways, agent.pose, config.turn_radius_m)
         ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
-        if agent.battery(ends_ms) <= 0.0:
+        free_ms = ends_ms + agent.endurance.takes_ms(config.run_in_m)
+        if not agent.endurance.lasts_from(sweep.leave, free_ms, MARGIN_MS):
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         self.strip = strip
-        self._legs = list(sweep.legs)
+        self._legs, self._passes = list(sweep.legs), list(sweep.passes)
         self._length_m = sum(leg.length_m for leg in sweep.legs)
         self._swept_m = 0.0
         agent.mode = Mode.TRANSIT
@@ -128,6 +136,15 @@ class SecondLooks:
         self._tell(strip.number, TaskState.ACCEPTED, ends_ms)
         agent.follow(sweep.legs[0], config.run_in_m)
         agent.report_state(now_ms)
+
+    def _battery_lasts(self, leg_ends_ms: int) -> bool:
+        """Whether it does for what is left of the sweep, if the present leg ends then."""
+        config, endurance = self.config, self._agent.endurance
+        if config.homing is None:
+            return True
+        left_m = length_over(self._passes, config.turn_radius_m) - self._passes[0].length_m
+        free_ms = leg_ends_ms + endurance.takes_ms(config.run_in_m + left_m)
+        return endurance.lasts_from(self._passes[-1].end, free_ms)
 
     def _give_back(self, number: int, now_ms: int) -> None:
         if self.strip is not None and self.strip.number == number:
@@ -144,7 +161,7 @@ class SecondLooks:
         agent.works_on = 0
         agent.expected_end_ms = 0
         self.strip = None
-        self._legs = []
+        self._legs, self._passes = [], []
         agent.report(now_ms)
         if state is TaskState.DONE:
             agent.report_again(strip)
@@ -174,7 +191,7 @@ class RevisitAgent(Agent):
     """A helper: see the module."""
 
     def __init__(self, config: RevisitConfig) -> None:
-        super().__init__(config.vehicle, config.footprint, config.endurance_ms)
+        super().__init__(config.vehicle, config.footprint, config.endurance_ms, config.homing)
         self.config = config
         self._looks = SecondLooks(self, config, rest=Mode.IDLE)
 
@@ -195,10 +212,15 @@ class RevisitAgent(Agent):
         self._looks.on_maneuver(status, now_ms)
 
     def on_over(self, now_ms: int) -> None:
-        """Stops where it is."""
-        self._looks.on_over(now_ms)
-        self.mode = Mode.FINISHED
-        self.hold()
+        """Stops where it is, unless it is on its way home."""
+        self._looks.leave(now_ms, THE_MISSION_IS_OVER)
+        if not self.mode.is_out_of_work:
+            self.mode = Mode.FINISHED
+            self.hold()
+
+    def leave_work(self, now_ms: int) -> None:
+        """Leaves what it has of a strip."""
+        self._looks.leave(now_ms, BATTERY_TOO_LOW)
 
     def report(self, now_ms: int) -> None:
         """Adds the progress of a strip under way to the report."""

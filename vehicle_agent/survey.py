@@ -30,7 +30,7 @@ from planner.hotspots import HotspotMap, update_hotspots
 from planner.profile_spacing import Known, SpacingTerms, known_before
 from planner.risk import HIGHEST_P_DETECT, residual_risk
 from planner.spacing_planners import SpacingDecision
-from planner.sweep import shifted
+from planner.sweep import Pass, pass_over, shifted
 from planner.types import BoolArray, DetectionCurve, FloatArray, Track
 from vehicle_agent.agent import Agent
 from vehicle_agent.config import WHOLE, SurveyConfig
@@ -46,7 +46,7 @@ class SurveyAgent(Agent):
     """A primary: see the module. Its node id is its vehicle's."""
 
     def __init__(self, config: SurveyConfig) -> None:
-        super().__init__(config.vehicle, config.footprint, config.endurance_ms)
+        super().__init__(config.vehicle, config.footprint, config.endurance_ms, config.homing)
         self.config = config
         self.flown: list[Track] = []
         self.ahead: list[Track] = []  # in the present part; the first one is under way
@@ -62,6 +62,7 @@ class SurveyAgent(Agent):
         self._range_bin_m = 0.0
         self._along_bin_m = 0.0
         self._reach: Reach | None = None
+        self._run_out_ms = 0  # until when it sails straight on behind its last track
         self._looked_to_m: float | None = None  # along the track under way, in the grid's frame
         self._plan_revision = 0
         self._hotspots: HotspotMap
@@ -109,7 +110,11 @@ class SurveyAgent(Agent):
         if not self.ahead or self.mode is Mode.FINISHED:
             return
         self.expected_end_ms = status.ends_ms
-        if status.state is ManeuverState.ON_TRACK:
+        if status.state is ManeuverState.ACCEPTED:
+            free_ms = status.ends_ms + self.endurance.takes_ms(self.config.run_in_m)
+            if not self.endurance.lasts_from(self._pass(self.ahead[0]).end, free_ms):
+                self.turn_home(now_ms)
+        elif status.state is ManeuverState.ON_TRACK:
             self.mode = Mode.SURVEY
             self.report_state(now_ms)
         elif status.state is ManeuverState.DONE:
@@ -120,10 +125,17 @@ class SurveyAgent(Agent):
             self._after_track(now_ms)
 
     def on_over(self, now_ms: int) -> None:
-        """Stops, and says a last time where the hotspots are."""
-        if self.mode is not Mode.FINISHED:
+        """Stops, unless it is on its way home, and says a last time where the hotspots are."""
+        if self.mode is not Mode.FINISHED and not self.mode.is_out_of_work:
             self._finish()
         self._find_hotspots(now_ms)
+
+    def leave_work(self, now_ms: int) -> None:
+        """Ends the survey where it is: what is left is for others."""
+        if self.ahead:
+            self.ahead, self.later = [], []
+            self._publish_plan(f"the battery lasts for no further track and the way home: {self._ending()}")
+            self._find_hotspots(now_ms)
 
     def hotspots_told(self) -> int:
         """See `Agent`."""
@@ -154,6 +166,7 @@ class SurveyAgent(Agent):
     def _end_track(self, now_ms: int) -> None:
         track = self.ahead.pop(0)
         self.flown.append(track)
+        self._run_out_ms = now_ms + self.endurance.takes_ms(self.config.run_in_m)
         self._looked_to_m = None
         r_eff_m, curve = 0, UNSEEN
         if self._tally is not None:
@@ -200,11 +213,13 @@ class SurveyAgent(Agent):
         """To the next track, or the next part's first, or the end."""
         while not self.ahead and self._part + 1 < len(self._parts):
             self._begin_part(self._part + 1)
-        if self.ahead:
-            self._begin_track(now_ms)
-        else:
+        if not self.ahead:
             self._publish_plan(self._ending())
             self._finish()
+        elif self._lasting(self.ahead[:1]):
+            self._begin_track(now_ms)
+        else:
+            self.turn_home(now_ms)
 
     def _finish(self) -> None:
         self.mode = Mode.FINISHED
@@ -263,7 +278,9 @@ class SurveyAgent(Agent):
 
     def _publish_plan(self, note: str) -> None:
         self._plan_revision += 1
-        tracks = [(track, True) for track in self.flown] + [(track, False) for track in (*self.ahead, *self.later)]
+        ahead = [*self.ahead, *self.later]
+        lasting = self._lasting(ahead)
+        tracks = [(track, True) for track in self.flown] + [(track, False) for track in lasting]
         later = len(self.later) if any(part.replans for part in self._parts[self._part + 1 :]) else 0
         message = Plan(
             revision=self._plan_revision,
@@ -271,9 +288,22 @@ class SurveyAgent(Agent):
             r_adpt_m=tuple(self.r_adpt_m),
             r_eff_m=tuple(self.r_eff_m),
             note=note,
-            tentative=self._parts[self._part].tentative(self.ahead) + later,
+            tentative=max(0, self._parts[self._part].tentative(self.ahead) + later - (len(ahead) - len(lasting))),
         )
         self.publish(PLAN.key(vehicle=self.vehicle), message)
+
+    def _lasting(self, tracks: list[Track]) -> list[Track]:
+        """Of tracks to be flown in their order those for which the battery lasts; all before the vehicle has said where
+        it is."""
+        here, at_ms = self.pose, self._now_ms
+        if here is None or self.config.homing is None:
+            return tracks
+        if self.flown and at_ms < self._run_out_ms:
+            here, at_ms = self._pass(self.flown[-1]).end, self._run_out_ms
+        return tracks[: self.endurance.lasts_for(here, [self._pass(track) for track in tracks], at_ms)]
+
+    def _pass(self, track: Track) -> Pass:
+        return pass_over(track.start, track.end, self.config.run_in_m, self.footprint.lead_m)
 
     def _across_m(self, track: Track) -> float:
         """A track's offset in the grid's frame; its own is in that of its part."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from comms.said.messages import Look, ManeuverStatus, Mode, Task
 from vehicle_agent.config import SurveyRevisitConfig
-from vehicle_agent.revisit import SecondLooks
+from vehicle_agent.revisit import BATTERY_TOO_LOW, THE_MISSION_IS_OVER, SecondLooks
 from vehicle_agent.survey import SurveyAgent
 
 
@@ -35,9 +35,14 @@ class SurveyRevisitAgent(SurveyAgent):
     def on_over(self, now_ms: int) -> None:
         """Stops, and says a last time where the hotspots are."""
         if self._looks.strip is not None:
-            self._looks.on_over(now_ms)
+            self._looks.leave(now_ms, THE_MISSION_IS_OVER)
             self.hold()
         super().on_over(now_ms)
+
+    def leave_work(self, now_ms: int) -> None:
+        """Leaves what is left of the survey, or what it has of a strip."""
+        self._looks.leave(now_ms, BATTERY_TOO_LOW)
+        super().leave_work(now_ms)
 
     def report(self, now_ms: int) -> None:
         """Adds the progress of a strip under way to the report."""

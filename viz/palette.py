@@ -52,6 +52,9 @@ MODE: dict[Mode, Colour] = {
     Mode.SURVEY: (74, 176, 140),
     Mode.REVISIT: (255, 110, 199),
     Mode.FINISHED: (50, 55, 64),
+    Mode.RETURNING: (230, 190, 90),
+    Mode.HOME: (50, 55, 64),
+    Mode.EMPTY: (235, 110, 60),
 }
 _SURVEY: tuple[Colour, ...] = ((255, 255, 255), (150, 225, 255), (190, 190, 255))
 _REVISIT: tuple[Colour, ...] = ((255, 110, 199), (255, 170, 110), (230, 140, 255))

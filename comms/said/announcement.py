@@ -72,6 +72,8 @@ class RosterVehicle:
 
     `footprint`, `near_m`, `far_m`, `half_angle_rad`, `look_m`: what its sonar sees, see `planner.types.SonarShape`.
     `p_detect`: the mean P_d of a pass over the lateral ranges that it reaches, which a second look is expected to have.
+    `endurance_ms`: how long its battery lasts from the mission's start. By its own reckoning it is home, at `home_x_m`,
+    `home_y_m`, `reserve_ms` before that.
     """
 
     vehicle: Identifier
@@ -86,6 +88,9 @@ class RosterVehicle:
     footprint: Identifier = "side"
     half_angle_rad: Radians = 0.0
     look_m: Metres = 20.0
+    home_x_m: Metres = 0.0
+    home_y_m: Metres = 0.0
+    reserve_ms: Milliseconds = 0
 
     @property
     def sonar(self) -> SonarShape:

@@ -120,12 +120,13 @@ class Maneuver:
 
 
 class ManeuverState(enum.Enum):
-    """How far a manoeuvre got."""
+    """How far a manoeuvre got. EMPTY: no farther, and nor will any other, as the vehicle's battery is empty."""
 
     ACCEPTED = "accepted"
     ON_TRACK = "on_track"
     DONE = "done"
     REFUSED = "refused"
+    EMPTY = "empty"
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,13 +140,27 @@ class ManeuverStatus:
 
 
 class Mode(enum.Enum):
-    """What an agent is doing."""
+    """What an agent is doing. RETURNING: its vehicle is on its way home, as its battery lasts for no more. HOME, EMPTY:
+    it has come home, or has not: its battery is empty."""
 
     IDLE = "idle"
     TRANSIT = "transit"
     SURVEY = "survey"
     REVISIT = "revisit"
     FINISHED = "finished"
+    RETURNING = "returning"
+    HOME = "home"
+    EMPTY = "empty"
+
+    @property
+    def is_out_of_work(self) -> bool:
+        """Whether it takes on nothing more."""
+        return self in (Mode.RETURNING, Mode.HOME, Mode.EMPTY)
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether it has done all that it will do, of a survey at least."""
+        return self in (Mode.FINISHED, Mode.HOME, Mode.EMPTY)
 
 
 @dataclass(frozen=True, slots=True)

@@ -154,6 +154,7 @@ class _Routes:
         self._takes_s = to_begin_s + table.sonar_on_s[numbers, ways] + helper.run_in_m / helper.speed_mps
         self._then = 1 + table.leave.shape[1] * numbers + ways
         self._sweep_s = table.sonar_on_s[:, 0]
+        self._home_s = table.home_s.max(axis=1)
         self._removable_m2 = table.worth_m2
 
     def gains(self, path: Sequence[int]) -> tuple[FloatArray, IntArray]:
@@ -184,5 +185,5 @@ class _Routes:
         ends_s = free_s - self._helper.run_in_m / self._helper.speed_mps
         share = np.clip((self._deadline_s - ends_s) / self._sweep_s[strip] + 1, 0.0, 1.0)
         worth = self._removable_m2[strip] * share * 0.5 ** ((ends_s - self._now_s) / HALF_LIFE_S)
-        scores: FloatArray = np.where(ends_s <= self._helper.lasts_until_s, worth, 0.0)
+        scores: FloatArray = np.where(ends_s + self._home_s[strip] <= self._helper.lasts_until_s, worth, 0.0)
         return scores

@@ -134,11 +134,11 @@ def _best(counts_m2: FloatArray, sizes: Sequence[int]) -> int:
 class _Team:
     """What each helper finds at each strip, from its start and from behind each other strip.
 
-    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `way`, `sweep_s`: shape (helpers,
-    nodes, strips): how long it is from there until the sonar is on at a strip, flown the way that is shortest, as a
-    helper's agent does, the node that this is, and how long the sonar is on then. `worth_m2`: (helpers, strips).
-    `alone_s`: what a strip takes by itself, and `alone_m2`: what it brings at most, shape (strips,). `later_m2ps`: what
-    a second is worth for which no strip is left.
+    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `way`, `sweep_s`, `home_s`: shape
+    (helpers, nodes, strips): how long it is from there until the sonar is on at a strip, flown the way that is
+    shortest, as a helper's agent does, the node that this is, how long the sonar is on then, and how long it is home
+    after that. `worth_m2`: (helpers, strips). `alone_s`: what a strip takes by itself, and `alone_m2`: what it brings
+    at most, shape (strips,). `later_m2ps`: what a second is worth for which no strip is left.
     """
 
     def __init__(self, strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> None:
@@ -149,7 +149,7 @@ class _Team:
         self.start = count * ways
         places = np.arange(count)
         shape = (len(helpers), self.start + 1, count)
-        self.to_begin_s, self.sweep_s = np.full(shape, np.inf), np.ones(shape)
+        self.to_begin_s, self.sweep_s, self.home_s = np.full(shape, np.inf), np.ones(shape), np.zeros(shape)
         self.way = np.zeros(shape, dtype=np.intp)
         for number, (helper, table) in enumerate(zip(helpers, tables, strict=True)):
             own = table.sonar_on_s.shape[1]
@@ -159,6 +159,7 @@ class _Team:
             self.to_begin_s[number, rows], chosen = table.shortest_from(poses)
             self.way[number, rows] = places * ways + chosen
             self.sweep_s[number, rows] = table.sonar_on_s[places, chosen]
+            self.home_s[number, rows] = table.home_s[places, chosen]
         self.worth_m2 = np.array([one.worth_m2 for one in tables])
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
         self.lasts_s = np.array([one.lasts_until_s for one in helpers])
@@ -267,7 +268,8 @@ class _Plans:
             begins_s, sweep_s = self.free_s[rows, one][:, np.newaxis] + team.to_begin_s[one, at], team.sweep_s[one, at]
             ends_s = begins_s + sweep_s
             share = np.clip((team.deadline_s - begins_s) / sweep_s, 0.0, 1.0)
-            may = (ends_s <= team.lasts_s[one][:, np.newaxis]) & (self.turn[rows] < 0) & ~is_done[:, np.newaxis]
+            lasts = ends_s + team.home_s[one, at] <= team.lasts_s[one][:, np.newaxis]
+            may = lasts & (self.turn[rows] < 0) & ~is_done[:, np.newaxis]
             gained_m2 = np.where(may, team.worth_m2[one] * share, 0.0)
             ahead.next[places], ahead.gained_m2[places] = one, gained_m2
             ahead.ends_s[places] = ends_s + team.run_out_s[one][:, np.newaxis]

@@ -51,8 +51,10 @@ def expected_service(one: OpenStrip, helper: Helper) -> Service:
 
 
 def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: float) -> float:
-    """What a service is expected to remove by the deadline; nothing where the battery does not last to its end."""
-    if served.ends_s > helper.lasts_until_s:
+    """What a service is expected to remove by the deadline; nothing where the battery does not last to its end, and
+    home from there."""
+    home_s = float(helper.home_s(np.array([served.free_at], dtype=np.float64))[0])
+    if served.ends_s + home_s > helper.lasts_until_s:
         return 0.0
     return helper.p_detect * one.risk_m2 * served.share_by(deadline_s)
 
@@ -62,8 +64,8 @@ class StripTable:
     repeated. All arrays have shape (strips, ways), poses a third axis of 3.
 
     `entry`, `leave`: the poses in which a way is begun, before its run-in, and left, behind its run-out. `sonar_on_s`:
-    from when its sonar goes on until all is seen. `worth_m2`: what the strip's sweep removes, shape (strips,); 0 for
-    one that the helper is not to be offered.
+    from when its sonar goes on until all is seen. `home_s`: see `Helper.home_s`. `worth_m2`: what the strip's sweep
+    removes, shape (strips,); 0 for one that the helper is not to be offered.
     """
 
     def __init__(self, strips: Sequence[OpenStrip], helper: Helper) -> None:
@@ -75,6 +77,7 @@ class StripTable:
         self.entry = np.array([one.entry for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
         self.leave = np.array([one.leave for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
         length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
+        self.home_s = helper.home_s(self.leave.reshape(-1, 3)).reshape(shape)
         self.sonar_on_s: FloatArray = (length_m - 2 * helper.run_in_m) / helper.speed_mps
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
         self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
@@ -94,9 +97,9 @@ class StripTable:
 
     def removed_m2(self, begins_s: FloatArray, deadline_s: float) -> FloatArray:
         """What services remove by the deadline that begin at these times, shape (n, strips, ways); nothing where the
-        battery does not last to their end."""
+        battery does not last to their end, and home from there."""
         share = np.clip((deadline_s - begins_s) / self.sonar_on_s, 0.0, 1.0)
-        lasts = begins_s + self.sonar_on_s <= self.helper.lasts_until_s
+        lasts = begins_s + self.sonar_on_s + self.home_s <= self.helper.lasts_until_s
         return np.where(lasts, self.worth_m2[:, np.newaxis] * share, 0.0)
 
     def best_from(self, pose: Pose, free_s: float, deadline_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:

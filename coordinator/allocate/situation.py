@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
+import numpy as np
+
 from planner.dubins import Pose
-from planner.types import Strip
+from planner.types import FloatArray, Strip
+from planner.way_home import WayHome
 
 
 @dataclass(frozen=True)
@@ -25,10 +28,10 @@ class Helper:
 
     `pose`: where it is, mission frame. `free_at`, `free_s`: where and when it will be free; where it is, and now, if it
     is free. `task`: the strip that it has, None if it is free. `swath_m`: the full width that one leg covers;
-    `p_detect`: its P_d there. `lasts_until_s`: when its battery is empty. `refused`: strips that it is not to be
-    offered. `sweeping`: whether it is on its task's strip already. `beside_m`: how far beside the middle of what a leg
-    covers it flies it, on either side; `lead_m`: how much earlier than over the ground that it sees. Times are seconds
-    since the mission's start.
+    `p_detect`: its P_d there. `lasts_until_s`: until when its battery lasts, less its reserve; with `way_home` it must
+    be home by then, else at the end of a sweep. `refused`: strips that it is not to be offered. `sweeping`: whether it
+    is on its task's strip already. `beside_m`: how far beside the middle of what a leg covers it flies it, on either
+    side; `lead_m`: how much earlier than over the ground that it sees. Times are seconds since the mission's start.
     """
 
     vehicle: str
@@ -46,6 +49,14 @@ class Helper:
     sweeping: bool = False
     beside_m: float = 0.0
     lead_m: float = 0.0
+    way_home: WayHome | None = None
+
+    def home_s(self, poses: FloatArray) -> FloatArray:
+        """How long its battery must last after sweeps: until it is home, where it must come home, from the poses in
+        which it leaves them, behind the run-out; shape (n, 3). Shape (n,)."""
+        if self.way_home is None:
+            return np.zeros(len(poses))
+        return self.way_home.times_s(poses) + self.run_in_m / self.speed_mps
 
 
 @dataclass(frozen=True)

@@ -56,6 +56,8 @@ class Underway:
     @property
     def gives_way(self) -> bool:
         """Whether it can be told to."""
+        if self.vehicle.state is not None and self.vehicle.state.mode.is_out_of_work:
+            return False
         role = self.vehicle.entry.role
         return role.revisits and (not role.surveys or self.vehicle.finished_ms is not None)
 

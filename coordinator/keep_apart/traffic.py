@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from comms.said.messages import Mode
+from comms.said.messages import AgentState, Mode
 from coordinator.keep_apart.courses import (
     Course,
     course,
@@ -52,6 +52,8 @@ class Traffic:
         state = vehicle.state
         if vehicle.lost or state is None:
             return None
+        if state.mode.is_out_of_work:
+            return self._homeward(vehicle, state)
         if vehicle.entry.role.surveys and vehicle.finished_ms is None:
             return self._survey(vehicle, now_s)
         if strip is not None:
@@ -125,6 +127,21 @@ class Traffic:
         if stage == 2:
             self._entered[entry.vehicle] = known.sweep
         return known.course
+
+    def _homeward(self, vehicle: KnownVehicle, state: AgentState) -> Course:
+        """On its way home, or where it lies."""
+        entry = vehicle.entry
+        known = self._rests.get(entry.vehicle)
+        if known is None or known[0] != vehicle.heard_ms:
+            pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
+            laid = lying_still(pose, heard_s)
+            if state.mode is Mode.RETURNING:
+                run_out = self._run_out(vehicle, pose)
+                end = run_out.pose_at(run_out.length_m)
+                way = shortest_path(end, _arrival(end, (entry.home_x_m, entry.home_y_m)), entry.turn_radius_m)
+                laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [run_out, way])
+            known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
+        return known[1]
 
     def _rest(self, vehicle: KnownVehicle) -> Course:
         """It circles from where it was last, if it has ever been under way."""

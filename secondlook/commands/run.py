@@ -173,7 +173,10 @@ def run(
             typer.echo(json.dumps(summary, indent=2))
         elif not failure:
             closing_table(summary, folder)
-    if failure or unreported:
+        empty = [] if failure else [name for name, one in summary["vehicles"].items() if one["ended"] == "empty"]
+        if empty:
+            sys.stderr.write(f"{', '.join(empty)}: the battery was empty before it was home\n")
+    if failure or unreported or empty:
         raise typer.Exit(MISSION_FAILED)
 
 

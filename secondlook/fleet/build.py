@@ -15,9 +15,10 @@ from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
+from planner.way_home import WayHome
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
-from secondlook.fleet.roster import endurance_ms_of, role_of, roster_vehicle
+from secondlook.fleet.roster import endurance_ms_of, reserve_ms_of, role_of, roster_vehicle
 from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
 from secondlook.scenario import (
     PatchySeabed,
@@ -38,7 +39,7 @@ from sim_world.config import (
     VehicleConfig,
     WorldConfig,
 )
-from vehicle_agent.config import RevisitConfig, SurveyConfig, SurveyRevisitConfig
+from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
@@ -133,6 +134,7 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
 
 def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
     footprint, endurance_ms = footprint_of(vehicle.sonar), endurance_ms_of(vehicle)
+    homing = Homing(WayHome(vehicle.home_m, vehicle.speed_mps, vehicle.turn_radius_m), reserve_ms_of(vehicle))
     revisit = RevisitConfig(
         vehicle=name,
         footprint=footprint,
@@ -140,6 +142,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         turn_radius_m=vehicle.turn_radius_m,
         run_in_m=vehicle.run_in_m,
         endurance_ms=endurance_ms,
+        homing=homing,
     )
     if isinstance(vehicle, RevisitVehicle):
         return node_spec(Role.REVISIT, revisit, vehicle.agent)
@@ -156,6 +159,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
         share=vehicle.share,
         wanted_risk=vehicle.wanted_risk,
+        homing=homing,
     )
     if vehicle.revisits:
         return node_spec(Role.SURVEY_REVISIT, SurveyRevisitConfig(survey, revisit), vehicle.agent)
@@ -203,6 +207,8 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
         speed_mps=vehicle.speed_mps,
         turn_radius_m=vehicle.turn_radius_m,
         altitude_m=vehicle.altitude_m,
+        endurance_ms=endurance_ms_of(vehicle),
+        home=vehicle.home_m,
         position_error_m=vehicle.position_error_m,
         position_drift_mps=vehicle.position_drift_m_per_h / 3600,
         settling=None if settling is None else SettlingConfig(settling.share, settling.length_m),

@@ -25,6 +25,9 @@ def roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> Roster
         footprint=sonar.footprint,
         half_angle_rad=sonar.half_angle_rad,
         look_m=sonar.look_m,
+        home_x_m=vehicle.home_m[0],
+        home_y_m=vehicle.home_m[1],
+        reserve_ms=reserve_ms_of(vehicle),
     )
 
 
@@ -41,6 +44,11 @@ def _mean_p_detect(vehicle: SurveyVehicle | RevisitVehicle) -> float:
 def endurance_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
     """How long its battery lasts, in whole milliseconds."""
     return max(1, round(vehicle.endurance_s * 1000))
+
+
+def reserve_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
+    """How long it is still to last when the vehicle comes home."""
+    return round(vehicle.kept_s * 1000)
 
 
 def role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:

@@ -27,6 +27,7 @@ from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
+from secondlook.launch.run_display import ending_of
 from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
@@ -111,6 +112,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
             restarts=run.restarts,
         )
         warn_of_pairs(summary)
+        warn_of_batteries(summary)
     try:
         write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n")
     except CannotWriteError as error:
@@ -134,6 +136,14 @@ def warn_of_pairs(summary: Mapping[str, Any]) -> None:
                 pair["t_s"],
                 least_m,
             )
+
+
+def warn_of_batteries(summary: Mapping[str, Any]) -> None:
+    """One warning in the log for each vehicle that had to end its survey early, or has not come home."""
+    for name, vehicle in summary["vehicles"].items():
+        ending = ending_of(name, vehicle)
+        if ending.cut_short or ending.how == "empty":
+            log.warning("%s: %s", name, ending.words)
 
 
 def check_bodies(scenario: Scenario) -> None:

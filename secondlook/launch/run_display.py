@@ -16,6 +16,7 @@ from rich.table import Table
 
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Progress as ProgressFunction
+from secondlook.recorded.vehicles import Ending
 
 REPORT, RECORDING = "report.html", "mission.rrd"
 LONG_S = 3600.0
@@ -85,6 +86,12 @@ class ProgressLines:
         sys.stderr.flush()
 
 
+def ending_of(name: str, vehicle: dict[str, Any]) -> Ending:
+    """How a vehicle has ended, by its part of the summary."""
+    cut_short = vehicle.get("survey_cut_short", False)
+    return Ending(name, vehicle["ended"], vehicle["ended_s"], vehicle["battery_left"], cut_short)
+
+
 def closing_table(summary: dict[str, Any], folder: Path) -> None:
     """Prints what came of the mission, where its files are, and how to look at it."""
     table = Table(show_header=False, box=None, pad_edge=False)
@@ -100,6 +107,9 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
             spacing = ", ".join(str(range_m) for range_m in vehicle["r_adpt_m"])
             told += f", {vehicle['tracks']} tracks, spaced for {spacing} m"
         table.add_row(name, told)
+        how = ending_of(name, vehicle)
+        if how.words:
+            table.add_row("", how.words, style="red" if how.how == "empty" else "yellow" if how.cut_short else None)
     hotspots = summary["hotspots"]
     table.add_row(
         "strips",

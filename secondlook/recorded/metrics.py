@@ -16,6 +16,8 @@ from comms.said.messages import (
     AgentState,
     CoverageTile,
     Look,
+    ManeuverState,
+    ManeuverStatus,
     Mode,
     Nav,
     Plan,
@@ -33,6 +35,7 @@ from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
 from secondlook.recorded.closest_approach import ClosestApproaches
+from secondlook.recorded.vehicles import Ending
 from vehicle_agent.agent import makes_sense
 
 RISK_AT_FACTORS = (1.0, 1.05)
@@ -40,8 +43,9 @@ RISK_AT_FACTORS = (1.0, 1.05)
 
 @dataclass
 class VehicleFigures:
-    """One vehicle: path flown, when it ended, and for a primary what it planned and learned. `surveyed`: its layer when
-    it had surveyed all, if it goes on to take strips."""
+    """One vehicle: path flown, when it ended, and for a primary what it planned and learned. `finished_ms`: when its
+    survey ended, all of it or as much as its battery lasted for. `surveyed`: its layer then, if it goes on to take
+    strips. `mode`, `battery`: as it told last. `rests_ms`: since when it lies, at home or with an empty battery."""
 
     role: Role
     footprint: Footprint
@@ -52,11 +56,24 @@ class VehicleFigures:
     last_nav: Nav | None = None
     finished_ms: int | None = None
     surveyed: VehicleLayer | None = None
+    mode: Mode | None = None
+    battery: float = 1.0
+    rests_ms: int | None = None
+    has_finished: bool = False
 
     @property
     def has_surveyed_all(self) -> bool:
         """Whether no track is left that it has not flown, by its plan: the mission may have ended before."""
         return self.plan is None or all(track.flown for track in self.plan.tracks)
+
+    def ended_as(self, name: str) -> Ending:
+        """How it has ended."""
+        ended_ms = self.rests_ms
+        if ended_ms is None:
+            ended_ms = self.ended_ms if self.finished_ms is None else self.finished_ms
+        how = self.mode.value if self.mode is not None and self.mode.is_out_of_work else "over"
+        cut_short = self.role.surveys and how != "over" and not self.has_finished
+        return Ending(name, how, ended_ms / 1000, self.battery, cut_short=cut_short)
 
 
 @dataclass
@@ -110,11 +127,15 @@ class Metrics:
         elif isinstance(message, Plan) and vehicle is not None:
             vehicle.plan = message
         elif isinstance(message, AgentState) and vehicle is not None:
-            vehicle.ended_ms = received.header.sent_ms
-            if message.mode is Mode.FINISHED and vehicle.finished_ms is None and vehicle.has_surveyed_all:
+            self._hear_state(vehicle, message, received.header.sent_ms)
+            ends = message.mode is Mode.FINISHED or message.mode.is_out_of_work
+            if ends and vehicle.finished_ms is None and vehicle.has_surveyed_all:
                 vehicle.finished_ms = received.header.sent_ms
                 if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
                     vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))
+        elif isinstance(message, ManeuverStatus) and vehicle is not None:
+            if message.state is ManeuverState.EMPTY:
+                self._rest(vehicle, Mode.EMPTY, received.header.sent_ms)
         elif isinstance(message, StripBooks.telling):
             for one in self.books.hear(received):
                 self._hear_strip(one, one.message)
@@ -191,7 +212,7 @@ class Metrics:
         risk, alone = self.risk(), self.risk_primary_alone()
         primary_ms = self.primary_ms()
         return {
-            "vehicles": {name: _vehicle_summary(one) for name, one in self.vehicles.items()},
+            "vehicles": {name: _vehicle_summary(name, one) for name, one in self.vehicles.items()},
             "primary_s": None if primary_ms is None else primary_ms / 1000,
             "risk": asdict(risk) if risk else None,
             "risk_primary_alone": asdict(alone) if alone else None,
@@ -232,6 +253,24 @@ class Metrics:
         if vehicle.last_nav is not None:
             vehicle.path_m += math.hypot(nav.x_m - vehicle.last_nav.x_m, nav.y_m - vehicle.last_nav.y_m)
         vehicle.last_nav = nav
+
+    def _hear_state(self, vehicle: VehicleFigures, state: AgentState, sent_ms: int) -> None:
+        vehicle.ended_ms = sent_ms
+        if vehicle.mode is Mode.EMPTY:  # whatever its agent, which may have been started anew, makes of it
+            return
+        vehicle.mode, vehicle.battery = state.mode, state.battery
+        vehicle.has_finished |= state.mode is Mode.FINISHED
+        if state.mode in (Mode.HOME, Mode.EMPTY):
+            self._rest(vehicle, state.mode, sent_ms)
+        else:
+            vehicle.rests_ms = None
+
+    def _rest(self, vehicle: VehicleFigures, mode: Mode, sent_ms: int) -> None:
+        if vehicle.mode is not mode or vehicle.rests_ms is None:
+            vehicle.rests_ms = sent_ms
+        vehicle.mode = mode
+        if mode is Mode.EMPTY:
+            vehicle.battery = 0.0
 
     def _hear_tile(self, received: Received, tile: CoverageTile) -> None:
         if self.map is None:
@@ -279,14 +318,17 @@ class Metrics:
         }
 
 
-def _vehicle_summary(vehicle: VehicleFigures) -> dict[str, Any]:
-    ended_ms = vehicle.finished_ms if vehicle.finished_ms is not None else vehicle.ended_ms
+def _vehicle_summary(name: str, vehicle: VehicleFigures) -> dict[str, Any]:
+    ending = vehicle.ended_as(name)
     summary: dict[str, Any] = {
         "role": vehicle.role.value,
         "path_m": round(vehicle.path_m, 1),
-        "ended_s": ended_ms / 1000,
+        "ended": ending.how,
+        "ended_s": ending.ended_s,
+        "battery_left": ending.battery_left,
     }
     if vehicle.role.surveys:
+        summary["survey_cut_short"] = ending.cut_short
         plan = vehicle.plan
         summary["tracks"] = sum(track.flown for track in plan.tracks) if plan else 0
         summary["r_adpt_m"] = list(plan.r_adpt_m) if plan else []

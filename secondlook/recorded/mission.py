@@ -43,7 +43,7 @@ from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord, con
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
-from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord, activities, paths, tracks
+from secondlook.recorded.vehicles import Activity, Ending, PathRecord, TrackRecord, activities, paths, tracks
 
 log = logging.getLogger("secondlook.recorded")
 
@@ -138,6 +138,11 @@ class Mission(ABC):
     def closest(self) -> list[Closest]:
         """How near each two vehicles came to each other while both were under way, the nearest first."""
         return self._figures.approaches.found()
+
+    @property
+    def endings(self) -> list[Ending]:
+        """How each vehicle has ended, and with which share of its battery."""
+        return [one.ended_as(name) for name, one in self._figures.vehicles.items()]
 
     @cached_property
     def _figures(self) -> Metrics:

@@ -9,12 +9,14 @@ from typing import NamedTuple
 from comms.node import Received
 from comms.said.announcement import RunInfo
 from comms.said.messages import (
+    AgentState,
     Curve,
     Hotspot,
     HotspotState,
     ManeuverState,
     ManeuverStatus,
     MissionOver,
+    Mode,
     Plan,
     StripState,
     StripStatus,
@@ -53,7 +55,7 @@ class Story:
     `telling`: the messages that may be worth a line; of the others there is nothing to tell.
     """
 
-    telling = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, MissionOver)
+    telling = (RunInfo, Plan, Curve, Hotspot, StripStatus, Task, TaskStatus, ManeuverStatus, AgentState, MissionOver)
 
     def __init__(self) -> None:
         self._books = StripBooks()
@@ -102,6 +104,10 @@ class Story:
                 return f"{received.vehicle}, {what} strip {task.strip}", False
             case TaskStatus() as status:
                 return self._task(received, status)
+            case ManeuverStatus(state=ManeuverState.EMPTY):
+                return f"{received.vehicle}: the battery is empty, it lies where it is", True
+            case AgentState(mode=Mode.RETURNING | Mode.HOME) as state:
+                return self._homeward(received, state)
             case ManeuverStatus(state=ManeuverState.REFUSED) as status:
                 return f"manoeuvre {status.number} refused{_because(status.reason)}", True
             case MissionOver() as over:
@@ -151,6 +157,12 @@ class Story:
         }[status.state]
         warns = status.state in (TaskState.REFUSED, TaskState.FAILED)
         return f"strip {status.strip} {what}{_because(status.reason)}", warns
+
+    def _homeward(self, received: Received, state: AgentState) -> tuple[str, bool] | None:
+        if not self._is_news((received.vehicle, "homeward"), state.mode):
+            return None
+        where = "home" if state.mode is Mode.HOME else "on the way home"
+        return f"{where}, {state.battery:.0%} of the battery left", False
 
     def _worth(self, strip: int) -> str:
         removable_m2 = self._removable_m2.get(strip)

@@ -49,6 +49,33 @@ def _activity(said: Received[AgentState], ended_s: float) -> Activity:
 
 
 @dataclass(frozen=True)
+class Ending:
+    """How a vehicle has ended, and with which share of its battery.
+
+    `how`: `home`, as its battery lasted for no more; `returning`, on its way there when the mission was over; `empty`,
+    wherever that was; else `over`, where the mission ended with it. `ended_s`: when it was home, or its battery empty;
+    else when its survey or the mission ended. `cut_short`: whether its survey ended early by that.
+    """
+
+    vehicle: str
+    how: str
+    ended_s: float
+    battery_left: float
+    cut_short: bool
+
+    @property
+    def words(self) -> str:
+        """The same for people; nothing where the mission ended with it."""
+        left = f"with {self.battery_left:.0%} of its battery"
+        told = {
+            "home": f"home at {self.ended_s:.0f} s {left}",
+            "returning": f"on its way home at the end {left}",
+            "empty": f"its battery was empty at {self.ended_s:.0f} s, not home",
+        }.get(self.how, "")
+        return f"{told}, its survey is not finished" if self.cut_short else told
+
+
+@dataclass(frozen=True)
 class TrackRecord:
     """A track of a vehicle's last plan.
 

@@ -203,6 +203,9 @@ IN_WORDS = {
     Mode.SURVEY: "surveys track {number}",
     Mode.REVISIT: "takes a second look at strip {number}",
     Mode.FINISHED: "has finished",
+    Mode.RETURNING: "on the way home",
+    Mode.HOME: "is home",
+    Mode.EMPTY: "lies with an empty battery",
 }
 
 

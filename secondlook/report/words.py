@@ -157,6 +157,11 @@ def _begun_and_done(mission: RecordedMission) -> Iterator[Moment]:
         if one.mode is Mode.FINISHED and one.vehicle in primaries and one.begun_s <= over_s:
             primaries.remove(one.vehicle)
             yield Moment(one.begun_s, f"{one.vehicle} has finished the survey")
+        if one.mode is Mode.RETURNING:
+            primaries.discard(one.vehicle)
+            yield Moment(one.begun_s, f"{one.vehicle} goes home, as its battery lasts for no more")
+        if one.mode is Mode.HOME:
+            yield Moment(one.begun_s, f"{one.vehicle} is home")
     for over in mission.said(MissionOver):
         yield Moment(over.t_s, f"the mission is over: {over.message.reason}")
 

@@ -19,7 +19,7 @@ from secondlook.scenario.chart import ChartError, read_chart
 from secondlook.scenario.errors import KeyPath
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import Mapping, check_pair, refused
-from secondlook.scenario.vehicle import Start
+from secondlook.scenario.vehicle import Home, Start
 
 FARTHEST_KM = 100
 
@@ -99,8 +99,8 @@ class PriorityInDegrees(Mapping):
     """In place of `polygon_m`: the corners as [easting, northing]; the last may repeat the first."""
 
 
-class StartInDegrees(Mapping):
-    """What of a start may be given in degrees or in UTM metres."""
+class PlaceInDegrees(Mapping):
+    """What of a start or home may be given in degrees or in UTM metres."""
 
     latitude_deg: Latitude | None = None
     """In place of `y_m`, with `longitude_deg`: degrees north, WGS84."""
@@ -118,7 +118,8 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
     Origin: OriginInUtm,
     Area: AreaInDegrees,
     Priority: PriorityInDegrees,
-    Start: StartInDegrees,
+    Start: PlaceInDegrees,
+    Home: PlaceInDegrees,
 }
 """What may be given in degrees or UTM metres in place of keys of a mapping."""
 
@@ -254,9 +255,10 @@ def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value]
             if isinstance(one, dict):
                 yield ("area", "priorities", index), one, PriorityInDegrees
     for key, vehicle in vehicles.items() if isinstance(vehicles, dict) else ():
-        start = vehicle.get("start") if isinstance(vehicle, dict) else None
-        if isinstance(start, dict):
-            yield ("vehicles", key, "start"), start, StartInDegrees
+        for name in ("start", "home"):
+            place = vehicle.get(name) if isinstance(vehicle, dict) else None
+            if isinstance(place, dict):
+                yield ("vehicles", key, name), place, PlaceInDegrees
 
 
 def _epsg(data: dict[str, Value], path: KeyPath, own: int | None) -> int:
@@ -294,10 +296,10 @@ def _turn(
         return  # told when the whole is validated, or needed by none
     frame = _Frame(origin)
     match checked:
-        case StartInDegrees(latitude_deg=float(latitude_deg), longitude_deg=float(longitude_deg)):
+        case PlaceInDegrees(latitude_deg=float(latitude_deg), longitude_deg=float(longitude_deg)):
             place = frame.place_m((*path, "latitude_deg"), (latitude_deg, longitude_deg))
             holder["x_m"], holder["y_m"] = place
-        case StartInDegrees(easting_m=float(easting_m), northing_m=float(northing_m)):
+        case PlaceInDegrees(easting_m=float(easting_m), northing_m=float(northing_m)):
             frame = replace(frame, epsg=_epsg(data, path, checked.epsg))
             holder["x_m"], holder["y_m"] = frame.place_m((*path, "easting_m"), (easting_m, northing_m))
         case AreaInDegrees(file=str(file)):

@@ -10,7 +10,7 @@ from pydantic import AfterValidator, Field, ValidationInfo, field_validator, mod
 
 from comms.said.announcement import Role
 from planner.curve import effective_range_m
-from planner.types import DetectionCurve, SonarShape
+from planner.types import DetectionCurve, Point, SonarShape
 from secondlook.scenario.plug_ins import NODE, SPACING
 from secondlook.scenario.sensor import Curve, OptionalCurve, Sensor
 from secondlook.scenario.values import (
@@ -27,6 +27,7 @@ from secondlook.scenario.values import (
     refused,
 )
 
+RESERVE_SHARE = 0.1
 _SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
 RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
@@ -58,6 +59,15 @@ class Start(Mapping):
     """Compass heading."""
 
 
+class Home(Mapping):
+    """Where a vehicle is waited for: mission frame."""
+
+    x_m: Coordinate
+    """East. Or `longitude_deg`."""
+    y_m: Coordinate
+    """North. Or `latitude_deg`."""
+
+
 class Settling(Mapping):
     """How a vehicle settles after a turn, until when its sonar sees less."""
 
@@ -81,7 +91,12 @@ class VehicleBase(Mapping):
     turn_radius_m: Length
     """The tightest circle that it can turn."""
     endurance_s: Duration
-    """How long its battery lasts."""
+    """How long its battery lasts, from the mission's start. Who would not come home otherwise ends its work before."""
+    home: Home | None = None
+    """Where it is to be before its battery is empty; left out, where it starts."""
+    reserve_s: Annotated[float, Field(ge=0, le=1e7)] | None = None
+    """How long its battery is still to last when it comes home, by its own reckoning; less than `endurance_s`. Left
+    out, a tenth of that."""
     altitude_m: Length
     """Height above the seabed."""
     run_in_m: LengthOrZero
@@ -105,6 +120,25 @@ class VehicleBase(Mapping):
         if "nadir_gap_m" in info.data:
             sensor.check_nadir_gap(info.data["nadir_gap_m"])
         return sensor
+
+    @field_validator("reserve_s")
+    @classmethod
+    def _check_reserve(cls, reserve_s: float | None, info: ValidationInfo) -> float | None:
+        endurance_s = info.data.get("endurance_s")
+        if reserve_s is not None and endurance_s is not None and reserve_s >= endurance_s:
+            raise refused(f"must be less than endurance_s, {endurance_s:g}")
+        return reserve_s
+
+    @property
+    def home_m(self) -> Point:
+        """Where it is to be before its battery is empty, mission frame."""
+        place = self.start if self.home is None else self.home
+        return place.x_m, place.y_m
+
+    @property
+    def kept_s(self) -> float:
+        """How long its battery is still to last when it comes home."""
+        return RESERVE_SHARE * self.endurance_s if self.reserve_s is None else self.reserve_s
 
     @property
     def sonar(self) -> SonarShape:

@@ -15,7 +15,7 @@ from secondlook.testing.flight import Flight, fail_if, lives
 
 def assert_all_finished(flight: Flight) -> None:
     """The coordinator has said that the mission is over, and the last word of every vehicle that is still there is that
-    it has finished."""
+    it has finished, or has gone home before."""
     __tracebackhide__ = True
     problems = []
     if not flight.said(MissionOver):
@@ -29,9 +29,24 @@ def assert_all_finished(flight: Flight) -> None:
             problems.append(f"{vehicle} has never told its state")
             continue
         last = states[-1]
-        if last.message.mode is not Mode.FINISHED:
+        if last.message.mode not in (Mode.FINISHED, Mode.RETURNING, Mode.HOME):
             problems.append(f"{vehicle} was last heard at {last.t_s:.3f} s, and in {last.message.mode.value}")
     fail_if(problems, "not everyone has finished")
+
+
+def assert_home_before_empty(flight: Flight, *vehicles: str) -> None:
+    """No vehicle's battery has run empty before it was home; each of `vehicles` has come home before the end."""
+    __tracebackhide__ = True
+    if unknown := [name for name in vehicles if name not in flight.scenario.vehicles]:
+        raise UserError(f"vehicles: {unknown[0]} is not allowed; must be of {', '.join(flight.scenario.vehicles)}")
+    problems = []
+    for ending in flight.endings:
+        if ending.how == "empty":
+            problems.append(f"{ending.vehicle}: {ending.words}")
+        elif ending.vehicle in vehicles and ending.how != "home":
+            told = ending.words or f"is out, with {ending.battery_left:.0%} of its battery"
+            problems.append(f"{ending.vehicle} has not come home by {flight.end_s:.3f} s: {told}")
+    fail_if(problems, "not everyone has come home in time")
 
 
 def assert_no_message_dropped(flight: Flight) -> None:
