@@ -42,9 +42,9 @@ class MissionEnd:
         self._ask(lacking, now_ms)
         returning = any(one.is_returning for one in self._fleet.vehicles.values())
         if not left and not surveying and not lacking and not returning and not self._cut_is_left(now_ms):
-            early = [name for name, one in self._fleet.primaries.items() if one.ended_early]
-            cut_short = f", the survey of {', '.join(early)} not for want of battery," if early else ""
-            reason = f"every primary has finished{cut_short} and no strip is left"
+            early = ", ".join(name for name, one in self._fleet.primaries.items() if one.ended_early)
+            cut_short = f"; the survey of {early} has ended early, as the battery lasted for no more" if early else ""
+            reason = f"every primary has finished and no strip is left{cut_short}"
         elif now_ms >= self._deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
             end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"

@@ -227,16 +227,16 @@ class Agent:
             self.report_state(now_ms)
 
     def _hear_status(self, status: ManeuverStatus, now_ms: int) -> None:
-        if status.state is ManeuverState.EMPTY:  # whatever it was told
-            if self.mode is not Mode.EMPTY:
-                self.leave_work(now_ms)
-                self._rest(Mode.EMPTY, now_ms)
-        elif self.maneuver is not None and status.number == self.maneuver.number:
-            self._word_due_ms = _next_word_due_ms(status)
-            if not self.mode.is_out_of_work:
-                self.on_maneuver(status, now_ms)
-            elif status.state is ManeuverState.DONE:
-                self._rest(Mode.HOME, now_ms)
+        if self.maneuver is None or status.number != self.maneuver.number or self.mode in (Mode.HOME, Mode.EMPTY):
+            return
+        self._word_due_ms = _next_word_due_ms(status)
+        if status.state is ManeuverState.EMPTY:
+            self.leave_work(now_ms)
+            self._rest(Mode.EMPTY, now_ms)
+        elif not self.mode.is_out_of_work:
+            self.on_maneuver(status, now_ms)
+        elif status.state is ManeuverState.DONE:
+            self._rest(Mode.HOME, now_ms)
 
     def _rest(self, mode: Mode, now_ms: int) -> None:
         """The vehicle lies, at home or where its battery has run empty."""
@@ -298,7 +298,7 @@ class Agent:
 
 def _next_word_due_ms(status: ManeuverStatus) -> int | None:
     """When the vehicle has to say more, a report's time granted; None where it has said its last."""
-    if status.state in (ManeuverState.DONE, ManeuverState.REFUSED) or status.ends_ms == 0:
+    if status.state in (ManeuverState.DONE, ManeuverState.REFUSED, ManeuverState.EMPTY) or status.ends_ms == 0:
         return None
     return status.ends_ms + REPORT_EVERY_MS
 

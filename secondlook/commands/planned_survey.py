@@ -19,6 +19,7 @@ from planner.footprints import footprint_of
 from planner.footprints.cells import seen_cells
 from planner.sweep import distance_over, pass_over
 from planner.types import Point, Track
+from planner.way_home import MARGIN_S, WayHome
 from secondlook.errors import UserError
 from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
 from secondlook.launch.run_display import in_seconds
@@ -31,7 +32,7 @@ from secondlook.scenario import Scenario, SurveyVehicle
 class PlannedSurvey:
     """One vehicle's first plan. `heading_rad`: of the sweep frame, compass. `uncovered_share`: of its part of the area,
     how much lies nowhere between the nadir gap and the range it is told. `takes_s`: from its start to its last track's
-    end."""
+    end; `home_s`: from there home. `lasts_for`: for how many tracks its battery lasts, and home after them."""
 
     name: str
     vehicle: SurveyVehicle
@@ -39,6 +40,8 @@ class PlannedSurvey:
     plan: FirstPlan
     uncovered_share: float
     takes_s: float
+    home_s: float
+    lasts_for: int
 
     @property
     def sentence(self) -> str:
@@ -55,11 +58,13 @@ class PlannedSurvey:
     @property
     def warning(self) -> str:
         """That the battery will not last, in a sentence; else empty."""
-        endurance_s = self.vehicle.endurance_s
-        if self.takes_s <= endurance_s:
+        tracks, vehicle = self.plan.track_count, self.vehicle
+        if self.lasts_for >= tracks:
             return ""
         return (
-            f"{self.name}: its survey takes {in_seconds(self.takes_s)}, longer than its endurance_s of {endurance_s:g}"
+            f"{self.name}: its survey takes {in_seconds(self.takes_s)} and {in_seconds(self.home_s)} home, longer than "
+            f"its endurance_s of {vehicle.endurance_s:g} less {vehicle.kept_s + MARGIN_S:g} to spare; "
+            f"it will go home after {self.lasts_for} of {tracks} tracks"
         )
 
 
@@ -87,9 +92,12 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
     way_m = distance_over(start, passes, vehicle.turn_radius_m) - vehicle.run_in_m
-    return PlannedSurvey(
-        name, vehicle, heading_rad, plan, float(missed.sum() / max(1, inside.sum())), way_m / vehicle.speed_mps
-    )
+    homeward = WayHome(vehicle.home_m, vehicle.speed_mps, vehicle.turn_radius_m)
+    home_s = vehicle.run_in_m / vehicle.speed_mps + homeward.from_pose(passes[-1].end if passes else start)[0]
+    lasts_for = homeward.passes_within(start, passes, vehicle.endurance_s - vehicle.kept_s - MARGIN_S)
+    uncovered_share = float(missed.sum() / max(1, inside.sum()))
+    takes_s = way_m / vehicle.speed_mps
+    return PlannedSurvey(name, vehicle, heading_rad, plan, uncovered_share, takes_s, home_s, lasts_for)
 
 
 def plan_as_text(surveys: Sequence[PlannedSurvey]) -> str:
@@ -126,6 +134,8 @@ def plan_as_json(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> dict[s
                 "uncovered_share": survey.uncovered_share,
                 "takes_s": round(survey.takes_s, 1),
                 "endurance_s": survey.vehicle.endurance_s,
+                "home_s": round(survey.home_s, 1),
+                "tracks_before_going_home": survey.lasts_for,
                 "parts": [_part(*part) for part in _parts(survey)],
             }
             for survey in surveys

@@ -133,6 +133,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "place": partial(place_in_words, mission.origin),
         "degrees": None if mission.origin is None else degrees_by_place(mission.origin, mission.area),
         "priorities": risk_in_priorities(mission.priorities, before, after),
+        "endings": mission.endings,
         "tracks": mission.tracks,
         "paths": mission.paths,
         "fates": [one for one in fates if one.css != "withdrawn"],

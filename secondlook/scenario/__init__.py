@@ -18,13 +18,14 @@ from secondlook.scenario.model import (
     scenario_hash,
 )
 from secondlook.scenario.sensor import Curve
-from secondlook.scenario.vehicle import RevisitVehicle, Settling, Start, SurveyVehicle, body_of
+from secondlook.scenario.vehicle import Home, RevisitVehicle, Settling, Start, SurveyVehicle, body_of
 
 __all__ = [
     "Area",
     "Coordinator",
     "Current",
     "Curve",
+    "Home",
     "Mission",
     "Origin",
     "PatchySeabed",

@@ -45,6 +45,8 @@ def draw_fleet(number: int) -> Scenario:
         "coordinator": _coordinator(rng),
         **({"current": {"speed_mps": _m(rng.uniform(0.1, 1)), "toward_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
+    if rng.random() < 0.15:  # for less than its survey, perhaps
+        vehicles[rng.choice(list(vehicles)[:primaries])]["endurance_s"] = _m(rng.uniform(0.2, 1) * _LONGEST_S)
     scenario = make_scenario(drawn)
     try:
         build_fleet(scenario, record=False)

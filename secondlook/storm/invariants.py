@@ -20,7 +20,7 @@ from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.mission import load_run
 from secondlook.storm.witness import Violation, Witness
 from secondlook.testing.flight import Flight, Heard
-from secondlook.testing.mission_assertions import assert_no_message_dropped
+from secondlook.testing.mission_assertions import assert_home_before_empty, assert_no_message_dropped
 from secondlook.testing.plan import TroublePlan
 from secondlook.testing.strip_assertions import (
     assert_no_strip_lost,
@@ -57,11 +57,11 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
     surveyed_s = 0.0
     for name in plan.scenario.survey_vehicles:
         if name in core:
-            surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY))
+            surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING))
         else:  # who has failed may say to the end that it is at a track, after a survey that went slowly
             states = flight.said(AgentState, f"agent/{name}/state")
             for before, one in pairwise(states):
-                is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY)
+                is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING)
                 if is_at_work and _where(one.message) != _where(before.message):
                     failed_s = max(failed_s, one.t_s)
     surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s)
@@ -79,7 +79,7 @@ def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> I
         states = flight.said(AgentState, f"agent/{name}/state")
         if not states:
             yield Violation("the core finishes", flight.end_s, name, "it was never heard")
-        elif states[-1].message.mode is not Mode.FINISHED:
+        elif states[-1].message.mode not in (Mode.FINISHED, Mode.RETURNING, Mode.HOME):
             what = f"its last word is that it is in {states[-1].message.mode.value}"
             yield Violation("the core finishes", states[-1].t_s, name, what)
 
@@ -207,6 +207,7 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
     """What must hold beside that where nothing goes wrong."""
     yield from _asserted("no strip is served twice", assert_no_strip_served_twice, flight)
     yield from _asserted("no message is dropped", assert_no_message_dropped, flight)
+    yield from _asserted("vehicles come home", assert_home_before_empty, flight)
     gives_way_from_s = {
         one.vehicle: _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0
         for one in flight.run.vehicles

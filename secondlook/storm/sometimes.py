@@ -12,11 +12,13 @@ from comms.lockstep.group import LOST
 from comms.node import Received
 from comms.said.announcement import Role
 from comms.said.messages import (
+    AgentState,
     CoverageTile,
     Hotspot,
     HotspotState,
     Maneuver,
     MissionOver,
+    Mode,
     StripState,
     StripStatus,
     Task,
@@ -32,6 +34,7 @@ from coordinator.reasons import BEST, BEYOND, NADIR_GAP, RANGE_END
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.storm.witness import NOTED, Witness
 from secondlook.testing.flight import Flight
+from vehicle_agent.endurance import ON_ITS_WAY_HOME
 from vehicle_agent.revisit import BATTERY_TOO_LOW
 
 
@@ -62,8 +65,8 @@ class Seen:
 
     `reasons`: of changes of strips; `whys`: what makes a strip worth a second look; `moves`: from which state to which,
     None where it is new. `answers`, `words`: of helpers on strips, and their reasons. `again`: types of messages that
-    were said again as they were. `starts`: what happened to which node before the mission's end. `dropped`: for which
-    reasons messages were, `logged`: sentences.
+    were said again as they were. `modes`: of primaries and of helpers. `starts`: what happened to which node before the
+    mission's end. `dropped`: for which reasons messages were, `logged`: sentences.
     """
 
     def __init__(self, flight: Flight, witness: Witness) -> None:
@@ -77,6 +80,8 @@ class Seen:
         self.again: set[type] = set()
         self.hotspots: set[HotspotState] = set()
         self.is_merged = self.gives_old_back = False
+        self.modes: set[tuple[str, Mode]] = set()
+        self.is_empty = any(one.how == "empty" for one in flight.endings)
         self.dropped = set(flight.summary["dropped"])
         self.logged = set(witness.logged)
         self.noted = set(witness.noted)
@@ -120,6 +125,8 @@ class Seen:
             self.words.add(message.reason)
             if message.state is TaskState.DONE:
                 self._say(one, message.strip, one.sender)
+        elif isinstance(message, AgentState):
+            self.modes.add(("a primary" if one.vehicle in self.primaries else "a helper", message.mode))
         elif isinstance(message, CoverageTile):
             self._say(one, message.version)
         elif isinstance(message, Maneuver):
@@ -190,6 +197,7 @@ REFUSALS: Mapping[str, str] = MappingProxyType(
     {
         "a helper refuses: it has a strip": "at work on strip ",
         "a helper refuses: its battery is too low": BATTERY_TOO_LOW,
+        "a helper refuses: it has gone home": ON_ITS_WAY_HOME,
         "a primary refuses: it still surveys": "surveying",
         "a helper at a strip hears that the mission is over": "the mission is over",
     }
@@ -272,11 +280,17 @@ SOMETIMES: Mapping[str, Sign] = MappingProxyType(
     }
     | {f"a task: {action.value}": _holds("tasks", action) for action in TaskAction}
     | {f"an answer: {answer.value}": _holds("answers", answer) for answer in TaskState}
+    | {
+        f"{who} is {mode.value}": _holds("modes", (who, mode))
+        for who in ("a primary", "a helper")
+        for mode in (Mode.RETURNING, Mode.HOME)
+    }
     | {f"a hotspot is {state.value}": _holds("hotspots", state) for state in HotspotState}
     | {
         "a hotspot is merged into another": lambda seen: seen.is_merged,
         "a strip of a coordinator that is gone is given back": lambda seen: seen.gives_old_back,
         "a primary is not waited for any more": lambda seen: seen.is_given_up,
+        "a vehicle's battery runs empty": lambda seen: seen.is_empty,
         DISK_FULL: lambda seen: False,  # there is no flight to look at: the mission has failed
     }
 )

@@ -17,6 +17,7 @@ from secondlook.testing.flight import Flight, Heard
 from secondlook.testing.map_assertions import assert_maps_converged, assert_risk_at_most
 from secondlook.testing.mission_assertions import (
     assert_all_finished,
+    assert_home_before_empty,
     assert_kept_apart,
     assert_no_message_dropped,
     assert_repeats,
@@ -46,6 +47,7 @@ __all__ = [
     "NotRepeatedError",
     "RunFailedError",
     "assert_all_finished",
+    "assert_home_before_empty",
     "assert_kept_apart",
     "assert_maps_converged",
     "assert_never_assigned_to_lost",

@@ -121,15 +121,20 @@ def test_plan_of_a_scenario_as_geojson_lies_where_the_scenario_does(secondlook: 
 def test_a_survey_that_outlasts_its_battery_is_told(
     secondlook: SecondLook, write: Callable[[str], str], valid_text: str
 ) -> None:
-    # Three tracks of 400 m take 800 s; with the way to the first and two turns it is more than 900.
+    # Three tracks of 400 m take 800 s; with the way to the first and two turns it is more than 900. Home is 400 m
+    # and more from where the first and the third end.
     name = write(valid_text.replace("endurance_s: 36000", "endurance_s: 900"))
-    told = re.compile(r"primary: its survey takes (\d+) s, longer than its endurance_s of 900\n")
+    told = re.compile(
+        r"primary: its survey takes (\d+) s and (\d+) s home, longer than its endurance_s of 900 less 100 to spare; "
+        r"it will go home after 1 of 3 tracks\n"
+    )
     for command in ("check", "plan"):
         code, _, err = secondlook(command, name)
         match = told.fullmatch(err)
         assert code == 0
         assert match is not None
         assert int(match[1]) > 900
+        assert int(match[2]) > 400 / 1.5
 
 
 @pytest.mark.parametrize(

@@ -98,7 +98,7 @@ class TestPaths:
         summary = stream.metrics.summary()["vehicles"]
         assert (summary[PRIMARY]["tracks"], summary[PRIMARY]["r_adpt_m"]) == (2, [138, 120])
         assert summary[PRIMARY]["r_eff_m"] == [130, 129]
-        assert summary[HELPER].keys() == {"role", "path_m", "ended_s"}
+        assert summary[HELPER].keys() == {"role", "path_m", "ended", "ended_s", "battery_left"}
         assert (summary[PRIMARY]["role"], summary[HELPER]["role"]) == ("survey", "revisit")
 
     def test_a_primary_ends_when_it_says_so_first_others_with_their_last_state(self) -> None:

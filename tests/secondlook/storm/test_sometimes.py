@@ -155,6 +155,8 @@ ROWS = {
     "it vanishes": ("a helper that has a strip is lost",),
     "it comes back": ("a helper is at a strip after all", "two starts of a vehicle tell of one tile"),
     "its battery does not last": ("a helper refuses: its battery is too low",),
+    "a battery does not last for the next track": ("a primary is returning", "a primary is home", "a helper is home"),
+    "a battery runs empty": ("a vehicle's battery runs empty",),
     "a word about a strip is repeated": ("a word about a strip comes after a newer one, or again",),
     "a message is damaged on its way": ("a message is malformed", "a damaged message is dropped"),
     "a primary vanishes, or stands still": ("a primary is not waited for any more",),

@@ -1,0 +1,78 @@
+"""The way home against ways that are measured by hand, and against Dubins' shortest path to the pose of arrival."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from planner.dubins import Pose, shortest_path
+from planner.sweep import pass_over
+from planner.way_home import WayHome
+
+NORTH, EAST, SOUTH = 0.0, math.pi / 2, math.pi
+WAY = WayHome((0.0, 0.0), speed_mps=2.0, turn_radius_m=10.0)
+
+
+class TestByHand:
+    def test_straight_ahead(self) -> None:
+        assert WAY.from_pose(Pose(0, -100, NORTH)) == pytest.approx((50.0, NORTH))
+
+    def test_right_behind_it_turns_until_it_heads_there(self) -> None:
+        # The circle's centre lies 10 m beside it, and 100 m from the line's end: the tangent is sqrt(100^2 + 10^2 -
+        # 10^2) = 100 m long, and lies atan(10 / 100) twice beyond half a turn.
+        turn_rad = math.pi + 2 * math.atan(10 / 100)
+        time_s, heading_rad = WAY.from_pose(Pose(0, -100, SOUTH))
+        assert time_s == pytest.approx((10 * turn_rad + 100) / 2)
+        assert min(heading_rad, 2 * math.pi - heading_rad) == pytest.approx(2 * math.atan(10 / 100))
+
+    def test_abeam_to_either_side_it_turns_there(self) -> None:
+        # To port: the centre is 30 m short of home, the tangent sqrt(30^2 - 10^2) long.
+        tangent_m = math.sqrt(30**2 - 10**2)
+        to_port = 10 * (math.pi / 2 + math.atan(10 / tangent_m)) + tangent_m
+        for x_m in (40.0, -40.0):
+            assert WAY.from_pose(Pose(x_m, 0, NORTH))[0] == pytest.approx(to_port / 2)
+
+    def test_who_is_there_has_no_way(self) -> None:
+        assert WAY.from_pose(Pose(0.01, 0, SOUTH))[0] == 0.0
+
+    def test_many_at_once_are_as_one_by_one(self) -> None:
+        poses = np.array([[40.0, 0.0, NORTH], [0.0, -100.0, SOUTH], [0.0, 0.0, EAST], [3.0, 4.0, EAST]])
+        assert WAY.times_s(poses).tolist() == [WAY.from_pose(Pose(*pose))[0] for pose in poses.tolist()]
+
+
+@given(st.floats(-200, 200), st.floats(-200, 200), st.floats(0, 6.28))
+def test_a_vehicle_sent_to_the_pose_of_arrival_takes_as_long(x_m: float, y_m: float, heading_rad: float) -> None:
+    pose = Pose(x_m, y_m, heading_rad)
+    time_s, arrival_rad = WAY.from_pose(pose)
+    if math.hypot(x_m, y_m) > 1:
+        there = shortest_path(pose, Pose(0, 0, arrival_rad), 10.0)
+        assert there.length_m <= 2 * time_s + 1e-3
+        assert math.hypot(x_m, y_m) <= 2 * time_s + 1e-9
+        if math.hypot(x_m, y_m) > 40:  # nearer by, three turns may be shorter than a turn and a straight
+            assert there.length_m == pytest.approx(2 * time_s, abs=1e-3)
+
+
+class TestPassesWithin:
+    # Tracks of 100 m along the meridian, 40 m apart, flown there and back: a pass takes 50 s, a turn between two
+    # pi * 10 m + 20 m, 25.7 s.
+    PASSES = (
+        pass_over((0, 0), (0, 100), 0.0),
+        pass_over((40, 100), (40, 0), 0.0),
+        pass_over((80, 0), (80, 100), 0.0),
+    )
+    TURN_S = (math.pi * 10 + 20) / 2
+
+    @pytest.mark.parametrize("short_s", [-0.1, 0.1])
+    @pytest.mark.parametrize("count", [1, 2, 3])
+    def test_as_many_as_leave_time_to_come_home(self, count: int, short_s: float) -> None:
+        way_s = 50 * count + self.TURN_S * (count - 1)
+        time_s = way_s + WAY.from_pose(self.PASSES[count - 1].end)[0]
+        within = WAY.passes_within(Pose(0, 0, NORTH), self.PASSES, time_s - short_s)
+        assert within == (count if short_s < 0 else count - 1)
+
+    def test_of_none_none(self) -> None:
+        assert WAY.passes_within(Pose(0, 0, NORTH), (), 0.0) == 0

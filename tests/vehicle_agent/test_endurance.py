@@ -1,0 +1,51 @@
+"""What a battery is reckoned to last for, by hand; and an agent of a vehicle that is told of it."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from planner.dubins import Pose
+from planner.sweep import pass_over
+from planner.way_home import WayHome
+from vehicle_agent.config import Homing
+from vehicle_agent.endurance import Endurance
+
+NORTH = 0.0
+# 1000 s at 2 m/s, of which 100 s are kept; home is 600 m to the north of the origin.
+LASTS = Endurance(1_000_000, Homing(WayHome((0, 600), speed_mps=2.0, turn_radius_m=10.0), reserve_ms=100_000))
+FOR_EVER = Endurance(1_000_000, None)
+
+
+def test_the_share_that_is_left_falls_evenly_and_stays_where_the_vehicle_lies() -> None:
+    endurance = Endurance(1_000_000, None)
+    assert [endurance.left(now_ms) for now_ms in (0, 250_000, 1_000_000, 2_000_000)] == [1.0, 0.75, 0.0, 0.0]
+    endurance.rest(250_000)
+    assert endurance.left(900_000) == 0.75
+
+
+@pytest.mark.parametrize(("at_ms", "lasts"), [(600_000, True), (600_001, False)])
+def test_it_lasts_from_a_place_if_it_is_home_with_its_reserve(at_ms: int, lasts: bool) -> None:
+    assert LASTS.lasts_from(Pose(0, 0, NORTH), at_ms) is lasts  # 300 s home, at 900 s
+    assert FOR_EVER.lasts_from(Pose(0, 0, NORTH), at_ms)
+
+
+def test_nothing_is_begun_that_leaves_less_than_ten_seconds_beside() -> None:
+    passes = [pass_over((0, 0), (0, 100), 0.0), pass_over((0, 100), (0, 200), 0.0)]
+    # Each takes 50 s towards home: 300 s in all for both and home from there.
+    for now_ms, count in ((589_999, 2), (590_001, 0)):
+        assert LASTS.lasts_for(Pose(0, 0, NORTH), passes, now_ms) == count
+    away = [pass_over((0, 0), (0, -100), 0.0)]
+    assert LASTS.lasts_for(Pose(0, 0, math.pi), away, 400_000) == 1
+    assert LASTS.lasts_for(Pose(0, 0, math.pi), away, 520_000) == 0
+    assert FOR_EVER.lasts_for(Pose(0, 0, NORTH), passes, 10**9) == 2
+
+
+def test_who_waits_goes_home_while_it_may_circle_once_more() -> None:
+    circle_ms = round(2 * math.pi * 10 / 2 * 1000)
+    latest_ms = 600_000 - 10_000 - circle_ms
+    here = Pose(0, 0, NORTH)
+    assert [LASTS.is_low(here, now_ms, circles=True) for now_ms in (latest_ms, latest_ms + 1)] == [False, True]
+    assert [LASTS.is_low(here, now_ms, circles=False) for now_ms in (600_000, 600_001)] == [False, True]
+    assert not FOR_EVER.is_low(here, 10**9, circles=True)
