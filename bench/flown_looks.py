@@ -76,14 +76,15 @@ class _Body:
     def __init__(self, world: WorldConfig, config: VehicleConfig) -> None:
         exact = replace(config, sensor=replace(config.sensor, noise_cell=0.0, noise_track=0.0))
         self._footprint = footprint_of(config.sensor.shape)
-        self._vehicle = SimulatedVehicle(config, world.seed)
+        current = make_current(world.current, world.seed)
+        self._vehicle = SimulatedVehicle(config, world.seed, current)
         self._looks = Looks(
             exact,
             sonar=config.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed), config.vehicle),
             targets=Targets(world.area, 0, 0),
             recogniser=Recogniser(config.sensor.curve, false_alarms_per_km2=0),
             seed=world.seed,
-            current=make_current(world.current, world.seed),
+            current=current,
         )
 
     def true_look(self, look: Look, maneuver: Maneuver, passed_ms: int) -> Look:

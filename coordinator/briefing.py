@@ -8,7 +8,7 @@ from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Counted
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.vehicles import KnownVehicle
+from coordinator.vehicles import KnownVehicle, sailing_of
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.types import Strip
@@ -86,7 +86,7 @@ class Briefing:
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
         open_strips = self._ledger.in_state(StripState.OPEN)
         sees = footprint_of(entry.sonar)
-        way_home = WayHome((entry.home_x_m, entry.home_y_m), entry.speed_mps, entry.turn_radius_m)
+        way_home = WayHome((entry.home_x_m, entry.home_y_m), sailing_of(entry), entry.turn_radius_m)
         return Helper(
             vehicle=entry.vehicle,
             pose=pose,

@@ -15,6 +15,7 @@ from coordinator.arrivals import Arrivals
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
+from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.risk import LevelArray
@@ -41,13 +42,24 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
         at_ms = max(at_ms, state.expected_end_ms)
         pose = pass_of(ahead[0], entry).end
         ahead = ahead[1:]
-        at_ms += round(entry.run_in_m / entry.speed_mps * 1000) if ahead else 0
+        run_out_s = sailing_of(entry).straight_s(entry.run_in_m, pose.heading_rad)
+        at_ms += round(run_out_s * 1000) if ahead else 0
     if not ahead:
         return at_ms
     passes = [pass_of(track, entry) for track in ahead]
     # The last track's run-out comes after its end.
-    way_m = distance_over(pose, passes, entry.turn_radius_m) - entry.run_in_m
-    return at_ms + round(way_m / entry.speed_mps * 1000)
+    sailing = sailing_of(entry)
+    if sailing.is_in_still_water:
+        takes_s = (distance_over(pose, passes, entry.turn_radius_m) - entry.run_in_m) / entry.speed_mps
+    else:
+        takes_s = sailing.passes_s(passes, entry.turn_radius_m, pose)
+        takes_s -= sailing.straight_s(entry.run_in_m, passes[-1].end.heading_rad)
+    return at_ms + round(takes_s * 1000)
+
+
+def sailing_of(entry: RosterVehicle) -> Sailing:
+    """What a vehicle makes good, as it is reckoned with."""
+    return Sailing(entry.speed_mps, entry.drift_mps, entry.set_rad, tidal=entry.is_tidal)
 
 
 def pass_of(track: PlannedTrack, entry: RosterVehicle) -> Pass:

@@ -152,15 +152,17 @@ class SettlingConfig:
 
 @dataclass(frozen=True)
 class CurrentConfig:
-    """A current towards the compass heading `toward_rad`. With `period_s` it flows to and fro, `speed_mps` at most."""
+    """A current towards the compass heading `set_rad`. With `period_s` it flows to and fro, at `drift_mps` at most.
+    `over_ground`: vehicles keep their speed over the ground; else that through the water."""
 
-    speed_mps: float
-    toward_rad: float
+    drift_mps: float
+    set_rad: float
     period_s: float | None = None
+    over_ground: bool = False
 
     def __post_init__(self) -> None:
-        _require(0.0 <= self.speed_mps <= 100.0, "speed_mps", self.speed_mps, "0 to 100")
-        _require(-7.0 <= self.toward_rad <= 7.0, "toward_rad", self.toward_rad, "-7 to 7")
+        _require(0.0 <= self.drift_mps <= 100.0, "drift_mps", self.drift_mps, "0 to 100")
+        _require(-7.0 <= self.set_rad <= 7.0, "set_rad", self.set_rad, "-7 to 7")
         _require(self.period_s is None or 1.0 <= self.period_s <= 1e7, "period_s", self.period_s, "1 to 1e7 s")
 
 
@@ -240,7 +242,7 @@ class WorldConfig:
         names = [vehicle.vehicle for vehicle in self.vehicles]
         _require(len(set(names)) == len(names), "vehicles", ", ".join(names), "different names")
         slowest_mps = min((vehicle.speed_mps for vehicle in self.vehicles), default=math.inf)
-        holds = self.current is None or self.current.speed_mps < slowest_mps
+        holds = self.current is None or self.current.drift_mps < slowest_mps
         _require(holds, "current", self.current, f"slower than every vehicle, {slowest_mps:g} m/s")
 
 

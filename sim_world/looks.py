@@ -3,16 +3,18 @@ the truth behind it."""
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from comms.node import random_stream
-from comms.said.messages import Look, LookContact, TruthLook
-from planner.types import FloatArray, Point
+from comms.said.messages import Look, LookContact, Maneuver, TruthLook
+from planner.types import BoolArray, FloatArray, Point
 from sim_world.config import VehicleConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
 from sim_world.sonar import HIGHEST_P_DETECT, SonarModel
-from sim_world.steadiness import STILL_WATER, Current, Steadiness
+from sim_world.steadiness import STILL_WATER, Steadiness, Stream
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import Stretch
 
@@ -86,7 +88,7 @@ class Looks:
         targets: Targets,
         recogniser: Recogniser,
         seed: int,
-        current: Current = STILL_WATER,
+        current: Stream = STILL_WATER,
     ) -> None:
         self._config = config
         self._sonar = sonar
@@ -118,9 +120,8 @@ class Looks:
             stretch.bins,
             (sensor.along_bin_m, sensor.range_bin_m),
         )
-        run_in_m = maneuver.run_in_m
-        truly = self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), run_in_m, time_s)
-        contacts, truth = self._targets_passed(swath, run_in_m, time_s)
+        truly = self._p_detect(swath, swath.along_m, swath.lateral_m, swath.cell_centres(), maneuver, time_s)
+        contacts, truth = self._targets_passed(swath, maneuver, time_s)
         if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
             contacts += self._recogniser.false_alarms(swath, self._stream("false_alarms", self._looks))
         contacts = sorted(contacts, key=lambda contact: contact.score, reverse=True)[:MOST_CONTACTS]
@@ -142,12 +143,12 @@ class Looks:
         return look, truth
 
     def _targets_passed(
-        self, swath: Swath, run_in_m: float, time_s: float
+        self, swath: Swath, maneuver: Maneuver, time_s: float
     ) -> tuple[list[LookContact], TruthLook | None]:
         passed = self._targets.passed(swath)
         if not passed.numbers.size:
             return [], None
-        p_detect = self._p_detect(swath, passed.along_m, passed.lateral_m, (passed.x_m, passed.y_m), run_in_m, time_s)
+        p_detect = self._p_detect(swath, passed.along_m, passed.lateral_m, (passed.x_m, passed.y_m), maneuver, time_s)
         seen = p_detect > 0.0
         if not seen.any():
             return [], None
@@ -167,13 +168,18 @@ class Looks:
         along_m: FloatArray,
         lateral_m: FloatArray,
         position_m: tuple[FloatArray, FloatArray],
-        run_in_m: float,
+        maneuver: Maneuver,
         time_s: float,
     ) -> FloatArray:
         range_m, bearing_rad = swath.range_m(along_m, lateral_m), swath.bearing_rad(along_m, lateral_m)
+        sees: BoolArray | None = None
+        if self._steadiness.shears_looks:
+            crab_rad = self._steadiness.crab_rad(swath.heading_rad, time_s)
+            track_m = math.hypot(maneuver.end_x_m - maneuver.start_x_m, maneuver.end_y_m - maneuver.start_y_m)
+            range_m, bearing_rad, sees = swath.askew(along_m, lateral_m, crab_rad, track_m)
         p_detect = self._sonar.p_detect(range_m, bearing_rad, self._config.altitude_m, position_m, time_s)
-        left = self._steadiness.factor(run_in_m + swath.seen_from_m(along_m), swath.heading_rad, time_s)
-        return p_detect * left
+        left = self._steadiness.factor(maneuver.run_in_m + swath.seen_from_m(along_m), swath.heading_rad, time_s)
+        return p_detect * left if sees is None else np.where(sees, p_detect * left, 0.0)
 
     def _stream(self, name: str, number: int) -> np.random.Generator:
         return random_stream(self._seed, "world", self._config.vehicle, name, str(number))

@@ -1,4 +1,5 @@
-"""How a vehicle moves: in closed form, at one speed, along arcs and straights no tighter than its turn radius."""
+"""How a vehicle moves: at one speed, along arcs and straights no tighter than its turn radius; in closed form, but
+where a current carries it."""
 
 from __future__ import annotations
 
@@ -8,6 +9,7 @@ from bisect import bisect_right
 from dataclasses import dataclass
 from typing import Protocol
 
+from planner.currents import Current, made_good_mps
 from planner.dubins import Pose, shortest_path
 from planner.types import Point
 
@@ -79,7 +81,9 @@ class Path:
 
     def pose_at(self, time_ms: int) -> Pose:
         """The pose at a time from `start_ms`."""
-        distance_m = self.distance_at(time_ms)
+        return self._pose_after(self.distance_at(time_ms))
+
+    def _pose_after(self, distance_m: float) -> Pose:
         number = bisect_right(self._starts_m, distance_m) - 1
         return self._legs[number].pose_at(distance_m - self._starts_m[number])
 
@@ -92,6 +96,59 @@ class Path:
         distance_m = self.distance_at(time_ms)
         left = (end - distance_m for start, end in self._held_m if start - ROUNDING_M <= distance_m < end)
         return max(left, default=0.0)
+
+
+STEP_OF_RADIUS = 0.1
+"""A vehicle that is carried by a current turns by no more a step."""
+
+
+class CarriedPath(Path):
+    """A path in a current: the vehicle swims at `speed_mps`, keeps the path by crabbing, and makes good what the stream
+    leaves it. Its way over time is summed up step by step, as far as it is asked for."""
+
+    def __init__(
+        self,
+        start_ms: int,
+        speed_mps: float,
+        legs: list[Leg],
+        held_m: list[tuple[float, float]],
+        current: Current,
+        step_m: float,
+    ) -> None:
+        super().__init__(start_ms, speed_mps, legs, held_m)
+        self._current = current
+        self._step_m = step_m
+        self._times_s = [0.0]
+
+    def distance_at(self, time_ms: int) -> float:
+        """How far along the path the vehicle is."""
+        time_s = (time_ms - self.start_ms) / 1000.0
+        while self._times_s[-1] <= time_s:
+            self._go_on()
+        step = bisect_right(self._times_s, time_s) - 1
+        since_s, took_s = time_s - self._times_s[step], self._times_s[step + 1] - self._times_s[step]
+        return self._step_m * (step + since_s / took_s)
+
+    def time_ms(self, distance_m: float) -> int:
+        """When the vehicle has come so far, rounded up to the millisecond."""
+        step = int(distance_m / self._step_m)
+        while len(self._times_s) < step + 2:
+            self._go_on()
+        share = distance_m / self._step_m - step
+        time_s = self._times_s[step] + share * (self._times_s[step + 1] - self._times_s[step])
+        return self.start_ms + math.ceil(time_s * 1000.0 - ROUNDING_MS)
+
+    def made_good_mps(self, distance_m: float, time_s: float) -> float:
+        """The speed over the ground at a distance from the start, so long after it."""
+        course_rad = self._pose_after(distance_m).heading_rad
+        flow_mps = self._current.flow_mps(self.start_ms / 1000.0 + time_s)
+        return made_good_mps(course_rad, self.speed_mps, flow_mps)
+
+    def _go_on(self) -> None:
+        """A step more, at the speed in its middle."""
+        distance_m, time_s = self._step_m * (len(self._times_s) - 1), self._times_s[-1]
+        half_s = self._step_m / 2 / self.made_good_mps(distance_m, time_s)
+        self._times_s.append(time_s + self._step_m / self.made_good_mps(distance_m + self._step_m / 2, time_s + half_s))
 
 
 @dataclass(frozen=True)
@@ -112,22 +169,25 @@ class Motion:
 
     It waits at its start pose until the first manoeuvre. After a manoeuvre it loiters: a circle to starboard of the
     turn radius. A new manoeuvre replaces the one under way from the pose of that moment, except that the run-out of a
-    track that is done is sailed to its end first, so that the sonar stays straight to the end of the swath.
+    track that is done is sailed to its end first, so that the sonar stays straight to the end of the swath. In a
+    `current` it keeps its speed through the water; its turns are as wide over the ground. Where it lies it lies.
     """
 
-    def __init__(self, start: Pose, *, speed_mps: float, turn_radius_m: float) -> None:
+    def __init__(self, start: Pose, *, speed_mps: float, turn_radius_m: float, current: Current | None = None) -> None:
         self._start = start._replace(heading_rad=compass_rad(start.heading_rad))
         self._speed_mps = speed_mps
         self._turn_radius_m = turn_radius_m
+        self._current = current
         self._path: Path | None = None
 
     def pose_at(self, time_ms: int) -> Pose:
         """The pose at a time not before the last manoeuvre's start."""
         return self._start if self._path is None else self._path.pose_at(time_ms)
 
-    @property
-    def speed_mps(self) -> float:
-        """The speed since the last manoeuvre's start: 0 before the first, and where it lies still."""
+    def speed_mps(self, time_ms: int) -> float:
+        """The speed over the ground: 0 before the first manoeuvre, and where it lies still."""
+        if isinstance(self._path, CarriedPath):
+            return self._path.made_good_mps(self._path.distance_at(time_ms), (time_ms - self._path.start_ms) / 1000.0)
         return 0.0 if self._path is None else self._speed_mps
 
     def stop(self, now_ms: int) -> None:
@@ -196,7 +256,12 @@ class Motion:
 
     def _sail(self, legs: list[Leg], held_m: list[tuple[float, float]], now_ms: int) -> Path:
         last = legs[-1].pose_at(legs[-1].length_m) if legs else self.pose_at(now_ms)
-        self._path = Path(now_ms, self._speed_mps, [*legs, Loiter(last, self._turn_radius_m)], held_m)
+        legs = [*legs, Loiter(last, self._turn_radius_m)]
+        if self._current is None:
+            self._path = Path(now_ms, self._speed_mps, legs, held_m)
+        else:
+            step_m = STEP_OF_RADIUS * self._turn_radius_m
+            self._path = CarriedPath(now_ms, self._speed_mps, legs, held_m, self._current, step_m)
         return self._path
 
 

@@ -14,6 +14,7 @@ from planner.types import Point
 from planner.way_home import THERE_M
 from sim_world.config import FARTHEST_M, VehicleConfig
 from sim_world.motion import FollowedTrack, Motion, bearing_rad
+from sim_world.steadiness import STILL_WATER, Stream
 
 TRACK_ROUNDING_M = 0.02
 """Two ends in whole centimetres make a track up to 1.5 cm too long; no bin is added for that."""
@@ -41,7 +42,7 @@ class SimulatedVehicle:
     is empty it lies where it is, and says so.
     """
 
-    def __init__(self, config: VehicleConfig, seed: int) -> None:
+    def __init__(self, config: VehicleConfig, seed: int, current: Stream = STILL_WATER) -> None:
         self.config = config
         self._error_rad, self._drift_rad = (
             random_stream(seed, "world", config.vehicle, name).uniform(0.0, 2 * math.pi)
@@ -51,6 +52,7 @@ class SimulatedVehicle:
             Pose(config.start_x_m, config.start_y_m, config.start_heading_rad),
             speed_mps=config.speed_mps,
             turn_radius_m=config.turn_radius_m,
+            current=current if current.carries else None,
         )
         self._to_come: deque[tuple[int, Event]] = deque()
         self._home = (config.start_x_m, config.start_y_m) if config.home is None else config.home
@@ -77,7 +79,7 @@ class SimulatedVehicle:
     def nav(self, now_ms: int) -> Nav:
         """Where it believes it is."""
         pose = self._motion.pose_at(now_ms)
-        return Nav(*pose, self._motion.speed_mps, self.config.altitude_m, self.sigma_at(now_ms))
+        return Nav(*pose, self._motion.speed_mps(now_ms), self.config.altitude_m, self.sigma_at(now_ms))
 
     def truth(self, now_ms: int) -> TruthPose:
         """Where it is."""

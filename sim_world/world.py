@@ -11,7 +11,7 @@ from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
 from sim_world.sonar import Seabed
-from sim_world.steadiness import Current, make_current
+from sim_world.steadiness import Stream, make_current
 from sim_world.targets import Recogniser, Targets
 from sim_world.vehicle import SimulatedVehicle
 
@@ -20,9 +20,9 @@ class Body:
     """A vehicle of a world, with the keys under which it speaks."""
 
     def __init__(
-        self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, current: Current, targets: Targets
+        self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, current: Stream, targets: Targets
     ) -> None:
-        self._vehicle = SimulatedVehicle(config, world.seed)
+        self._vehicle = SimulatedVehicle(config, world.seed, current)
         sensor = config.sensor
         self._looks = Looks(
             config,

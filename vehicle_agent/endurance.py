@@ -33,9 +33,11 @@ class Endurance:
             now_ms = min(now_ms, self._rests_ms)
         return max(0.0, 1.0 - now_ms / self._endurance_ms)
 
-    def takes_ms(self, length_m: float) -> int:
-        """How long so many metres take where that counts, as the vehicle must come home; else 0."""
-        return 0 if self.homing is None else round(length_m / self.homing.way.speed_mps * 1000)
+    def run_out_ms(self, one: Pass, run_in_m: float) -> int:
+        """How long the run-out of a pass takes where that counts, as the vehicle must come home; else 0."""
+        if self.homing is None:
+            return 0
+        return round(self.homing.way.sailing.straight_s(run_in_m, one.end.heading_rad) * 1000)
 
     def lasts_from(self, pose: Pose, at_ms: int, margin_ms: int = 0) -> bool:
         """Whether the vehicle comes home with its reserve, and a margin, from a pose in which it is at a time."""
@@ -57,5 +59,6 @@ class Endurance:
         if self.homing is None:
             return False
         way = self.homing.way
-        wait_ms = MARGIN_MS + self.takes_ms(2 * math.pi * way.turn_radius_m) if circles else 0
+        circle_s = 2 * math.pi * way.turn_radius_m / way.sailing.slowest_mps
+        wait_ms = MARGIN_MS + round(circle_s * 1000) if circles else 0
         return not self.lasts_from(pose, now_ms, wait_ms)

@@ -8,8 +8,10 @@ import math
 from comms.said.announcement import RunInfo
 from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
 from comms.said.topics import TASK_STATUS
+from planner.currents import Sailing
+from planner.dubins import Pose
 from planner.region import share_within
-from planner.sweep import Pass, length_over, shortest_sweep, sweeps_by
+from planner.sweep import Pass, Sweep, shortest_sweep, sweeps_by
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
@@ -30,6 +32,7 @@ class SecondLooks:
         self.config = config
         self.strip: Strip | None = None
         self._agent = agent
+        self._sailing = Sailing(config.speed_mps) if config.homing is None else config.homing.way.sailing
         self._rest = rest
         self._legs: list[Track] = []
         self._passes: list[Pass] = []
@@ -113,7 +116,9 @@ class SecondLooks:
             self._tell(strip.number, TaskState.REFUSED, 0, "it lies outside the area")
             return
         least_ms = round(
-            (strip.length_m + strip.width_m - agent.footprint.reach.strip_width_m) / config.speed_mps * 1000
+            (strip.length_m + strip.width_m - agent.footprint.reach.strip_width_m)
+            / (config.speed_mps + self._sailing.drift_mps)
+            * 1000
         )
         if agent.endurance.left(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
@@ -121,8 +126,8 @@ class SecondLooks:
         assert agent.pose is not None
         ways = sweeps_by(agent.footprint, strip, config.turn_radius_m, config.run_in_m)
         sweep, way_m = shortest_sweep(ways, agent.pose, config.turn_radius_m)
-        ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
-        free_ms = ends_ms + agent.endurance.takes_ms(config.run_in_m)
+        ends_ms = now_ms + self._takes_ms(sweep, agent.pose, way_m)
+        free_ms = ends_ms + agent.endurance.run_out_ms(sweep.passes[-1], config.run_in_m)
         if not agent.endurance.lasts_from(sweep.leave, free_ms, MARGIN_MS):
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
@@ -137,13 +142,22 @@ class SecondLooks:
         agent.follow(sweep.legs[0], config.run_in_m)
         agent.report_state(now_ms)
 
+    def _takes_ms(self, sweep: Sweep, pose: Pose, way_m: float) -> int:
+        """How long a sweep takes, with the way there from a pose, which is so long."""
+        config = self.config
+        if self._sailing.is_in_still_water:
+            return round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
+        run_out_s = self._sailing.straight_s(config.run_in_m, sweep.leave.heading_rad)
+        return round((self._sailing.passes_s(sweep.passes, config.turn_radius_m, pose) - run_out_s) * 1000)
+
     def _battery_lasts(self, leg_ends_ms: int) -> bool:
         """Whether it does for what is left of the sweep, if the present leg ends then."""
         config, endurance = self.config, self._agent.endurance
         if config.homing is None:
             return True
-        left_m = length_over(self._passes, config.turn_radius_m) - self._passes[0].length_m
-        free_ms = leg_ends_ms + endurance.takes_ms(config.run_in_m + left_m)
+        leg, *others = self._passes
+        left_s = self._sailing.passes_s(others, config.turn_radius_m, leg.end)
+        free_ms = leg_ends_ms + endurance.run_out_ms(leg, config.run_in_m) + round(left_s * 1000)
         return endurance.lasts_from(self._passes[-1].end, free_ms)
 
     def _give_back(self, number: int, now_ms: int) -> None:

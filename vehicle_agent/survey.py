@@ -111,8 +111,9 @@ class SurveyAgent(Agent):
             return
         self.expected_end_ms = status.ends_ms
         if status.state is ManeuverState.ACCEPTED:
-            free_ms = status.ends_ms + self.endurance.takes_ms(self.config.run_in_m)
-            if not self.endurance.lasts_from(self._pass(self.ahead[0]).end, free_ms):
+            one = self._pass(self.ahead[0])
+            free_ms = status.ends_ms + self.endurance.run_out_ms(one, self.config.run_in_m)
+            if not self.endurance.lasts_from(one.end, free_ms):
                 self.turn_home(now_ms)
         elif status.state is ManeuverState.ON_TRACK:
             self.mode = Mode.SURVEY
@@ -166,7 +167,7 @@ class SurveyAgent(Agent):
     def _end_track(self, now_ms: int) -> None:
         track = self.ahead.pop(0)
         self.flown.append(track)
-        self._run_out_ms = now_ms + self.endurance.takes_ms(self.config.run_in_m)
+        self._run_out_ms = now_ms + self.endurance.run_out_ms(self._pass(track), self.config.run_in_m)
         self._looked_to_m = None
         r_eff_m, curve = 0, UNSEEN
         if self._tally is not None:

@@ -18,6 +18,7 @@ from comms.said.wire import (
     Probability,
     Radians,
     Whole,
+    YesNo,
 )
 from planner.types import GridSpec, Point, SonarShape, SweepFrame
 
@@ -73,7 +74,8 @@ class RosterVehicle:
     `footprint`, `near_m`, `far_m`, `half_angle_rad`, `look_m`: what its sonar sees, see `planner.types.SonarShape`.
     `p_detect`: the mean P_d of a pass over the lateral ranges that it reaches, which a second look is expected to have.
     `endurance_ms`: how long its battery lasts from the mission's start. By its own reckoning it is home, at `home_x_m`,
-    `home_y_m`, `reserve_ms` before that.
+    `home_y_m`, `reserve_ms` before that. `drift_mps`, `set_rad`: of the current that it reckons with, slower than it is
+    through the water; `is_tidal`: it flows to and fro, so fast at most. 0 for one that keeps its speed over the ground.
     """
 
     vehicle: Identifier
@@ -91,6 +93,9 @@ class RosterVehicle:
     home_x_m: Metres = 0.0
     home_y_m: Metres = 0.0
     reserve_ms: Milliseconds = 0
+    drift_mps: MetresPerSecond = 0.0
+    set_rad: Radians = 0.0
+    is_tidal: YesNo = False
 
     @property
     def sonar(self) -> SonarShape:

@@ -151,9 +151,10 @@ class _Routes:
         to_begin_s, ways = table.shortest_from(np.vstack([[helper.free_at], table.leave.reshape(-1, 3)]))
         numbers = np.arange(len(considered))
         # From each of these to each strip: the time until it is free again, and from where it then sets out.
-        self._takes_s = to_begin_s + table.sonar_on_s[numbers, ways] + helper.run_in_m / helper.speed_mps
+        self._takes_s = to_begin_s + table.sonar_on_s[numbers, ways] + table.run_out_s[numbers, ways]
         self._then = 1 + table.leave.shape[1] * numbers + ways
         self._sweep_s = table.sonar_on_s[:, 0]
+        self._run_out_s = table.run_out_s[:, 0]
         self._home_s = table.home_s.max(axis=1)
         self._removable_m2 = table.worth_m2
 
@@ -182,7 +183,7 @@ class _Routes:
 
     def _score(self, strip: int | IntArray, free_s: FloatArray) -> FloatArray:
         """What is removed of strips by the deadline, discounted, for times at which the helper is free again."""
-        ends_s = free_s - self._helper.run_in_m / self._helper.speed_mps
+        ends_s = free_s - self._run_out_s[strip]
         share = np.clip((self._deadline_s - ends_s) / self._sweep_s[strip] + 1, 0.0, 1.0)
         worth = self._removable_m2[strip] * share * 0.5 ** ((ends_s - self._now_s) / HALF_LIFE_S)
         scores: FloatArray = np.where(ends_s + self._home_s[strip] <= self._helper.lasts_until_s, worth, 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordinator.allocate.situation import Helper, OpenStrip
-from planner.dubins import Pose, path_lengths_m
+from planner.dubins import Pose, path_lengths_m, shortest_path
 from planner.sweep import Sweep, shortest_sweep, sweeps_over
 from planner.types import FloatArray, Strip
 
@@ -38,16 +38,30 @@ def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
 def expected_service(one: OpenStrip, helper: Helper) -> Service:
     """The service of a strip from where and when a helper is free, flown the shortest way, as its agent does."""
     sweep, way_m = shortest_sweep(sweeps(one.strip, helper), helper.free_at, helper.turn_radius_m)
-    to_begin_s = (way_m + helper.run_in_m) / helper.speed_mps
-    sonar_on_s = (sweep.length_m - 2 * helper.run_in_m) / helper.speed_mps
+    run_out_s = helper.run_in_m / helper.speed_mps
+    if helper.sailing.is_in_still_water:
+        to_begin_s = (way_m + helper.run_in_m) / helper.speed_mps
+        sonar_on_s = (sweep.length_m - 2 * helper.run_in_m) / helper.speed_mps
+    else:
+        way = shortest_path(helper.free_at, sweep.entry, helper.turn_radius_m)
+        to_begin_s = helper.sailing.path_s(way) + helper.sailing.straight_s(helper.run_in_m, sweep.entry.heading_rad)
+        sonar_on_s = _sonar_on_s(sweep, helper)
+        run_out_s = helper.sailing.straight_s(helper.run_in_m, sweep.leave.heading_rad)
     begins_s = helper.free_s + to_begin_s
     ends_s = begins_s + sonar_on_s
     return Service(
         begins_s=begins_s,
         ends_s=ends_s,
         free_at=sweep.leave,
-        free_s=ends_s + helper.run_in_m / helper.speed_mps,
+        free_s=ends_s + run_out_s,
     )
+
+
+def _sonar_on_s(sweep: Sweep, helper: Helper) -> float:
+    """From the first run-in's end to the last run-out's beginning, in a current."""
+    sailing, headings_rad = helper.sailing, (sweep.entry.heading_rad, sweep.leave.heading_rad)
+    ends_s = sum(sailing.straight_s(helper.run_in_m, heading_rad) for heading_rad in headings_rad)
+    return sailing.passes_s(sweep.passes, helper.turn_radius_m) - ends_s
 
 
 def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: float) -> float:
@@ -64,8 +78,9 @@ class StripTable:
     repeated. All arrays have shape (strips, ways), poses a third axis of 3.
 
     `entry`, `leave`: the poses in which a way is begun, before its run-in, and left, behind its run-out. `sonar_on_s`:
-    from when its sonar goes on until all is seen. `home_s`: see `Helper.home_s`. `worth_m2`: what the strip's sweep
-    removes, shape (strips,); 0 for one that the helper is not to be offered.
+    from when its sonar goes on until all is seen; `run_out_s`: from then until it is free. `home_s`: see
+    `Helper.home_s`. `worth_m2`: what the strip's sweep removes, shape (strips,); 0 for one that the helper is not to be
+    offered.
     """
 
     def __init__(self, strips: Sequence[OpenStrip], helper: Helper) -> None:
@@ -79,13 +94,25 @@ class StripTable:
         length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
         self.home_s = helper.home_s(self.leave.reshape(-1, 3)).reshape(shape)
         self.sonar_on_s: FloatArray = (length_m - 2 * helper.run_in_m) / helper.speed_mps
+        if not helper.sailing.is_in_still_water:
+            on_s = [_sonar_on_s(one, helper) for way in filled for one in way]
+            self.sonar_on_s = np.array(on_s, dtype=np.float64).reshape(shape)
+        self.run_out_s = helper.run_in_s(self.leave[:, :, 2])
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
         self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 
     def to_begin_s(self, poses: FloatArray) -> FloatArray:
         """How long it is from poses, shape (n, 3), until the sonar goes on, shape (n, strips, ways)."""
         way_m = path_lengths_m(poses, self.entry.reshape(-1, 3), self.helper.turn_radius_m)
-        return (way_m.reshape(len(poses), *self.sonar_on_s.shape) + self.helper.run_in_m) / self.helper.speed_mps
+        way_m = way_m.reshape(len(poses), *self.sonar_on_s.shape)
+        sailing = self.helper.sailing
+        if sailing.is_in_still_water:
+            return (way_m + self.helper.run_in_m) / self.helper.speed_mps
+        # By the bearing of the entry: what turns make of it is told when it is offered.
+        east_m, north_m = (self.entry[:, :, axis] - poses[:, axis, np.newaxis, np.newaxis] for axis in (0, 1))
+        way_s = way_m / sailing.made_good_mps(np.arctan2(east_m, north_m))
+        to_begin_s: FloatArray = way_s + self.helper.run_in_s(self.entry[:, :, 2])
+        return to_begin_s
 
     def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
         """Of each strip the way that is shortest from poses, shape (n, 3), as an agent flies it: how long it is until
@@ -108,6 +135,6 @@ class StripTable:
         (to_begin_s,), (way,) = self.shortest_from(np.array([pose], dtype=np.float64))
         strips = np.arange(to_begin_s.size)
         begins_s, sonar_on_s = free_s + to_begin_s, self.sonar_on_s[strips, way]
-        ends_s = begins_s + sonar_on_s + self.helper.run_in_m / self.helper.speed_mps
+        ends_s = begins_s + sonar_on_s + self.run_out_s[strips, way]
         removed_m2 = self.removed_m2(begins_s[:, np.newaxis], deadline_s)
         return removed_m2[strips, way], ends_s, self.leave[strips, way]

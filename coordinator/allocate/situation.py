@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
+from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.types import FloatArray, Strip
 from planner.way_home import WayHome
@@ -51,12 +52,23 @@ class Helper:
     lead_m: float = 0.0
     way_home: WayHome | None = None
 
+    @property
+    def sailing(self) -> Sailing:
+        """What it makes good over the ground."""
+        return Sailing(self.speed_mps) if self.way_home is None else self.way_home.sailing
+
+    def run_in_s(self, headings_rad: FloatArray) -> FloatArray:
+        """How long run-ins and run-outs along headings take, same shape."""
+        if self.sailing.is_in_still_water:
+            return np.full(np.shape(headings_rad), self.run_in_m / self.speed_mps)
+        return self.run_in_m / self.sailing.made_good_mps(headings_rad)
+
     def home_s(self, poses: FloatArray) -> FloatArray:
         """How long its battery must last after sweeps: until it is home, where it must come home, from the poses in
         which it leaves them, behind the run-out; shape (n, 3). Shape (n,)."""
         if self.way_home is None:
             return np.zeros(len(poses))
-        return self.way_home.times_s(poses) + self.run_in_m / self.speed_mps
+        return self.way_home.times_s(poses) + self.run_in_s(poses[:, 2])
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,8 @@ import numpy as np
 
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan
-from coordinator.vehicles import pass_of
+from coordinator.vehicles import pass_of, sailing_of
+from planner.currents import Sailing
 from planner.dubins import DubinsPath, Pose, shortest_path
 from planner.sweep import Sweep, shifted
 from planner.types import FloatArray
@@ -51,13 +52,18 @@ class Course:
         return Course(self.first, np.concatenate([waiting, self.poses]), self.arrives_s + steps * STEP_S)
 
 
-def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, paths: Sequence[DubinsPath]) -> Course:
+def course(start: Pose, start_s: float, sailing: Sailing, turn_radius_m: float, paths: Sequence[DubinsPath]) -> Course:
     """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard; of paths
     that take longer than LONGEST_S no more than that."""
     first = math.ceil(start_s / STEP_S)
-    lasts_s = min(sum(path.length_m for path in paths) / speed_mps + AHEAD_S, LONGEST_S)
+    speed_mps, still = sailing.speed_mps, sailing.is_in_still_water
+    knots_s, knots_m = sailing.knots(() if still else paths)
+    sails_s = sum(path.length_m for path in paths) / speed_mps if still else float(knots_s[-1])
+    lasts_s = min(sails_s + AHEAD_S, LONGEST_S)
     times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
     way_m: FloatArray = speed_mps * (times_s - start_s)
+    if not still:
+        way_m = np.interp(times_s - start_s, knots_s, knots_m) + np.maximum(way_m - speed_mps * sails_s, 0.0)
     parts, done, done_m, pose = [], 0, 0.0, start
     for path in paths:
         to = int(np.searchsorted(way_m, done_m + path.length_m))
@@ -65,7 +71,7 @@ def course(start: Pose, start_s: float, speed_mps: float, turn_radius_m: float, 
         pose, done, done_m = path.pose_at(path.length_m), to, done_m + path.length_m
     circle = DubinsPath(pose, turn_radius_m, (1, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
     parts.append(circle.poses_at(way_m[done:] - done_m))
-    return Course(first, np.concatenate(parts), start_s + done_m / speed_mps)
+    return Course(first, np.concatenate(parts), start_s + (done_m / speed_mps if still else sails_s))
 
 
 def lying_still(pose: Pose, from_s: float) -> Course:
@@ -82,7 +88,8 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
     if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         # When the track ends is known more exactly than where the vehicle was last.
         end = pass_of(ahead.pop(0), entry).end
-        left_m = max(0.0, state.expected_end_ms / 1000 - heard_s) * entry.speed_mps + entry.run_in_m
+        left_s = max(0.0, state.expected_end_ms / 1000 - heard_s)
+        left_m = left_s / sailing_of(entry).straight_s(1.0, end.heading_rad) + entry.run_in_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
         left_m = survey_run_out_left_m(entry, plan, pose)
@@ -92,13 +99,13 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
         one = pass_of(track, entry)
         paths += [shortest_path(here, one.begin, radius_m), straight(one.begin, one.length_m, radius_m)]
         here = one.end
-    return course(pose, heard_s, entry.speed_mps, radius_m, paths)
+    return course(pose, heard_s, sailing_of(entry), radius_m, paths)
 
 
 def sweep_course(
     pose: Pose,
     start_s: float,
-    speed_mps: float,
+    sailing: Sailing,
     turn_radius_m: float,
     sweep: Sweep,
     *,
@@ -114,7 +121,7 @@ def sweep_course(
             here = begin
         paths.append(straight(here, math.dist(here[:2], end[:2]), turn_radius_m))
         here = end
-    return course(pose, start_s, speed_mps, turn_radius_m, paths)
+    return course(pose, start_s, sailing, turn_radius_m, paths)
 
 
 def straight(start: Pose, length_m: float, turn_radius_m: float) -> DubinsPath:

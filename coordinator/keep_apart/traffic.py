@@ -16,7 +16,7 @@ from coordinator.keep_apart.courses import (
     survey_run_out_left_m,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle
+from coordinator.vehicles import KnownVehicle, sailing_of
 from planner.dubins import DubinsPath, Pose, shortest_path
 from planner.footprints import footprint_of
 from planner.sweep import Sweep, shortest_sweep, sweeps_by
@@ -68,7 +68,7 @@ class Traffic:
         pose, start_s = self._here(vehicle, now_s, strip)
         entry, run_out_m = vehicle.entry, self._run_out_m(vehicle, pose)
         sweep = _sweep_from(pose, vehicle, other)
-        return sweep_course(pose, start_s, entry.speed_mps, entry.turn_radius_m, sweep, run_out_m=run_out_m), sweep
+        return sweep_course(pose, start_s, sailing_of(entry), entry.turn_radius_m, sweep, run_out_m=run_out_m), sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
@@ -76,13 +76,13 @@ class Traffic:
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
         way = shortest_path(end, _arrival(end, place), entry.turn_radius_m)
-        return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [run_out, way])
+        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out, way])
 
     def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
         """The course of a helper that leaves what it does and circles where it is."""
         pose, start_s = self._here(vehicle, now_s, strip)
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
-        return course(pose, start_s, entry.speed_mps, entry.turn_radius_m, [run_out])
+        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out])
 
     def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
         """A helper was sent to a strip."""
@@ -122,7 +122,7 @@ class Traffic:
             sweep = known.sweep if known and entered else _sweep_from(pose, vehicle, strip)
             run_out_m = 0.0 if entered else self._run_out_m(vehicle, pose)
             radius_m = entry.turn_radius_m
-            laid = sweep_course(pose, heard_s, entry.speed_mps, radius_m, sweep, entered=entered, run_out_m=run_out_m)
+            laid = sweep_course(pose, heard_s, sailing_of(entry), radius_m, sweep, entered=entered, run_out_m=run_out_m)
             known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
         if stage == 2:
             self._entered[entry.vehicle] = known.sweep
@@ -139,7 +139,7 @@ class Traffic:
                 run_out = self._run_out(vehicle, pose)
                 end = run_out.pose_at(run_out.length_m)
                 way = shortest_path(end, _arrival(end, (entry.home_x_m, entry.home_y_m)), entry.turn_radius_m)
-                laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [run_out, way])
+                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [run_out, way])
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
 
@@ -156,7 +156,7 @@ class Traffic:
             elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
                 laid = lying_still(pose, heard_s)
             else:
-                laid = course(pose, heard_s, entry.speed_mps, entry.turn_radius_m, [self._run_out(vehicle, pose)])
+                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [self._run_out(vehicle, pose)])
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
 

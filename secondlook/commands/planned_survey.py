@@ -17,10 +17,11 @@ from planner.dubins import Pose
 from planner.first_plan import FirstPlan
 from planner.footprints import footprint_of
 from planner.footprints.cells import seen_cells
-from planner.sweep import distance_over, pass_over
+from planner.sweep import pass_over
 from planner.types import Point, Track
-from planner.way_home import MARGIN_S, WayHome
+from planner.way_home import MARGIN_S
 from secondlook.errors import UserError
+from secondlook.fleet.roster import way_home_of
 from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
 from secondlook.launch.run_display import in_seconds
 from secondlook.recorded import GeographicOrigin
@@ -91,12 +92,12 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     lead_m = footprint_of(vehicle.sonar).lead_m
     passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
-    way_m = distance_over(start, passes, vehicle.turn_radius_m) - vehicle.run_in_m
-    homeward = WayHome(vehicle.home_m, vehicle.speed_mps, vehicle.turn_radius_m)
-    home_s = vehicle.run_in_m / vehicle.speed_mps + homeward.from_pose(passes[-1].end if passes else start)[0]
+    homeward, end = way_home_of(vehicle, scenario.current), passes[-1].end if passes else start
+    run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end.heading_rad)
+    home_s = run_out_s + homeward.from_pose(end)[0]
     lasts_for = homeward.passes_within(start, passes, vehicle.endurance_s - vehicle.kept_s - MARGIN_S)
     uncovered_share = float(missed.sum() / max(1, inside.sum()))
-    takes_s = way_m / vehicle.speed_mps
+    takes_s = homeward.sailing.passes_s(passes, vehicle.turn_radius_m, start) - run_out_s
     return PlannedSurvey(name, vehicle, heading_rad, plan, uncovered_share, takes_s, home_s, lasts_for)
 
 

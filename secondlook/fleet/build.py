@@ -15,12 +15,12 @@ from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
-from planner.way_home import WayHome
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
-from secondlook.fleet.roster import endurance_ms_of, reserve_ms_of, role_of, roster_vehicle
+from secondlook.fleet.roster import endurance_ms_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
 from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
 from secondlook.scenario import (
+    Current,
     PatchySeabed,
     RevisitVehicle,
     Scenario,
@@ -92,12 +92,12 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
             grid.rows,
         ),
         rho=scenario.mission.rho,
-        vehicles=tuple(roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
+        vehicles=tuple(roster_vehicle(name, vehicle, scenario.current) for name, vehicle in scenario.vehicles.items()),
         holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
     )
     Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
     roster = _roster_of(scenario, record=record)
-    specs = {name: _agent_spec(name, vehicle) for name, vehicle in scenario.vehicles.items()}
+    specs = {name: _agent_spec(name, vehicle, scenario.current) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
     if any(one.role is Role.WORLD for one in roster):
         specs = {WORLD: node_spec(Role.WORLD, _world_config(scenario)), **specs}
@@ -132,9 +132,9 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
     return tuple(Vertex(*corner) for corner in corners if corner in convex)
 
 
-def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
+def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle, current: Current | None) -> NodeSpec:
     footprint, endurance_ms = footprint_of(vehicle.sonar), endurance_ms_of(vehicle)
-    homing = Homing(WayHome(vehicle.home_m, vehicle.speed_mps, vehicle.turn_radius_m), reserve_ms_of(vehicle))
+    homing = Homing(way_home_of(vehicle, current), reserve_ms_of(vehicle))
     revisit = RevisitConfig(
         vehicle=name,
         footprint=footprint,
@@ -179,7 +179,9 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         targets=TargetsConfig(scenario.targets.count),
         current=None
         if current is None
-        else CurrentConfig(current.speed_mps, math.radians(current.toward_deg), current.period_s),
+        else CurrentConfig(
+            current.drift_mps, math.radians(current.set_deg), current.period_s, over_ground=current.keeps == "ground"
+        ),
     )
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from comms.said.announcement import Role, RosterVehicle
+from planner.currents import Sailing
 from planner.footprints import footprint_of
-from secondlook.scenario import RevisitVehicle, SurveyVehicle
+from planner.way_home import WayHome
+from secondlook.scenario import Current, RevisitVehicle, SurveyVehicle
 
 
-def roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> RosterVehicle:
+def roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle, current: Current | None = None) -> RosterVehicle:
     """A vehicle as it is announced."""
+    sailing = sailing_of(vehicle, current)
     sonar = vehicle.sonar
     return RosterVehicle(
         vehicle=name,
@@ -28,6 +33,9 @@ def roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> Roster
         home_x_m=vehicle.home_m[0],
         home_y_m=vehicle.home_m[1],
         reserve_ms=reserve_ms_of(vehicle),
+        drift_mps=sailing.drift_mps,
+        set_rad=sailing.set_rad,
+        is_tidal=sailing.tidal,
     )
 
 
@@ -49,6 +57,19 @@ def endurance_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
 def reserve_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
     """How long it is still to last when the vehicle comes home."""
     return round(vehicle.kept_s * 1000)
+
+
+def sailing_of(vehicle: SurveyVehicle | RevisitVehicle, current: Current | None) -> Sailing:
+    """What it makes good in a current, as it is reckoned with."""
+    if current is None or current.keeps == "ground":
+        return Sailing(vehicle.speed_mps)
+    tidal = current.period_s is not None
+    return Sailing(vehicle.speed_mps, current.drift_mps, math.radians(current.set_deg), tidal=tidal)
+
+
+def way_home_of(vehicle: SurveyVehicle | RevisitVehicle, current: Current | None) -> WayHome:
+    """Its way home, as it is reckoned with."""
+    return WayHome(vehicle.home_m, sailing_of(vehicle, current), vehicle.turn_radius_m)
 
 
 def role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:

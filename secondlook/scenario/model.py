@@ -127,16 +127,19 @@ class PatchySeabed(Mapping):
 
 
 class Current(Mapping):
-    """A current, everywhere alike. Every simulated vehicle is faster: it keeps its track and its speed over the ground,
-    and crabs. What that does to its sonar, `sensor.half_at_crab_deg` tells."""
+    """A current, everywhere alike. Every vehicle is faster: it keeps its track by crabbing. What that does to its sonar
+    besides, `sensor.half_at_crab_deg` tells."""
 
-    speed_mps: Speed
-    """How fast the water flows, at most."""
-    toward_deg: Heading
+    set_deg: Heading
     """Compass heading towards which it flows."""
+    drift_mps: Speed
+    """How fast the water flows, at most."""
     period_s: Annotated[float, Field(ge=1, le=1e7)] | None = None
     """With a period it flows to and fro, as in a seiche or a tide, and when it is slack is drawn from the seed. Left
     out, it is steady."""
+    keeps: Literal["water", "ground"] = "water"
+    """Of which kind the speed is that vehicles keep: through the `water`, so that with the stream they make good more
+    than against it, or over the `ground`, whatever that takes."""
 
 
 class Targets(Mapping):
@@ -232,8 +235,8 @@ class Scenario(Mapping):
         current = info.data.get("current")
         if current is not None:
             for key, vehicle in vehicles.items():
-                if vehicle.body == "simulated" and vehicle.speed_mps <= current.speed_mps:
-                    raise refused(f"must be faster than the current, {current.speed_mps:g} m/s, but {key} is not")
+                if vehicle.speed_mps <= current.drift_mps:
+                    raise refused(f"must be faster than the current, {current.drift_mps:g} m/s, but {key} is not")
         return vehicles
 
     @field_validator("vehicles")

@@ -43,7 +43,7 @@ def draw_fleet(number: int) -> Scenario:
         "targets": {"count": rng.choice((0, 20, 60))},
         "vehicles": vehicles,
         "coordinator": _coordinator(rng),
-        **({"current": {"speed_mps": _m(rng.uniform(0.1, 1)), "toward_deg": 45.0}} if rng.random() < 0.1 else {}),
+        **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
     if rng.random() < 0.15:  # for less than its survey, perhaps
         vehicles[rng.choice(list(vehicles)[:primaries])]["endurance_s"] = _m(rng.uniform(0.2, 1) * _LONGEST_S)

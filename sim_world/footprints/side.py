@@ -38,6 +38,15 @@ class SideSwath(Swath):
         """Abeam."""
         return self.heading_rad + np.copysign(math.pi / 2, lateral_m)
 
+    def askew(
+        self, along_m: FloatArray, lateral_m: FloatArray, crab_rad: float, track_m: float
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Abeam of the bow: on the side from which the stream comes farther ahead, and nowhere as far to the side. Of
+        what lies beside the track's ends it passes some before its sonar is on, or after."""
+        passed_at_m = along_m + lateral_m * math.tan(crab_rad)
+        seen = (passed_at_m >= 0.0) & (passed_at_m <= track_m)
+        return np.abs(lateral_m) / math.cos(crab_rad), self.bearing_rad(along_m, lateral_m) + crab_rad, seen
+
     def area_m2(self, near_m: float, far_m: float) -> float:
         """Both sides together."""
         return 2.0 * (far_m - near_m) * (self.end_along_m - self.first_along_m)

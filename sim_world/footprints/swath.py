@@ -64,6 +64,13 @@ class Swath(ABC):
         """P_d of the cells, 0 where they are not seen."""
         return np.where(self.sees(self.along_m, self.lateral_m), p_detect, 0.0)
 
+    def askew(
+        self, along_m: FloatArray, lateral_m: FloatArray, crab_rad: float, track_m: float
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Range and bearing of places for a vehicle that crabs, and whether it sees them from its track of `track_m` at
+        all. `crab_rad`: how far its bow points off the track, to starboard above 0. Here it makes no difference."""
+        return self.range_m(along_m, lateral_m), self.bearing_rad(along_m, lateral_m), np.array(True)
+
     @abstractmethod
     def seen_from_m(self, along_m: FloatArray) -> FloatArray:
         """How far down the track the vehicle is as it sees places that lie so far along it."""

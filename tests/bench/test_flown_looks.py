@@ -127,7 +127,10 @@ class TestAFlownMission:
             ("coordinator.strips=lanes",),
             ("coordinator.strips=lanes_across",),
             ("vehicles.helper.settling={share: 0.6, length_m: 25}",),
-            ("vehicles.helper.sensor.half_at_crab_deg=10", "current={speed_mps: 4, toward_deg: 70, period_s: 50}"),
+            (
+                "vehicles.helper.sensor.half_at_crab_deg=10",
+                "current={drift_mps: 4, set_deg: 70, period_s: 50, keeps: ground}",
+            ),
             (
                 "vehicles.helper.sensor={footprint: wedge, half_angle_deg: 60, near_m: 3, range_m: 30, p_detect: 0.4,"
                 " look_m: 10, noise_cell: 0, noise_track: 0}",
@@ -265,4 +268,6 @@ class TestARow:
 )
 def test_what_it_cannot_count_truly_is_refused(setting: str, told: str) -> None:
     with pytest.raises(UserError, match=told):
-        one_seed(load_scenario(BRIEF, ["current={speed_mps: 0.5, toward_deg: 0}", setting]), ["nearest"], 1.0)
+        one_seed(
+            load_scenario(BRIEF, ["current={drift_mps: 0.5, set_deg: 0, keeps: ground}", setting]), ["nearest"], 1.0
+        )

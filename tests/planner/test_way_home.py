@@ -9,12 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from planner.currents import Sailing
 from planner.dubins import Pose, shortest_path
 from planner.sweep import pass_over
 from planner.way_home import WayHome
 
 NORTH, EAST, SOUTH = 0.0, math.pi / 2, math.pi
-WAY = WayHome((0.0, 0.0), speed_mps=2.0, turn_radius_m=10.0)
+WAY = WayHome((0.0, 0.0), Sailing(2.0), turn_radius_m=10.0)
 
 
 class TestByHand:

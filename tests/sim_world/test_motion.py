@@ -22,13 +22,13 @@ def motion(start: Pose = NORTH) -> Motion:
 def test_it_waits_at_its_start_pose_until_the_first_manoeuvre() -> None:
     waiting = motion(Pose(3.0, 4.0, -math.pi / 2))
     assert waiting.pose_at(1_000_000) == Pose(3.0, 4.0, 1.5 * math.pi)
-    assert waiting.speed_mps == 0.0
+    assert waiting.speed_mps(0) == 0.0
 
 
 def test_a_track_dead_ahead_takes_its_run_in_its_length_and_its_run_out() -> None:
     sailing = motion()
     track = sailing.follow((0.0, 100.0), (0.0, 500.0), 50.0, 10_000)
-    assert sailing.speed_mps == 2.0
+    assert sailing.speed_mps(10_000) == 2.0
     assert [track.time_ms(along_m) for along_m in (0.0, 20.0, 400.0)] == [60_000, 70_000, 260_000]
     assert sailing.pose_at(60_000) == pytest.approx((0.0, 100.0, 0.0))
     assert sailing.pose_at(285_000) == pytest.approx((0.0, 550.0, 0.0))  # the end of the run-out

@@ -353,7 +353,7 @@ def test_the_first_metres_of_a_track_are_seen_worse_and_the_targets_there_too() 
 
 def test_in_a_current_it_crabs_more_with_the_stream_than_against_it() -> None:
     # 0.8 m/s to the east and 1 m/s to the north, at 2 m/s over the ground: arctan 0.8 / 1 northward, 0.8 / 3 southward.
-    current = CurrentConfig(math.hypot(0.8, 1.0), math.atan2(0.8, 1.0))
+    current = CurrentConfig(math.hypot(0.8, 1.0), math.atan2(0.8, 1.0), over_ground=True)
     half_rad = math.atan2(0.8, 1.0)
     config = replace(QUIET, vehicles=(replace(A, sensor=replace(SENSOR, half_at_crab_rad=half_rad)),))
     orders = NORTH_400, follow(8, (0.0, 400.0), (0.0, 0.0))

@@ -58,8 +58,8 @@ def test_bins_follow_from_the_lengths() -> None:
         (WORLD, "current", CurrentConfig(2.0, 0.0)),  # as fast as the vehicle
         (SettlingConfig(0.5, 100.0), "share", 1.0),
         (SettlingConfig(0.5, 100.0), "length_m", 0.0),
-        (CurrentConfig(1.0, 0.0), "speed_mps", -0.1),
-        (CurrentConfig(1.0, 0.0), "toward_rad", 90.0),
+        (CurrentConfig(1.0, 0.0), "drift_mps", -0.1),
+        (CurrentConfig(1.0, 0.0), "set_rad", 90.0),
         (CurrentConfig(1.0, 0.0), "period_s", 0.0),
         (TargetsConfig(), "count", 1001),
         (TargetsConfig(), "false_alarms_per_km2", -1.0),

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.sweep import pass_over
 from planner.way_home import WayHome
@@ -14,7 +15,7 @@ from vehicle_agent.endurance import Endurance
 
 NORTH = 0.0
 # 1000 s at 2 m/s, of which 100 s are kept; home is 600 m to the north of the origin.
-LASTS = Endurance(1_000_000, Homing(WayHome((0, 600), speed_mps=2.0, turn_radius_m=10.0), reserve_ms=100_000))
+LASTS = Endurance(1_000_000, Homing(WayHome((0, 600), Sailing(2.0), turn_radius_m=10.0), reserve_ms=100_000))
 FOR_EVER = Endurance(1_000_000, None)
 
 

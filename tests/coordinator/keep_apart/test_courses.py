@@ -18,6 +18,7 @@ from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import expected_service, sweeps
 from coordinator.allocate.situation import OpenStrip
 from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close
+from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.sweep import shortest_sweep
 
@@ -27,12 +28,12 @@ EAST, NORTH, SOUTH = math.pi / 2, 0.0, math.pi
 def ahead(x_m: float, y_m: float, heading_rad: float, speed_mps: float, length_m: float = 2000) -> Course:
     """Straight on from time 0."""
     start = Pose(x_m, y_m, heading_rad)
-    return course(start, 0, speed_mps, 10, [straight(start, length_m, 10)])
+    return course(start, 0, Sailing(speed_mps), 10, [straight(start, length_m, 10)])
 
 
 class TestCourses:
     def test_it_is_where_its_speed_takes_it_and_then_circles(self) -> None:
-        laid = course(Pose(0, 0, EAST), 5, 2, 10, [straight(Pose(0, 0, EAST), 100, 10)])
+        laid = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 100, 10)])
         pose, at_s = laid.at(25)
         assert at_s == 26
         assert pose == pytest.approx((42, 0, EAST))  # 21 s at 2 m/s
@@ -43,7 +44,7 @@ class TestCourses:
     def test_a_sweep_ends_when_and_where_its_service_does(self) -> None:
         one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
-        laid = sweep_course(free.pose, 0, free.speed_mps, free.turn_radius_m, sweep)
+        laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep)
         served = expected_service(OpenStrip(one, 1), free)
         assert laid.arrives_s == pytest.approx(served.free_s)
         there, at_s = laid.at(served.free_s)
@@ -52,8 +53,8 @@ class TestCourses:
     def test_a_run_out_is_sailed_before_the_way_to_the_next_strip(self) -> None:
         free = helper(heading_rad=EAST)
         sweep, _ = shortest_sweep(sweeps(strip(1, 300, 100), free), free.pose, free.turn_radius_m)
-        at_once = sweep_course(free.pose, 0, 2, 6, sweep)
-        later = sweep_course(free.pose, 0, 2, 6, sweep, run_out_m=20)
+        at_once = sweep_course(free.pose, 0, Sailing(2), 6, sweep)
+        later = sweep_course(free.pose, 0, Sailing(2), 6, sweep, run_out_m=20)
         assert later.at(10)[0] == pytest.approx((20, 0, EAST))
         assert at_once.at(10)[0].y_m > 1
         assert later.arrives_s == pytest.approx(at_once.arrives_s, abs=2)
@@ -61,7 +62,7 @@ class TestCourses:
     def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
         one, free = strip(1, 0, 0, length_m=4000), helper(x_m=0, y_m=-100)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
-        laid = sweep_course(free.pose, 0, free.speed_mps, free.turn_radius_m, sweep)
+        laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep)
         crosses_s = laid.arrives_s - 60
         assert crosses_s > 1800
         meets = laid.at(crosses_s)[0]
@@ -127,7 +128,7 @@ class TestCourses:
         speed_mps, radius_m, start_s = moves
         free = helper(x_m=place[0], y_m=place[1], heading_rad=place[2], speed_mps=speed_mps, turn_radius_m=radius_m)
         sweep, _ = shortest_sweep(sweeps(strip(1), free), free.pose, radius_m)
-        laid = sweep_course(free.pose, start_s, speed_mps, radius_m, sweep)
+        laid = sweep_course(free.pose, start_s, Sailing(speed_mps), radius_m, sweep)
         steps = [math.dist(one[:2], other[:2]) for one, other in pairwise(laid.poses.tolist())]
         assert max(steps) <= speed_mps * STEP_S + 1e-6
 
@@ -165,8 +166,8 @@ class TestTooClose:
 
     def test_nor_meet_again(self) -> None:
         # One sails away and circles back past where the other lies still.
-        away = course(Pose(0, 0, NORTH), 0, 2, 40, [])
-        still = course(Pose(-10, 0, NORTH), 0, 1e-9, 10, [])
+        away = course(Pose(0, 0, NORTH), 0, Sailing(2), 40, [])
+        still = course(Pose(-10, 0, NORTH), 0, Sailing(1e-9), 10, [])
         found = too_close(away, still, 20, 0, 300)
         assert found is not None
         assert found.time_s == pytest.approx(2 * math.pi * 40 / 2, abs=15)

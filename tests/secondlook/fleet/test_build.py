@@ -124,7 +124,7 @@ class TestTheWorld:
     def test_what_lowers_p_detect_comes_to_it_in_radians(self) -> None:
         overrides = (
             "seabed.ripple_crests_deg=[90, 180]",
-            "current={speed_mps: 0.5, toward_deg: 180, period_s: 3000}",
+            "current={drift_mps: 0.5, set_deg: 180, period_s: 3000}",
             "vehicles.primary.settling={share: 0.9, length_m: 150}",
             "vehicles.primary.sensor.half_at_crab_deg=45",
             "vehicles.helper.sensor.seabed_share=0.5",

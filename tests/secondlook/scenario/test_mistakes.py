@@ -545,7 +545,7 @@ MISTAKES = {
     ),
     "a current that no vehicle can hold against": (
         "name: trial",
-        "name: trial\ncurrent: {speed_mps: 1.5, toward_deg: 90}",
+        "name: trial\ncurrent: {drift_mps: 1.5, set_deg: 90}",
         [
             'bad.yaml:5: vehicles: {"primary": {"role": "survey", "start": {"x_m": 0, "y_m":... is not allowed; '
             "must be faster than the current, 1.5 m/s, but primary is not",
@@ -553,8 +553,8 @@ MISTAKES = {
     ),
     "a current towards nowhere": (
         "name: trial",
-        "name: trial\ncurrent: {speed_mps: 1}",
-        ["bad.yaml:2: current.toward_deg: missing; must be given"],
+        "name: trial\ncurrent: {drift_mps: 1}",
+        ["bad.yaml:2: current.set_deg: missing; must be given"],
     ),
     "a turn that leaves nothing": (
         "range_m: 145",

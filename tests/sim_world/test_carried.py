@@ -1,0 +1,93 @@
+"""A vehicle in a current that keeps its speed through the water: when it is where, and what it sees from there."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from comms.said.messages import Look, Nav
+from planner.currents import Sailing
+from planner.dubins import Pose, shortest_path
+from sim_world.config import CurrentConfig
+from tests.sim_world.test_world import QUIET, A, Sea, follow
+
+EAST, WEST = math.pi / 2, 1.5 * math.pi
+# 2.5 m/s through water that flows east at 1.5 m/s: 4 m/s with it, 1 against it, 2 across it.
+SWIMMER = replace(A, speed_mps=2.5, start_heading_rad=EAST)
+EASTWARD = CurrentConfig(1.5, EAST)
+
+
+def sea(current: CurrentConfig | None = EASTWARD, heading_rad: float = EAST) -> Sea:
+    vehicle = replace(SWIMMER, start_x_m=0.0, start_y_m=0.0, start_heading_rad=heading_rad)
+    return Sea(replace(QUIET, vehicles=(vehicle,), current=current))
+
+
+def speeds(told: Sea) -> set[float]:
+    return {round(nav.speed_mps, 6) for at_ms, nav in told.said(Nav) if at_ms and isinstance(nav, Nav)}
+
+
+@pytest.mark.parametrize(
+    ("heading_rad", "end", "ends_ms"),
+    [(EAST, (400.0, 0.0), 100_000), (WEST, (-400.0, 0.0), 400_000), (0.0, (0.0, 400.0), 200_000)],
+)
+def test_with_against_and_across_it_400_m_take_100_400_and_200_s(
+    heading_rad: float, end: tuple[float, float], ends_ms: int
+) -> None:
+    told = sea(heading_rad=heading_rad).order("a", follow(1, (0.0, 0.0), end, run_in_m=0.0)).until(ends_ms - 500)
+    accepted, on_track = told.statuses()
+    assert accepted[2] == pytest.approx(ends_ms, abs=1)
+    assert on_track[0] == 0
+    assert len(speeds(told)) == 1
+    assert next(iter(speeds(told))) == pytest.approx(400_000 / ends_ms)
+
+
+def test_the_look_of_each_20_m_comes_when_they_are_passed() -> None:
+    told = sea().order("a", follow(1, (0.0, 0.0), (100.0, 0.0), run_in_m=0.0)).until(60_000)
+    looks_ms = [at_ms for at_ms, _ in told.said(Look)]
+    assert looks_ms == pytest.approx([5_000, 10_000, 15_000, 20_000, 25_000], abs=1)
+
+
+def test_a_way_with_turns_takes_what_is_reckoned() -> None:
+    told = sea().order("a", follow(1, (200.0, 300.0), (-200.0, 300.0), run_in_m=0.0))
+    way = shortest_path(Pose(0, 0, EAST), Pose(200, 300, WEST), SWIMMER.turn_radius_m)
+    reckoned_s = Sailing(2.5, 1.5, EAST).path_s(way) + 400 / 1.0
+    assert told.statuses()[0][2] / 1000 == pytest.approx(reckoned_s, rel=2e-3)
+
+
+def test_a_tide_that_turns_gives_back_what_it_takes() -> None:
+    # To and fro within the track: it takes longer than in still water, less than against the stream.
+    tide = replace(EASTWARD, period_s=100.0)
+    ends_ms = sea(tide).order("a", follow(1, (0.0, 0.0), (1000.0, 0.0), run_in_m=0.0)).statuses()[0][2]
+    assert 1000 / 2.5 * 1000 - 60_000 < ends_ms < 1_000_000
+    told = sea(tide).order("a", follow(1, (0.0, 0.0), (1000.0, 0.0), run_in_m=0.0)).until(200_000)
+    assert min(speeds(told)) < 1.1
+    assert max(speeds(told)) > 3.9
+
+
+def test_one_that_keeps_its_speed_over_the_ground_is_as_in_still_water() -> None:
+    order = follow(1, (200.0, 300.0), (-200.0, 300.0))
+    kept, still = (
+        sea(current).order("a", order).until(300_000) for current in (replace(EASTWARD, over_ground=True), None)
+    )
+    assert kept.statuses() == still.statuses()
+
+
+def test_across_the_stream_the_swath_lies_askew() -> None:
+    # Northward, the bow points to the west of north by arcsin(1.5 / 2.5) = 36.87 degrees, tan = 3/4, cos = 4/5: abeam
+    # to starboard lies ahead. What is y m to starboard is passed 0.75 y m earlier, y / 0.8 m away.
+    order = follow(1, (0.0, 0.0), (0.0, 400.0), run_in_m=0.0)
+    askew = sea(heading_rad=0.0).order("a", order).until(300_000).looks()
+    straight = sea(None, heading_rad=0.0).order("a", order).until(300_000).looks()
+    assert len(askew) == len(straight) == 20
+    for look, plain in zip(askew, straight, strict=True):
+        along_m = look.first_along_m + 5.0 * (np.arange(4) + 0.5)
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            for number in range(look.p_detect.shape[2]):
+                lateral_m = 5.0 * number
+                seen = (along_m - sign * 0.75 * lateral_m >= 0) & (along_m - sign * 0.75 * lateral_m <= 400)
+                at_range = SWIMMER.sensor.curve.at(np.array([lateral_m / 0.8]))[0]
+                assert look.p_detect[side, :, number] == pytest.approx(np.where(seen, at_range, 0.0), abs=2e-4)
+        assert plain.p_detect.shape == look.p_detect.shape
