@@ -58,7 +58,7 @@ class SimulatedVehicle:
         self._home = (config.start_x_m, config.start_y_m) if config.home is None else config.home
         self._is_home = self._is_at_home((config.start_x_m, config.start_y_m))
         self._goes_home = False
-        self._number = 0
+        self._number = self._begun_ms = 0
         self._emptied_ms: int | None = None
 
     def offset_at(self, now_ms: int) -> Point:
@@ -99,7 +99,7 @@ class SimulatedVehicle:
             return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, reason)
         start, end = (maneuver.start_x_m, maneuver.start_y_m), (maneuver.end_x_m, maneuver.end_y_m)
         ends_ms = 0
-        self._number = maneuver.number
+        self._number, self._begun_ms = maneuver.number, now_ms
         self._is_home, self._goes_home = False, maneuver.kind is ManeuverKind.GOTO and self._is_at_home(end)
         match maneuver.kind:
             case ManeuverKind.HOLD:
@@ -119,7 +119,9 @@ class SimulatedVehicle:
     def next_event_ms(self) -> int | None:
         """When `pop_event` has something next, None for never."""
         to_come_ms = self._to_come[0][0] if self._to_come else None
-        empty_ms = None if self._is_home or self._emptied_ms is not None else self.config.endurance_ms
+        empty_ms = self.config.endurance_ms
+        if empty_ms is not None:  # who leaves home too late gets nowhere
+            empty_ms = None if self._is_home or self._emptied_ms is not None else max(empty_ms, self._begun_ms)
         return min((at_ms for at_ms in (to_come_ms, empty_ms) if at_ms is not None), default=None)
 
     def pop_event(self) -> Event:

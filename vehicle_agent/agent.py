@@ -182,6 +182,9 @@ class Agent:
         self.mode = Mode.RETURNING
         self.works_on = 0
         way_s, heading_rad = homing.way.from_pose(pose)
+        if way_s == 0.0 and self.nav is not None and self.nav.speed_mps == 0.0:  # it has never left
+            self._rest(Mode.HOME, now_ms)
+            return
         self.expected_end_ms = now_ms + round(way_s * 1000)
         begin = shifted(homing.way.home, heading_rad, -STRAIGHT_IN_M)
         self._command(ManeuverKind.GOTO, begin[:2], homing.way.home, 0.0)

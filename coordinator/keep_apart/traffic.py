@@ -45,7 +45,7 @@ class Traffic:
         self._rests: dict[str, tuple[int, Course]] = {}
 
     def course(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course | None:
-        """Where a vehicle will be; None for one that is lost or was never heard.
+        """Where a vehicle will be; None for one that is lost, was never heard or rests at home.
 
         `strip`: what it has of the coordinator.
         """
@@ -53,7 +53,7 @@ class Traffic:
         if vehicle.lost or state is None:
             return None
         if state.mode.is_out_of_work:
-            return self._homeward(vehicle, state)
+            return None if state.mode is Mode.HOME else self._homeward(vehicle, state)
         if vehicle.entry.role.surveys and vehicle.finished_ms is None:
             return self._survey(vehicle, now_s)
         if strip is not None:

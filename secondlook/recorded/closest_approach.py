@@ -38,7 +38,7 @@ class ClosestApproaches:
     """Take the messages in order; ask at any time.
 
     True positions count where they are told, else those that vehicles believe in. A vehicle counts from when it is
-    first under way. Vehicles that are told of at different times are compared where their last stretches overlap.
+    first under way, and not while it rests at home. Vehicles that are told of at different times are compared where their last stretches overlap.
     `speeds_mps`: the most that each vehicle does; a pair is not looked at again before it can be nearer than it was.
     """
 
@@ -69,6 +69,11 @@ class ClosestApproaches:
                 pair = (name, other) if name < other else (other, name)
                 if self._due_s.get(pair, 0.0) <= now_s:
                     self._compare(pair, leg, its)
+
+    def rest(self, name: str) -> None:
+        """A vehicle has come home: nobody can come too close to it there."""
+        self._legs.pop(name, None)
+        self._under_way.discard(name)
 
     def found(self) -> list[Closest]:
         """Of each pair of vehicles that were under way at one time, the nearest first."""

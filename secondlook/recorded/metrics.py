@@ -128,6 +128,8 @@ class Metrics:
             vehicle.plan = message
         elif isinstance(message, AgentState) and vehicle is not None:
             self._hear_state(vehicle, message, received.header.sent_ms)
+            if message.mode is Mode.HOME:
+                self.approaches.rest(received.vehicle)
             ends = message.mode is Mode.FINISHED or message.mode.is_out_of_work
             if ends and vehicle.finished_ms is None and vehicle.has_surveyed_all:
                 vehicle.finished_ms = received.header.sent_ms
@@ -231,7 +233,9 @@ class Metrics:
         self.map = FleetMap(spec, run.rho)
         self.inside = Region(run.outline, run.hole_outlines).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role, footprint_of(entry.sonar)) for entry in run.vehicles}
-        self.approaches = ClosestApproaches({entry.vehicle: entry.speed_mps for entry in run.vehicles})
+        self.approaches = ClosestApproaches(
+            {entry.vehicle: entry.speed_mps + entry.drift_mps for entry in run.vehicles}
+        )
 
     def _pass_time(self, sent_ms: int) -> None:
         while len(self.risk_at) < len(RISK_AT_FACTORS):

@@ -61,6 +61,15 @@ def test_who_leaves_home_again_has_what_is_left() -> None:
     assert told.statuses()[-1][:2] == (60_500, ManeuverState.EMPTY)
 
 
+def test_who_leaves_home_when_nothing_is_left_gets_nowhere() -> None:
+    told = sea().until(70_000).order("a", follow(1, (0, 0), (0, 400))).until(90_000)
+    assert [(at_ms, state) for at_ms, state, _ in told.statuses()] == [
+        (70_000, ManeuverState.ACCEPTED),
+        (70_000, ManeuverState.EMPTY),
+    ]
+    assert {(nav.x_m, nav.y_m) for nav in navs(told)} == {(0.0, -100.0)}
+
+
 def test_one_that_was_never_told_anything_waits_at_home_for_ever_and_elsewhere_till_it_is_empty() -> None:
     assert sea().until(90_000).statuses() == []
     assert sea(replace(SHORT, home=(0.0, 0.0))).until(90_000).said(ManeuverStatus) == [

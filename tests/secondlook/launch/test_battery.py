@@ -11,6 +11,7 @@ from flights import BRIEF
 
 from comms.said.messages import AgentState, MissionOver, Mode, Plan, StripState, Task, TaskAction
 from secondlook.cli import app
+from secondlook.commands.planned_survey import planned_surveys
 from secondlook.scenario.text import Value
 from secondlook.testing import Fleet, assert_all_finished, assert_home_before_empty, assert_kept_apart
 from secondlook.testing.flight import Flight
@@ -143,3 +144,40 @@ def test_the_command_has_exit_code_1_where_a_battery_runs_empty(
     assert told.err.splitlines()[-1] == "primary: the battery was empty before it was home"
     assert "its battery was empty at 60 s, not home, its survey is not finished" in told.out
     assert json.loads((tmp_path / "summary.json").read_text())["vehicles"]["primary"]["battery_left"] == 0.0
+
+
+def test_a_helper_that_has_never_left_home_rests_there(tmp_path: Path) -> None:
+    fleet = Fleet(BRIEF, folder=tmp_path, overrides={"vehicles.helper.endurance_s": 20})
+    flight = fleet.run()
+    assert_home_before_empty(flight, "helper")
+    assert modes(flight, "helper") == [Mode.IDLE, Mode.HOME]
+    assert flight.paths["helper"].length_m == 0.0
+
+
+@pytest.mark.parametrize("period_s", [None, 120])
+@pytest.mark.parametrize("set_deg", [0, 135, 270])
+def test_in_a_current_all_come_home_as_well(tmp_path: Path, set_deg: int, period_s: int | None) -> None:
+    current: dict[str, Value] = {"set_deg": set_deg, "drift_mps": 3}
+    if period_s is not None:
+        current["period_s"] = period_s
+    flight = flown(
+        tmp_path,
+        current=current,
+        vehicles__primary__endurance_s=110,
+        vehicles__helper__endurance_s=100,
+        mission__deadline_s=200,
+    )
+    assert_home_before_empty(flight, "primary", "helper")
+    if period_s is None:
+        assert_kept_apart(flight)
+    for name, endurance_s in (("primary", 110), ("helper", 100)):
+        assert flight.summary["vehicles"][name]["ended_s"] <= 0.9 * endurance_s
+
+
+def test_in_a_current_a_plan_tells_when_the_survey_ends(tmp_path: Path) -> None:
+    # Tracks run north and south, 8 m/s through water that flows north at 4 m/s: 12 m/s and 4 m/s over the ground.
+    flight = flown(tmp_path, current={"set_deg": 0, "drift_mps": 4})
+    on_tracks = [one for one in flight.activities if one.vehicle == "primary" and one.mode is Mode.SURVEY]
+    assert [one.ended_s - one.begun_s for one in on_tracks[:2]] == pytest.approx([100 / 12, 100 / 4], abs=0.01)
+    (survey,) = planned_surveys(flight.scenario)
+    assert survey.takes_s == pytest.approx(flight.summary["time"]["primary_s"], rel=0.01)
