@@ -38,8 +38,9 @@ class ClosestApproaches:
     """Take the messages in order; ask at any time.
 
     True positions count where they are told, else those that vehicles believe in. A vehicle counts from when it is
-    first under way, and not while it rests at home. Vehicles that are told of at different times are compared where their last stretches overlap.
-    `speeds_mps`: the most that each vehicle does; a pair is not looked at again before it can be nearer than it was.
+    first under way, and not while it rests at home. Vehicles that are told of at different times are compared where
+    their last stretches overlap. `speeds_mps`: the most that each vehicle does; a pair is not looked at again before it
+    can be nearer than it was.
     """
 
     def __init__(self, speeds_mps: Mapping[str, float]) -> None:
