@@ -91,6 +91,25 @@ def fail(told: Told, place: int) -> None:
     told.settle()
 
 
+class TestOneThatGoesHome:
+    def test_its_strip_is_for_another_and_it_is_offered_nothing_more(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY, vehicles=TWO_HELPERS)
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.status(HELPER, 1, TaskState.FAILED, "the battery does not last")
+        told.state(HELPER, Mode.RETURNING)
+        told.settle()
+        assert told.states()[1] is FAILED
+        told.state(HELPER, Mode.HOME)
+        told.settle()
+        assert {name for name, action, strip in told.tasks() if action is TAKE and strip > 1} <= {SECOND_HELPER}
+
+    def test_where_its_word_is_lost_its_state_tells(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        told.state(HELPER, Mode.RETURNING)
+        told.settle()
+        assert told.states()[1] is OPEN
+
+
 class TestOneThatFailsAgainAndAgain:
     def test_it_is_offered_nothing_more_and_the_log_says_so(self, caplog: pytest.LogCaptureFixture) -> None:
         caplog.set_level(logging.WARNING)

@@ -41,6 +41,34 @@ class TestTheEnd:
         assert told.node.wait(100) == []
         assert told.node.wake_ms is None
 
+    def test_a_primary_that_goes_home_early_has_finished_when_it_is_there(self) -> None:
+        told = coordinator()
+        told.state(PRIMARY, Mode.RETURNING, at_ms=10_000)
+        assert told.settle() == []
+        told.state(PRIMARY, Mode.HOME, at_ms=20_000)
+        (over,) = told.settle()
+        assert over.message == MissionOver(
+            f"every primary has finished and no strip is left; the survey of {PRIMARY} has ended early, "
+            "as the battery lasted for no more"
+        )
+
+    def test_it_is_not_over_before_a_helper_is_home_that_goes_there(self) -> None:
+        told = coordinator()
+        told.state(HELPER, Mode.RETURNING, at_ms=10_000)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=11_000)
+        assert told.settle() == []
+        told.state(HELPER, Mode.HOME, at_ms=11_500)
+        assert [type(one.message) for one in told.settle()] == [MissionOver]
+
+    def test_at_the_deadline_it_is_over_whoever_is_on_the_way_home(self) -> None:
+        told = coordinator()
+        told.state(HELPER, Mode.RETURNING, at_ms=10_000)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=20_000)
+        said = told.node.wait_until(21_000)
+        reason = "1.05 times the last primary's end is reached, 0 strips are left"
+        assert [one.message for one in said] == [MissionOver(reason)]
+        assert said[0].at_ms == 21_000
+
     def test_it_says_so_again_for_10_s_until_all_have_answered(self) -> None:
         told = coordinator()
         told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)

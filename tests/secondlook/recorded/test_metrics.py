@@ -19,6 +19,8 @@ from comms.said.messages import (
     Look,
     Maneuver,
     ManeuverKind,
+    ManeuverState,
+    ManeuverStatus,
     Message,
     MissionOver,
     Mode,
@@ -69,6 +71,44 @@ def begun(run: RunInfo = RUN) -> Stream:
     stream = Stream()
     stream.say(0, "run", run)
     return stream
+
+
+class TestBatteries:
+    def told(self, stream: Stream, name: str) -> tuple[str, float, float]:
+        one = stream.metrics.summary()["vehicles"][name]
+        return one["ended"], one["ended_s"], one["battery_left"]
+
+    def state(self, stream: Stream, at_s: float, name: str, mode: Mode, battery: float) -> None:
+        stream.say(at_s, f"agent/{name}/state", AgentState(mode, 0, battery, 0, 0, 0, 0))
+
+    def test_who_is_home_has_ended_when_it_came_there(self) -> None:
+        stream = begun()
+        self.state(stream, 10, PRIMARY, Mode.SURVEY, 0.5)
+        self.state(stream, 20, PRIMARY, Mode.RETURNING, 0.3)
+        assert self.told(stream, PRIMARY) == ("returning", 20.0, 0.3)
+        assert stream.metrics.primary_ms() == 20_000
+        for at_s in (30, 40):
+            self.state(stream, at_s, PRIMARY, Mode.HOME, 0.2)
+        assert self.told(stream, PRIMARY) == ("home", 30.0, 0.2)
+        assert stream.metrics.summary()["vehicles"][PRIMARY]["survey_cut_short"] is True
+
+    def test_a_survey_that_was_finished_before_was_not_cut_short(self) -> None:
+        stream = begun()
+        self.state(stream, 10, PRIMARY, Mode.FINISHED, 0.5)
+        self.state(stream, 30, PRIMARY, Mode.HOME, 0.2)
+        assert self.told(stream, PRIMARY) == ("home", 30.0, 0.2)
+        assert stream.metrics.primary_ms() == 10_000
+        assert stream.metrics.summary()["vehicles"][PRIMARY]["survey_cut_short"] is False
+
+    def test_whose_battery_is_empty_the_world_tells_whatever_the_agent_makes_of_it(self) -> None:
+        stream = begun()
+        self.state(stream, 10, HELPER, Mode.IDLE, 0.5)
+        assert self.told(stream, HELPER) == ("over", 10.0, 0.5)
+        empty = ManeuverStatus(1, ManeuverState.EMPTY, 20_000, "the battery is empty")
+        for at_s in (20, 25):
+            stream.say(at_s, f"veh/{HELPER}/maneuver_status", empty)
+            self.state(stream, at_s + 1, HELPER, Mode.IDLE, 0.4)
+        assert self.told(stream, HELPER) == ("empty", 20.0, 0.0)
 
 
 class TestPaths:

@@ -161,6 +161,22 @@ def test_only_changes_of_a_strip_are_told() -> None:
     assert story.tell(strip(StripState.WITHDRAWN)) == line("strip 3 withdrawn")
 
 
+def test_the_way_home_is_told_once_and_an_empty_battery_is_a_warning() -> None:
+    story = Story()
+
+    def state(mode: Mode, battery: float) -> list[str]:
+        one = said(STATE, AgentState(mode, 0, battery, 0, 0, 0, 0), vehicle="helper")
+        return [line.text for line in story.tell(one)]
+
+    assert state(Mode.IDLE, 0.4) == []
+    assert state(Mode.RETURNING, 0.3) == ["on the way home, 30% of the battery left"]
+    assert state(Mode.RETURNING, 0.25) == []
+    assert state(Mode.HOME, 0.2) == ["home, 20% of the battery left"]
+    empty = said(MANEUVER_STATUS, ManeuverStatus(3, ManeuverState.EMPTY, 10, "the battery is empty"), vehicle="helper")
+    (line,) = story.tell(empty)
+    assert (line.text, line.warns) == ("helper: the battery is empty, it lies where it is", True)
+
+
 def test_only_changes_of_a_task_are_told() -> None:
     story = Story()
     assert story.tell(task(TaskState.ACCEPTED)) == line("strip 3 accepted, done at about 90 s")

@@ -57,6 +57,9 @@ def test_degrees_become_the_metres_to_the_millimetre(write: Write, text: str) ->
     assert close(scenario.area.holes_m[0], HOLE_M)
     assert close(scenario.area.priorities[0].polygon_m, LANE_M)
     start = scenario.vehicles["primary"].start
+    home = "vehicles.primary.home={latitude_deg: 59.882, longitude_deg: 10.5}"
+    assert load_scenario(write(text), [home]).vehicles["primary"].home_m == pytest.approx((0.0, 222.822), abs=0.003)
+    assert scenario.vehicles["primary"].home_m == (start.x_m, start.y_m)
     # A degree of latitude at 59.88 N is 111.411 km.
     assert (start.x_m, start.y_m, start.heading_deg) == pytest.approx((0.0, 111.411, 90.0), abs=0.002)
     assert scenario.vehicles["helper"].start == Start(x_m=0.0, y_m=-40.0)
