@@ -134,8 +134,8 @@ def test_the_summary_has_all_that_is_promised(landed: Landed) -> None:
     assert summary["time"].keys() == {"mission_s", "primary_s", "wall_s", "real_time_factor"}
     assert 0 < summary["time"]["primary_s"] <= summary["time"]["mission_s"]
     primary, helper = summary["vehicles"]["primary"], summary["vehicles"]["helper"]
-    assert helper.keys() == {"role", "path_m", "ended_s"}
-    assert primary.keys() == {"role", "path_m", "ended_s", "tracks", "r_adpt_m", "r_eff_m"}
+    assert helper.keys() == {"role", "path_m", "ended", "ended_s", "battery_left"}
+    assert primary.keys() == helper.keys() | {"survey_cut_short", "tracks", "r_adpt_m", "r_eff_m"}
     assert len(primary["r_eff_m"]) == primary["tracks"] > 0
     for name in ("risk", "risk_primary_alone"):
         assert summary[name].keys() == {"cells", "mean", "worst30_mean", "uncovered_share"}
