@@ -177,17 +177,18 @@ class Agent:
         """Leaves what it does, and commands the vehicle home."""
         homing, pose = self.endurance.homing, self.pose
         assert homing is not None
-        assert pose is not None
         self.leave_work(now_ms)
         self.mode = Mode.RETURNING
         self.works_on = 0
-        way_s, heading_rad = homing.way.from_pose(pose)
-        if way_s == 0.0 and self.nav is not None and self.nav.speed_mps == 0.0:  # it has never left
-            self._rest(Mode.HOME, now_ms)
-            return
-        self.expected_end_ms = now_ms + round(way_s * 1000)
-        begin = shifted(homing.way.home, heading_rad, -STRAIGHT_IN_M)
-        self._command(ManeuverKind.GOTO, begin[:2], homing.way.home, 0.0)
+        self.expected_end_ms, begin = 0, homing.way.home
+        if pose is not None:
+            way_s, heading_rad = homing.way.from_pose(pose)
+            if way_s == 0.0 and self.maneuver is None and self.nav is not None and self.nav.speed_mps == 0.0:
+                self._rest(Mode.HOME, now_ms)  # it has never left
+                return
+            self.expected_end_ms = now_ms + round(way_s * 1000)
+            begin = shifted(homing.way.home, heading_rad, -STRAIGHT_IN_M)[:2]
+        self._command(ManeuverKind.GOTO, begin, homing.way.home, 0.0)
         self.report(now_ms)
 
     def report(self, now_ms: int) -> None:

@@ -79,7 +79,7 @@ def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> I
         states = flight.said(AgentState, f"agent/{name}/state")
         if not states:
             yield Violation("the core finishes", flight.end_s, name, "it was never heard")
-        elif states[-1].message.mode not in (Mode.FINISHED, Mode.RETURNING, Mode.HOME):
+        elif not (states[-1].message.mode.has_ended or states[-1].message.mode.is_out_of_work):
             what = f"its last word is that it is in {states[-1].message.mode.value}"
             yield Violation("the core finishes", states[-1].t_s, name, what)
 
