@@ -5,13 +5,30 @@ from __future__ import annotations
 import math
 
 import pytest
+from by_hand import PRIMARY, run_info
+from one_node import OneNode
 
+from comms.said.announcement import Role
+from comms.said.messages import (
+    AgentState,
+    Maneuver,
+    ManeuverKind,
+    ManeuverState,
+    ManeuverStatus,
+    Mode,
+    Nav,
+    Plan,
+)
 from planner.currents import Sailing
 from planner.dubins import Pose
+from planner.footprints.side import SideLooking
+from planner.spacing_planners import AdaptiveSpacing
 from planner.sweep import pass_over
+from planner.types import SonarShape
 from planner.way_home import WayHome
-from vehicle_agent.config import Homing
+from vehicle_agent.config import Homing, SurveyConfig
 from vehicle_agent.endurance import Endurance
+from vehicle_agent.survey import SurveyAgent
 
 NORTH = 0.0
 # 1000 s at 2 m/s, of which 100 s are kept; home is 600 m to the north of the origin.
@@ -50,3 +67,32 @@ def test_who_waits_goes_home_while_it_may_circle_once_more() -> None:
     assert [LASTS.is_low(here, now_ms, circles=True) for now_ms in (latest_ms, latest_ms + 1)] == [False, True]
     assert [LASTS.is_low(here, now_ms, circles=False) for now_ms in (600_000, 600_001)] == [False, True]
     assert not FOR_EVER.is_low(here, 10**9, circles=True)
+
+
+def survey(endurance_ms: int) -> OneNode:
+    """A primary of 2 m/s that is to come home to the origin, told of the run and of nothing else."""
+    homing = Homing(WayHome((0, 0), Sailing(2.0), turn_radius_m=10.0), reserve_ms=0)
+    sonar = SideLooking(SonarShape("side", 40, 145))
+    config = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, endurance_ms, homing=homing)
+    node = OneNode(SurveyAgent(config), Role.SURVEY)
+    node.hear("run", run_info(300, 200))
+    return node
+
+
+@pytest.mark.parametrize(("ends_ms", "goes_home"), [(100_000, False), (900_000, True)])
+def test_a_track_that_takes_too_long_is_left_for_home_wherever_that_is_left_from(ends_ms: int, goes_home: bool) -> None:
+    node = survey(1_000_000)
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.ACCEPTED, ends_ms, ""))
+    orders = [one.message for one in node.said if isinstance(one.message, Maneuver)]
+    assert [one.kind for one in orders] == [ManeuverKind.FOLLOW, ManeuverKind.GOTO][: 1 + goes_home]
+    assert not goes_home or (orders[-1].end_x_m, orders[-1].end_y_m) == (0, 0)
+
+
+def test_no_track_is_begun_that_the_battery_does_not_last_for() -> None:
+    node = survey(150_000)
+    node.hear(f"veh/{PRIMARY}/nav", Nav(0, 0, 0, 2, 15, 0))
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.REFUSED, 0, "no rudder"))
+    # Each track of 200 m, with 20 m before and after it, takes 120 s and ends 200 m from home or more, or begins there.
+    assert [one.message.kind for one in node.said if isinstance(one.message, Maneuver)][-1] is ManeuverKind.GOTO
+    assert node.all(Plan)[-1].tracks == ()
+    assert node.all(AgentState)[-1].mode is Mode.RETURNING
