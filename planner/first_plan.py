@@ -4,7 +4,7 @@ which order, and from which side, its parts are surveyed."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations
@@ -128,10 +128,12 @@ def first_plan(
     terms: SpacingTerms | None = None,
     *,
     thorough: bool = True,
+    flyable: Callable[[list[Track]], list[Track]] | None = None,
 ) -> FirstPlan:
     """The tracks as `spacing` lays them, by Algorithm 1 if left out, each part by itself and from its nearer end.
 
-    `known`, `terms`: for a planner that goes by P(y). For numbers and errors see `parts_in_order`.
+    `known`, `terms`: for a planner that goes by P(y). `flyable`: what of some tracks can be flown. For numbers and
+    errors see `parts_in_order`.
     """
     parts = parts_in_order(region, track_heading_rad, nadir_gap_m, told_range_m, thorough=thorough)
     spacing = spacing or AdaptiveSpacing(nadir_gap_m, told_range_m)
@@ -143,6 +145,7 @@ def first_plan(
         tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number)
         if here and tracks and math.dist(here, tracks[0].end) < math.dist(here, tracks[0].start):
             tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number, first_reverse=True)
+        tracks = tracks if flyable is None else flyable(tracks)
         laid.append(tuple(tracks))
         ranges_m.append(decision.range_m)
         number += len(tracks)

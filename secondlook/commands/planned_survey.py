@@ -20,7 +20,7 @@ from planner.footprints.cells import seen_cells
 from planner.sweep import distance_over, pass_over
 from planner.types import Point, Track
 from secondlook.errors import UserError
-from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
+from secondlook.fleet.survey_area import keep_out_of, plan_for, region_for, region_of, track_heading_rad
 from secondlook.launch.run_display import in_seconds
 from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
@@ -86,7 +86,7 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     lead_m = footprint_of(vehicle.sonar).lead_m
     passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
-    way_m = distance_over(start, passes, vehicle.turn_radius_m) - vehicle.run_in_m
+    way_m = distance_over(start, passes, vehicle.turn_radius_m, keep_out_of(scenario)) - vehicle.run_in_m
     return PlannedSurvey(
         name, vehicle, heading_rad, plan, float(missed.sum() / max(1, inside.sum())), way_m / vehicle.speed_mps
     )

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex
+from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode, Routing
 from coordinator.config import CoordinatorConfig
@@ -18,7 +18,7 @@ from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, role_of, roster_vehicle
-from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
+from secondlook.fleet.survey_area import keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
     PatchySeabed,
     RevisitVehicle,
@@ -75,6 +75,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     grid = region_of(scenario).about(heading_rad).grid(scenario.area.cell_m)
     for primary in scenario.survey_vehicles.values():
         region_for(scenario, primary, heading_rad)  # refuses a part that is none
+    keep_out = keep_out_of(scenario)
     run_info = RunInfo(
         schema=SCHEMA_VERSION,
         scenario=scenario.name,
@@ -93,8 +94,12 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
         rho=scenario.mission.rho,
         vehicles=tuple(roster_vehicle(name, vehicle) for name, vehicle in scenario.vehicles.items()),
         holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
+        keep_out=tuple(Zone(tuple(Vertex(*corner) for corner in zone)) for zone in keep_out.zones),
+        keep_out_margin_m=keep_out.margin_m,
     )
-    Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
+    Region(
+        run_info.outline, run_info.hole_outlines, run_info.keep_out_outlines
+    )  # refuses what is none in whole centimetres
     roster = _roster_of(scenario, record=record)
     specs = {name: _agent_spec(name, vehicle) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
@@ -168,6 +173,7 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
         holes=tuple(scenario.area.holes_m),
+        keep_out=keep_out_of(scenario).nearer().nearer(),
         vehicles=tuple(
             _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),

@@ -205,7 +205,7 @@ class Metrics:
         self.run = run
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
-        self.inside = Region(run.outline, run.hole_outlines).inside(spec)
+        self.inside = Region(run.outline, run.hole_outlines, run.keep_out_outlines).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role, footprint_of(entry.sonar)) for entry in run.vehicles}
         self.approaches = ClosestApproaches({entry.vehicle: entry.speed_mps for entry in run.vehicles})
 

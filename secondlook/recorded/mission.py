@@ -33,6 +33,7 @@ from comms.said.topics import TOPICS, Topic, topic_of
 from comms.said.wire import WireError
 from comms.strip_books import StripBooks
 from planner.fleet_map import FleetMap
+from planner.region import Region
 from planner.types import PriorityGround
 from secondlook.errors import UserError
 from secondlook.recorded.closest_approach import Closest
@@ -105,9 +106,9 @@ class Mission(ABC):
         return max((one.t_s for one in self.received()), default=0.0)
 
     @cached_property
-    def area(self) -> shapely.Polygon:
+    def area(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The survey area."""
-        return shapely.Polygon(self.run.outline, self.run.hole_outlines)
+        return Region(self.run.outline, self.run.hole_outlines, self.run.keep_out_outlines).polygon
 
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.

@@ -24,6 +24,7 @@ from comms.said.messages import (
     TaskStatus,
 )
 from comms.strip_books import StripBooks
+from planner.region import Region
 from planner.types import Point
 
 MOST_NAMED = 3
@@ -164,6 +165,8 @@ def _run(run: RunInfo) -> str:
 
 
 def _area_km2(run: RunInfo) -> float:
+    if run.keep_out:
+        return Region(run.outline, run.hole_outlines, run.keep_out_outlines).polygon.area / 1e6
     return (_ring_m2(run.outline) - sum(_ring_m2(hole) for hole in run.hole_outlines)) / 1e6
 
 

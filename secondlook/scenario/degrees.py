@@ -12,7 +12,7 @@ from typing import Annotated
 from pydantic import BaseModel, BeforeValidator, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
+from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES, MOST_ZONE_CORNERS, MOST_ZONES
 from secondlook.geography import GeographicOrigin
 from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
@@ -32,6 +32,8 @@ Point = Annotated[tuple[Latitude, Longitude], BeforeValidator(check_pair), Field
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
 HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
 
+ZoneCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_ZONE_CORNERS)]
+
 
 class Origin(Mapping):
     """The mission frame's origin, WGS84: x points east there, y north."""
@@ -49,9 +51,11 @@ class AreaInDegrees(Mapping):
     """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
     holes_deg: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
     """In place of `holes_m`: the same for each hole."""
+    keep_out_deg: Annotated[tuple[ZoneCorners, ...], Field(strict=False, max_length=MOST_ZONES)] | None = None
+    """In place of `keep_out_m`: the same for each zone."""
     file: str | None = None
-    """In place of polygon and holes: a GeoJSON or KML file that draws them, relative to the scenario's. Its priorities
-    follow those that are given here."""
+    """In place of polygon, holes and zones to keep out of: a GeoJSON or KML file that draws them, relative to the
+    scenario's. Its priorities follow those that are given here."""
 
 
 class PriorityInDegrees(Mapping):
@@ -80,15 +84,16 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
 _GIVES = {
     "polygon_deg": ("polygon_m",),
     "holes_deg": ("holes_m",),
+    "keep_out_deg": ("keep_out_m",),
     "latitude_deg": ("y_m",),
     "longitude_deg": ("x_m",),
-    "file": ("polygon_m", "holes_m"),
+    "file": ("polygon_m", "holes_m", "keep_out_m"),
 }
 _NOT_BESIDE = {
     **_GIVES,
     "latitude_deg": ("x_m", "y_m"),
     "longitude_deg": ("x_m", "y_m"),
-    "file": ("polygon_m", "holes_m", "polygon_deg", "holes_deg"),
+    "file": ("polygon_m", "holes_m", "keep_out_m", "polygon_deg", "holes_deg", "keep_out_deg"),
 }
 _NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
@@ -175,11 +180,11 @@ def _turn(turned: InMetres, path: KeyPath, holder: dict[str, Value], checked: Ba
         case AreaInDegrees() | PriorityInDegrees():
             if checked.polygon_deg is not None:
                 holder["polygon_m"] = _ring_m((*path, "polygon_deg"), checked.polygon_deg, origin)
-            holes = checked.holes_deg if isinstance(checked, AreaInDegrees) else None
-            if holes is not None:
-                holder["holes_m"] = [
-                    _ring_m((*path, "holes_deg", index), hole, origin) for index, hole in enumerate(holes)
-                ]
+            if isinstance(checked, AreaInDegrees):
+                for key, rings in (("holes", checked.holes_deg), ("keep_out", checked.keep_out_deg)):
+                    if rings is not None:
+                        in_deg = (*path, f"{key}_deg")
+                        holder[f"{key}_m"] = [_ring_m((*in_deg, at), ring, origin) for at, ring in enumerate(rings)]
 
 
 def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Path, origin: GeographicOrigin) -> None:
@@ -193,6 +198,8 @@ def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Pat
         raise _RefusedError(path, file, f"{chart.left_out[0]}; secondlook new leaves such features out")
     area["polygon_m"] = _ring_m(path, chart.area, origin)
     area["holes_m"] = [_ring_m(path, hole, origin) for hole in chart.holes]
+    if chart.keep_out:
+        area["keep_out_m"] = [_ring_m(path, zone, origin) for zone in chart.keep_out]
     if chart.priorities and "priorities" not in area:
         turned.written["area", "priorities"] = (path, file)
     priorities = area.setdefault("priorities", [])
