@@ -96,7 +96,9 @@ NOWHERE = KeepOut()
 
 
 def as_line(path: DubinsPath) -> BaseGeometry:
-    """A path as the chords by which it is judged."""
+    """A path as the chords by which it is judged; a point where it has no length."""
+    if path.length_m == 0.0:
+        return shapely.Point(path.start[:2])
     if not any(turn and length_m for turn, length_m in zip(path.turns, path.lengths_m, strict=True)):
         return shapely.LineString([path.start[:2], path.pose_at(path.length_m)[:2]])
     step_m = 2 * path.turn_radius_m * math.acos(max(0.5, 1 - SAGITTA_M / path.turn_radius_m))
