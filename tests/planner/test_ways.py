@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from zones import assert_keeps_radius, assert_stays_out, kept_out, places
 
 from planner.dubins import Pose, shortest_path
 from planner.keep_out import NOWHERE, KeepOut
 from planner.ways import Way, shortest_way, way_length_m, way_lengths_m, way_or_direct
-from zones import assert_keeps_radius, assert_stays_out, kept_out, places
 
 NORTH, EAST, SOUTH, WEST = (number * math.pi / 2 for number in range(4))
 SQUARE = KeepOut((((-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)),))
@@ -120,8 +120,8 @@ def test_every_way_stays_out_keeps_the_radius_and_arrives(
 @given(kept_out, places, places)
 def test_a_way_back_is_as_long(keep_out: KeepOut, start: Pose, end: Pose) -> None:
     there = shortest_way(start, end, RADIUS_M, keep_out)
-    turned = [Pose(one.x_m, one.y_m, one.heading_rad + math.pi) for one in (end, start)]
-    back = shortest_way(*turned, RADIUS_M, keep_out)
+    first, last = (Pose(one.x_m, one.y_m, one.heading_rad + math.pi) for one in (end, start))
+    back = shortest_way(first, last, RADIUS_M, keep_out)
     assert (there is None) == (back is None)
     if there is not None and back is not None:
         assert way_length_m(back) == pytest.approx(way_length_m(there), abs=1e-3)

@@ -8,11 +8,11 @@ from contextlib import suppress
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from zones import assert_keeps_radius, assert_stays_out, kept_out, places
 
 from planner.dubins import Pose
 from planner.keep_out import KeepOut
 from sim_world.motion import Motion, NoWayError
-from zones import assert_keeps_radius, assert_stays_out, kept_out, places
 
 WALL = KeepOut((((100.0, -500.0), (120.0, -500.0), (120.0, 500.0), (100.0, 500.0)),))
 RADIUS_M = 20.0
