@@ -38,6 +38,7 @@ from planner.types import PriorityGround
 from secondlook.errors import UserError
 from secondlook.recorded.closest_approach import Closest
 from secondlook.recorded.ground import RiskMap, TargetRecord, priorities, targets
+from secondlook.recorded.kept_out import Entered
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
@@ -136,6 +137,11 @@ class Mission(ABC):
     def closest(self) -> list[Closest]:
         """How near each two vehicles came to each other while both were under way, the nearest first."""
         return self._figures.approaches.found()
+
+    @property
+    def entered(self) -> list[Entered]:
+        """Which vehicles entered which zones of `area.keep_out_m`, and when first, in the order of time."""
+        return self._figures.entries.found()
 
     @cached_property
     def _figures(self) -> Metrics:

@@ -36,7 +36,7 @@ def summarise(
     `restarts`: how often processes that died were started again, by host.
     """
     told = observer.metrics.summary()
-    closest = told.pop("closest")
+    closest, entered = told.pop("closest"), told.pop("entered")
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
     return {
         "scenario": scenario.name,
@@ -56,6 +56,7 @@ def summarise(
             "pairs_closer": sum(pair["closest_m"] < scenario.mission.separation_m for pair in closest),
             "closest": closest,
         },
+        **({"keep_out": {"entered": entered}} if scenario.area.keep_out else {}),
         "latency_ms": {
             "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
         },
