@@ -8,14 +8,17 @@ from dataclasses import replace
 
 import numpy as np
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 from planner.dubins import Pose
 from planner.keep_out import KeepOut
 from planner.sweep import pass_over, shifted
-from planner.types import BoolArray, Track
+from planner.types import BoolArray, Point, Track
 
 SHORTEST_PIECE_M = 20.0
 """A piece of a track that is shorter is not worth its turns."""
+AROUND_M = 1000.0
+"""Beyond all zones there is this much water."""
 STEP_M = 1.0
 """So finely is looked for where a piece may begin and end."""
 
@@ -57,6 +60,20 @@ def _pieces(track: Track, keep_out: KeepOut, turn_radius_m: float, run_in_m: flo
         off_m = shifted(poses[stop][:2], heading_rad, lead_m - run_in_m)
         found.append(replace(track, start=on_m[:2], end=off_m[:2]))
     return found
+
+
+def reachable(place: Point, ground: BaseGeometry, keep_out: KeepOut) -> BaseGeometry:
+    """What of some ground lies where one can come from a place past the zones, as they are grown, or within reach of
+    there. Turns are not asked for: a gap that is too narrow to turn in counts as a way."""
+    if not keep_out:
+        return ground
+    about = shapely.box(*shapely.union_all([ground, keep_out.ground, shapely.Point(place)]).bounds).buffer(AROUND_M)
+    waters = [
+        part for part in shapely.get_parts(about.difference(keep_out.ground)) if part.covers(shapely.Point(place))
+    ]
+    # What lies in the margin is seen from where one can come.
+    near = shapely.union_all(waters).buffer(2 * keep_out.margin_m).difference(keep_out.true_ground)
+    return ground.intersection(near)
 
 
 def _runs(values: BoolArray) -> list[tuple[int, int]]:

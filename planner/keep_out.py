@@ -79,8 +79,14 @@ class KeepOut:
         """To which side a vehicle at a pose can circle: 1 to starboard, wherever it can, -1 to port, None neither."""
         if not self:
             return 1
+        east_m, north_m = turn_radius_m * math.cos(pose.heading_rad), -turn_radius_m * math.sin(pose.heading_rad)
         for side in (1, -1):
-            if self.is_clear([DubinsPath(pose, turn_radius_m, (side, 0, 0), (math.tau * turn_radius_m, 0.0, 0.0))]):
+            centre = shapely.Point(pose.x_m + side * east_m, pose.y_m + side * north_m)
+            if not shapely.dwithin(self._closed, centre, turn_radius_m + SAGITTA_M):
+                return side
+            # What is near may lie within the circle.
+            circle = DubinsPath(pose, turn_radius_m, (side, 0, 0), (math.tau * turn_radius_m, 0.0, 0.0))
+            if self.is_clear([circle]):
                 return side
         return None
 

@@ -139,7 +139,8 @@ class Region:
         """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""
         with_boundary = self.polygon.buffer(ON_BOUNDARY_M, join_style="mitre")
         found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
-        for ring in shapely.get_rings(with_boundary):  # what a hole's ring holds is in the outline's, too
+        # What a hole's ring holds is in the outline's, too.
+        for ring in shapely.get_rings(shapely.get_parts(with_boundary)):
             across_m, along_m = grid.frame.to_sweep(*ring.coords.xy)
             found ^= points_inside(across_m[:-1], along_m[:-1], grid.across_m, grid.along_m)
         return found

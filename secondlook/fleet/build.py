@@ -76,6 +76,12 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     for primary in scenario.survey_vehicles.values():
         region_for(scenario, primary, heading_rad)  # refuses a part that is none
     keep_out = keep_out_of(scenario)
+    for name, vehicle in scenario.vehicles.items():
+        if keep_out and not keep_out.are_clear([shapely.Point(vehicle.start.x_m, vehicle.start.y_m)]).all():
+            raise ValueError(
+                f"vehicles.{name}.start must be {keep_out.margin_m:g} m or more from ground to keep out of, "
+                "as all stay so far off"
+            )
     run_info = RunInfo(
         schema=SCHEMA_VERSION,
         scenario=scenario.name,
