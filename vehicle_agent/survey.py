@@ -82,7 +82,8 @@ class SurveyAgent(Agent):
         self._hotspots = HotspotMap.empty(self._grid)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
-        parts = parts_in_order(region, self._grid.frame.heading_rad, self.config.nadir_gap_m, self.config.range_m)
+        sonar, begin = (self.config.nadir_gap_m, self.config.range_m), self.config.begin
+        parts = parts_in_order(region, self._grid.frame.heading_rad, *sonar, begin=begin)
         terms = SpacingTerms(
             self._grid.cell_m, run.rho, self.config.wanted_risk, helper_looks(run.vehicles, self.vehicle)
         )
@@ -220,8 +221,8 @@ class SurveyAgent(Agent):
         self._part = place
         part = self._parts[place]
         decision = part.first(self._known)
-        if self.flown:
-            here = self.flown[-1].end
+        here = self.flown[-1].end if self.flown else self.config.begin
+        if here is not None:
             legs = lawnmower(part.area, decision.offsets_m[:1], decision.range_m)
             turned = any(math.dist(here, leg.end) < math.dist(here, leg.start) for leg in legs)
             self._first_reverse = turned ^ ((self._last_number + 1) % 2 == 0)

@@ -291,8 +291,7 @@ class Record:
         self.fields: tuple[tuple[str, Callable[[Any], Any], Callable[[Any], Any]], ...] = tuple(
             (name, kind.encode, kind.decode) for name, kind in kinds.items()
         )
-        told = [kinds[field.name].encode(field.default) for field in fields(cls) if field.default is not MISSING]
-        self._defaults: tuple[Any, ...] = tuple(told)
+        self._defaults = [kinds[one.name].encode(one.default) for one in fields(cls) if one.default is not MISSING]
         self._encode, self._decode = _put_together(cls, kinds)
         self._left_out = getattr(cls, "LEFT_OUT", 0)
 
@@ -301,9 +300,8 @@ class Record:
             wire = self._encode(value)
         except MISFITS:
             wire = self._name_the_field(lambda name, encode, _: encode(getattr(value, name)))
-        if self._left_out and tuple(wire[-self._left_out :]) == self._defaults[-self._left_out :]:
-            del wire[-self._left_out :]
-        return wire
+        last = self._left_out
+        return wire[:-last] if last and wire[-last:] == self._defaults[-last:] else wire
 
     def decode(self, wire: Any) -> Any:
         if type(wire) is not list or len(wire) != len(self.fields):

@@ -18,7 +18,7 @@ from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, role_of, roster_vehicle
-from secondlook.fleet.survey_area import keep_out_of, region_for, region_of, track_heading_rad
+from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
     PatchySeabed,
     RevisitVehicle,
@@ -107,7 +107,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
         run_info.outline, run_info.hole_outlines, run_info.keep_out_outlines
     )  # refuses what is none in whole centimetres
     roster = _roster_of(scenario, record=record)
-    specs = {name: _agent_spec(name, vehicle) for name, vehicle in scenario.vehicles.items()}
+    specs = {name: _agent_spec(scenario, name, vehicle, heading_rad) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
     if any(one.role is Role.WORLD for one in roster):
         specs = {WORLD: node_spec(Role.WORLD, _world_config(scenario)), **specs}
@@ -142,7 +142,7 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
     return tuple(Vertex(*corner) for corner in corners if corner in convex)
 
 
-def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
+def _agent_spec(scenario: Scenario, name: str, vehicle: SurveyVehicle | RevisitVehicle, heading_rad: float) -> NodeSpec:
     footprint, endurance_ms = footprint_of(vehicle.sonar), endurance_ms_of(vehicle)
     revisit = RevisitConfig(
         vehicle=name,
@@ -167,6 +167,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> NodeSpec:
         prior=None if vehicle.prior_curve is None else vehicle.prior_curve.detection_curve,
         share=vehicle.share,
         wanted_risk=vehicle.wanted_risk,
+        begin=begin_of(scenario, vehicle, heading_rad),
     )
     if vehicle.revisits:
         return node_spec(Role.SURVEY_REVISIT, SurveyRevisitConfig(survey, revisit), vehicle.agent)

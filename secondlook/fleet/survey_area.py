@@ -12,6 +12,7 @@ from planner.footprints import footprint_of
 from planner.keep_out import CLEARANCE_M, NOWHERE, KeepOut
 from planner.profile_spacing import SpacingTerms, known_before
 from planner.region import Region
+from planner.types import Point
 from secondlook.errors import UserError
 from secondlook.fleet.roster import roster_vehicle
 from secondlook.scenario import Scenario, SurveyVehicle
@@ -42,6 +43,17 @@ def region_for(scenario: Scenario, vehicle: SurveyVehicle, heading_rad: float) -
     return region if vehicle.share == WHOLE else region.share(*vehicle.share, heading_rad)
 
 
+def begin_of(scenario: Scenario, vehicle: SurveyVehicle, heading_rad: float) -> Point | None:
+    """The place from which the way through a vehicle's survey is to be short; None where the scenario has none."""
+    if vehicle.begin is None:
+        return None
+    if vehicle.begin == "nearest":
+        return vehicle.start.x_m, vehicle.start.y_m
+    west_m, south_m, east_m, north_m = region_for(scenario, vehicle, heading_rad).polygon.bounds
+    north_or_south, east_or_west = vehicle.begin
+    return (west_m if east_or_west == "w" else east_m, south_m if north_or_south == "s" else north_m)
+
+
 def track_heading_rad(scenario: Scenario) -> float:
     """The compass heading of the tracks; where the scenario leaves it to us, the best for the first survey vehicle."""
     heading_deg = scenario.area.track_heading_deg
@@ -69,6 +81,7 @@ def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
         run_in_m=vehicle.run_in_m,
         lead_m=lead_m,
     )
+    begin = begin_of(scenario, vehicle, heading_rad)
     known = None
     if vehicle.prior_curve is not None:
         known = known_before(vehicle.prior_curve.detection_curve, vehicle.threshold)
@@ -76,7 +89,7 @@ def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
     looks = helper_looks(fleet, name)
     terms = SpacingTerms(scenario.area.cell_m, scenario.mission.rho, vehicle.wanted_risk, looks)
     try:
-        return first_plan(region, heading_rad, *sonar, spacing, known, terms, flyable=flyable)
+        return first_plan(region, heading_rad, *sonar, spacing, known, terms, flyable=flyable, begin=begin)
     except NO_FAILURES:
         raise
     except BaseException as error:

@@ -47,3 +47,16 @@ def test_no_track_enters_it_and_the_way_round_takes_its_time() -> None:
         (x_m, y0_m), (_, y1_m) = track.start, track.end
         assert not (548 < x_m < 652) or max(y0_m, y1_m) <= 150 - 20 or min(y0_m, y1_m) >= 250 + 20
     assert survey.takes_s > free.takes_s
+
+
+def test_where_a_survey_begins_is_told_by_the_scenario() -> None:
+    def takes_s(*overrides: str) -> float:
+        far = load_scenario("tellaro", ["vehicles.primary.start.x_m=1252", *overrides])
+        (survey,) = planned_surveys(far)
+        return survey.takes_s
+
+    # From beside the south-east corner it is 1.2 km, at 1.5 m/s, to the south-west one.
+    nearest_s, usual_s = takes_s("vehicles.primary.begin=nearest"), takes_s()
+    assert nearest_s < usual_s - 500
+    assert takes_s("vehicles.primary.begin=se") == nearest_s
+    assert takes_s("vehicles.primary.begin=sw") == usual_s

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from comms.said.messages import ManeuverState, ManeuverStatus, StripState
+from comms.said.messages import ManeuverState, ManeuverStatus, Plan, StripState
 from planner.keep_out import NOWHERE, KeepOut
 from secondlook.errors import UserError
 from secondlook.launch.run_display import closing_table
@@ -95,3 +95,15 @@ def test_what_cannot_be_reached_is_left_out(tmp_path: Path) -> None:
     assert_all_finished(flight)
     assert set(refused(flight)) == {"no way to the track stays out of ground to keep out of"}
     assert flight.summary["risk"]["uncovered_share"] > 0.4
+
+
+@pytest.mark.parametrize("begin", ["nearest", "nw"])
+def test_a_survey_begins_where_it_is_told_to(tmp_path: Path, begin: str) -> None:
+    start = {"vehicles.primary.start.x_m": 640, "vehicles.primary.begin": begin}
+    flight = fly(tmp_path, PIERS, start)
+    assert_kept_out(flight)
+    assert_all_finished(flight)
+    assert flight.summary["risk_primary_alone"]["uncovered_share"] < 0.1
+    first = flight.said(Plan)[-1].message.tracks[0]
+    assert (first.start_x_m > 300) is (begin == "nearest")
+    assert (first.start_y_m < 150) is (begin == "nearest")
