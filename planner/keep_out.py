@@ -61,6 +61,17 @@ class KeepOut:
         return found
 
     @cached_property
+    def _lagoons(self) -> list[shapely.Polygon]:
+        """What the zones enclose."""
+        parts = shapely.get_parts(self.ground)
+        return [shapely.Polygon(ring) for part in parts for ring in part.interiors]
+
+    def are_parted(self, one: Point, other: Point) -> bool:
+        """Whether the zones enclose one of two places that lie outside of them and not the other: no way joins them."""
+        places = shapely.points([one, other])
+        return any(len(set(shapely.contains(lagoon, places).tolist())) > 1 for lagoon in self._lagoons)
+
+    @cached_property
     def _closed(self) -> BaseGeometry:
         closed: BaseGeometry = self.ground.buffer(-TOUCHES_M, join_style="mitre")
         shapely.prepare(closed)

@@ -55,7 +55,8 @@ def way_or_direct(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOu
 
 @lru_cache(maxsize=20_000)
 def _way_round(start: Pose, end: Pose, turn_radius_m: float, keep_out: KeepOut) -> Way | None:
-    if not keep_out.are_clear(shapely.points([start[:2], end[:2]])).all():
+    here, there = start[:2], end[:2]
+    if not keep_out.are_clear(shapely.points([here, there])).all() or keep_out.are_parted(here, there):
         return None
     graph = _graph(keep_out, turn_radius_m)
     for first_m, last_m in sorted(
