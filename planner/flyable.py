@@ -44,20 +44,24 @@ def _pieces(track: Track, keep_out: KeepOut, turn_radius_m: float, run_in_m: flo
         return [track]
     length_m = math.dist(begin[:2], end[:2])
     at_m = np.append(np.arange(0.0, length_m, STEP_M), length_m)
-    poses = [Pose(*shifted(begin[:2], begin.heading_rad, float(one_m))) for one_m in at_m]
+    x_m = begin.x_m + at_m * math.sin(begin.heading_rad)
+    y_m = begin.y_m + at_m * math.cos(begin.heading_rad)
+
+    def pose(place: int) -> Pose:
+        return Pose(float(x_m[place]), float(y_m[place]), begin.heading_rad)
 
     def has_room(place: int) -> bool:
-        return keep_out.circling(poses[place], turn_radius_m) is not None
+        return keep_out.circling(pose(place), turn_radius_m) is not None
 
     found = []
-    for first, last in _runs(keep_out.are_clear(shapely.points([pose[:2] for pose in poses]))):
+    for first, last in _runs(keep_out.are_clear(shapely.points(x_m, y_m))):
         start = next((place for place in range(first, last + 1) if has_room(place)), None)
         stop = next((place for place in range(last, first - 1, -1) if has_room(place)), None)
         if start is None or stop is None or at_m[stop] - at_m[start] < 2 * run_in_m + SHORTEST_PIECE_M:
             continue
         heading_rad = begin.heading_rad
-        on_m = shifted(poses[start][:2], heading_rad, run_in_m + lead_m)
-        off_m = shifted(poses[stop][:2], heading_rad, lead_m - run_in_m)
+        on_m = shifted(pose(start)[:2], heading_rad, run_in_m + lead_m)
+        off_m = shifted(pose(stop)[:2], heading_rad, lead_m - run_in_m)
         found.append(replace(track, start=on_m[:2], end=off_m[:2]))
     return found
 

@@ -95,11 +95,23 @@ class KeepOut:
             centre = shapely.Point(pose.x_m + side * east_m, pose.y_m + side * north_m)
             if not shapely.dwithin(self._closed, centre, turn_radius_m + SAGITTA_M):
                 return side
+            if not self._fits_within(turn_radius_m):
+                continue
             # What is near may lie within the circle.
             circle = DubinsPath(pose, turn_radius_m, (side, 0, 0), (math.tau * turn_radius_m, 0.0, 0.0))
             if self.is_clear([circle]):
                 return side
         return None
+
+    def _fits_within(self, turn_radius_m: float) -> bool:
+        """Whether a vehicle may circle about a zone."""
+        return bool((self._part_radii_m < turn_radius_m).any())
+
+    @cached_property
+    def _part_radii_m(self) -> FloatArray:
+        """Of each part of the grown zones, that of the least circle about it."""
+        radii_m: FloatArray = shapely.minimum_bounding_radius(shapely.get_parts(self._closed))
+        return radii_m
 
     def is_room(self, begin: Pose, end: Pose, turn_radius_m: float) -> bool:
         """Whether a straight pass stays out, and one can turn before it and behind it."""

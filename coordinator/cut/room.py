@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from comms.said.announcement import RosterVehicle
 from coordinator.cut.strips import strip_of
@@ -32,6 +33,7 @@ class Room:
         turn; in order."""
         return [piece for window in windows for piece in self._pieces(block, window)]
 
+    @lru_cache(maxsize=10_000)  # noqa: B019 - there is one of it in a mission, which lives as long
     def _pieces(self, block: int, window: Window) -> list[Window]:
         if self._can_fly(block, window):
             return [window]

@@ -104,6 +104,8 @@ def unreachable(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> list[st
     told = []
     for name, vehicle in scenario.vehicles.items():
         start = (vehicle.start.x_m, vehicle.start.y_m)
+        if vehicle.body == "external":
+            told.append(f"{name}: its body is not ours: it has to keep out of area.keep_out_m by itself")
         share = 1.0 - reachable(start, region, keep_out).area / region.area
         if share > LEAST_SHARE:
             told.append(

@@ -60,3 +60,10 @@ def test_where_a_survey_begins_is_told_by_the_scenario() -> None:
     assert nearest_s < usual_s - 500
     assert takes_s("vehicles.primary.begin=se") == nearest_s
     assert takes_s("vehicles.primary.begin=sw") == usual_s
+
+
+def test_a_body_that_is_not_ours_has_to_keep_out_by_itself() -> None:
+    said = ["area.keep_out_m=[[[550, 150], [650, 150], [650, 250]]]", "vehicles.helper.body=external"]
+    foreign = load_scenario("tellaro", said)
+    told = "helper: its body is not ours: it has to keep out of area.keep_out_m by itself"
+    assert unreachable(foreign, planned_surveys(foreign)) == [told]
