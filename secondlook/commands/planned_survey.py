@@ -181,6 +181,8 @@ def plan_as_geojson(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> dic
 
 def _features(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
     yield region_of(scenario).polygon, {"kind": "area", "scenario": scenario.name}
+    for number, zone in enumerate(scenario.area.keep_out, start=1):
+        yield shapely.Polygon(zone), {"kind": "keep_out", "zone": number}
     for survey in surveys:
         for number, (part, tracks, range_m) in enumerate(_parts(survey), start=1):
             of = {"vehicle": survey.name, "part": number}

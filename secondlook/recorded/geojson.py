@@ -23,7 +23,7 @@ Features = Iterable[tuple[BaseGeometry, dict[str, Any]]]
 
 
 def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None) -> dict[str, Any]:
-    """A FeatureCollection; each feature's property `kind` is area, track, path, hotspot or strip.
+    """A FeatureCollection; each feature's property `kind` is area, keep_out, track, path, hotspot or strip.
 
     Without an origin, given or in the scenario, coordinates are metres of the mission frame, and the member `frame`
     says so: most programs would take them for degrees. With one the collection is as RFC 7946 asks: WGS84, longitude
@@ -54,6 +54,8 @@ def collection(features: Features, origin: GeographicOrigin | None) -> dict[str,
 def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
     run = mission.run
     yield mission.area, {"kind": "area", "scenario": run.scenario, "seed": run.seed}
+    for number, zone in enumerate(mission.keep_out, start=1):
+        yield zone, {"kind": "keep_out", "zone": number}
     for track in mission.tracks:
         yield (
             track.line,

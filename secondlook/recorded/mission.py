@@ -111,6 +111,11 @@ class Mission(ABC):
         """The survey area."""
         return Region(self.run.outline, self.run.hole_outlines, self.run.keep_out_outlines).polygon
 
+    @cached_property
+    def keep_out(self) -> list[shapely.Polygon]:
+        """The zones that no vehicle may enter."""
+        return [shapely.Polygon(zone) for zone in self.run.keep_out_outlines]
+
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.
 

@@ -10,8 +10,11 @@ import pytest
 
 from comms.said.messages import ManeuverState, ManeuverStatus, Plan, StripState
 from planner.keep_out import NOWHERE, KeepOut
+from secondlook import load
 from secondlook.errors import UserError
 from secondlook.launch.run_display import closing_table
+from secondlook.recorded.geojson import to_geojson
+from secondlook.report.page import report_page
 from secondlook.testing import (
     Fleet,
     Flight,
@@ -29,11 +32,16 @@ PIERS = [[[200, 250], [400, 250], [400, 400], [200, 400]], [[450, -100], [470, -
 LAND = [[[-300, -200], [-45, -200], [-50, -10], [40, 100], [20, 220], [60, 400], [-300, 400]]]
 
 
-def fly(folder: Path, keep_out_m: Sequence[Sequence[Sequence[float]]], more: dict[str, Any] | None = None) -> Flight:
+def fly(
+    folder: Path,
+    keep_out_m: Sequence[Sequence[Sequence[float]]],
+    more: dict[str, Any] | None = None,
+    *,
+    record: bool = False,
+) -> Flight:
     starts = {"vehicles.west.start.x_m": -20, "vehicles.east.start.x_m": 620, "vehicles.east.start.y_m": 320}
-    return Fleet(
-        "two-helpers", folder=folder, overrides={**AREA, **starts, "area.keep_out_m": keep_out_m, **(more or {})}
-    ).run()
+    said = {**AREA, **starts, "area.keep_out_m": keep_out_m, **(more or {})}
+    return Fleet("two-helpers", folder=folder, overrides=said, record=record).run()
 
 
 def refused(flight: Flight) -> list[str]:
@@ -56,6 +64,16 @@ def test_all_stay_out_and_what_is_left_is_looked_at(tmp_path: Path, zones: list[
     assert flight.summary["risk"]["uncovered_share"] < 0.05
     done = [one for one in flight.strips if one.state is StripState.DONE]
     assert len({one.vehicle for one in done}) == 2
+
+
+def test_zones_are_drawn(tmp_path: Path) -> None:
+    flight = fly(tmp_path, PIERS, {"vehicles.primary.start.x_m": 640}, record=True)
+    mission = load(flight.folder)
+    kinds = [one["properties"]["kind"] for one in to_geojson(mission)["features"]]
+    assert kinds.count("keep_out") == 2
+    assert mission.area.area == 600 * 300 - 200 * 50 - 20 * 60
+    page = report_page(mission)
+    assert (page.count('class="keep-out"'), page.count("no vehicle may enter")) == (2, 2)
 
 
 def test_off_its_position_a_vehicle_stays_out_where_it_truly_is(tmp_path: Path) -> None:
