@@ -202,8 +202,8 @@ class TestGroundToKeepOutOf:
         assert [track.number for track in tracks] == list(range(1, len(tracks) + 1))
         assert all(track.flown for track in tracks)
         pieces = [track for track in tracks if abs(track.across_m - across_m) < 1e-6]
-        # Grown it is 11 m wide. A circle of 20 m beside the track touches its corner, 5.5 m to the side, where it begins
-        # sqrt(20^2 - 14.5^2) = 13.8 m before it; before that come 20 m of run-out. Looked for metre by metre.
+        # Grown it is 11 m wide. A circle of 20 m beside the track touches its corner, 5.5 m to the side, where it
+        # begins sqrt(20^2 - 14.5^2) = 13.8 m before it; before that come 20 m of run-out. Looked for metre by metre.
         assert [(piece.start_y_m, piece.end_y_m) for piece in pieces] == [(0.0, 260.0), (340.0, 600.0)]
         free = surveyor(announced(self.FIELD))
         fly_all(free, SEES_TO_130_M)
