@@ -42,7 +42,7 @@ class KeepOut:
 
     def nearer(self) -> KeepOut:
         """The same for who is told a way that was planned: an agent by the coordinator, a vehicle by its agent."""
-        return replace(self, margin_m=self.margin_m - NEARER_M) if self else self
+        return replace(self, margin_m=max(0.0, self.margin_m - NEARER_M)) if self else self
 
     @cached_property
     def true_ground(self) -> BaseGeometry:

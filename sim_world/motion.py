@@ -12,7 +12,7 @@ from typing import Protocol
 from planner.dubins import Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
-from planner.ways import shortest_way
+from planner.ways import Way, shortest_way
 
 ROUNDING_MS = 1e-6
 """A time is not rounded up to the next millisecond for as little as this."""
@@ -155,6 +155,7 @@ class Motion:
 
     def __init__(self, start: Pose, *, speed_mps: float, turn_radius_m: float, keep_out: KeepOut = NOWHERE) -> None:
         self._keep_out = keep_out
+        self._nearest = keep_out.nearer().nearer()
         self._start = start._replace(heading_rad=compass_rad(start.heading_rad))
         self._speed_mps = speed_mps
         self._turn_radius_m = turn_radius_m
@@ -176,7 +177,7 @@ class Motion:
             NoWayError: there is none.
         """
         for legs, held_m, pose in self._departures(now_ms):
-            if self._keep_out.circling(pose, self._turn_radius_m) is not None:
+            if self._circling(pose) is not None:
                 self._sail(legs, held_m, now_ms)
                 return
         raise NoWayError("there is no room to circle beside ground to keep out of")
@@ -200,8 +201,8 @@ class Motion:
             there = math.dist(pose[:2], point) == 0.0
             bearing = pose.heading_rad if there else bearing_rad(pose[:2], point)
             end = Pose(*point, bearing if heading_rad is None else heading_rad)
-            way = shortest_way(pose, end, self._turn_radius_m, self._keep_out)
-            if way is not None and self._keep_out.circling(end, self._turn_radius_m) is not None:
+            way = self._way(pose, end)
+            if way is not None and self._circling(end) is not None:
                 legs.extend(way)
                 arrival_m = sum(leg.length_m for leg in legs)
                 return self._sail(legs, held_m, now_ms).time_ms(arrival_m)
@@ -227,10 +228,10 @@ class Motion:
             start[0] - run_in_m * math.sin(heading_rad), start[1] - run_in_m * math.cos(heading_rad), heading_rad
         )
         whole = Straight(run_in, length_m + 2 * run_in_m)
-        if not self._keep_out.is_room(run_in, whole.pose_at(whole.length_m), self._turn_radius_m):
+        if not self._nearest.is_room(run_in, whole.pose_at(whole.length_m), self._turn_radius_m):
             raise NoWayError("the track, with its runs and turns, enters ground to keep out of")
         for legs, held_m, pose in self._departures(now_ms):
-            way = shortest_way(pose, run_in, self._turn_radius_m, self._keep_out)
+            way = self._way(pose, run_in)
             if way is not None:
                 legs.extend(way)
                 start_m = sum(leg.length_m for leg in legs) + run_in_m
@@ -238,6 +239,16 @@ class Motion:
                 held_m.append((start_m + length_m, start_m + length_m + run_in_m))
                 return FollowedTrack(self._sail(legs, held_m, now_ms), start_m, length_m)
         raise NoWayError("no way to the track stays out of ground to keep out of")
+
+    def _way(self, start: Pose, end: Pose) -> Way | None:
+        """The way that those expect who planned this, or else one that comes nearer to the zones by what they leave for
+        rounding."""
+        way = shortest_way(start, end, self._turn_radius_m, self._keep_out)
+        return shortest_way(start, end, self._turn_radius_m, self._nearest) if way is None else way
+
+    def _circling(self, pose: Pose) -> int | None:
+        side = self._keep_out.circling(pose, self._turn_radius_m)
+        return self._nearest.circling(pose, self._turn_radius_m) if side is None else side
 
     def _departures(self, now_ms: int) -> Iterator[tuple[list[Leg], list[tuple[float, float]], Pose]]:
         """What has to be sailed before a new manoeuvre, as legs and held stretches, and the pose it starts from.
@@ -260,7 +271,7 @@ class Motion:
 
     def _sail(self, legs: list[Leg], held_m: list[tuple[float, float]], now_ms: int) -> Path:
         last = legs[-1].pose_at(legs[-1].length_m) if legs else self.pose_at(now_ms)
-        side = self._keep_out.circling(last, self._turn_radius_m) or 1
+        side = self._circling(last) or 1
         self._path = Path(now_ms, self._speed_mps, [*legs, Loiter(last, self._turn_radius_m, side)], held_m)
         return self._path
 

@@ -180,7 +180,7 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
         holes=tuple(scenario.area.holes_m),
-        keep_out=keep_out_of(scenario).nearer().nearer(),
+        keep_out=keep_out_of(scenario),
         vehicles=tuple(
             _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),
