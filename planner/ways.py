@@ -108,17 +108,10 @@ class _Graph:
         ends = np.array([2 * (count + 2), 2 * (count + 3) + 1])
         out = self._joined(centres, begins, np.concatenate([corners, ends]))
         into = self._joined(centres, corners, ends)
-        return self._search(centres, start, end, out, into, begins, ends)
+        return self._search(centres, start, end, out, into, ends)
 
     def _search(
-        self,
-        centres: FloatArray,
-        start: Pose,
-        end: Pose,
-        out: _Lines,
-        into: _Lines,
-        begins: np.ndarray,
-        ends: np.ndarray,
+        self, centres: FloatArray, start: Pose, end: Pose, out: _Lines, into: _Lines, ends: np.ndarray
     ) -> Way | None:
         """By the length so far and the beeline from there (A*). What is searched are lines that end on a circle."""
         radius_m, goal = self._radius_m, end[:2]

@@ -54,8 +54,7 @@ def collection(features: Features, origin: GeographicOrigin | None) -> dict[str,
 def _features(mission: RecordedMission) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
     run = mission.run
     yield mission.area, {"kind": "area", "scenario": run.scenario, "seed": run.seed}
-    for number, zone in enumerate(mission.keep_out, start=1):
-        yield zone, {"kind": "keep_out", "zone": number}
+    yield from ((zone, {"kind": "keep_out", "zone": at}) for at, zone in enumerate(mission.keep_out, start=1))
     for track in mission.tracks:
         yield (
             track.line,
