@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from comms.said.messages import StripState
+from coordinator.allocate.service import can_fly
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Counted
@@ -85,7 +88,7 @@ class Briefing:
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
         open_strips = self._ledger.in_state(StripState.OPEN)
         sees = footprint_of(entry.sonar)
-        return Helper(
+        helper = Helper(
             vehicle=entry.vehicle,
             pose=pose,
             free_at=free_at,
@@ -101,4 +104,7 @@ class Briefing:
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms) / 1000,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
+            keep_out=vehicle.keep_out,
         )
+        cannot = frozenset(one.strip.number for one in open_strips if not can_fly(one.strip, helper))
+        return replace(helper, refused=helper.refused | cannot) if cannot else helper

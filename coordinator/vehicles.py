@@ -17,6 +17,7 @@ from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
 from planner.dubins import Pose
 from planner.footprints import footprint_of
+from planner.keep_out import NOWHERE, KeepOut
 from planner.risk import LevelArray
 from planner.sweep import Pass, distance_over, pass_over
 from planner.types import DetectionCurve, Strip
@@ -24,7 +25,9 @@ from planner.types import DetectionCurve, Strip
 log = logging.getLogger("secondlook.coordinator")
 
 
-def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int) -> int | None:
+def expected_end_ms(
+    entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int, keep_out: KeepOut = NOWHERE
+) -> int | None:
     """Milliseconds since the mission's start; None where that cannot be told.
 
     The track that the state tells it works on ends when the state expects; each further one is reached the
@@ -44,7 +47,7 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
         return at_ms
     passes = [pass_of(track, entry) for track in ahead]
     # The last track's run-out comes after its end.
-    way_m = distance_over(pose, passes, entry.turn_radius_m) - entry.run_in_m
+    way_m = distance_over(pose, passes, entry.turn_radius_m, keep_out) - entry.run_in_m
     return at_ms + round(way_m / entry.speed_mps * 1000)
 
 
@@ -91,7 +94,7 @@ class KnownVehicle:
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
     has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and
     `curves`: P(y) by track, 0 for that of earlier missions, for a primary. `arrivals`: what has come of its tiles and
-    hotspots.
+    hotspots. `keep_out`: what it may not enter.
     """
 
     entry: RosterVehicle
@@ -110,6 +113,7 @@ class KnownVehicle:
     curves: dict[int, DetectionCurve] = field(default_factory=dict)
     arrivals: Arrivals = field(default_factory=Arrivals)
     stirred_ms: int = 0
+    keep_out: KeepOut = NOWHERE
     _plan_order: Order = _NONE_YET
     _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
@@ -219,7 +223,7 @@ class KnownVehicle:
         """When a primary has surveyed all, or is expected to have; None where nobody can tell."""
         if self.finished_ms is not None:
             return self.finished_ms
-        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms)
+        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms, self.keep_out)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

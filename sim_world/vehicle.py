@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from comms.node import random_stream
 from comms.said.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
 from planner.dubins import Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
 from sim_world.config import FARTHEST_M, VehicleConfig
-from sim_world.motion import FollowedTrack, Motion, bearing_rad
+from sim_world.motion import FollowedTrack, Motion, NoWayError, bearing_rad
 
 TRACK_ROUNDING_M = 0.02
 """Two ends in whole centimetres make a track up to 1.5 cm too long; no bin is added for that."""
@@ -38,7 +39,7 @@ class SimulatedVehicle:
     track it was on is not looked at.
     """
 
-    def __init__(self, config: VehicleConfig, seed: int) -> None:
+    def __init__(self, config: VehicleConfig, seed: int, keep_out: KeepOut = NOWHERE) -> None:
         self.config = config
         self._error_rad, self._drift_rad = (
             random_stream(seed, "world", config.vehicle, name).uniform(0.0, 2 * math.pi)
@@ -48,6 +49,7 @@ class SimulatedVehicle:
             Pose(config.start_x_m, config.start_y_m, config.start_heading_rad),
             speed_mps=config.speed_mps,
             turn_radius_m=config.turn_radius_m,
+            keep_out=keep_out,
         )
         self._to_come: deque[tuple[int, Event]] = deque()
 
@@ -85,6 +87,14 @@ class SimulatedVehicle:
         reason = _reason_to_refuse(maneuver)
         if reason:
             return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, reason)
+        try:
+            ends_ms = self._begin(maneuver, now_ms)
+        except NoWayError as error:
+            return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, str(error))
+        return ManeuverStatus(maneuver.number, ManeuverState.ACCEPTED, ends_ms, "")
+
+    def _begin(self, maneuver: Maneuver, now_ms: int) -> int:
+        """Begins a manoeuvre, and tells when it ends, 0 for never; raises NoWayError and goes on with what it does."""
         start, end = (maneuver.start_x_m, maneuver.start_y_m), (maneuver.end_x_m, maneuver.end_y_m)
         ends_ms = 0
         match maneuver.kind:
@@ -99,7 +109,7 @@ class SimulatedVehicle:
                 track = self._motion.follow(start, end, maneuver.run_in_m, now_ms)
                 ends_ms = track.time_ms(track.length_m)
                 self._to_come = deque(self._on_track(maneuver, track, bearing_rad(start, end)))
-        return ManeuverStatus(maneuver.number, ManeuverState.ACCEPTED, ends_ms, "")
+        return ends_ms
 
     @property
     def next_event_ms(self) -> int | None:

@@ -23,6 +23,7 @@ from comms.said.messages import (
 )
 from comms.said.topics import CONTACT, MANEUVER, STATE
 from planner.footprints.footprint import Footprint
+from planner.keep_out import NOWHERE, KeepOut
 from planner.region import Region
 from planner.sweep import pass_over
 from planner.types import Point, Strip, SweepFrame, Track
@@ -52,6 +53,7 @@ class Agent:
         self.nav: Nav | None = None
         self.coverage: CoverageLayer | None = None
         self.region: Region
+        self.keep_out: KeepOut = NOWHERE
         self.maneuver: Maneuver | None = None
         self._word_due_ms: int | None = None  # when the vehicle should have said more of the present manoeuvre
         self._looks_taken: set[tuple[int, int]] = set()
@@ -80,7 +82,8 @@ class Agent:
             self._hear_nav(message, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
             self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
-            self.region = Region(message.outline, message.hole_outlines)
+            self.region = Region(message.outline, message.hole_outlines, message.keep_out_outlines)
+            self.keep_out = KeepOut(message.keep_out_outlines, message.keep_out_margin_m)
             self._wake_ms = now_ms + REPORT_EVERY_MS
             self.on_run(message, now_ms)
         elif self.coverage is not None and not self._over:

@@ -10,13 +10,14 @@ from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task,
 from comms.said.topics import TASK_STATUS
 from planner.dubins import Pose
 from planner.region import share_within
-from planner.sweep import shortest_sweep, sweeps_by
+from planner.sweep import NoSweepError, shortest_sweep, sweeps_by
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
 
 SWEPT_SHARE = 0.5
 BATTERY_TOO_LOW = "the battery does not last"
+NO_ROOM = "it cannot be flown without entering ground to keep out of"
 
 
 class SecondLooks:
@@ -112,8 +113,13 @@ class SecondLooks:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         pose = Pose(agent.nav.x_m, agent.nav.y_m, agent.nav.heading_rad)
-        ways = sweeps_by(agent.footprint, strip, config.turn_radius_m, config.run_in_m)
-        sweep, way_m = shortest_sweep(ways, pose, config.turn_radius_m)
+        radius_m, keep_out = config.turn_radius_m, agent.keep_out.nearer()
+        ways = sweeps_by(agent.footprint, strip, radius_m, config.run_in_m, keep_out)
+        try:
+            sweep, way_m = shortest_sweep(ways, pose, radius_m, keep_out)
+        except NoSweepError:
+            self._tell(strip.number, TaskState.REFUSED, 0, NO_ROOM)
+            return
         ends_ms = now_ms + round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
         if agent.battery(ends_ms) <= 0.0:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from planner.dubins import Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Strip
 
 
@@ -28,7 +29,8 @@ class Helper:
     `p_detect`: its P_d there. `lasts_until_s`: when its battery is empty. `refused`: strips that it is not to be
     offered. `sweeping`: whether it is on its task's strip already. `beside_m`: how far beside the middle of what a leg
     covers it flies it, on either side; `lead_m`: how much earlier than over the ground that it sees. Times are seconds
-    since the mission's start.
+    since the mission's start. `keep_out`: what it may not enter; strips that it cannot fly therefore are among those
+    refused.
     """
 
     vehicle: str
@@ -46,6 +48,7 @@ class Helper:
     sweeping: bool = False
     beside_m: float = 0.0
     lead_m: float = 0.0
+    keep_out: KeepOut = NOWHERE
 
 
 @dataclass(frozen=True)

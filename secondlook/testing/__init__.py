@@ -18,6 +18,7 @@ from secondlook.testing.map_assertions import assert_maps_converged, assert_risk
 from secondlook.testing.mission_assertions import (
     assert_all_finished,
     assert_kept_apart,
+    assert_kept_out,
     assert_no_message_dropped,
     assert_repeats,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "RunFailedError",
     "assert_all_finished",
     "assert_kept_apart",
+    "assert_kept_out",
     "assert_maps_converged",
     "assert_never_assigned_to_lost",
     "assert_no_message_dropped",
