@@ -13,9 +13,9 @@ class AwakeClock:
     SIGSTOP, or frozen with the machine. What the system tells of that is too little; but whoever reads the clock again
     and again sees a long time pass between two readings, without work.
 
-    `most_s`: more passes between two readings, beyond the time that the process was at work, only where it was stopped;
-    then that time alone counts. `held`: while it says so the clock stands still as well. `real`, `worked`: the clocks of
-    the wall and of the process's own work; the system's.
+    `most_s`: more passes between two readings, beyond the time that the process was at work, only where it was stopped:
+    then that time alone counts. `held`: while it says so the clock stands still as well. `real`, `worked`: the clocks
+    of the wall and of the process's own work; the system's.
     """
 
     def __init__(
