@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test docs example pictures golden lock clean
+.PHONY: run test docs example pictures golden lock release clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -74,6 +74,22 @@ example: .venv/.test-ready
 	"$$home/venv/bin/python" -m mypy . ../vehicle/vehicle.py ../read_a_mission.py; \
 	"$$home/venv/bin/python" -m pytest
 
+# Wheel and source archive in dist/, checked as an index checks them; the wheel is flown from an environment of its own,
+# away from this folder. The wheel is built from the archive, so that nothing is missing there.
+RELEASE_TOOLS := build==1.3.0 twine==6.2.0 setuptools==80.9.0
+release: .venv/.run-ready
+	@set -e; home=$$(mktemp -d); trap 'rm -rf "$$home"' EXIT; rm -rf dist; \
+	"$(PYTHON)" -m venv "$$home/tools"; \
+	"$$home/tools/bin/python" -m pip --disable-pip-version-check install --quiet $(RELEASE_TOOLS); \
+	"$$home/tools/bin/python" -m build --no-isolation --outdir dist . >"$$home/log" 2>&1 || { cat "$$home/log"; exit 1; }; \
+	"$$home/tools/bin/python" -m twine check --strict dist/*; \
+	"$(PYTHON)" -m venv "$$home/venv"; \
+	"$$home/venv/bin/python" -m pip --disable-pip-version-check install --quiet --require-hashes \
+		--requirement requirements.lock; \
+	"$$home/venv/bin/python" -m pip --disable-pip-version-check install --quiet --no-deps dist/*.whl; \
+	cp tests/support/brief.yaml "$$home"; cd "$$home"; venv/bin/secondlook --version; \
+	venv/bin/secondlook check brief.yaml; venv/bin/secondlook run brief.yaml --out out
+
 # The stamps are what makes a second call start at once.
 .venv/.made:
 	@"$(PYTHON)" -c '$(usable)' 2>/dev/null || { echo "No usable Python found: secondlook needs Python 3.11 or newer" \
@@ -117,6 +133,6 @@ lock: .venv-lock/.uv-$(UV_VERSION)
 # What the targets above have made, but for the missions in runs/, and nothing else.
 SOURCES := bench comms coordinator docs examples planner secondlook sim_world tests vehicle_agent viz
 clean:
-	rm -rf .venv .venv-lock build secondlook.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache \
+	rm -rf .venv .venv-lock build dist secondlook.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache \
 		.hypothesis site runs/golden runs/pictures
 	find $(SOURCES) -name __pycache__ -type d -prune -exec rm -rf {} +
