@@ -133,6 +133,6 @@ lock: .venv-lock/.uv-$(UV_VERSION)
 # What the targets above have made, but for the missions in runs/, and nothing else.
 SOURCES := bench comms coordinator docs examples planner secondlook sim_world tests vehicle_agent viz
 clean:
-	rm -rf .venv .venv-lock build dist secondlook.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache \
+	rm -rf .venv .venv-lock build secondlook.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache \
 		.hypothesis site runs/golden runs/pictures
 	find $(SOURCES) -name __pycache__ -type d -prune -exec rm -rf {} +

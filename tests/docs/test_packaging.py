@@ -44,14 +44,7 @@ def test_every_locked_package_has_one_exact_version_and_hashes() -> None:
 
 def test_make_clean_removes_what_was_made_and_nothing_else(tmp_path: Path) -> None:
     made = [
-        *(
-            ".venv/bin/python",
-            ".venv-lock/bin/uv",
-            "build/lib/a.py",
-            "dist/a.whl",
-            "secondlook.egg-info/PKG-INFO",
-            "site/index.html",
-        ),
+        *(".venv/bin/python", ".venv-lock/bin/uv", "build/lib/a.py", "secondlook.egg-info/PKG-INFO", "site/index.html"),
         *(".mypy_cache/a", ".ruff_cache/a", ".pytest_cache/a", ".import_linter_cache/a", ".hypothesis/a"),
         *("runs/golden/a", "runs/pictures/a"),
         *(f"{room}/deep/__pycache__/a.pyc" for room in (*ROOMS, "bench", "docs", "examples", "tests")),
