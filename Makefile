@@ -50,14 +50,15 @@ golden: .venv/.run-ready
 	@cp runs/golden/scenario.yaml $(GOLDEN)
 	@gzip --best --no-name --stdout runs/golden/messages.mpk >$(GOLDEN)/messages.mpk.gz
 
-# Two tests at a time. The processes they start, some hundreds, are not to compile each module anew.
+# Three tests at a time, as many wait for a clock or a process. The processes they start, some hundreds, are not to compile
+# each module anew.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: .venv/.test-ready
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	$(BIN)/pytest -n 2 --dist worksteal
+	$(BIN)/pytest -n 3 --dist worksteal
 
 # The examples' types and tests, as a user checks them: against the wheel, in an environment of its own, away from this
 # folder.
