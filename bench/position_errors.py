@@ -67,7 +67,7 @@ class TrueMap:
                 layer = self.layers[one.vehicle].layer
                 sums += layer.sum_levels
                 np.maximum(largest, layer.largest_levels, out=largest)
-        inside = Region(self.run.outline, self.run.hole_outlines).inside(spec)
+        inside = Region(self.run.outline, self.run.hole_outlines, self.run.keep_out_outlines).inside(spec)
         return float(risk_statistics(residual_risk(sums, largest, self.run.rho), sums > 0, inside).mean)
 
 

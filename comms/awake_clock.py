@@ -13,9 +13,9 @@ class AwakeClock:
     SIGSTOP, or frozen with the machine. What the system tells of that is too little; but whoever reads the clock again
     and again sees a long time pass between two readings, without work.
 
-    `most_s`: more passes between two readings, beyond the time that the process was at work, only where it was stopped;
-    then that time alone counts. `held`: while it says
-    so the clock stands still as well. `real`, `worked`: the clocks of the wall and of the process's own work.
+    `most_s`: more passes between two readings, beyond the time that the process was at work, only where it was stopped:
+    then that time alone counts. `held`: while it says so the clock stands still as well. `real`, `worked`: the clocks
+    of the wall and of the process's own work; the system's.
     """
 
     def __init__(
@@ -23,14 +23,14 @@ class AwakeClock:
         most_s: float = MOST_S,
         held: Callable[[], bool] = lambda: False,
         *,
-        real: Callable[[], float] = time.monotonic,
-        worked: Callable[[], float] = time.process_time,
+        real: Callable[[], float] | None = None,
+        worked: Callable[[], float] | None = None,
     ) -> None:
         self._most_s = most_s
         self._held = held
-        self._real = real
-        self._worked = worked
-        self._real_s, self._worked_s = real(), worked()
+        self._real = time.monotonic if real is None else real
+        self._worked = time.process_time if worked is None else worked
+        self._real_s, self._worked_s = self._real(), self._worked()
         self._now_s = self._real_s
         self.times_stopped = 0
         """How often the process was stopped, as far as readings have told."""

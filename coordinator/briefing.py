@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from comms.said.messages import StripState
+from coordinator.allocate.service import can_fly
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Counted
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
-from coordinator.vehicles import KnownVehicle, sailing_of
+from coordinator.vehicles import KnownVehicle, way_home_of
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.types import Strip
-from planner.way_home import MARGIN_S, WayHome
+from planner.way_home import MARGIN_S
 
 
 class Briefing:
@@ -86,8 +89,7 @@ class Briefing:
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
         open_strips = self._ledger.in_state(StripState.OPEN)
         sees = footprint_of(entry.sonar)
-        way_home = WayHome((entry.home_x_m, entry.home_y_m), sailing_of(entry), entry.turn_radius_m)
-        return Helper(
+        helper = Helper(
             vehicle=entry.vehicle,
             pose=pose,
             free_at=free_at,
@@ -99,9 +101,12 @@ class Briefing:
             swath_m=sees.reach.strip_width_m,
             beside_m=sees.reach.beside_m,
             lead_m=sees.lead_m,
-            way_home=way_home,
+            way_home=way_home_of(entry, vehicle.keep_out),
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
+            keep_out=vehicle.keep_out,
         )
+        cannot = frozenset(one.strip.number for one in open_strips if not can_fly(one.strip, helper))
+        return replace(helper, refused=helper.refused | cannot) if cannot else helper

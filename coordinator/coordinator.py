@@ -89,7 +89,7 @@ class Coordinator:
 
     def _begin(self, run: RunInfo, now_ms: int) -> None:
         config, agenda, outbox = self.config, self._agenda, self._outbox
-        inside = Region(run.outline, run.hole_outlines).inside(run.grid.spec)
+        inside = Region(run.outline, run.hole_outlines, run.keep_out_outlines).inside(run.grid.spec)
         self.fleet = fleet = KnownFleet(run, config.lost_after_ms, now_ms)
         ledger = Ledger(self._first_number)
         helpers = [one.entry for one in fleet.helpers]

@@ -41,7 +41,9 @@ class Dispatch:
         self._agenda = agenda
         self._outbox = outbox
         lies_inside = partial(_lies_inside, fleet.map.grid, inside)
-        self._right_of_way = RightOfWay(config.separation_m, lies_inside) if config.separation_m > 0 else None
+        self._right_of_way = None
+        if config.separation_m > 0:
+            self._right_of_way = RightOfWay(config.separation_m, lies_inside, fleet.keep_out)
 
     def note_state(self, name: str, now_ms: int, *, does_another: bool) -> None:
         """A vehicle was heard. `does_another`: what it does is another than it was."""

@@ -14,6 +14,7 @@ from comms.said.messages import StripState
 from coordinator.allocate.routes import BEAM, plan_routes
 from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
+from coordinator.cut.room import Room
 from coordinator.cut.strips import Cut, cells_wide
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
@@ -96,6 +97,8 @@ class Lanes:
             lanes = _lanes(inside, edges[place], edges[place + 1], width)
             nearer_end = at_m > (edges[place] + edges[place + 1]) / 2 * grid.cell_m
             found[name] = [self._window(lane) for lane in (lanes[::-1] if nearer_end else lanes)]
+            if self._fleet.keep_out:
+                found[name] = Room(grid, entry, self._fleet.keep_out, grid.cell_m).flyable(1, found[name])
         return found
 
     def _window(self, lane: Window) -> Window:

@@ -13,6 +13,7 @@ from comms.said.messages import CoverageTile
 from coordinator.cut.window import Window
 from coordinator.vehicles import KnownVehicle
 from planner.fleet_map import FleetMap
+from planner.keep_out import KeepOut
 from planner.risk import LevelArray
 
 log = logging.getLogger("secondlook.coordinator")
@@ -25,12 +26,17 @@ it. One that stands still may hear nothing, and then never surveys, though it sa
 class KnownFleet:
     """The fleet that the run's announcement names: `vehicles`, by name, and of these the `primaries`, which survey.
 
-    `map`: the tiles of all, joined. `lost_after_ms`: age of a vehicle's state from which it counts as lost.
+    `keep_out`: what none may enter. `map`: the tiles of all, joined. `lost_after_ms`: age of a vehicle's state from
+    which it counts as lost.
     """
 
     def __init__(self, run: RunInfo, lost_after_ms: int, now_ms: int) -> None:
         self.map = FleetMap(run.grid.spec, run.rho)
-        self.vehicles = {one.vehicle: KnownVehicle(one, heard_ms=now_ms, stirred_ms=now_ms) for one in run.vehicles}
+        self.keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
+        self.vehicles = {
+            one.vehicle: KnownVehicle(one, heard_ms=now_ms, stirred_ms=now_ms, keep_out=self.keep_out)
+            for one in run.vehicles
+        }
         self.primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
         self._lost_after_ms = lost_after_ms
         self._given_up_after_ms = GIVEN_UP_AFTER * lost_after_ms

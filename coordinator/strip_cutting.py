@@ -14,6 +14,7 @@ from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.cutter import Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, CuttingRules
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
@@ -53,7 +54,8 @@ class StripCutting:
         area_m2 = fleet.map.grid.cell_area_m2
         least_worth = self._objective.mean * config.worth_risk * narrowest.p_detect * area_m2
         least_worth = max(least_worth, LEAST_WORTH * area_m2)
-        self._cutter = Cutter(fleet.map.grid, rules, least_worth, across=config.across)
+        room = Room(fleet.map.grid, narrowest, fleet.keep_out, config.min_strip_m) if fleet.keep_out else None
+        self._cutter = Cutter(fleet.map.grid, rules, least_worth, across=config.across, room=room)
         self._weights = weights_over(fleet.map.grid, inside, config.priorities) * area_m2
         self._expected = expected
         self._briefing = briefing

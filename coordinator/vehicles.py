@@ -18,14 +18,18 @@ from coordinator.ledger import StripRecord
 from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.footprints import footprint_of
+from planner.keep_out import NOWHERE, KeepOut
 from planner.risk import LevelArray
 from planner.sweep import Pass, distance_over, pass_over
 from planner.types import DetectionCurve, Strip
+from planner.way_home import WayHome
 
 log = logging.getLogger("secondlook.coordinator")
 
 
-def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int) -> int | None:
+def expected_end_ms(
+    entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int, keep_out: KeepOut = NOWHERE
+) -> int | None:
     """Milliseconds since the mission's start; None where that cannot be told.
 
     On its way home it has done when it is there. The track that the state tells it works on ends when the state
@@ -50,9 +54,10 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
     # The last track's run-out comes after its end.
     sailing = sailing_of(entry)
     if sailing.is_in_still_water:
-        takes_s = (distance_over(pose, passes, entry.turn_radius_m) - entry.run_in_m) / entry.speed_mps
+        way_m = distance_over(pose, passes, entry.turn_radius_m, keep_out)
+        takes_s = (way_m - entry.run_in_m) / entry.speed_mps
     else:
-        takes_s = sailing.passes_s(passes, entry.turn_radius_m, pose)
+        takes_s = sailing.passes_s(passes, entry.turn_radius_m, pose, keep_out)
         takes_s -= sailing.straight_s(entry.run_in_m, passes[-1].end.heading_rad)
     return at_ms + round(takes_s * 1000)
 
@@ -60,6 +65,11 @@ def expected_end_ms(entry: RosterVehicle, state: AgentState | None, plan: Plan |
 def sailing_of(entry: RosterVehicle) -> Sailing:
     """What a vehicle makes good, as it is reckoned with."""
     return Sailing(entry.speed_mps, entry.drift_mps, entry.set_rad, tidal=entry.is_tidal)
+
+
+def way_home_of(entry: RosterVehicle, keep_out: KeepOut = NOWHERE) -> WayHome:
+    """A vehicle's way home, as it is reckoned with."""
+    return WayHome((entry.home_x_m, entry.home_y_m), sailing_of(entry), entry.turn_radius_m, keep_out)
 
 
 def pass_of(track: PlannedTrack, entry: RosterVehicle) -> Pass:
@@ -106,7 +116,7 @@ class KnownVehicle:
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
     has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and
     `curves`: P(y) by track, 0 for that of earlier missions, for a primary. `arrivals`: what has come of its tiles and
-    hotspots.
+    hotspots. `keep_out`: what it may not enter.
     """
 
     entry: RosterVehicle
@@ -126,6 +136,7 @@ class KnownVehicle:
     arrivals: Arrivals = field(default_factory=Arrivals)
     stirred_ms: int = 0
     ended_early: bool = False
+    keep_out: KeepOut = NOWHERE
     _plan_order: Order = _NONE_YET
     _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
@@ -242,7 +253,7 @@ class KnownVehicle:
         """When a primary has surveyed all, or is expected to have; None where nobody can tell."""
         if self.finished_ms is not None:
             return self.finished_ms
-        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms)
+        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms, self.keep_out)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

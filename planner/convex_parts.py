@@ -61,11 +61,15 @@ def convex_parts(
     Raises:
         ValueError: the heading is not finite.
     """
-    if not region.holes and _is_convex(region.polygon):
+    if not region.holes and not region.keep_out and _is_convex(region.polygon):
         return [SurveyArea(region.outline, track_heading_rad)]
     frame = region.about(track_heading_rad).frame
-    _, pieces = _Cutting(tracks_for, thorough=thorough).best(_to(frame, region.polygon))
-    return [_part(frame, piece, track_heading_rad) for piece in pieces]
+    found = []
+    for polygon in shapely.get_parts(region.polygon):
+        if not region.keep_out or polygon.area > LEAST_PART_M2:
+            _, pieces = _Cutting(tracks_for, thorough=thorough).best(_to(frame, polygon))
+            found += [_part(frame, piece, track_heading_rad) for piece in pieces]
+    return found
 
 
 class _Cutting:
@@ -114,7 +118,7 @@ def _sum(costs: list[_Cost]) -> _Cost:
     return sum(tracks for tracks, _ in costs), sum(length_m for _, length_m in costs)
 
 
-def _hull(polygon: shapely.Polygon) -> shapely.Polygon:
+def _hull(polygon: shapely.Polygon | shapely.MultiPolygon) -> shapely.Polygon:
     hull = polygon.convex_hull
     assert isinstance(hull, shapely.Polygon)
     return hull
@@ -125,13 +129,13 @@ def _split(polygon: shapely.Polygon, line: shapely.LineString) -> list[shapely.P
     return [piece for piece in pieces if isinstance(piece, shapely.Polygon)]
 
 
-def is_all_but_convex(polygon: shapely.Polygon) -> bool:
+def is_all_but_convex(polygon: shapely.Polygon | shapely.MultiPolygon) -> bool:
     """Whether no dent, and no hole, is deeper than `SHALLOW_M`: it is surveyed in one part."""
     left_out = _hull(polygon).difference(polygon)
     return bool(left_out.buffer(-SHALLOW_M / 2).is_empty)
 
 
-def _is_convex(polygon: shapely.Polygon) -> bool:
+def _is_convex(polygon: shapely.Polygon | shapely.MultiPolygon) -> bool:
     """Whether it is a `SurveyArea` as it stands."""
     return bool(_hull(polygon).area - polygon.area <= ON_A_LINE_M * polygon.length)
 

@@ -10,9 +10,11 @@ from functools import cache
 
 import numpy as np
 
-from planner.dubins import DubinsPath, Pose, shortest_path
+from planner.dubins import DubinsPath, Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Pass
 from planner.types import FloatArray
+from planner.ways import way_or_direct
 
 Flow = tuple[float, float]
 """How the water flows, to the east and to the north, in m/s."""
@@ -108,6 +110,10 @@ class Sailing:
             heading_rad += by_rad
         return spent_s
 
+    def way_s(self, way: Sequence[DubinsPath]) -> float:
+        """How long paths that follow each other take."""
+        return sum(self.path_s(path) for path in way)
+
     def knots(self, paths: Sequence[DubinsPath]) -> tuple[FloatArray, FloatArray]:
         """When a vehicle is how far along paths that follow each other, at the ends of their turns and straights; both
         begin with 0."""
@@ -121,12 +127,14 @@ class Sailing:
                 heading_rad += turn * length_m / path.turn_radius_m
         return np.array(times_s), np.array(lengths_m)
 
-    def passes_s(self, passes: Sequence[Pass], turn_radius_m: float, here: Pose | None = None) -> float:
-        """How long passes take in their order, with the turns between them, and the way there from a pose, if any."""
+    def passes_s(
+        self, passes: Sequence[Pass], turn_radius_m: float, here: Pose | None = None, keep_out: KeepOut = NOWHERE
+    ) -> float:
+        """How long passes take in their order, with the ways between them, and the way there from a pose, if any."""
         spent_s = 0.0
         for one in passes:
             if here is not None:
-                spent_s += self.path_s(shortest_path(here, one.begin, turn_radius_m))
+                spent_s += self.way_s(way_or_direct(here, one.begin, turn_radius_m, keep_out))
             spent_s += self.straight_s(one.length_m, one.begin.heading_rad)
             here = one.end
         return spent_s

@@ -4,7 +4,7 @@ which order, and from which side, its parts are surveyed."""
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import permutations
@@ -97,11 +97,18 @@ class FirstPlan:
 
 
 def parts_in_order(
-    region: Region, track_heading_rad: float, nadir_gap_m: float, told_range_m: float, *, thorough: bool = True
+    region: Region,
+    track_heading_rad: float,
+    nadir_gap_m: float,
+    told_range_m: float,
+    *,
+    begin: Point | None = None,
+    thorough: bool = True,
 ) -> list[SurveyArea]:
     """The convex parts of a region as a sensor of this nadir gap and range surveys them.
 
-    The order begins at the corner from which tracks are laid. `thorough`: see `convex_parts`.
+    The order begins at the corner from which tracks are laid; with `begin`, so that the way from there through all of
+    them is short, and the first part's tracks are laid from its side that is nearer. `thorough`: see `convex_parts`.
 
     Raises:
         ValueError: a number is not finite or out of its range (`planner.spacing.track_count`).
@@ -112,6 +119,8 @@ def parts_in_order(
         return track_count(width_m, nadir_gap_m, highest_m)
 
     parts = convex_parts(region, track_heading_rad, tracks_for, thorough=thorough)
+    if begin is not None:
+        return in_order(parts, begin)
     if len(parts) == 1:
         return parts
     frame = region.about(track_heading_rad).frame
@@ -128,21 +137,25 @@ def first_plan(
     terms: SpacingTerms | None = None,
     *,
     thorough: bool = True,
+    flyable: Callable[[list[Track]], list[Track]] | None = None,
+    begin: Point | None = None,
 ) -> FirstPlan:
     """The tracks as `spacing` lays them, by Algorithm 1 if left out, each part by itself and from its nearer end.
 
-    `known`, `terms`: for a planner that goes by P(y). For numbers and errors see `parts_in_order`.
+    `known`, `terms`: for a planner that goes by P(y). `flyable`: what of some tracks can be flown. `begin`: from
+    where the way to the first track is to be short. For numbers and errors see `parts_in_order`.
     """
-    parts = parts_in_order(region, track_heading_rad, nadir_gap_m, told_range_m, thorough=thorough)
+    parts = parts_in_order(region, track_heading_rad, nadir_gap_m, told_range_m, begin=begin, thorough=thorough)
     spacing = spacing or AdaptiveSpacing(nadir_gap_m, told_range_m)
     laid: list[tuple[Track, ...]] = []
     ranges_m: list[int] = []
-    number, here = 1, None
+    number, here = 1, begin
     for part in parts:
         decision = first_decision(spacing, part.width_m, known, terms or SpacingTerms())
         tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number)
         if here and tracks and math.dist(here, tracks[0].end) < math.dist(here, tracks[0].start):
             tracks = lawnmower(part, decision.offsets_m, decision.range_m, first_number=number, first_reverse=True)
+        tracks = tracks if flyable is None else flyable(tracks)
         laid.append(tuple(tracks))
         ranges_m.append(decision.range_m)
         number += len(tracks)

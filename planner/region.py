@@ -55,28 +55,47 @@ def share_within(strip: Strip, other: Strip) -> float:
 class Region:
     """A simple polygon and the holes in it, which are not to be surveyed; mission frame, corners not repeated.
 
+    `keep_out`: zones that no vehicle may enter; what of them lies in it is not to be surveyed either, and it may be of
+    several parts.
+
     Raises:
-        ValueError: a number is not finite, an outline has no area or crosses itself, or a hole does not lie inside.
+        ValueError: a number is not finite, an outline has no area or crosses itself, a hole does not lie inside, or
+            the zones leave nothing.
     """
 
     outline: tuple[Point, ...]
     holes: tuple[tuple[Point, ...], ...] = ()
+    keep_out: tuple[tuple[Point, ...], ...] = ()
 
     def __post_init__(self) -> None:
-        rings = (self.outline, *self.holes)
+        rings = (self.outline, *self.holes, *self.keep_out)
         if not all(math.isfinite(place_m) for ring in rings for point in ring for place_m in point):
             raise ValueError("an area's corners must be finite numbers")
         if not all(len(set(ring)) >= 3 for ring in rings):
             raise ValueError("an area and its holes need at least 3 different corners each")
-        if not (self.polygon.is_valid and self.polygon.area > ON_BOUNDARY_M * self.polygon.length):
+        drawn = self._drawn
+        if not (drawn.is_valid and drawn.area > ON_BOUNDARY_M * drawn.length):
             raise ValueError(
                 "an area must have an inside, its sides must not cross, its holes must lie in it and apart"
             )
 
+        if not all(shapely.Polygon(zone).is_valid for zone in self.keep_out):
+            raise ValueError("the sides of a zone to keep out of must not cross")
+        if self.keep_out and self.polygon.is_empty:
+            raise ValueError("the zones to keep out of leave nothing of the area")
+
     @cached_property
-    def polygon(self) -> shapely.Polygon:
-        """The same as a polygon of shapely."""
+    def _drawn(self) -> shapely.Polygon:
         return shapely.Polygon(self.outline, self.holes)
+
+    @cached_property
+    def polygon(self) -> shapely.Polygon | shapely.MultiPolygon:
+        """The same as a polygon of shapely, or several where zones to keep out of divide it."""
+        if not self.keep_out:
+            return self._drawn
+        left = self._drawn.difference(shapely.union_all([shapely.Polygon(zone) for zone in self.keep_out]))
+        parts = [part for part in shapely.get_parts(left) if isinstance(part, shapely.Polygon)]
+        return parts[0] if len(parts) == 1 else shapely.MultiPolygon(parts)
 
     def about(self, track_heading_rad: float) -> SurveyArea:
         """The convex hull, to be swept along a heading: its frame and rectangle are those of the region.
@@ -104,13 +123,13 @@ class Region:
         u_m, v_m = (begin * whole.width_m, end * whole.width_m), (-1.0, whole.length_m + 1.0)
         corners = [(u_m[0], v_m[0]), (u_m[1], v_m[0]), (u_m[1], v_m[1]), (u_m[0], v_m[1])]
         band = shapely.Polygon([tuple(map(float, whole.frame.to_mission(*corner))) for corner in corners])
-        cut = band.intersection(self.polygon)
+        cut = band.intersection(self._drawn)
         if not isinstance(cut, shapely.Polygon) or cut.is_empty:
             what = "nothing of the area" if cut.is_empty else "the area, in several pieces,"
             raise ValueError(f"{what} lies from {begin:.3g} to {end:.3g} of its width")
         rings = [cut.exterior, *cut.interiors]
         outline, *holes = (tuple((x_m, y_m) for x_m, y_m in ring.coords[:-1]) for ring in rings)
-        return Region(outline, tuple(holes))
+        return Region(outline, tuple(holes), self.keep_out)
 
     def meets(self, strip: Strip) -> bool:
         """Whether any of a strip, whose numbers are finite, lies in the region."""
@@ -120,7 +139,8 @@ class Region:
         """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""
         with_boundary = self.polygon.buffer(ON_BOUNDARY_M, join_style="mitre")
         found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
-        for ring in shapely.get_rings(with_boundary):  # what a hole's ring holds is in the outline's, too
+        # What a hole's ring holds is in the outline's, too.
+        for ring in shapely.get_rings(shapely.get_parts(with_boundary)):
             across_m, along_m = grid.frame.to_sweep(*ring.coords.xy)
             found ^= points_inside(across_m[:-1], along_m[:-1], grid.across_m, grid.along_m)
         return found

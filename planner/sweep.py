@@ -9,11 +9,17 @@ from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple
 
-from planner.dubins import Pose, shortest_path
+from planner.dubins import Pose
 from planner.footprints.footprint import Footprint
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point, Strip, SweepFrame, Track
+from planner.ways import shortest_way, way_length_m, way_or_direct
 
 LENGTH_TOLERANCE_M = 1e-6
+
+
+class NoSweepError(ValueError):
+    """A strip that cannot be flown from where one is."""
 
 
 class Pass(NamedTuple):
@@ -77,12 +83,19 @@ def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list
 
 @lru_cache(maxsize=10_000)
 def sweeps_over(
-    strip: Strip, swath_m: float, turn_radius_m: float, run_in_m: float, beside_m: float = 0.0, lead_m: float = 0.0
+    strip: Strip,
+    swath_m: float,
+    turn_radius_m: float,
+    run_in_m: float,
+    beside_m: float = 0.0,
+    lead_m: float = 0.0,
+    keep_out: KeepOut = NOWHERE,
 ) -> tuple[Sweep, ...]:
     """The ways to fly the legs over a strip (see `legs_over_strip`): in sequence from the first or from the last, in
     their directions or all turned round; where they lie beside what they cover, on either side of it.
 
-    Each leg is entered and left straight for `run_in_m` >= 0, and flown `lead_m` earlier, see `pass_over`. Raises
+    Each leg is entered and left straight for `run_in_m` >= 0, and flown `lead_m` earlier, see `pass_over`. None that
+    enters ground to keep out of, or leaves no room to turn before a leg or behind it. Raises
     ValueError where the run-in, or the turn radius where there are turns, is not finite or out of its range.
     """
     if not (math.isfinite(run_in_m) and run_in_m >= 0):
@@ -95,26 +108,39 @@ def sweeps_over(
             passes = tuple(pass_over(leg.start, leg.end, run_in_m, lead_m) for leg in way)
             numbered = tuple(replace(leg, number=number) for number, leg in enumerate(way, start=1))
             follows = len(legs) == 1 and way is legs
-            found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m), follows))
+            if _stays_out(passes, turn_radius_m, keep_out):
+                found.append(Sweep(numbered, passes, length_over(passes, turn_radius_m, keep_out), follows))
     return tuple(found)
 
 
-def sweeps_by(sees: Footprint, strip: Strip, turn_radius_m: float, run_in_m: float) -> tuple[Sweep, ...]:
+def _stays_out(passes: Sequence[Pass], turn_radius_m: float, keep_out: KeepOut) -> bool:
+    if not keep_out:
+        return True
+    rooms = all(keep_out.is_room(one.begin, one.end, turn_radius_m) for one in passes)
+    return rooms and all(shortest_way(one.end, other.begin, turn_radius_m, keep_out) for one, other in pairwise(passes))
+
+
+def sweeps_by(
+    sees: Footprint, strip: Strip, turn_radius_m: float, run_in_m: float, keep_out: KeepOut = NOWHERE
+) -> tuple[Sweep, ...]:
     """The ways in which a vehicle with such a sonar may fly the legs over a strip, see `sweeps_over`."""
     reach = sees.reach
-    return sweeps_over(strip, reach.strip_width_m, turn_radius_m, run_in_m, reach.beside_m, sees.lead_m)
+    return sweeps_over(strip, reach.strip_width_m, turn_radius_m, run_in_m, reach.beside_m, sees.lead_m, keep_out)
 
 
-def shortest_sweep(sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float) -> tuple[Sweep, float]:
+def shortest_sweep(
+    sweeps: Sequence[Sweep], pose: Pose, turn_radius_m: float, keep_out: KeepOut = NOWHERE
+) -> tuple[Sweep, float]:
     """The sweep that is shortest with the way there from `pose`, of equals the first, and the length of that way in
-    metres. Raises ValueError where there is none."""
+    metres. Raises NoSweepError where there is none, or no way there stays out."""
     best, best_m = None, math.inf
     for sweep in sweeps:
-        way_m = shortest_path(pose, sweep.entry, turn_radius_m).length_m
+        way = shortest_way(pose, sweep.entry, turn_radius_m, keep_out)
+        way_m = math.inf if way is None else way_length_m(way)
         if way_m + sweep.length_m < best_m - LENGTH_TOLERANCE_M:
             best, best_m = sweep, way_m + sweep.length_m
     if best is None:
-        raise ValueError("there is no sweep to choose from")
+        raise NoSweepError("there is no sweep to choose from")
     return best, best_m - best.length_m
 
 
@@ -124,18 +150,21 @@ def pass_over(start: Point, end: Point, run_in_m: float, lead_m: float = 0.0) ->
     return Pass(shifted(start, heading_rad, -run_in_m - lead_m), shifted(end, heading_rad, run_in_m - lead_m))
 
 
-def length_over(passes: Sequence[Pass], turn_radius_m: float) -> float:
+def length_over(passes: Sequence[Pass], turn_radius_m: float, keep_out: KeepOut = NOWHERE) -> float:
     """How far it is, in metres, over passes in their order, with the turns between them. Raises ValueError where the
     turn radius is not finite and above 0."""
-    turns_m = (shortest_path(one.end, other.begin, turn_radius_m).length_m for one, other in pairwise(passes))
+    turns_m = (
+        way_length_m(way_or_direct(one.end, other.begin, turn_radius_m, keep_out)) for one, other in pairwise(passes)
+    )
     return sum(one.length_m for one in passes) + sum(turns_m)
 
 
-def distance_over(pose: Pose, passes: Sequence[Pass], turn_radius_m: float) -> float:
+def distance_over(pose: Pose, passes: Sequence[Pass], turn_radius_m: float, keep_out: KeepOut = NOWHERE) -> float:
     """How far it is, in metres, from a pose over passes in their order to the last one's end; 0 without passes."""
     if not passes:
         return 0.0
-    return shortest_path(pose, passes[0].begin, turn_radius_m).length_m + length_over(passes, turn_radius_m)
+    way_m = way_length_m(way_or_direct(pose, passes[0].begin, turn_radius_m, keep_out))
+    return way_m + length_over(passes, turn_radius_m, keep_out)
 
 
 def shifted(point: Point, heading_rad: float, distance_m: float) -> Pose:

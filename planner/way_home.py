@@ -5,18 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from planner.currents import Sailing
-from planner.dubins import Pose
+from planner.dubins import Pose, path_lengths_m, shortest_path
+from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Pass
 from planner.types import FloatArray, Point
+from planner.ways import Way, shortest_way, way_lengths_m, way_or_direct
 
 THERE_M = 0.05
 """Who is so near to a place is there."""
 MARGIN_S = 10.0
 """Nothing is begun that leaves less beside the reserve: words that are lost, and asked for again, take their time."""
+ARRIVALS = 16
+"""Headings of arrival that are compared where a way home leads round ground to keep out of, beside the direct one."""
 _FULL_TURN_RAD = 2 * math.pi
 _ROUNDING_RAD = 1e-7
 
@@ -24,27 +29,49 @@ _ROUNDING_RAD = 1e-7
 @dataclass(frozen=True)
 class WayHome:
     """A vehicle's way to `home`, mission frame: a turn of `turn_radius_m` > 0 to either side until it heads for home,
-    and then straight on; of the two the shorter one. From where it is there already it is none."""
+    and then straight on; of the two the shorter one. From where it is there already it is none.
+
+    Where ground to `keep_out` of is in the way it leads round that, to home with whichever of some headings takes
+    least; where no such way is found the direct one counts.
+    """
 
     home: Point
     sailing: Sailing
     turn_radius_m: float
+    keep_out: KeepOut = NOWHERE
 
     def from_pose(self, pose: Pose) -> tuple[float, float]:
         """How long it takes from a pose, in seconds, and the compass heading of arrival, [0, 2 pi)."""
         time_s, heading_rad = self._ways(np.array([pose], dtype=np.float64))
-        return float(time_s[0]), float(heading_rad[0]) % _FULL_TURN_RAD
+        direct = float(time_s[0]), float(heading_rad[0]) % _FULL_TURN_RAD
+        if not self.keep_out or direct[0] == 0.0:
+            return direct
+        return _past_zones(self, pose, direct)
+
+    def way(self, pose: Pose) -> Way:
+        """The same as paths that a vehicle sails."""
+        return way_or_direct(pose, Pose(*self.home, self.from_pose(pose)[1]), self.turn_radius_m, self.keep_out)
 
     def times_s(self, poses: FloatArray) -> FloatArray:
-        """How long it takes from poses, shape (n, 3) of x, y and heading; shape (n,)."""
-        return self._ways(poses)[0]
+        """About how long it takes from poses, shape (n, 3) of x, y and heading; shape (n,). Exactly where no ground to
+        keep out of is in the way; there the way from corner to corner counts, as `planner.ways.way_lengths_m` tells
+        it."""
+        time_s = self._ways(poses)[0]
+        if not self.keep_out or not len(poses):
+            return time_s
+        home = np.array([[*self.home, 0.0]])
+        round_m = way_lengths_m(poses, home, self.turn_radius_m, self.keep_out)[:, 0]
+        further_m = round_m - path_lengths_m(poses, home, self.turn_radius_m)[:, 0]
+        further_m[~np.isfinite(further_m)] = 0.0
+        times_s: FloatArray = time_s + further_m / self.sailing.slowest_mps
+        return times_s
 
     def passes_within(self, pose: Pose, passes: Sequence[Pass], time_s: float) -> int:
         """How many passes, the first ones, can be flown in their order from a pose so that there is time to come home
         before `time_s` have passed."""
         spent_s, here = 0.0, pose
         for count, one in enumerate(passes):
-            spent_s, here = spent_s + self.sailing.passes_s([one], self.turn_radius_m, here), one.end
+            spent_s, here = spent_s + self.sailing.passes_s([one], self.turn_radius_m, here, self.keep_out), one.end
             if spent_s + self.from_pose(here)[0] > time_s:
                 return count
         return len(passes)
@@ -75,3 +102,17 @@ class WayHome:
             time_s += straight_m / self.sailing.made_good_mps(arrival_rad)
         there = np.hypot(self.home[0] - x_m, self.home[1] - y_m) <= THERE_M
         return np.where(there, 0.0, time_s), arrival_rad
+
+
+@lru_cache(maxsize=10_000)
+def _past_zones(home: WayHome, pose: Pose, direct: tuple[float, float]) -> tuple[float, float]:
+    """Time and heading of arrival of the way that takes least; `direct`: those where nothing is in the way."""
+    radius_m, keep_out = home.turn_radius_m, home.keep_out
+    if keep_out.is_clear([shortest_path(pose, Pose(*home.home, direct[1]), radius_m)]):
+        return direct
+    found = []
+    for heading_rad in (direct[1], *(_FULL_TURN_RAD * number / ARRIVALS for number in range(ARRIVALS))):
+        way = shortest_way(pose, Pose(*home.home, heading_rad), radius_m, keep_out)
+        if way is not None:
+            found.append((home.sailing.way_s(way), heading_rad))
+    return min(found, default=direct)

@@ -5,7 +5,11 @@ Their names are plain words, and a folder or file of the user's with such a name
 
 from __future__ import annotations
 
+import errno
+import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -45,15 +49,40 @@ def hidden_in(folder: Path) -> Path | None:
     return None
 
 
-WRONG_USE = 2
-"""Exit code of wrong use and bad input. 0 is done, 1 a mission that failed."""
+FAILED, WRONG_USE = 1, 2
+"""Exit codes: of a mission that failed, of wrong use and bad input; 0 is done."""
+NOT_WRITABLE = (errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EBADF)
+
+
+@contextmanager
+def _ended_by_ctrl_c() -> Iterator[None]:
+    """Within it Ctrl-C ends the process as it does any program: what is being imported could make an error of its own
+    of an exception. One that is ignored stays so."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def main() -> None:
-    """Checks the rooms, then runs the command line."""
+    """Checks the rooms, then runs the command line. Ctrl-C while that is still being loaded ends it without a word,
+    standard output that cannot be written with a sentence."""
     try:
         check_rooms()
+        with _ended_by_ctrl_c():
+            command_line = import_module("secondlook.cli")
+        command_line.main()
     except UserError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(WRONG_USE)
-    import_module("secondlook.cli").main()
+    except OSError as error:
+        if error.filename is not None or error.errno not in NOT_WRITABLE:
+            raise
+        sys.stderr.write(f"standard output cannot be written: {error.strerror}\n")
+        sys.stdout = None  # nothing is left to be written when the interpreter ends
+        sys.exit(FAILED)

@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from comms.said.wire import IDENTIFIER
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.footprints import FOOTPRINTS
 from sim_world.sonar import HIGHEST_P_DETECT, CheckedSonar, CurveSonar, Seabed, SonarModel, SufferedSeabed
@@ -221,7 +222,8 @@ class TargetsConfig:
 @dataclass(frozen=True)
 class WorldConfig:
     """The whole sea. `area`, `holes`: outlines of the survey area and of what is left out of it, at least three corners
-    each. `vehicles`: those simulated here, all of them faster than the current."""
+    each. `vehicles`: those simulated here, all of them faster than the current. `keep_out`: what none of them may
+    enter, and where no target lies."""
 
     seed: int
     area: tuple[Point, ...]
@@ -230,6 +232,7 @@ class WorldConfig:
     targets: TargetsConfig = field(default_factory=TargetsConfig)
     holes: tuple[tuple[Point, ...], ...] = ()
     current: CurrentConfig | None = None
+    keep_out: KeepOut = NOWHERE
 
     def __post_init__(self) -> None:
         _require(self.seed >= 0, "seed", self.seed, "0 or more")

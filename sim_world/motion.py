@@ -6,16 +6,26 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
 from planner.currents import Current, made_good_mps
-from planner.dubins import Pose, shortest_path
+from planner.dubins import Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
+from planner.ways import Way, shortest_way
 
 ROUNDING_MS = 1e-6
 """A time is not rounded up to the next millisecond for as little as this."""
 ROUNDING_M = 1e-6
+CIRCLE_PARTS = 8
+"""At so many places of a circle a vehicle looks for a way off it."""
+MOST_DEPARTURES = 60
+
+
+class NoWayError(Exception):
+    """A manoeuvre that cannot be sailed without entering ground to keep out of; `str()` says why."""
 
 
 class Leg(Protocol):
@@ -44,19 +54,21 @@ class Straight:
 
 @dataclass(frozen=True, slots=True)
 class Loiter:
-    """A circle to starboard without end."""
+    """A circle without end, to starboard where `side` is 1, to port where it is -1."""
 
     start: Pose
     radius_m: float
+    side: int = 1
     length_m: float = math.inf
 
     def pose_at(self, distance_m: float) -> Pose:
         """The pose at a distance from the start."""
         x_m, y_m, heading_rad = self.start
-        turned = heading_rad + distance_m / self.radius_m
+        turned = heading_rad + self.side * distance_m / self.radius_m
+        beside_m = self.side * self.radius_m
         return Pose(
-            x_m + self.radius_m * (math.cos(heading_rad) - math.cos(turned)),
-            y_m + self.radius_m * (math.sin(turned) - math.sin(heading_rad)),
+            x_m + beside_m * (math.cos(heading_rad) - math.cos(turned)),
+            y_m + beside_m * (math.sin(turned) - math.sin(heading_rad)),
             compass_rad(turned),
         )
 
@@ -81,11 +93,17 @@ class Path:
 
     def pose_at(self, time_ms: int) -> Pose:
         """The pose at a time from `start_ms`."""
-        return self._pose_after(self.distance_at(time_ms))
+        return self.pose_after(self.distance_at(time_ms))
 
-    def _pose_after(self, distance_m: float) -> Pose:
+    def pose_after(self, distance_m: float) -> Pose:
+        """The pose at a distance from the start."""
         number = bisect_right(self._starts_m, distance_m) - 1
         return self._legs[number].pose_at(distance_m - self._starts_m[number])
+
+    @property
+    def circles_from_m(self) -> float:
+        """The distance from which on it circles."""
+        return self._starts_m[-1]
 
     def time_ms(self, distance_m: float) -> int:
         """When the vehicle has come so far, rounded up to the millisecond."""
@@ -96,6 +114,19 @@ class Path:
         distance_m = self.distance_at(time_ms)
         left = (end - distance_m for start, end in self._held_m if start - ROUNDING_M <= distance_m < end)
         return max(left, default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Onward:
+    """What is left of an earlier path, or some of it, sailed on."""
+
+    path: Path
+    from_m: float
+    length_m: float
+
+    def pose_at(self, distance_m: float) -> Pose:
+        """The pose at a distance from where it is taken up."""
+        return self.path.pose_after(self.from_m + distance_m)
 
 
 STEP_OF_RADIUS = 0.1
@@ -140,7 +171,7 @@ class CarriedPath(Path):
 
     def made_good_mps(self, distance_m: float, time_s: float) -> float:
         """The speed over the ground at a distance from the start, so long after it."""
-        course_rad = self._pose_after(distance_m).heading_rad
+        course_rad = self.pose_after(distance_m).heading_rad
         flow_mps = self._current.flow_mps(self.start_ms / 1000.0 + time_s)
         return made_good_mps(course_rad, self.speed_mps, flow_mps)
 
@@ -171,9 +202,23 @@ class Motion:
     turn radius. A new manoeuvre replaces the one under way from the pose of that moment, except that the run-out of a
     track that is done is sailed to its end first, so that the sonar stays straight to the end of the swath. In a
     `current` it keeps its speed through the water; its turns are as wide over the ground. Where it lies it lies.
+
+    Of ground to `keep_out` of all stays clear, and so does the circle at the end of each manoeuvre, which is to port
+    where there is no room to starboard. Where no way leads off from where a manoeuvre arrives, the vehicle first sails
+    on as it was told before, as far as it must.
     """
 
-    def __init__(self, start: Pose, *, speed_mps: float, turn_radius_m: float, current: Current | None = None) -> None:
+    def __init__(
+        self,
+        start: Pose,
+        *,
+        speed_mps: float,
+        turn_radius_m: float,
+        keep_out: KeepOut = NOWHERE,
+        current: Current | None = None,
+    ) -> None:
+        self._keep_out = keep_out
+        self._nearest = keep_out.nearer().nearer()
         self._start = start._replace(heading_rad=compass_rad(start.heading_rad))
         self._speed_mps = speed_mps
         self._turn_radius_m = turn_radius_m
@@ -195,11 +240,18 @@ class Motion:
         self._start, self._path = self.pose_at(now_ms), None
 
     def hold(self, now_ms: int) -> None:
-        """Loiters from here."""
-        legs, held_m, _ = self._departure(now_ms)
-        self._sail(legs, held_m, now_ms)
+        """Loiters from here, or from where there is room for it first.
 
-    def go_to(self, point: Point, heading_rad: float | None, now_ms: int) -> int:
+        Raises:
+            NoWayError: there is none.
+        """
+        for legs, held_m, pose in self._departures(now_ms):
+            if self._circling(pose) is not None:
+                self._sail(legs, held_m, now_ms)
+                return
+        raise NoWayError("there is no room to circle beside ground to keep out of")
+
+    def go_to(self, point: Point, heading_rad: float | None, now_ms: int, *, loiters: bool = True) -> int:
         """Goes to a point the shortest way and loiters there.
 
         Args:
@@ -207,17 +259,24 @@ class Motion:
             heading_rad: the heading on arrival; None for the bearing of the point from where the vehicle departs, or
                 its heading where it is there already.
             now_ms: when the manoeuvre begins.
+            loiters: False where it is stopped there, and needs no room to circle.
 
         Returns:
             When it arrives.
+
+        Raises:
+            NoWayError: no way there stays out of ground to keep out of, or there is no room to circle there.
         """
-        legs, held_m, pose = self._departure(now_ms)
-        if heading_rad is None:
+        for legs, held_m, pose in self._departures(now_ms):
             there = math.dist(pose[:2], point) == 0.0
-            heading_rad = pose.heading_rad if there else bearing_rad(pose[:2], point)
-        legs.append(self._shortest(pose, Pose(*point, heading_rad)))
-        arrival_m = sum(leg.length_m for leg in legs)
-        return self._sail(legs, held_m, now_ms).time_ms(arrival_m)
+            bearing = pose.heading_rad if there else bearing_rad(pose[:2], point)
+            end = Pose(*point, bearing if heading_rad is None else heading_rad)
+            way = self._way(pose, end)
+            if way is not None and (not loiters or self._circling(end) is not None):
+                legs.extend(way)
+                arrival_m = sum(leg.length_m for leg in legs)
+                return self._sail(legs, held_m, now_ms).time_ms(arrival_m)
+        raise NoWayError("no way there, to circle there, stays out of ground to keep out of")
 
     def follow(self, start: Point, end: Point, run_in_m: float, now_ms: int) -> FollowedTrack:
         """Sails a straight track, with a straight run of `run_in_m` >= 0 before its start and after its end.
@@ -230,39 +289,74 @@ class Motion:
 
         Returns:
             When the vehicle is where on the track.
+
+        Raises:
+            NoWayError: the track or its runs enter ground to keep out of, or no way there stays out of it.
         """
-        legs, held_m, pose = self._departure(now_ms)
         heading_rad, length_m = bearing_rad(start, end), math.dist(start, end)
         run_in = Pose(
             start[0] - run_in_m * math.sin(heading_rad), start[1] - run_in_m * math.cos(heading_rad), heading_rad
         )
-        legs.append(self._shortest(pose, run_in))
-        start_m = sum(leg.length_m for leg in legs) + run_in_m
-        legs.append(Straight(run_in, length_m + 2 * run_in_m))
-        held_m.append((start_m + length_m, start_m + length_m + run_in_m))
-        return FollowedTrack(self._sail(legs, held_m, now_ms), start_m, length_m)
+        whole = Straight(run_in, length_m + 2 * run_in_m)
+        if not self._nearest.is_room(run_in, whole.pose_at(whole.length_m), self._turn_radius_m):
+            raise NoWayError("the track, with its runs and turns, enters ground to keep out of")
+        for legs, held_m, pose in self._departures(now_ms):
+            way = self._way(pose, run_in)
+            if way is not None:
+                legs.extend(way)
+                start_m = sum(leg.length_m for leg in legs) + run_in_m
+                legs.append(whole)
+                held_m.append((start_m + length_m, start_m + length_m + run_in_m))
+                return FollowedTrack(self._sail(legs, held_m, now_ms), start_m, length_m)
+        raise NoWayError("no way to the track stays out of ground to keep out of")
 
-    def _departure(self, now_ms: int) -> tuple[list[Leg], list[tuple[float, float]], Pose]:
-        # What has to be sailed before a new manoeuvre, as legs and held stretches, and the pose it starts from.
+    def _way(self, start: Pose, end: Pose) -> Way | None:
+        """The way that those expect who planned this, or else one that comes nearer to the zones by what they leave for
+        rounding."""
+        way = shortest_way(start, end, self._turn_radius_m, self._keep_out)
+        return shortest_way(start, end, self._turn_radius_m, self._nearest) if way is None else way
+
+    def _circling(self, pose: Pose) -> int | None:
+        side = self._keep_out.circling(pose, self._turn_radius_m)
+        return self._nearest.circling(pose, self._turn_radius_m) if side is None else side
+
+    def _departures(self, now_ms: int) -> Iterator[tuple[list[Leg], list[tuple[float, float]], Pose]]:
+        """What has to be sailed before a new manoeuvre, as legs and held stretches, and the pose it starts from.
+
+        Where there is ground to keep out of: beside the least that has to be, ever more of the way under way.
+        """
         pose = self.pose_at(now_ms)
         held_m = 0.0 if self._path is None else self._path.still_held_m(now_ms)
         if held_m == 0.0:
-            return [], [], pose
-        run_out = Straight(pose, held_m)
-        return [run_out], [(0.0, held_m)], run_out.pose_at(held_m)
-
-    def _shortest(self, start: Pose, end: Pose) -> Leg:
-        return shortest_path(start, end, self._turn_radius_m)
+            yield [], [], pose
+        else:
+            run_out = Straight(pose, held_m)
+            yield [run_out], [(0.0, held_m)], run_out.pose_at(held_m)
+        if self._keep_out and self._path is not None:
+            path, here_m = self._path, self._path.distance_at(now_ms)
+            for further_m in _further(here_m + held_m, path.circles_from_m, self._turn_radius_m):
+                length_m = further_m - here_m
+                held = [(0.0, held_m)] if held_m else []
+                yield [Onward(path, here_m, length_m)], held, path.pose_after(further_m)
 
     def _sail(self, legs: list[Leg], held_m: list[tuple[float, float]], now_ms: int) -> Path:
         last = legs[-1].pose_at(legs[-1].length_m) if legs else self.pose_at(now_ms)
-        legs = [*legs, Loiter(last, self._turn_radius_m)]
+        legs = [*legs, Loiter(last, self._turn_radius_m, self._circling(last) or 1)]
         if self._current is None:
             self._path = Path(now_ms, self._speed_mps, legs, held_m)
         else:
             step_m = STEP_OF_RADIUS * self._turn_radius_m
             self._path = CarriedPath(now_ms, self._speed_mps, legs, held_m, self._current, step_m)
         return self._path
+
+
+def _further(from_m: float, circles_from_m: float, turn_radius_m: float) -> list[float]:
+    """Distances along a path at which it may be left: on the way each turn radius, then on the circle at its end."""
+    way_m, on_circle = max(0.0, circles_from_m - from_m), math.tau * turn_radius_m / CIRCLE_PARTS
+    count = min(math.ceil(way_m / turn_radius_m), MOST_DEPARTURES)
+    on_way_m = [from_m + way_m * number / count for number in range(1, count + 1)] if count else []
+    begin_m = max(from_m, circles_from_m)
+    return [*on_way_m, *(begin_m + on_circle * number for number in range(1, CIRCLE_PARTS + 1))]
 
 
 def bearing_rad(start: Point, end: Point) -> float:

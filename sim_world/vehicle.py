@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from comms.node import random_stream
 from comms.said.messages import Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Nav, TruthPose
 from planner.dubins import Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
 from planner.way_home import THERE_M
 from sim_world.config import FARTHEST_M, VehicleConfig
-from sim_world.motion import FollowedTrack, Motion, bearing_rad
+from sim_world.motion import FollowedTrack, Motion, NoWayError, bearing_rad
 from sim_world.steadiness import STILL_WATER, Stream
 
 TRACK_ROUNDING_M = 0.02
@@ -42,7 +43,9 @@ class SimulatedVehicle:
     is empty it lies where it is, and says so.
     """
 
-    def __init__(self, config: VehicleConfig, seed: int, current: Stream = STILL_WATER) -> None:
+    def __init__(
+        self, config: VehicleConfig, seed: int, current: Stream = STILL_WATER, keep_out: KeepOut = NOWHERE
+    ) -> None:
         self.config = config
         self._error_rad, self._drift_rad = (
             random_stream(seed, "world", config.vehicle, name).uniform(0.0, 2 * math.pi)
@@ -53,6 +56,7 @@ class SimulatedVehicle:
             speed_mps=config.speed_mps,
             turn_radius_m=config.turn_radius_m,
             current=current if current.carries else None,
+            keep_out=keep_out,
         )
         self._to_come: deque[tuple[int, Event]] = deque()
         self._home = (config.start_x_m, config.start_y_m) if config.home is None else config.home
@@ -97,23 +101,32 @@ class SimulatedVehicle:
         reason = _reason_to_refuse(maneuver)
         if reason:
             return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, reason)
+        try:
+            ends_ms = self._begin(maneuver, now_ms)
+        except NoWayError as error:
+            return ManeuverStatus(maneuver.number, ManeuverState.REFUSED, 0, str(error))
+        return ManeuverStatus(maneuver.number, ManeuverState.ACCEPTED, ends_ms, "")
+
+    def _begin(self, maneuver: Maneuver, now_ms: int) -> int:
+        """Begins a manoeuvre, and tells when it ends, 0 for never; raises NoWayError and goes on with what it does."""
         start, end = (maneuver.start_x_m, maneuver.start_y_m), (maneuver.end_x_m, maneuver.end_y_m)
-        ends_ms = 0
-        self._number, self._begun_ms = maneuver.number, now_ms
-        self._is_home, self._goes_home = False, maneuver.kind is ManeuverKind.GOTO and self._is_at_home(end)
+        ends_ms, goes_home = 0, maneuver.kind is ManeuverKind.GOTO and self._is_at_home(end)
         match maneuver.kind:
             case ManeuverKind.HOLD:
                 self._motion.hold(now_ms)
                 self._to_come = deque()
             case ManeuverKind.GOTO:
-                ends_ms = self._motion.go_to(end, None if start == end else bearing_rad(start, end), now_ms)
+                heading_rad = None if start == end else bearing_rad(start, end)
+                ends_ms = self._motion.go_to(end, heading_rad, now_ms, loiters=not goes_home)
                 done = ManeuverStatus(maneuver.number, ManeuverState.DONE, ends_ms, "")
                 self._to_come = deque([(ends_ms, done)])
             case ManeuverKind.FOLLOW:
                 track = self._motion.follow(start, end, maneuver.run_in_m, now_ms)
                 ends_ms = track.time_ms(track.length_m)
                 self._to_come = deque(self._on_track(maneuver, track, bearing_rad(start, end)))
-        return ManeuverStatus(maneuver.number, ManeuverState.ACCEPTED, ends_ms, "")
+        self._number, self._begun_ms = maneuver.number, now_ms
+        self._is_home, self._goes_home = False, goes_home
+        return ends_ms
 
     @property
     def next_event_ms(self) -> int | None:

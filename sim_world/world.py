@@ -22,7 +22,7 @@ class Body:
     def __init__(
         self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, current: Stream, targets: Targets
     ) -> None:
-        self._vehicle = SimulatedVehicle(config, world.seed, current)
+        self._vehicle = SimulatedVehicle(config, world.seed, current, world.keep_out)
         sensor = config.sensor
         self._looks = Looks(
             config,
@@ -88,7 +88,7 @@ class World:
     """
 
     def __init__(self, config: WorldConfig) -> None:
-        self._targets = Targets(config.area, config.targets.count, config.seed, config.holes)
+        self._targets = Targets(config.area, config.targets.count, config.seed, (*config.holes, *config.keep_out.zones))
         seabed = make_seabed(config.seabed, config.area, config.seed)
         current = make_current(config.current, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)

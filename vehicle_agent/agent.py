@@ -24,6 +24,7 @@ from comms.said.messages import (
 from comms.said.topics import CONTACT, MANEUVER, STATE
 from planner.dubins import Pose
 from planner.footprints.footprint import Footprint
+from planner.keep_out import NOWHERE, KeepOut
 from planner.region import Region
 from planner.sweep import pass_over, shifted
 from planner.types import Point, Strip, SweepFrame, Track
@@ -57,6 +58,7 @@ class Agent:
         self.nav: Nav | None = None
         self.coverage: CoverageLayer | None = None
         self.region: Region
+        self.keep_out: KeepOut = NOWHERE
         self.maneuver: Maneuver | None = None
         self._word_due_ms: int | None = None  # when the vehicle should have said more of the present manoeuvre
         self._looks_taken: set[tuple[int, int]] = set()
@@ -84,7 +86,9 @@ class Agent:
             self._hear_nav(message, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
             self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
-            self.region = Region(message.outline, message.hole_outlines)
+            self.region = Region(message.outline, message.hole_outlines, message.keep_out_outlines)
+            self.keep_out = KeepOut(message.keep_out_outlines, message.keep_out_margin_m)
+            self.endurance.keep_out_of(self.keep_out)
             self._wake_ms = now_ms + REPORT_EVERY_MS
             self.on_run(message, now_ms)
         elif self.coverage is not None and not self._over:
@@ -114,7 +118,8 @@ class Agent:
         if self._word_due_ms is not None and now_ms >= self._word_due_ms:
             self._send_maneuver()
         pose, circles = self.pose, self.mode in (Mode.IDLE, Mode.FINISHED)
-        if pose is not None and not self.mode.is_out_of_work and self.endurance.is_low(pose, now_ms, circles=circles):
+        works, was_refused = not self.mode.is_out_of_work, self.mode is Mode.RETURNING and self.maneuver is None
+        if was_refused or (pose is not None and works and self.endurance.is_low(pose, now_ms, circles=circles)):
             self.turn_home(now_ms)
         else:
             self.report(now_ms)
@@ -241,6 +246,8 @@ class Agent:
             self.on_maneuver(status, now_ms)
         elif status.state is ManeuverState.DONE:
             self._rest(Mode.HOME, now_ms)
+        elif status.state is ManeuverState.REFUSED:
+            self.maneuver = None  # from elsewhere it may find a way home
 
     def _rest(self, mode: Mode, now_ms: int) -> None:
         """The vehicle lies, at home or where its battery has run empty."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from planner.footprints.footprint import Footprint
 from planner.spacing_planners import SpacingPlanner
-from planner.types import DetectionCurve
+from planner.types import DetectionCurve, Point
 from planner.way_home import WayHome
 
 WHOLE = (0.0, 1.0)
@@ -27,7 +27,9 @@ class SurveyConfig:
     hotspot. `run_in_m`: straight run before and after each track. `endurance_ms`: mission time on one battery. `prior`:
     P(y) of earlier missions, which holds until the first track is flown (paper, section III-B). `share`: from which to
     which share of the area's width it surveys, see `planner.region.Region.share`. `wanted_risk`: see
-    `planner.profile_spacing.SpacingTerms`. `homing`: None for a vehicle that need not come home."""
+    `planner.profile_spacing.SpacingTerms`. `begin`: the place from which the way to the first track, and through all
+    parts, is to be short; None for the corner from which tracks are laid. `homing`: None for a vehicle that need not
+    come home."""
 
     vehicle: str
     spacing: SpacingPlanner
@@ -41,6 +43,7 @@ class SurveyConfig:
     prior: DetectionCurve | None = None
     share: tuple[float, float] = WHOLE
     wanted_risk: float | None = None
+    begin: Point | None = None
     homing: Homing | None = None
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from planner.dubins import Pose
+from planner.keep_out import KeepOut
 from planner.sweep import Pass
 from planner.way_home import MARGIN_S
 from vehicle_agent.config import Homing
@@ -22,6 +24,11 @@ class Endurance:
         self.homing = homing
         self._endurance_ms = endurance_ms
         self._rests_ms: int | None = None
+
+    def keep_out_of(self, keep_out: KeepOut) -> None:
+        """The way home leads round ground to keep out of."""
+        if self.homing is not None:
+            self.homing = replace(self.homing, way=replace(self.homing.way, keep_out=keep_out))
 
     def rest(self, since_ms: int) -> None:
         """The vehicle lies, and needs none any more."""

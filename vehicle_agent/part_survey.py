@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from planner.area import SurveyArea
+from planner.area import SurveyArea, lawnmower
 from planner.footprints.footprint import Reach
 from planner.profile_spacing import Known, PartSoFar, ProfilePlanner, SpacingTerms, first_decision
 from planner.spacing import NARROWEST_M
@@ -45,6 +45,11 @@ class PartSurvey:
         self._decision = first_decision(self._config.spacing, self.area.width_m, known, self._terms)
         return self._decision
 
+    def tracks(self, decision: SpacingDecision, first_number: int, *, reverse: bool) -> list[Track]:
+        """The tracks of a decision, there and back; the first one against the part's heading or not."""
+        offsets_m, range_m = decision.offsets_m, decision.range_m
+        return lawnmower(self.area, offsets_m, range_m, first_number=first_number, first_reverse=reverse)
+
     def flown(self, track: Track, r_eff_m: int, curve: DetectionCurve) -> None:
         """Notes a track flown and how well it saw."""
         singles = self._decision.singles
@@ -55,13 +60,23 @@ class PartSurvey:
     def is_due(self, ahead: Sequence[Track]) -> bool:
         """Whether it is time to decide again, `ahead` being the tracks of this part still to be flown."""
         # Where all that a decision laid was refused there is nothing new to decide on.
-        new = len(self._since)
+        new = self._done(ahead)
         return self._decision.replans and (new >= self._decision.asks_after or (new > 0 and not ahead))
 
     def tentative(self, ahead: Sequence[Track]) -> int:
         """How many of the tracks of this part still to be flown, the last ones, the next decision may lay elsewhere."""
-        due = max(0, self._decision.asks_after - len(self._since))
-        return max(0, len(ahead) - due) if self.replans else 0
+        return len(self._beyond(ahead)) if self.replans else 0
+
+    def _done(self, ahead: Sequence[Track]) -> int:
+        """How many tracks are flown since the last decision; one that was cut in pieces when all of them are."""
+        offsets_m = {track.across_m for track in self._since}
+        return len(offsets_m - {ahead[0].across_m} if ahead else offsets_m)
+
+    def _beyond(self, ahead: Sequence[Track]) -> list[Track]:
+        """Of the tracks still to be flown those that the next decision may lay elsewhere."""
+        due = max(0, self._decision.asks_after - self._done(ahead))
+        until_then = set(list(dict.fromkeys(track.across_m for track in ahead))[:due])
+        return [track for track in ahead if track.across_m not in until_then]
 
     @property
     def replans(self) -> bool:
@@ -87,15 +102,15 @@ class PartSurvey:
         """The offset beyond which the next decision may still lay tracks that see; None where it will not."""
         if not self._decision.replans or not ahead:
             return None
-        due = max(0, self._decision.asks_after - len(self._since))
         by_profile = isinstance(self._config.spacing, ProfilePlanner)
         if by_profile and r_eff_m is None:
             # Nothing but the range that it was told has laid what comes after the first track.
             return ahead[0].across_m - reach.far_m
         if self._decision.singles or by_profile:
             # They will not lie much nearer than they do now.
-            return min(track.across_m for track in ahead[due:]) - reach.far_m if ahead[due:] else None
-        pair = [*self._since, *ahead][:TRACKS_A_PAIR]
+            beyond = self._beyond(ahead)
+            return min(track.across_m for track in beyond) - reach.far_m if beyond else None
+        pair = list({track.across_m: track for track in (*self._since, *ahead)}.values())[:TRACKS_A_PAIR]
         known_m = math.floor(reach.far_m) if r_eff_m is None else r_eff_m
         edge_m = self._edge_m(pair, known_m)
         if edge_m >= self.area.width_m - NARROWEST_M:
@@ -107,7 +122,7 @@ class PartSurvey:
         return min(nearest_m, pulled_in_m) - reach.far_m - cell_m
 
     def _so_far(self, r_eff_m: int, curve: DetectionCurve) -> PartSoFar:
-        planned_m = self._decision.offsets_m[len(self._since) :]
+        planned_m = self._decision.offsets_m[self._done([]) :]
         return PartSoFar(self.area.width_m, self._before_m, tuple(self._looked), planned_m, curve, r_eff_m)
 
     def _edge_m(self, tracks: Sequence[Track], r_eff_m: int) -> float:

@@ -11,7 +11,7 @@ from comms.said.topics import TASK_STATUS
 from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.region import share_within
-from planner.sweep import Pass, Sweep, shortest_sweep, sweeps_by
+from planner.sweep import NoSweepError, Pass, Sweep, shortest_sweep, sweeps_by
 from planner.types import Strip, Track
 from vehicle_agent.agent import FARTHEST_M, Agent
 from vehicle_agent.config import RevisitConfig
@@ -20,6 +20,7 @@ from vehicle_agent.endurance import MARGIN_MS, ON_ITS_WAY_HOME
 SWEPT_SHARE = 0.5
 BATTERY_TOO_LOW = "the battery does not last"
 THE_MISSION_IS_OVER = "the mission is over"
+NO_ROOM = "it cannot be flown without entering ground to keep out of"
 
 
 class SecondLooks:
@@ -124,8 +125,13 @@ class SecondLooks:
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
         assert agent.pose is not None
-        ways = sweeps_by(agent.footprint, strip, config.turn_radius_m, config.run_in_m)
-        sweep, way_m = shortest_sweep(ways, agent.pose, config.turn_radius_m)
+        radius_m, keep_out = config.turn_radius_m, agent.keep_out.nearer()
+        ways = sweeps_by(agent.footprint, strip, radius_m, config.run_in_m, keep_out)
+        try:
+            sweep, way_m = shortest_sweep(ways, agent.pose, radius_m, keep_out)
+        except NoSweepError:
+            self._tell(strip.number, TaskState.REFUSED, 0, NO_ROOM)
+            return
         ends_ms = now_ms + self._takes_ms(sweep, agent.pose, way_m)
         free_ms = ends_ms + agent.endurance.run_out_ms(sweep.passes[-1], config.run_in_m)
         if not agent.endurance.lasts_from(sweep.leave, free_ms, MARGIN_MS):
@@ -148,7 +154,8 @@ class SecondLooks:
         if self._sailing.is_in_still_water:
             return round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
         run_out_s = self._sailing.straight_s(config.run_in_m, sweep.leave.heading_rad)
-        return round((self._sailing.passes_s(sweep.passes, config.turn_radius_m, pose) - run_out_s) * 1000)
+        keep_out = self._agent.keep_out.nearer()
+        return round((self._sailing.passes_s(sweep.passes, config.turn_radius_m, pose, keep_out) - run_out_s) * 1000)
 
     def _battery_lasts(self, leg_ends_ms: int) -> bool:
         """Whether it does for what is left of the sweep, if the present leg ends then."""
@@ -156,7 +163,7 @@ class SecondLooks:
         if config.homing is None:
             return True
         leg, *others = self._passes
-        left_s = self._sailing.passes_s(others, config.turn_radius_m, leg.end)
+        left_s = self._sailing.passes_s(others, config.turn_radius_m, leg.end, self._agent.keep_out.nearer())
         free_ms = leg_ends_ms + endurance.run_out_ms(leg, config.run_in_m) + round(left_s * 1000)
         return endurance.lasts_from(self._passes[-1].end, free_ms)
 

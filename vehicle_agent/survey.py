@@ -4,6 +4,7 @@ early what was seen badly."""
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,6 +25,7 @@ from comms.said.topics import CURVE, HOTSPOT, PLAN
 from planner.area import lawnmower
 from planner.curve import NEWEST_CURVES, RangeTally, effective_range_m, mean_curve
 from planner.first_plan import parts_in_order
+from planner.flyable import flyable_pieces
 from planner.footprints.cells import Ahead, cells_within, settled_cells
 from planner.footprints.footprint import Reach
 from planner.hotspots import HotspotMap, update_hotspots
@@ -81,11 +83,13 @@ class SurveyAgent(Agent):
         self._hotspots = HotspotMap.empty(self._grid)
         if self.config.prior is not None:
             self._publish_prior(self.config.prior)
-        parts = parts_in_order(region, self._grid.frame.heading_rad, self.config.nadir_gap_m, self.config.range_m)
+        sonar, begin = (self.config.nadir_gap_m, self.config.range_m), self.config.begin
+        parts = parts_in_order(region, self._grid.frame.heading_rad, *sonar, begin=begin)
         terms = SpacingTerms(
             self._grid.cell_m, run.rho, self.config.wanted_risk, helper_looks(run.vehicles, self.vehicle)
         )
         self._parts = [PartSurvey(part, self.config, terms) for part in parts]
+        self._turn_radius_m = next((one.turn_radius_m for one in run.vehicles if one.vehicle == self.vehicle), 0.0)
         self._begin_part(0)
         self._go_on(now_ms)
 
@@ -233,8 +237,8 @@ class SurveyAgent(Agent):
         self._part = place
         part = self._parts[place]
         decision = part.first(self._known)
-        if self.flown:
-            here = self.flown[-1].end
+        here = self.flown[-1].end if self.flown else self.config.begin
+        if here is not None:
             legs = lawnmower(part.area, decision.offsets_m[:1], decision.range_m)
             turned = any(math.dist(here, leg.end) < math.dist(here, leg.start) for leg in legs)
             self._first_reverse = turned ^ ((self._last_number + 1) % 2 == 0)
@@ -250,24 +254,26 @@ class SurveyAgent(Agent):
     def _lay(self, decision: SpacingDecision, words: str, *, counts: bool = False) -> None:
         """Takes a decision on the present part; of the parts after it what follows from the same knowledge."""
         self.r_adpt_m.append(decision.range_m)
-        self.ahead = self._legs(self._parts[self._part], decision, self._last_number + 1)
+        self.ahead = self._legs(self._parts[self._part], decision, self._last_number + 1, self.flown)
         self.later = []
         for part in self._parts[self._part + 1 :]:
             to_come = part.first(self._known)
             number = self._last_number + len(self.ahead) + len(self.later) + 1
-            self.later += self._legs(part, to_come, number)
+            self.later += self._legs(part, to_come, number, [*self.ahead, *self.later])
         if counts:
             words += f", {len(self.ahead)} track{'' if len(self.ahead) == 1 else 's'}"
         self._publish_plan(f"{words}; {decision.note}" if decision.note else words)
 
-    def _legs(self, part: PartSurvey, decision: SpacingDecision, number: int) -> list[Track]:
-        return lawnmower(
-            part.area,
-            decision.offsets_m,
-            decision.range_m,
-            first_number=number,
-            first_reverse=self._first_reverse ^ (number % 2 == 0),
-        )
+    def _legs(self, part: PartSurvey, decision: SpacingDecision, number: int, before: Sequence[Track]) -> list[Track]:
+        """The tracks of a decision; `before`: those flown until then. Where there is ground to keep out of, what of
+        them can be flown, begun at the nearer end, as numbers do not tell directions there."""
+        reverse = self._first_reverse ^ (number % 2 == 0)
+        legs = part.tracks(decision, number, reverse=reverse)
+        if not self.keep_out:
+            return legs
+        if before and legs and math.dist(before[-1].end, legs[0].end) < math.dist(before[-1].end, legs[0].start):
+            legs = part.tracks(decision, number, reverse=not reverse)
+        return flyable_pieces(legs, self.keep_out, self._turn_radius_m, self.config.run_in_m, self.footprint.lead_m)
 
     def _ending(self) -> str:
         """In words, how much of the area the survey leaves unseen."""
@@ -327,9 +333,8 @@ class SurveyAgent(Agent):
         ahead = [self._still_ahead(track) for track in (*self.ahead, *self.later)]
         settled = self._inside & settled_cells(self._grid, ahead, self._reach)
         part, far_m = self._parts[self._part], self._reach.far_m
-        frontier_m = part.frontier_m(
-            self.ahead, self._reach, self.r_eff_m[-1] if self.r_eff_m else None, self._grid.cell_m
-        )
+        r_eff_m = self.r_eff_m[-1] if self.r_eff_m else None
+        frontier_m = part.frontier_m(self.ahead, self._reach, r_eff_m, self._grid.cell_m)
         if frontier_m is not None:
             settled &= ~self._cells_within(part, frontier_m, far_m)
         for later in self._parts[self._part + 1 :]:

@@ -222,7 +222,10 @@ class RiskMap:
         for path, height_m in ((paths.RISK, 1.25 * below_m), (paths.UNSEEN, below_m)):
             place = rr.Transform3D(translation=[float(corner_x_m), float(corner_y_m), height_m], rotation=turn)
             self._canvas.put_static(path, place)
-        rings = [ring(one, OUTLINE_Z_M) for one in (run.area, *(hole.outline for hole in run.holes))]
+        rings = [
+            ring(one, OUTLINE_Z_M)
+            for one in (run.area, *(hole.outline for hole in run.holes), *(zone.outline for zone in run.keep_out))
+        ]
         self._canvas.put_static(
             paths.OUTLINE,
             rr.LineStrips3D(rings, colors=[palette.OUTLINE], radii=rr.Radius.ui_points(1.0)),
@@ -261,7 +264,7 @@ class RiskMap:
 def _inside(run: RunInfo) -> BoolArray:
     spec = run.grid.spec
     try:
-        region = Region(run.outline, run.hole_outlines)
+        region = Region(run.outline, run.hole_outlines, run.keep_out_outlines)
     except ValueError:  # no polygon to survey: a picture of the whole grid is better than none
         return np.ones(spec.shape, dtype=np.bool_)
     return region.inside(spec)

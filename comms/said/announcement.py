@@ -5,7 +5,7 @@ Annotations are not postponed here: the wire's codecs read them, and would have 
 
 import enum
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from comms.said.wire import (
     AtMost,
@@ -29,6 +29,9 @@ MOST_CORNERS = 1000
 MOST_HOLES = 20
 MOST_HOLE_CORNERS = 50
 """Of each hole: more would not fit a message, with as many holes as there may be."""
+MOST_ZONES = 20
+MOST_ZONE_CORNERS = 50
+"""Of each zone to keep out of."""
 
 
 class Role(enum.Enum):
@@ -137,12 +140,23 @@ class Hole:
 
 
 @dataclass(frozen=True, slots=True)
+class Zone:
+    """Ground that no vehicle may enter: its outline."""
+
+    outline: Annotated[tuple[Vertex, ...], AtMost(MOST_ZONE_CORNERS)]
+
+
+@dataclass(frozen=True, slots=True)
 class RunInfo:
     """What is run: published once by the clock before anything else. Everyone takes area, grid and roster from here.
 
     `area`: the survey area's outline. `rho`: correlation of looks at one cell in the residual risk, 0 for none.
-    `holes`: what is not to be surveyed within the area.
+    `holes`: what is not to be surveyed within the area. `keep_out`: ground that no vehicle may enter, within the area
+    or beside it, and `keep_out_margin_m`: how far off it all stay where they believe they are, as that may not be quite
+    so.
     """
+
+    LEFT_OUT: ClassVar[int] = 2
 
     schema: Count
     scenario: Identifier
@@ -154,6 +168,8 @@ class RunInfo:
     rho: Probability
     vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(100)]
     holes: Annotated[tuple[Hole, ...], AtMost(MOST_HOLES)] = ()
+    keep_out: Annotated[tuple[Zone, ...], AtMost(MOST_ZONES)] = ()
+    keep_out_margin_m: Metres = 0.0
 
     @property
     def outline(self) -> tuple[Point, ...]:
@@ -164,3 +180,8 @@ class RunInfo:
     def hole_outlines(self) -> tuple[tuple[Point, ...], ...]:
         """The corners of each hole, mission frame."""
         return tuple(tuple((corner.x_m, corner.y_m) for corner in hole.outline) for hole in self.holes)
+
+    @property
+    def keep_out_outlines(self) -> tuple[tuple[Point, ...], ...]:
+        """The corners of each zone to keep out of, mission frame."""
+        return tuple(tuple((corner.x_m, corner.y_m) for corner in zone.outline) for zone in self.keep_out)

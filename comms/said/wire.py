@@ -281,7 +281,8 @@ class Many:
 
 class Record:
     """A frozen dataclass as a positional array of its fields. The last ones, if they have defaults, may be missing: one
-    written before there were such fields reads as if it had the defaults."""
+    written before there were such fields reads as if it had the defaults. Of a class with `LEFT_OUT` so many of the
+    last ones are not written where all of them have their defaults."""
 
     def __init__(self, cls: type[Any]) -> None:
         hints = get_type_hints(cls, include_extras=True)
@@ -290,15 +291,17 @@ class Record:
         self.fields: tuple[tuple[str, Callable[[Any], Any], Callable[[Any], Any]], ...] = tuple(
             (name, kind.encode, kind.decode) for name, kind in kinds.items()
         )
-        told = [kinds[field.name].encode(field.default) for field in fields(cls) if field.default is not MISSING]
-        self._defaults: tuple[Any, ...] = tuple(told)
+        self._defaults = [kinds[one.name].encode(one.default) for one in fields(cls) if one.default is not MISSING]
         self._encode, self._decode = _put_together(cls, kinds)
+        self._left_out = getattr(cls, "LEFT_OUT", 0)
 
     def encode(self, value: Any) -> list[Any]:
         try:
-            return self._encode(value)
+            wire = self._encode(value)
         except MISFITS:
-            return self._name_the_field(lambda name, encode, _: encode(getattr(value, name)))
+            wire = self._name_the_field(lambda name, encode, _: encode(getattr(value, name)))
+        last = self._left_out
+        return wire[:-last] if last and wire[-last:] == self._defaults[-last:] else wire
 
     def decode(self, wire: Any) -> Any:
         if type(wire) is not list or len(wire) != len(self.fields):

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from coordinator.allocate.situation import Helper, OpenStrip
-from planner.dubins import Pose, path_lengths_m, shortest_path
-from planner.sweep import Sweep, shortest_sweep, sweeps_over
+from planner.dubins import Pose
+from planner.keep_out import NOWHERE, KeepOut
+from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_over
 from planner.types import FloatArray, Strip
+from planner.ways import way_lengths_m, way_or_direct
 
 
 @dataclass(frozen=True)
@@ -30,21 +32,33 @@ class Service:
 
 
 def sweeps(strip: Strip, helper: Helper) -> tuple[Sweep, ...]:
-    """The ways in which a helper may fly a strip."""
+    """The ways in which a helper may fly a strip; without heed of ground to keep out of where there is none else."""
+    return _sweeps(strip, helper, helper.keep_out) or _sweeps(strip, helper, NOWHERE)
+
+
+def can_fly(strip: Strip, helper: Helper) -> bool:
+    """Whether a helper can fly a strip without entering ground to keep out of."""
+    return not helper.keep_out or bool(_sweeps(strip, helper, helper.keep_out))
+
+
+def _sweeps(strip: Strip, helper: Helper, keep_out: KeepOut) -> tuple[Sweep, ...]:
     radius_m, run_in_m = helper.turn_radius_m, helper.run_in_m
-    return sweeps_over(strip, helper.swath_m, radius_m, run_in_m, helper.beside_m, helper.lead_m)
+    return sweeps_over(strip, helper.swath_m, radius_m, run_in_m, helper.beside_m, helper.lead_m, keep_out)
 
 
 def expected_service(one: OpenStrip, helper: Helper) -> Service:
     """The service of a strip from where and when a helper is free, flown the shortest way, as its agent does."""
-    sweep, way_m = shortest_sweep(sweeps(one.strip, helper), helper.free_at, helper.turn_radius_m)
-    run_out_s = helper.run_in_m / helper.speed_mps
+    ways, radius_m, run_out_s = sweeps(one.strip, helper), helper.turn_radius_m, helper.run_in_m / helper.speed_mps
+    try:
+        sweep, way_m = shortest_sweep(ways, helper.free_at, radius_m, helper.keep_out)
+    except NoSweepError:  # it will refuse it
+        sweep, way_m = shortest_sweep(ways, helper.free_at, radius_m)
     if helper.sailing.is_in_still_water:
         to_begin_s = (way_m + helper.run_in_m) / helper.speed_mps
         sonar_on_s = (sweep.length_m - 2 * helper.run_in_m) / helper.speed_mps
     else:
-        way = shortest_path(helper.free_at, sweep.entry, helper.turn_radius_m)
-        to_begin_s = helper.sailing.path_s(way) + helper.sailing.straight_s(helper.run_in_m, sweep.entry.heading_rad)
+        way = way_or_direct(helper.free_at, sweep.entry, radius_m, helper.keep_out)
+        to_begin_s = helper.sailing.way_s(way) + helper.sailing.straight_s(helper.run_in_m, sweep.entry.heading_rad)
         sonar_on_s = _sonar_on_s(sweep, helper)
         run_out_s = helper.sailing.straight_s(helper.run_in_m, sweep.leave.heading_rad)
     begins_s = helper.free_s + to_begin_s
@@ -61,7 +75,7 @@ def _sonar_on_s(sweep: Sweep, helper: Helper) -> float:
     """From the first run-in's end to the last run-out's beginning, in a current."""
     sailing, headings_rad = helper.sailing, (sweep.entry.heading_rad, sweep.leave.heading_rad)
     ends_s = sum(sailing.straight_s(helper.run_in_m, heading_rad) for heading_rad in headings_rad)
-    return sailing.passes_s(sweep.passes, helper.turn_radius_m) - ends_s
+    return sailing.passes_s(sweep.passes, helper.turn_radius_m, keep_out=helper.keep_out) - ends_s
 
 
 def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: float) -> float:
@@ -103,7 +117,7 @@ class StripTable:
 
     def to_begin_s(self, poses: FloatArray) -> FloatArray:
         """How long it is from poses, shape (n, 3), until the sonar goes on, shape (n, strips, ways)."""
-        way_m = path_lengths_m(poses, self.entry.reshape(-1, 3), self.helper.turn_radius_m)
+        way_m = way_lengths_m(poses, self.entry.reshape(-1, 3), self.helper.turn_radius_m, self.helper.keep_out)
         way_m = way_m.reshape(len(poses), *self.sonar_on_s.shape)
         sailing = self.helper.sailing
         if sailing.is_in_still_water:

@@ -10,6 +10,7 @@ import numpy as np
 
 from planner.currents import Sailing
 from planner.dubins import Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.types import FloatArray, Strip
 from planner.way_home import WayHome
 
@@ -33,6 +34,7 @@ class Helper:
     be home by then, else at the end of a sweep. `refused`: strips that it is not to be offered. `sweeping`: whether it
     is on its task's strip already. `beside_m`: how far beside the middle of what a leg covers it flies it, on either
     side; `lead_m`: how much earlier than over the ground that it sees. Times are seconds since the mission's start.
+    `keep_out`: what it may not enter; strips that it cannot fly therefore are among those refused.
     """
 
     vehicle: str
@@ -50,6 +52,7 @@ class Helper:
     sweeping: bool = False
     beside_m: float = 0.0
     lead_m: float = 0.0
+    keep_out: KeepOut = NOWHERE
     way_home: WayHome | None = None
 
     @property

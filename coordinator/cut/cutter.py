@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from coordinator.cut.ground import Ground
+from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, Cut, CuttingRules, cells_wide, cut_windows
 from coordinator.cut.window import Window
 from planner.types import GridSpec
@@ -29,9 +30,13 @@ Flown = Callable[[Sequence[Counted]], Mapping[int, float]]
 class Cutter:
     """Remembers prices and heading, which hardly change from one cut to the next. `least_worth`: what a cell has to
     count for a look to be worth flying there whatever time there is, as a mean over a swath (residual risk times
-    m2). `across`: whether strips may run across the tracks, too."""
+    m2). `across`: whether strips may run across the tracks, too. `room`: cuts them so
+    that they can be flown where there is ground to keep out of."""
 
-    def __init__(self, grid: GridSpec, rules: CuttingRules, least_worth: float, *, across: bool = False) -> None:
+    def __init__(
+        self, grid: GridSpec, rules: CuttingRules, least_worth: float, *, across: bool = False, room: Room | None = None
+    ) -> None:
+        self._room = room
         self._cell_area_m2, self._shape = grid.cell_area_m2, grid.shape
         self._block = _block(cells_wide(grid, rules.swath_m))
         least_price = least_worth * rules.swath_m / grid.cell_area_m2
@@ -82,7 +87,8 @@ class Cutter:
         after, rest_m2 = self._flown(left, stay, flown)
         most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
         for way in self._ways:
-            anew = _counted(left, way.windows(left, time_m))
+            windows = way.windows(left, time_m)
+            anew = _counted(left, windows if self._room is None else self._room.flyable(self._block, windows))
             after_anew, rest_m2 = self._flown(left, anew, flown)
             gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
             if gained_m2 > most_m2 or not best:

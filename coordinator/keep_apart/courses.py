@@ -13,9 +13,11 @@ from comms.said.announcement import RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan
 from coordinator.vehicles import pass_of, sailing_of
 from planner.currents import Sailing
-from planner.dubins import DubinsPath, Pose, shortest_path
+from planner.dubins import DubinsPath, Pose
+from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep, shifted
 from planner.types import FloatArray
+from planner.ways import way_or_direct
 
 STEP_S = 2.0
 """Courses are sampled at the whole multiples of this, so that any two are at the same times."""
@@ -52,9 +54,16 @@ class Course:
         return Course(self.first, np.concatenate([waiting, self.poses]), self.arrives_s + steps * STEP_S)
 
 
-def course(start: Pose, start_s: float, sailing: Sailing, turn_radius_m: float, paths: Sequence[DubinsPath]) -> Course:
-    """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard; of paths
-    that take longer than LONGEST_S no more than that."""
+def course(
+    start: Pose,
+    start_s: float,
+    sailing: Sailing,
+    turn_radius_m: float,
+    paths: Sequence[DubinsPath],
+    keep_out: KeepOut = NOWHERE,
+) -> Course:
+    """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard, or to
+    port where there is only room for that; of paths that take longer than LONGEST_S no more than that."""
     first = math.ceil(start_s / STEP_S)
     speed_mps, still = sailing.speed_mps, sailing.is_in_still_water
     knots_s, knots_m = sailing.knots(() if still else paths)
@@ -69,7 +78,8 @@ def course(start: Pose, start_s: float, sailing: Sailing, turn_radius_m: float, 
         to = int(np.searchsorted(way_m, done_m + path.length_m))
         parts.append(path.poses_at(way_m[done:to] - done_m))
         pose, done, done_m = path.pose_at(path.length_m), to, done_m + path.length_m
-    circle = DubinsPath(pose, turn_radius_m, (1, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
+    side = keep_out.circling(pose, turn_radius_m) or 1
+    circle = DubinsPath(pose, turn_radius_m, (side, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
     parts.append(circle.poses_at(way_m[done:] - done_m))
     return Course(first, np.concatenate(parts), start_s + (done_m / speed_mps if still else sails_s))
 
@@ -80,7 +90,9 @@ def lying_still(pose: Pose, from_s: float) -> Course:
     return Course(first, np.tile(np.array(pose, dtype=np.float64), (math.ceil(AHEAD_S / STEP_S), 1)), from_s)
 
 
-def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, heard_s: float) -> Course:
+def survey_course(
+    entry: RosterVehicle, state: AgentState, plan: Plan | None, heard_s: float, keep_out: KeepOut = NOWHERE
+) -> Course:
     """The course of a primary along all tracks that it has planned, from what it said at `heard_s`."""
     pose, radius_m = Pose(state.x_m, state.y_m, state.heading_rad), entry.turn_radius_m
     tracks = plan.tracks if plan is not None else ()
@@ -97,9 +109,9 @@ def survey_course(entry: RosterVehicle, state: AgentState, plan: Plan | None, he
     paths, here = [straight(pose, left_m, radius_m)], end
     for track in ahead:
         one = pass_of(track, entry)
-        paths += [shortest_path(here, one.begin, radius_m), straight(one.begin, one.length_m, radius_m)]
+        paths += [*way_or_direct(here, one.begin, radius_m, keep_out), straight(one.begin, one.length_m, radius_m)]
         here = one.end
-    return course(pose, heard_s, sailing_of(entry), radius_m, paths)
+    return course(pose, heard_s, sailing_of(entry), radius_m, paths, keep_out)
 
 
 def sweep_course(
@@ -111,17 +123,18 @@ def sweep_course(
     *,
     entered: bool = False,
     run_out_m: float = 0.0,
+    keep_out: KeepOut = NOWHERE,
 ) -> Course:
     """The course over a strip's legs from a pose at a time; `entered`: the first leg's run-in lies behind it, the pose
     on the leg; `run_out_m`: what is first to be sailed straight on, see `run_out_left_m`."""
     paths, here = [straight(pose, run_out_m, turn_radius_m)], shifted(pose[:2], pose.heading_rad, run_out_m)
     for place, (begin, end) in enumerate(sweep.passes):
         if not (entered and place == 0):
-            paths.append(shortest_path(here, begin, turn_radius_m))
+            paths += way_or_direct(here, begin, turn_radius_m, keep_out)
             here = begin
         paths.append(straight(here, math.dist(here[:2], end[:2]), turn_radius_m))
         here = end
-    return course(pose, start_s, sailing, turn_radius_m, paths)
+    return course(pose, start_s, sailing, turn_radius_m, paths, keep_out)
 
 
 def straight(start: Pose, length_m: float, turn_radius_m: float) -> DubinsPath:

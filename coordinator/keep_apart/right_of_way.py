@@ -17,6 +17,7 @@ from coordinator.allocate.situation import Helper, OpenStrip
 from coordinator.keep_apart.courses import STEP_S, Approach, Course, too_close
 from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle
+from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep
 from planner.types import Point, Strip
 
@@ -72,14 +73,15 @@ class Instruction:
 
 
 class RightOfWay:
-    """`separation_m` > 0: how near two vehicles may come. `is_inside`: whether a place lies in the area."""
+    """`separation_m` > 0: how near two vehicles may come. `is_inside`: whether a place lies in the area. `keep_out`:
+    what none may enter."""
 
-    def __init__(self, separation_m: float, is_inside: Callable[[Point], bool]) -> None:
+    def __init__(self, separation_m: float, is_inside: Callable[[Point], bool], keep_out: KeepOut = NOWHERE) -> None:
         self.separation_m = separation_m
         self.check_s = 0.0
         """When to check next."""
         self._is_inside = is_inside
-        self._traffic = Traffic()
+        self._traffic = Traffic(keep_out)
         self._due_s: dict[tuple[str, str], float] = {}
         self._sent_s: dict[str, float] = {}
         self._told_s: dict[str, float] = {}
@@ -209,7 +211,7 @@ class RightOfWay:
                 bearing_rad = here.heading_rad + 2 * math.pi * number / BEARINGS
                 far_m = share * self.separation_m
                 place = (here.x_m + far_m * math.sin(bearing_rad), here.y_m + far_m * math.cos(bearing_rad))
-                if self._is_inside(place):
+                if self._is_inside(place) and self._traffic.has_room(one.vehicle, one.strip, place, now_s):
                     laid = self._traffic.aside(one.vehicle, one.strip, place, now_s)
                     if self._is_clear(laid, courses, now_s, for_s, OFFER_MARGIN_M):
                         return place

@@ -16,11 +16,13 @@ from coordinator.keep_apart.courses import (
     survey_run_out_left_m,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle, sailing_of
-from planner.dubins import DubinsPath, Pose, shortest_path
+from coordinator.vehicles import KnownVehicle, sailing_of, way_home_of
+from planner.dubins import DubinsPath, Pose
 from planner.footprints import footprint_of
-from planner.sweep import Sweep, shortest_sweep, sweeps_by
+from planner.keep_out import NOWHERE, KeepOut
+from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_by
 from planner.types import Point, Strip
+from planner.ways import shortest_way, way_or_direct
 
 
 @dataclass(frozen=True)
@@ -34,9 +36,11 @@ class _Sweeping:
 
 
 class Traffic:
-    """Courses are laid when asked for, and kept until something is heard that changes them."""
+    """Courses are laid when asked for, and kept until something is heard that changes them. `keep_out`: round what all
+    of them lead."""
 
-    def __init__(self) -> None:
+    def __init__(self, keep_out: KeepOut = NOWHERE) -> None:
+        self._keep_out = keep_out
         self._surveys: dict[str, tuple[object, int, Course]] = {}
         self._sweeps: dict[str, _Sweeping] = {}
         self._entered: dict[str, Sweep] = {}
@@ -67,22 +71,35 @@ class Traffic:
         """The course of a helper that leaves what it does and sets out to another strip now, and how it sweeps it."""
         pose, start_s = self._here(vehicle, now_s, strip)
         entry, run_out_m = vehicle.entry, self._run_out_m(vehicle, pose)
-        sweep = _sweep_from(pose, vehicle, other)
-        return sweep_course(pose, start_s, sailing_of(entry), entry.turn_radius_m, sweep, run_out_m=run_out_m), sweep
+        sweep = self._sweep_from(pose, vehicle, other)
+        radius_m, keep_out = entry.turn_radius_m, self._keep_out
+        laid = sweep_course(pose, start_s, sailing_of(entry), radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
+        return laid, sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
         pose, start_s = self._here(vehicle, now_s, strip)
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
-        way = shortest_path(end, _arrival(end, place), entry.turn_radius_m)
-        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out, way])
+        way = way_or_direct(end, _arrival(end, place), entry.turn_radius_m, self._keep_out)
+        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out, *way], self._keep_out)
+
+    def has_room(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> bool:
+        """Whether a helper that leaves what it does can go to a place and circle there."""
+        if not self._keep_out:
+            return True
+        pose, radius_m = self._here(vehicle, now_s, strip)[0], vehicle.entry.turn_radius_m
+        run_out = self._run_out(vehicle, pose)
+        end = run_out.pose_at(run_out.length_m)
+        there = _arrival(end, place)
+        way = shortest_way(end, there, radius_m, self._keep_out)
+        return way is not None and self._keep_out.circling(there, radius_m) is not None
 
     def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
         """The course of a helper that leaves what it does and circles where it is."""
         pose, start_s = self._here(vehicle, now_s, strip)
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
-        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out])
+        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out], self._keep_out)
 
     def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
         """A helper was sent to a strip."""
@@ -107,7 +124,7 @@ class Traffic:
         known = self._surveys.get(name)
         # One that should have sailed its tracks, or has none yet, is where it was heard last.
         if known is None or known[0] != told or (known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s):
-            laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000)
+            laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000, self._keep_out)
             known = self._surveys[name] = told, vehicle.heard_ms, laid
         return known[2]
 
@@ -119,10 +136,15 @@ class Traffic:
         if known is None or known.strip != strip or known.stage < stage:
             pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
             entered = known is not None and known.strip == strip and stage == 2
-            sweep = known.sweep if known and entered else _sweep_from(pose, vehicle, strip)
+            sweep = known.sweep if known and entered else self._sweep_from(pose, vehicle, strip)
             run_out_m = 0.0 if entered else self._run_out_m(vehicle, pose)
             radius_m = entry.turn_radius_m
-            laid = sweep_course(pose, heard_s, sailing_of(entry), radius_m, sweep, entered=entered, run_out_m=run_out_m)
+            laid = sweep_course(
+                *(pose, heard_s, sailing_of(entry), radius_m, sweep),
+                entered=entered,
+                run_out_m=run_out_m,
+                keep_out=self._keep_out,
+            )
             known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
         if stage == 2:
             self._entered[entry.vehicle] = known.sweep
@@ -138,8 +160,8 @@ class Traffic:
             if state.mode is Mode.RETURNING:
                 run_out = self._run_out(vehicle, pose)
                 end = run_out.pose_at(run_out.length_m)
-                way = shortest_path(end, _arrival(end, (entry.home_x_m, entry.home_y_m)), entry.turn_radius_m)
-                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [run_out, way])
+                way = way_home_of(entry, self._keep_out).way(end)
+                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [run_out, *way], self._keep_out)
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
 
@@ -152,13 +174,25 @@ class Traffic:
             heard_s = vehicle.heard_ms / 1000
             pose = Pose(state.x_m, state.y_m, state.heading_rad)
             if entry.role.surveys and not entry.role.revisits:
-                laid = survey_course(entry, state, vehicle.plan, heard_s)
+                laid = survey_course(entry, state, vehicle.plan, heard_s, self._keep_out)
             elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
                 laid = lying_still(pose, heard_s)
             else:
-                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [self._run_out(vehicle, pose)])
+                run_out = self._run_out(vehicle, pose)
+                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [run_out], self._keep_out)
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
+
+    def _sweep_from(self, pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
+        """How a helper sweeps a strip that it sets out to from a pose."""
+        entry, keep_out = vehicle.entry, self._keep_out
+        for heeded in (keep_out, NOWHERE) if keep_out else (NOWHERE,):
+            sweeps = sweeps_by(footprint_of(entry.sonar), strip, entry.turn_radius_m, entry.run_in_m, heeded)
+            try:
+                return shortest_sweep(sweeps, pose, entry.turn_radius_m, heeded)[0]
+            except NoSweepError:  # it will refuse the strip
+                continue
+        raise AssertionError("every strip can be flown where nothing is in the way")
 
     def _run_out(self, vehicle: KnownVehicle, pose: Pose) -> DubinsPath:
         return straight(pose, self._run_out_m(vehicle, pose), vehicle.entry.turn_radius_m)
@@ -174,10 +208,3 @@ class Traffic:
 def _arrival(pose: Pose, place: Point) -> Pose:
     """How a vehicle that is sent to a place comes there: the way it lies."""
     return Pose(*place, math.atan2(place[0] - pose.x_m, place[1] - pose.y_m) % (2 * math.pi))
-
-
-def _sweep_from(pose: Pose, vehicle: KnownVehicle, strip: Strip) -> Sweep:
-    """How a helper sweeps a strip that it sets out to from a pose."""
-    entry = vehicle.entry
-    sweeps = sweeps_by(footprint_of(entry.sonar), strip, entry.turn_radius_m, entry.run_in_m)
-    return shortest_sweep(sweeps, pose, entry.turn_radius_m)[0]

@@ -173,7 +173,7 @@ def serve(session: zenoh.Session, run: str, name: str, vehicle: Vehicle) -> None
             key, payload = "", b""
         now_s = time.monotonic()
         if key == time_key:
-            _, told_ms, factor, _ = msgpack.unpackb(payload)
+            _, told_ms, factor, *_ = msgpack.unpackb(payload)
             if told_ms is not None:
                 first = not mission_time.known
                 mission_time.hear(told_ms, factor, now_s)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from secondlook.commands.planned_survey import planned_surveys
+from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.fleet.build import build_fleet
 from secondlook.scenario import load_scenario
@@ -23,7 +23,7 @@ def check(
     ] = None,
 ) -> None:
     """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
-    battery is too small for that."""
+    battery is too small for that, and what cannot be reached past ground to keep out of."""
     valid = load_scenario(scenario, set_ or ())
     build_fleet(valid, record=False)
     surveys = planned_surveys(valid)
@@ -34,3 +34,5 @@ def check(
         typer.echo(survey.sentence)
         if survey.warning:
             sys.stderr.write(f"{survey.warning}\n")
+    for sentence in unreachable(valid, surveys):
+        sys.stderr.write(f"{sentence}\n")

@@ -102,6 +102,7 @@ def _text(chart: Chart, source: Path, cell_m: int, limit_s: int) -> str:
         "  polygon_deg:                # corners in order: latitude, longitude, WGS84",
         *_ring(chart.area, "    "),
         *_holes(chart.holes),
+        *_keep_out(chart.keep_out),
         "  track_heading_deg: auto     # the heading that needs the fewest; or degrees",
         f"  cell_m: {cell_m:<20}# cell of the residual-risk map",
         *_priorities(chart.priorities),
@@ -165,6 +166,11 @@ def _holes(holes: Iterable[Ring]) -> list[str]:
     found = [line for hole in holes for line in _ring(hole, "    ", "- ")]
     remark = "# what lies in it and need not be surveyed"
     return [f"  holes_deg:                  {remark}", *found] if found else [f"  holes_deg: []               {remark}"]
+
+
+def _keep_out(zones: Iterable[Ring]) -> list[str]:
+    found = [line for zone in zones for line in _ring(zone, "    ", "- ")]
+    return ["  keep_out_deg:               # what no vehicle may enter", *found] if found else []
 
 
 def _priorities(priorities: Iterable[tuple[Ring, float]]) -> list[str]:

@@ -15,18 +15,23 @@ from comms.said.messages import MOST_TRACKS
 from planner.area import SurveyArea
 from planner.dubins import Pose
 from planner.first_plan import FirstPlan
+from planner.flyable import reachable
 from planner.footprints import footprint_of
 from planner.footprints.cells import seen_cells
 from planner.sweep import pass_over
 from planner.types import Point, Track
 from planner.way_home import MARGIN_S
+from planner.ways import shortest_way
 from secondlook.errors import UserError
 from secondlook.fleet.roster import way_home_of
-from secondlook.fleet.survey_area import plan_for, region_for, region_of, track_heading_rad
+from secondlook.fleet.survey_area import keep_out_of, plan_for, region_for, region_of, track_heading_rad
 from secondlook.launch.run_display import in_seconds
 from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
 from secondlook.scenario import Scenario, SurveyVehicle
+
+LEAST_SHARE = 1e-4
+"""Less of the area than this is rounding."""
 
 
 @dataclass(frozen=True)
@@ -88,17 +93,55 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     grid = region.about(heading_rad).grid(scenario.area.cell_m)
     inside = region.inside(grid)
     missed = inside & ~seen_cells(grid, tracks, footprint_of(vehicle.sonar).told(vehicle.told_range_m).reach)
-    start = Pose(vehicle.start.x_m, vehicle.start.y_m, math.radians(vehicle.start.heading_deg))
     lead_m = footprint_of(vehicle.sonar).lead_m
     passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
-    homeward, end = way_home_of(vehicle, scenario.current), passes[-1].end if passes else start
+    start, keep_out = _start(vehicle), keep_out_of(scenario)
+    homeward, end = way_home_of(vehicle, scenario.current, keep_out), passes[-1].end if passes else start
     run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end.heading_rad)
     home_s = run_out_s + homeward.from_pose(end)[0]
     lasts_for = homeward.passes_within(start, passes, vehicle.endurance_s - vehicle.kept_s - MARGIN_S)
     uncovered_share = float(missed.sum() / max(1, inside.sum()))
-    takes_s = homeward.sailing.passes_s(passes, vehicle.turn_radius_m, start) - run_out_s
+    takes_s = homeward.sailing.passes_s(passes, vehicle.turn_radius_m, start, keep_out) - run_out_s
     return PlannedSurvey(name, vehicle, heading_rad, plan, uncovered_share, takes_s, home_s, lasts_for)
+
+
+def unreachable(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> list[str]:
+    """What ground to keep out of leaves nobody, or a vehicle, no way to: a sentence each."""
+    keep_out, region = keep_out_of(scenario), region_of(scenario).polygon
+    if not keep_out:
+        return []
+    told = []
+    for name, vehicle in scenario.vehicles.items():
+        start = (vehicle.start.x_m, vehicle.start.y_m)
+        if vehicle.body == "external":
+            told.append(f"{name}: its body is not ours: it has to keep out of area.keep_out_m by itself")
+        share = 1.0 - reachable(start, region, keep_out).area / region.area
+        if share > LEAST_SHARE:
+            told.append(
+                f"{name}: {share:.2%} of the area lies where no way leads from its start past ground to keep out of"
+            )
+        if keep_out.are_parted(start, vehicle.home_m):
+            told.append(f"{name}: no way past ground to keep out of leads from its start to its home")
+    for survey in surveys:
+        vehicle, here = survey.vehicle, _start(survey.vehicle)
+        lead_m, without = footprint_of(vehicle.sonar).lead_m, []
+        for track in survey.plan.all_tracks:
+            begin, end = pass_over(track.start, track.end, vehicle.run_in_m, lead_m)
+            if shortest_way(here, begin, vehicle.turn_radius_m, keep_out) is None:
+                without.append(str(track.number))
+            else:
+                here = end
+        if without:
+            tracks = f"track {without[0]}" if len(without) == 1 else f"tracks {', '.join(without)}"
+            told.append(
+                f"{survey.name}: no way past ground to keep out of leads to {tracks}, of which it will look at nothing"
+            )
+    return told
+
+
+def _start(vehicle: SurveyVehicle) -> Pose:
+    return Pose(vehicle.start.x_m, vehicle.start.y_m, math.radians(vehicle.start.heading_deg))
 
 
 def plan_as_text(surveys: Sequence[PlannedSurvey]) -> str:
@@ -152,6 +195,8 @@ def plan_as_geojson(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> dic
 
 def _features(scenario: Scenario, surveys: Sequence[PlannedSurvey]) -> Iterator[tuple[BaseGeometry, dict[str, Any]]]:
     yield region_of(scenario).polygon, {"kind": "area", "scenario": scenario.name}
+    for number, zone in enumerate(scenario.area.keep_out, start=1):
+        yield shapely.Polygon(zone), {"kind": "keep_out", "zone": number}
     for survey in surveys:
         for number, (part, tracks, range_m) in enumerate(_parts(survey), start=1):
             of = {"vehicle": survey.name, "part": number}

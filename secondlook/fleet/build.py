@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import shapely
 
-from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex
+from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode, Routing
 from coordinator.config import CoordinatorConfig
@@ -18,9 +18,8 @@ from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
-from secondlook.fleet.survey_area import region_for, region_of, track_heading_rad
+from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
-    Current,
     PatchySeabed,
     RevisitVehicle,
     Scenario,
@@ -76,6 +75,15 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     grid = region_of(scenario).about(heading_rad).grid(scenario.area.cell_m)
     for primary in scenario.survey_vehicles.values():
         region_for(scenario, primary, heading_rad)  # refuses a part that is none
+    keep_out = keep_out_of(scenario)
+    for name, vehicle in scenario.vehicles.items():
+        places = {"start": (vehicle.start.x_m, vehicle.start.y_m), "home": vehicle.home_m}
+        for key, place in places.items():
+            if keep_out and not keep_out.are_clear([shapely.Point(place)]).all():
+                raise ValueError(
+                    f"vehicles.{name}.{key} must be {keep_out.margin_m:g} m or more from ground to keep out of, "
+                    "as all stay so far off"
+                )
     run_info = RunInfo(
         schema=SCHEMA_VERSION,
         scenario=scenario.name,
@@ -94,10 +102,14 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
         rho=scenario.mission.rho,
         vehicles=tuple(roster_vehicle(name, vehicle, scenario.current) for name, vehicle in scenario.vehicles.items()),
         holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
+        keep_out=tuple(Zone(tuple(Vertex(*corner) for corner in zone)) for zone in keep_out.zones),
+        keep_out_margin_m=keep_out.margin_m,
     )
-    Region(run_info.outline, run_info.hole_outlines)  # refuses what is none in whole centimetres
+    Region(
+        run_info.outline, run_info.hole_outlines, run_info.keep_out_outlines
+    )  # refuses what is none in whole centimetres
     roster = _roster_of(scenario, record=record)
-    specs = {name: _agent_spec(name, vehicle, scenario.current) for name, vehicle in scenario.vehicles.items()}
+    specs = {name: _agent_spec(scenario, name, vehicle, heading_rad) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
     if any(one.role is Role.WORLD for one in roster):
         specs = {WORLD: node_spec(Role.WORLD, _world_config(scenario)), **specs}
@@ -132,9 +144,9 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
     return tuple(Vertex(*corner) for corner in corners if corner in convex)
 
 
-def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle, current: Current | None) -> NodeSpec:
+def _agent_spec(scenario: Scenario, name: str, vehicle: SurveyVehicle | RevisitVehicle, heading_rad: float) -> NodeSpec:
     footprint, endurance_ms = footprint_of(vehicle.sonar), endurance_ms_of(vehicle)
-    homing = Homing(way_home_of(vehicle, current), reserve_ms_of(vehicle))
+    homing = Homing(way_home_of(vehicle, scenario.current), reserve_ms_of(vehicle))
     revisit = RevisitConfig(
         vehicle=name,
         footprint=footprint,
@@ -160,6 +172,7 @@ def _agent_spec(name: str, vehicle: SurveyVehicle | RevisitVehicle, current: Cur
         share=vehicle.share,
         wanted_risk=vehicle.wanted_risk,
         homing=homing,
+        begin=begin_of(scenario, vehicle, heading_rad),
     )
     if vehicle.revisits:
         return node_spec(Role.SURVEY_REVISIT, SurveyRevisitConfig(survey, revisit), vehicle.agent)
@@ -172,6 +185,7 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         seed=scenario.seed,
         area=tuple(scenario.area.polygon_m),
         holes=tuple(scenario.area.holes_m),
+        keep_out=keep_out_of(scenario),
         vehicles=tuple(
             _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),

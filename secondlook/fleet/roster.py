@@ -9,6 +9,7 @@ import numpy as np
 from comms.said.announcement import Role, RosterVehicle
 from planner.currents import Sailing
 from planner.footprints import footprint_of
+from planner.keep_out import NOWHERE, KeepOut
 from planner.way_home import WayHome
 from secondlook.scenario import Current, RevisitVehicle, SurveyVehicle
 
@@ -67,9 +68,11 @@ def sailing_of(vehicle: SurveyVehicle | RevisitVehicle, current: Current | None)
     return Sailing(vehicle.speed_mps, current.drift_mps, math.radians(current.set_deg), tidal=tidal)
 
 
-def way_home_of(vehicle: SurveyVehicle | RevisitVehicle, current: Current | None) -> WayHome:
-    """Its way home, as it is reckoned with."""
-    return WayHome(vehicle.home_m, sailing_of(vehicle, current), vehicle.turn_radius_m)
+def way_home_of(
+    vehicle: SurveyVehicle | RevisitVehicle, current: Current | None, keep_out: KeepOut = NOWHERE
+) -> WayHome:
+    """Its way home, as it is reckoned with; its agent hears of ground to keep out of from the run's announcement."""
+    return WayHome(vehicle.home_m, sailing_of(vehicle, current), vehicle.turn_radius_m, keep_out)
 
 
 def role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:

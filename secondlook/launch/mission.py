@@ -111,7 +111,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
             factor=options.drive.factor,
             restarts=run.restarts,
         )
-        warn_of_pairs(summary)
+        warn_of(summary)
         warn_of_batteries(summary)
     try:
         write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n")
@@ -122,8 +122,11 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     return summary
 
 
-def warn_of_pairs(summary: Mapping[str, Any]) -> None:
-    """One warning in the log for each two vehicles that came nearer to each other than `mission.separation_m`."""
+def warn_of(summary: Mapping[str, Any]) -> None:
+    """One warning in the log for each two vehicles that came nearer to each other than `mission.separation_m`, and for
+    each that entered ground to keep out of."""
+    for one in summary.get("keep_out", {}).get("entered", ()):
+        log.warning("%s entered zone %d of area.keep_out_m at %.0f s", one["vehicle"], one["zone"], one["t_s"])
     least_m = summary["separation"]["least_m"]
     for pair in summary["separation"]["closest"]:
         if pair["closest_m"] < least_m:

@@ -131,6 +131,9 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
             one, other = pair["vehicles"]
             told = f"{one} and {other}: {pair['closest_m']:.1f} m at {pair['t_s']:.0f} s, less than {least_m:g} m"
             table.add_row("too close", told, style="yellow")
+    for one in summary.get("keep_out", {}).get("entered", ()):
+        told = f"{one['vehicle']}: zone {one['zone']} of area.keep_out_m at {one['t_s']:.0f} s"
+        table.add_row("entered", told, style="yellow")
     if restarts := summary.get("restarts"):
         table.add_row("started again", ", ".join(f"{host} {count} x" for host, count in restarts.items()))
     table.add_row("files", str(folder))

@@ -35,7 +35,7 @@ from secondlook.fleet.nodes import (
     make_nodes,
     node_spec,
 )
-from secondlook.launch.mission import not_over, recorder_config, warn_of_pairs
+from secondlook.launch.mission import not_over, recorder_config, warn_of
 from secondlook.launch.run_display import closing_table
 from secondlook.launch.signals import signals_ask
 from secondlook.launch.supervisor import AGAIN, OVER, end_with_supervisor, tell_supervisor
@@ -173,7 +173,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     )
     if failure is None and summary["risk"] is None:  # of one that was started again at the very end, say
         failure = "the mission was over before anything was heard of it"
-    warn_of_pairs(summary)
+    warn_of(summary)
     try:
         write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
         write_report(folder)

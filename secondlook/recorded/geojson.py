@@ -26,8 +26,9 @@ Feature = tuple[BaseGeometry, dict[str, Any]]
 
 
 def to_geojson(mission: RecordedMission, origin: GeographicOrigin | None = None) -> dict[str, Any]:
-    """A FeatureCollection; each feature's property `kind` is area, priority, track, path, hotspot, strip, contact or
-    missed_target. Beside a time in seconds stands the same in UTC where the scenario says when the mission began.
+    """A FeatureCollection; each feature's property `kind` is area, keep_out, priority, track, path, hotspot, strip,
+    contact or missed_target. Beside a time in seconds stands the same in UTC where the scenario says when the mission
+    began.
 
     Without an origin, given or in the scenario, coordinates are metres of the mission frame, and the member `frame`
     says so: most programs would take them for degrees. With one the collection is as RFC 7946 asks: WGS84, longitude
@@ -66,6 +67,7 @@ def features_of(mission: RecordedMission) -> Iterator[Feature]:
 def _ground(mission: RecordedMission) -> Iterator[Feature]:
     run = mission.run
     yield mission.area, {"kind": "area", "scenario": run.scenario, "seed": run.seed}
+    yield from ((zone, {"kind": "keep_out", "zone": at}) for at, zone in enumerate(mission.keep_out, start=1))
     if not mission.priorities:
         return
     risk = mission.risk()

@@ -143,7 +143,9 @@ def risk_in_priorities(grounds: Iterable[PriorityGround], before: RiskMap, after
 _PRIORITIES = TypeAdapter(list[Priority])
 
 
-def priorities(scenario: Mapping[str, Any], area: shapely.Polygon, folder: Path) -> list[PriorityGround]:
+def priorities(
+    scenario: Mapping[str, Any], area: shapely.Polygon | shapely.MultiPolygon, folder: Path
+) -> list[PriorityGround]:
     """Those of a scenario as a run's folder holds it, each as far as it lies in the area and under no later one.
 
     Raises UserError where they are not as the run wrote them.

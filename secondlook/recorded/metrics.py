@@ -35,6 +35,7 @@ from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray
 from secondlook.recorded.closest_approach import ClosestApproaches
+from secondlook.recorded.kept_out import Entries
 from secondlook.recorded.vehicles import Ending
 from vehicle_agent.agent import makes_sense
 
@@ -99,6 +100,7 @@ class Metrics:
     detected: set[int] = field(default_factory=set)
     risk_at: list[dict[str, float]] = field(default_factory=list)
     approaches: ClosestApproaches = field(default_factory=lambda: ClosestApproaches({}))
+    entries: Entries = field(default_factory=lambda: Entries(()))
     misfits: int = 0
     books: StripBooks = field(default_factory=StripBooks)
 
@@ -113,10 +115,12 @@ class Metrics:
             if vehicle is not None:
                 self._hear_nav(vehicle, message)
                 self.approaches.hear(received)
+                self.entries.hear(received)
         elif isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
         elif isinstance(message, TruthPose) and vehicle is not None:
             self.approaches.hear(received)
+            self.entries.hear(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
             if makes_sense(message):
                 vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
@@ -225,17 +229,19 @@ class Metrics:
                 {"vehicles": list(one.vehicles), "closest_m": round(one.closest_m, 2), "t_s": round(one.t_s, 3)}
                 for one in self.approaches.found()
             ],
+            "entered": [asdict(one) for one in self.entries.found()],
         }
 
     def _begin(self, run: RunInfo) -> None:
         self.run = run
         spec = run.grid.spec
         self.map = FleetMap(spec, run.rho)
-        self.inside = Region(run.outline, run.hole_outlines).inside(spec)
+        self.inside = Region(run.outline, run.hole_outlines, run.keep_out_outlines).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role, footprint_of(entry.sonar)) for entry in run.vehicles}
         self.approaches = ClosestApproaches(
             {entry.vehicle: entry.speed_mps + entry.drift_mps for entry in run.vehicles}
         )
+        self.entries = Entries(run.keep_out_outlines)
 
     def _pass_time(self, sent_ms: int) -> None:
         while len(self.risk_at) < len(RISK_AT_FACTORS):

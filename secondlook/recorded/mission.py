@@ -35,11 +35,13 @@ from comms.said.topics import TOPICS, Topic, topic_of
 from comms.said.wire import WireError
 from comms.strip_books import StripBooks
 from planner.fleet_map import FleetMap
+from planner.region import Region
 from planner.types import PriorityGround
 from secondlook.errors import UserError
 from secondlook.geography import GeographicOrigin
 from secondlook.recorded.closest_approach import Closest
 from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord, contacts, priorities, targets
+from secondlook.recorded.kept_out import Entered
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import read_messages
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
@@ -108,9 +110,14 @@ class Mission(ABC):
         return max((one.t_s for one in self.received()), default=0.0)
 
     @cached_property
-    def area(self) -> shapely.Polygon:
+    def area(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The survey area."""
-        return shapely.Polygon(self.run.outline, self.run.hole_outlines)
+        return Region(self.run.outline, self.run.hole_outlines, self.run.keep_out_outlines).polygon
+
+    @cached_property
+    def keep_out(self) -> list[shapely.Polygon]:
+        """The zones that no vehicle may enter."""
+        return [shapely.Polygon(zone) for zone in self.run.keep_out_outlines]
 
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.
@@ -143,6 +150,11 @@ class Mission(ABC):
     def endings(self) -> list[Ending]:
         """How each vehicle has ended, and with which share of its battery."""
         return [one.ended_as(name) for name, one in self._figures.vehicles.items()]
+
+    @property
+    def entered(self) -> list[Entered]:
+        """Which vehicles entered which zones of `area.keep_out_m`, and when first, in the order of time."""
+        return self._figures.entries.found()
 
     @cached_property
     def _figures(self) -> Metrics:

@@ -178,6 +178,10 @@ def _run(run: RunInfo) -> str:
 
 
 def _area_km2(run: RunInfo) -> float:
+    if run.keep_out:
+        from planner.region import Region  # noqa: PLC0415 - it takes long to import, and is seldom needed
+
+        return Region(run.outline, run.hole_outlines, run.keep_out_outlines).polygon.area / 1e6
     return (_ring_m2(run.outline) - sum(_ring_m2(hole) for hole in run.hole_outlines)) / 1e6
 
 

@@ -45,7 +45,7 @@ def summarise(
     again, by host.
     """
     told = observer.metrics.summary()
-    closest = told.pop("closest")
+    closest, entered = told.pop("closest"), told.pop("entered")
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
     return {
         "scenario": scenario.name,
@@ -67,6 +67,7 @@ def summarise(
             "pairs_closer": sum(pair["closest_m"] < scenario.mission.separation_m for pair in closest),
             "closest": closest,
         },
+        **({"keep_out": {"entered": entered}} if scenario.area.keep_out else {}),
         "latency_ms": {
             "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
         },

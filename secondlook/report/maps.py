@@ -146,6 +146,7 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
     children = [
         frame.risk(risk),
         element("path", d=frame.line(mission.area), class_="area"),
+        *(_keep_out(frame, zone) for zone in mission.keep_out),
         *(_priority(frame, one) for one in mission.priorities),
         *(_path(frame, path, classes.get(vehicle, "helper"), unit_m) for vehicle, path in paths.items()),
         *(_track(frame, track, unit_m) for track in tracks),
@@ -169,6 +170,14 @@ def flown_map(mission: RecordedMission, risk: RiskMap, ids: str) -> Element:
         data_west=frame.west_m,
         data_north=frame.north_m,
     )
+
+
+def _keep_out(frame: MapFrame, zone: shapely.Polygon) -> Element:
+    """A zone, as much of it as is shown."""
+    shown = zone.intersection(shapely.box(frame.west_m, frame.south_m, frame.east_m, frame.north_m))
+    parts = [part for part in shapely.get_parts(shown) if isinstance(part, shapely.Polygon)]
+    line = frame.line(shapely.MultiPolygon(parts))
+    return element("g", element("title", "no vehicle may enter"), element("path", d=line), class_="keep-out")
 
 
 def _priority(frame: MapFrame, priority: PriorityGround) -> Element:

@@ -8,10 +8,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator
-from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates, get_parts
+from shapely import MultiPoint, MultiPolygon, Polygon, get_coordinates, get_parts, union_all
 from shapely.geometry.base import BaseGeometry
 
-from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
+from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES, MOST_ZONE_CORNERS, MOST_ZONES
 from planner.types import PriorityGround, SweepFrame
 from secondlook.scenario.values import TOLERANCE, Bin, Coordinate, Heading, Mapping, check_pair, refused
 
@@ -32,6 +32,7 @@ def _check_metres(value: object) -> object:
 Point = Annotated[tuple[Coordinate, Coordinate], BeforeValidator(_check_metres), Field(strict=False)]
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
 HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
+ZoneCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_ZONE_CORNERS)]
 
 
 def _check_outline(corners: tuple[Point, ...]) -> tuple[Point, ...]:
@@ -88,6 +89,9 @@ class Area(Mapping):
     """The corners in order, each once; convex or not. Or `polygon_deg`, or `polygon_utm_m`."""
     holes_m: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] = ()
     """The corners of each piece that lies in it and is not surveyed."""
+    keep_out_m: Annotated[tuple[ZoneCorners, ...], Field(strict=False, max_length=MOST_ZONES)] | None = None
+    """The corners of each zone that no vehicle may enter, such as land, moorings or a traffic lane: in the area, across
+    its edge or beside it. What of the area lies in one is not surveyed, and all ways lead round."""
     track_heading_deg: TrackHeading = 0.0
     """Compass heading of the tracks, or `auto` for the one that needs the fewest."""
     cell_m: Annotated[Bin, Field(validate_default=True)] = 5.0
@@ -118,6 +122,25 @@ class Area(Mapping):
         ):
             raise refused("must not touch each other")
         return holes_m
+
+    @field_validator("keep_out_m")
+    @classmethod
+    def _check_keep_out(
+        cls, keep_out_m: tuple[tuple[Point, ...], ...] | None, info: ValidationInfo
+    ) -> tuple[tuple[Point, ...], ...] | None:
+        for zone in keep_out_m or ():
+            _check_outline(zone)
+        if keep_out_m and "polygon_m" in info.data and "holes_m" in info.data:
+            area = Polygon(info.data["polygon_m"], info.data["holes_m"])
+            left = area.difference(union_all([Polygon(zone) for zone in keep_out_m]))
+            if left.area < SMALLEST_PRIORITY_M2:
+                raise refused("must leave some of the area to survey")
+        return keep_out_m or None
+
+    @property
+    def keep_out(self) -> tuple[tuple[Point, ...], ...]:
+        """The zones that no vehicle may enter."""
+        return self.keep_out_m or ()
 
     @field_validator("priorities")
     @classmethod
@@ -152,7 +175,7 @@ def _extent_m(polygon_m: tuple[Point, ...], track_heading_deg: float | Literal["
     return float(np.ptp(across_m)), float(np.ptp(along_m))
 
 
-def priority_grounds(area: Polygon, priorities: Sequence[Priority]) -> list[PriorityGround]:
+def priority_grounds(area: Polygon | MultiPolygon, priorities: Sequence[Priority]) -> list[PriorityGround]:
     """What counts more or less of an area: where several overlap the last one alone."""
     found: list[PriorityGround] = []
     left: BaseGeometry = area

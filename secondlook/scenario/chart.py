@@ -1,4 +1,4 @@
-"""Charts: the area, holes, priorities and starts that a GeoJSON or KML file draws, in degrees."""
+"""Charts: the area, holes, zones to keep out of, priorities and starts that a GeoJSON or KML file draws, in degrees."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from xml.etree import ElementTree
 
 import shapely
 
-from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS
+from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_ZONE_CORNERS
 from secondlook.geography import UnknownGridError, utm_to_degrees
 from secondlook.scenario.errors import shown
 
 LARGEST_CHART_BYTES = 10_000_000
 USUAL_WEIGHT = 3.0
-ROLES = ("area", "hole", "priority", "start")
+ROLES = ("area", "hole", "keep_out", "priority", "start")
 _ROLE_KEYS = ("role", "kind", "name", "title")
-_ROLE = re.compile(rf"({'|'.join(ROLES)})s?(?![a-z])[\s_:-]*(.*)", re.DOTALL)
+_ROLE = re.compile(rf"({'|'.join(ROLES).replace('_', '[ _-]?')})s?(?![a-z])[\s_:-]*(.*)", re.DOTALL)
 _WGS84 = re.compile(r".*(crs84|epsg:+(4326|4979))", re.IGNORECASE)
 _EPSG = re.compile(r".*epsg:+(?:[0-9.]*:)?([0-9]{1,6})", re.IGNORECASE)
 
@@ -49,6 +49,7 @@ class Chart:
 
     area: Ring
     holes: tuple[Ring, ...] = ()
+    keep_out: tuple[Ring, ...] = ()
     priorities: tuple[tuple[Ring, float], ...] = ()
     starts: tuple[ChartStart, ...] = ()
     left_out: tuple[str, ...] = ()
@@ -73,6 +74,7 @@ class _Feature:
 class _Drawn:
     areas: list[list[Ring]] = field(default_factory=list)
     holes: list[Ring] = field(default_factory=list)
+    keep_out: list[Ring] = field(default_factory=list)
     priorities: list[tuple[Ring, float]] = field(default_factory=list)
     starts: list[ChartStart] = field(default_factory=list)
     left_out: list[str] = field(default_factory=list)
@@ -81,8 +83,9 @@ class _Drawn:
 def read_chart(path: Path) -> Chart:
     """The chart in a file: KML, or GeoJSON as RFC 7946 has it, or with a member `crs` that names WGS84 or a UTM zone.
 
-    A feature's role is told by its property `role`, `kind`, `name` or `title`: area, hole, priority (with `weight`, 3
-    if left out) or start (with `vehicle` and `heading_deg`). A file's only polygon is the area whatever it is called.
+    A feature's role is told by its property `role`, `kind`, `name` or `title`: area, hole, keep_out (or keep-out),
+    priority (with `weight`, 3 if left out) or start (with `vehicle` and `heading_deg`). A file's only polygon is the
+    area whatever it is called.
 
     Raises:
         ChartError: the file cannot be read, or a feature of a known role cannot be used, or there is no area.
@@ -98,7 +101,14 @@ def read_chart(path: Path) -> Chart:
         count = "no feature is the area" if not drawn.areas else f"{len(drawn.areas)} features are areas"
         raise ChartError(f"{count}; must have one polygon whose role or name is area")
     outline, *holes = drawn.areas[0]
-    return Chart(outline, (*holes, *drawn.holes), tuple(drawn.priorities), tuple(drawn.starts), tuple(drawn.left_out))
+    return Chart(
+        outline,
+        (*holes, *drawn.holes),
+        tuple(drawn.keep_out),
+        tuple(drawn.priorities),
+        tuple(drawn.starts),
+        tuple(drawn.left_out),
+    )
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -224,7 +234,7 @@ def _role(properties: dict[str, Any]) -> tuple[str | None, str]:
     for key in _ROLE_KEYS:
         match = _ROLE.fullmatch(str(properties.get(key) or "").strip().lower())
         if match:
-            return match[1], match[2]
+            return "keep_out" if match[1].startswith("keep") else match[1], match[2]
     return None, ""
 
 
@@ -234,6 +244,8 @@ def _take(feature: _Feature, drawn: _Drawn) -> None:
             drawn.areas.append(_rings(feature, holes=True))
         case "hole":
             drawn.holes.extend(_rings(feature, holes=False))
+        case "keep_out":
+            drawn.keep_out.extend(_rings(feature, holes=False))
         case "priority":
             weight = feature.properties.get("weight", USUAL_WEIGHT)
             if not _is_number(weight) or not 0 <= weight <= 100:
@@ -269,7 +281,11 @@ def _rings(feature: _Feature, *, holes: bool) -> list[Ring]:
         raise feature.wrong("no coordinates; must be a list of rings")
     if len(coordinates) > 1 and not holes:
         raise feature.wrong("rings within it are not allowed; must be one ring")
-    most = [MOST_CORNERS if holes or feature.role == "priority" else MOST_HOLE_CORNERS]
+    most = [
+        {"area": MOST_CORNERS, "priority": MOST_CORNERS, "keep_out": MOST_ZONE_CORNERS}.get(
+            feature.role or "", MOST_HOLE_CORNERS
+        )
+    ]
     most += [MOST_HOLE_CORNERS] * (len(coordinates) - 1)
     return [_ring(feature, ring, limit) for ring, limit in zip(coordinates, most, strict=True)]
 

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field, ValidationError
 from pydantic_core import ErrorDetails
 
-from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES
+from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES, MOST_ZONE_CORNERS, MOST_ZONES
 from secondlook.geography import GeographicOrigin, UnknownGridError, utm_to_degrees, utm_zone
 from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
@@ -32,6 +32,8 @@ Point = Annotated[tuple[Latitude, Longitude], BeforeValidator(check_pair), Field
 Corners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
 HoleCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
 
+ZoneCorners = Annotated[tuple[Point, ...], Field(strict=False, min_length=3, max_length=MOST_ZONE_CORNERS)]
+
 
 def _check_zone(epsg: int) -> int:
     try:
@@ -46,6 +48,7 @@ Easting = Annotated[float, Field(ge=0, le=1_000_000)]
 Northing = Annotated[float, Field(ge=0, le=10_000_000)]
 UtmPoint = Annotated[tuple[Easting, Northing], BeforeValidator(check_pair), Field(strict=False)]
 UtmCorners = Annotated[tuple[UtmPoint, ...], Field(strict=False, min_length=3, max_length=MOST_CORNERS)]
+UtmZoneCorners = Annotated[tuple[UtmPoint, ...], Field(strict=False, min_length=3, max_length=MOST_ZONE_CORNERS)]
 UtmHoleCorners = Annotated[tuple[UtmPoint, ...], Field(strict=False, min_length=3, max_length=MOST_HOLE_CORNERS)]
 
 
@@ -76,6 +79,8 @@ class AreaInDegrees(Mapping):
     """In place of `polygon_m`: the corners as [latitude, longitude], WGS84; the last may repeat the first."""
     holes_deg: Annotated[tuple[HoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
     """In place of `holes_m`: the same for each hole."""
+    keep_out_deg: Annotated[tuple[ZoneCorners, ...], Field(strict=False, max_length=MOST_ZONES)] | None = None
+    """In place of `keep_out_m`: the same for each zone."""
     epsg: Epsg | None = None
     """The UTM zone of all that is given in UTM metres and names none itself: the EPSG code of a zone of WGS84, 32601 to
     32660 and 32701 to 32760, or of ETRS89, 25828 to 25838."""
@@ -83,9 +88,11 @@ class AreaInDegrees(Mapping):
     """In place of `polygon_m`: the corners as [easting, northing]; the last may repeat the first."""
     holes_utm_m: Annotated[tuple[UtmHoleCorners, ...], Field(strict=False, max_length=MOST_HOLES)] | None = None
     """In place of `holes_m`: the same for each hole."""
+    keep_out_utm_m: Annotated[tuple[UtmZoneCorners, ...], Field(strict=False, max_length=MOST_ZONES)] | None = None
+    """In place of `keep_out_m`: the same for each zone."""
     file: str | None = None
-    """In place of polygon and holes: a GeoJSON or KML file that draws them, relative to the scenario's. Its priorities
-    follow those that are given here."""
+    """In place of polygon, holes and zones to keep out of: a GeoJSON or KML file that draws them, relative to the
+    scenario's. Its priorities follow those that are given here."""
 
 
 class PriorityInDegrees(Mapping):
@@ -133,7 +140,9 @@ _GIVES: dict[str, tuple[str, ...]] = {
     "easting_m": ("x_m",),
     "northing_m": ("y_m",),
     "epsg": (),
-    "file": ("polygon_m", "holes_m"),
+    "keep_out_deg": ("keep_out_m",),
+    "keep_out_utm_m": ("keep_out_m",),
+    "file": ("polygon_m", "holes_m", "keep_out_m"),
 }
 _GIVES_ORIGIN = {"easting_m": ("longitude_deg",), "northing_m": ("latitude_deg",), "epsg": ()}
 _PARTNER = {
@@ -148,12 +157,13 @@ _NOT_BESIDE = {
     "holes_utm_m": ("holes_m", "holes_deg"),
     "latitude_deg": ("x_m", "y_m"),
     "longitude_deg": ("x_m", "y_m"),
+    "keep_out_utm_m": ("keep_out_m", "keep_out_deg"),
     "easting_m": ("x_m", "y_m", "latitude_deg", "longitude_deg"),
     "northing_m": ("x_m", "y_m", "latitude_deg", "longitude_deg"),
     "epsg": ("polygon_m", "x_m", "y_m"),
-    "file": ("polygon_m", "holes_m", "polygon_deg", "holes_deg", "polygon_utm_m", "holes_utm_m"),
+    "file": tuple(f"{key}_{ending}" for key in ("polygon", "holes", "keep_out") for ending in ("m", "deg", "utm_m")),
 }
-_SEVERAL = ("holes",)  # keys, without their ending, that hold several rings
+_SEVERAL = ("holes", "keep_out")  # keys, without their ending, that hold several rings
 _NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
 
@@ -329,6 +339,8 @@ def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Pat
         raise _RefusedError(path, file, f"{chart.left_out[0]}; secondlook new leaves such features out")
     area["polygon_m"] = frame.ring_m(path, chart.area)
     area["holes_m"] = [frame.ring_m(path, hole) for hole in chart.holes]
+    if chart.keep_out:
+        area["keep_out_m"] = [frame.ring_m(path, zone) for zone in chart.keep_out]
     if chart.priorities and "priorities" not in area:
         turned.written["area", "priorities"] = (path, file)
     priorities = area.setdefault("priorities", [])

@@ -6,6 +6,7 @@ import hashlib
 import json
 from typing import Annotated, Literal
 
+import shapely
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME
@@ -219,6 +220,18 @@ class Scenario(Mapping):
     def _check_survey(cls, vehicles: dict[str, Vehicle]) -> dict[str, Vehicle]:
         if not any(isinstance(vehicle, SurveyVehicle) for vehicle in vehicles.values()):
             raise refused("must have a vehicle with role survey")
+        return vehicles
+
+    @field_validator("vehicles")
+    @classmethod
+    def _check_starts(cls, vehicles: dict[str, Vehicle], info: ValidationInfo) -> dict[str, Vehicle]:
+        zones = info.data["area"].keep_out if "area" in info.data else ()
+        for key, vehicle in vehicles.items():
+            start, home = shapely.Point(vehicle.start.x_m, vehicle.start.y_m), shapely.Point(vehicle.home_m)
+            if any(shapely.Polygon(zone).intersects(start) for zone in zones):
+                raise refused(f"must all start outside area.keep_out_m, but {key} starts in it")
+            if any(shapely.Polygon(zone).intersects(home) for zone in zones):
+                raise refused(f"must all have their home outside area.keep_out_m, but that of {key} lies in it")
         return vehicles
 
     @field_validator("vehicles")

@@ -178,6 +178,10 @@ class SurveyVehicle(VehicleBase):
     part: str | None = None
     """Which share of the area is its own: `1 of 3` is the first of three equally wide ones, in the order in which
     tracks are laid. Left out, the whole."""
+    begin: Literal["nearest", "sw", "se", "nw", "ne"] | None = None
+    """Where its survey begins, and so on which side, and in which order it surveys the parts of an area: at the corner
+    `nearest` to its start, or towards the south-west (`sw`) and so on. Left out, at the corner from which tracks are
+    laid, which is the south-west with tracks to the north."""
     revisits: bool = False
     """Whether it takes strips itself once it has surveyed all."""
 

@@ -208,6 +208,9 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
     yield from _asserted("no strip is served twice", assert_no_strip_served_twice, flight)
     yield from _asserted("no message is dropped", assert_no_message_dropped, flight)
     yield from _asserted("vehicles come home", assert_home_before_empty, flight)
+    for entered in flight.entered:
+        what = f"{entered.vehicle} entered zone {entered.zone} of area.keep_out_m"
+        yield Violation("vehicles keep out", entered.t_s, entered.vehicle, what)
     gives_way_from_s = {
         one.vehicle: _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0
         for one in flight.run.vehicles

@@ -19,6 +19,7 @@ from secondlook.testing.mission_assertions import (
     assert_all_finished,
     assert_home_before_empty,
     assert_kept_apart,
+    assert_kept_out,
     assert_no_message_dropped,
     assert_repeats,
 )
@@ -49,6 +50,7 @@ __all__ = [
     "assert_all_finished",
     "assert_home_before_empty",
     "assert_kept_apart",
+    "assert_kept_out",
     "assert_maps_converged",
     "assert_never_assigned_to_lost",
     "assert_no_message_dropped",

@@ -79,6 +79,18 @@ def assert_kept_apart(flight: Flight, separation_m: float | None = None) -> None
     fail_if(problems, f"vehicles came nearer to each other than {least_m:g} m")
 
 
+def assert_kept_out(flight: Flight) -> None:
+    """No vehicle entered ground to keep out of, `area.keep_out_m` of the scenario, of which there must be some.
+
+    True positions count where they are told; from one to the next a vehicle is taken to go straight.
+    """
+    __tracebackhide__ = True
+    if not flight.run.keep_out:
+        raise UserError("assert_kept_out needs a scenario with area.keep_out_m")
+    problems = [f"{one.vehicle} entered zone {one.zone} at {one.t_s:.3f} s" for one in flight.entered]
+    fail_if(problems, "vehicles entered ground to keep out of")
+
+
 def assert_repeats(fleet: Fleet, buses: Sequence[Bus] = ("local", "local")) -> Flight:
     """The fleet's mission, flown once on each of these buses, is the same each time, message for message.
 

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from planner.currents import Current, Sailing, made_good_mps
 from planner.dubins import DubinsPath, Pose
+from planner.keep_out import KeepOut
 from planner.sweep import pass_over
 from planner.way_home import WayHome
+from planner.ways import shortest_way
 
 NORTH, EAST, SOUTH, WEST = (quarter * math.pi / 2 for quarter in range(4))
 # 2.5 m/s through water that flows east at 1.5 m/s: 4 with it, 1 against it, and 2 across it, as 2^2 + 1.5^2 = 2.5^2.
@@ -78,3 +80,27 @@ def test_what_is_made_good_less_the_flow_is_what_is_swum(
     assert swum_mps == pytest.approx(speed_mps)
     reckoned = Sailing(speed_mps, share * speed_mps, set_rad).made_good_mps(np.array(course_rad))
     assert float(reckoned) == pytest.approx(mps)
+
+
+def test_a_way_takes_what_its_paths_take_one_after_the_other() -> None:
+    # 80 m with the stream and 30 m across it.
+    way = (
+        DubinsPath(Pose(0, 0, EAST), 10, (0, 0, 0), (80, 0, 0)),
+        DubinsPath(Pose(80, 0, NORTH), 10, (0, 0, 0), (30, 0, 0)),
+    )
+    assert EASTWARD.way_s(way) == pytest.approx(80 / 4 + 30 / 2)
+    assert Sailing(2.0).way_s(way) == 55.0
+
+
+def test_passes_past_a_zone_take_the_way_round_it() -> None:
+    # The zone lies on the beeline between the two, from which it reaches 40 m to either side.
+    zone = KeepOut((((40, -40), (60, -40), (60, 40), (40, 40)),))
+    passes = [pass_over((-100, 0), (0, 0), 0.0), pass_over((200, 0), (300, 0), 0.0)]
+    assert EASTWARD.passes_s(passes, 10) == pytest.approx(400 / 4)
+    way = shortest_way(passes[0].end, passes[1].begin, 10, zone)
+    assert way is not None
+    assert len(way) > 1
+    assert EASTWARD.passes_s(passes, 10, keep_out=zone) == pytest.approx(200 / 4 + sum(map(EASTWARD.path_s, way)))
+    # At 4 m/s at most it takes longer than the taut line at that, 2 m/s less than the whole of it across the stream.
+    taut_m = math.hypot(40, 40) + 20 + math.hypot(140, 40)
+    assert 50 + taut_m / 4 < EASTWARD.passes_s(passes, 10, keep_out=zone) < 50 + 1.2 * taut_m / 2

@@ -253,3 +253,28 @@ class TestBestHeading:
         best = first_plan(region, best_heading(region, 40, 145), 40, 145)
         other = region.about(heading_rad).width_m
         assert best.track_count <= adapt_range(other + 1e-3, 40, 120, 145).tracks
+
+
+class TestWhereItBegins:
+    @pytest.mark.parametrize("corner", [(0, 0), (1212, 0), (0, 400), (1212, 400)])
+    def test_at_the_corner_that_is_named(self, corner: tuple[float, float]) -> None:
+        plan = first_plan(RECTANGLE, 0, 40, 145, begin=corner)
+        first, last = plan.all_tracks[0], plan.all_tracks[-1]
+        assert first.start[1] == pytest.approx(corner[1])
+        assert (first.start[0] < last.start[0]) is (corner[0] == 0)
+        assert sorted(round(abs(track.start[0] - corner[0]), 6) for track in plan.all_tracks) == sorted(
+            round(track.start[0], 6) for track in first_plan(RECTANGLE, 0, 40, 145).all_tracks
+        )
+
+    def test_left_out_it_is_the_corner_from_which_tracks_are_laid(self) -> None:
+        assert (
+            first_plan(RECTANGLE, 0, 40, 145).all_tracks == first_plan(RECTANGLE, 0, 40, 145, begin=(0, 0)).all_tracks
+        )
+
+    def test_the_order_of_parts_weighs_the_way_there(self) -> None:
+        # The leg of the L that reaches north is entered first by who comes from there.
+        plan = first_plan(L_SHAPE, 0, 40, 145, begin=(0.0, 900.0))
+        assert plan.all_tracks[0].start[1] == pytest.approx(600.0)
+        from_here_m = math.dist((0.0, 900.0), plan.all_tracks[0].start)
+        usual = first_plan(L_SHAPE, 0, 40, 145).all_tracks[0]
+        assert from_here_m < math.dist((0.0, 900.0), usual.start)

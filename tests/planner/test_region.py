@@ -44,6 +44,22 @@ def test_cells_inside_are_those_of_the_polygon(region: Region, heading_rad: floa
     assert not shapely.covers(region.polygon.buffer(-1e-5), points[~inside]).any()
 
 
+def test_what_it_is_to_keep_out_of_is_no_part_of_it_also_where_that_divides_it() -> None:
+    lane = ((40.0, -10.0), (60.0, -10.0), (60.0, 110.0), (40.0, 110.0))
+    divided = Region(SQUARE, (), (lane,))
+    grid = divided.about(0).grid(10)
+    inside = divided.inside(grid)
+    assert [part.area for part in divided.polygon.geoms] == [4000, 4000]  # type: ignore[union-attr]
+    assert grid.shape == (10, 11)
+    # Columns are centred at 0, 10 and so on: at 50 is the lane's middle, at 40 and 60 its edges, which are inside.
+    assert inside.all(axis=0).tolist() == [True] * 5 + [False] + [True] * 5
+    assert not inside[:, 5].any()
+    share = divided.share(0, 0.3, 0)
+    assert (share.polygon.area, share.keep_out) == (3000, (lane,))
+    with pytest.raises(ValueError, match="leave nothing of the area"):
+        Region(SQUARE, (), (((-1.0, -1.0), (101.0, -1.0), (101.0, 101.0), (-1.0, 101.0)),))
+
+
 @pytest.mark.parametrize(
     ("outline", "holes", "message"),
     [

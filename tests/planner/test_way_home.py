@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 
 from planner.currents import Sailing
 from planner.dubins import Pose, shortest_path
+from planner.keep_out import KeepOut
 from planner.sweep import pass_over
 from planner.way_home import WayHome
 
@@ -77,3 +79,46 @@ class TestPassesWithin:
 
     def test_of_none_none(self) -> None:
         assert WAY.passes_within(Pose(0, 0, NORTH), (), 0.0) == 0
+
+
+class TestRoundAZone:
+    # It lies across the way from the south, 20 m to either side.
+    ZONE = KeepOut((((-20, -120), (20, -120), (20, -80), (-20, -80)),))
+    ROUND = replace(WAY, keep_out=ZONE)
+    TAUT_M = 2 * math.hypot(20, 80) + 40
+
+    def test_where_nothing_is_in_the_way_it_is_the_way_without_zones(self) -> None:
+        for pose in (Pose(0, -60, NORTH), Pose(100, 50, EAST), Pose(60, -200, NORTH), Pose(0, 0, EAST)):
+            assert self.ROUND.from_pose(pose) == WAY.from_pose(pose)
+
+    def test_else_it_leads_round_by_hardly_more_than_a_taut_line(self) -> None:
+        time_s, heading_rad = self.ROUND.from_pose(Pose(0, -200, NORTH))
+        assert self.TAUT_M / 2 < time_s < self.TAUT_M / 2 + 3
+        way = self.ROUND.way(Pose(0, -200, NORTH))
+        assert self.ZONE.is_clear(way)
+        assert sum(path.length_m for path in way) == pytest.approx(2 * time_s)
+        assert way[-1].pose_at(way[-1].length_m) == pytest.approx((0, 0, heading_rad), abs=1e-6)
+
+    def test_many_at_once_take_the_way_from_corner_to_corner(self) -> None:
+        poses = np.array([[0.0, -200.0, NORTH], [0.0, -60.0, NORTH]])
+        assert self.ROUND.times_s(poses) == pytest.approx([self.TAUT_M / 2, 30.0], abs=0.1)
+
+    def test_in_a_current_each_path_of_it_counts_by_its_own(self) -> None:
+        northward = replace(self.ROUND, sailing=Sailing(2.0, 1.0, NORTH))
+        pose = Pose(0, -200, NORTH)
+        assert northward.from_pose(pose)[0] == pytest.approx(sum(map(northward.sailing.path_s, northward.way(pose))))
+        assert self.TAUT_M / 3 < northward.from_pose(pose)[0] < self.TAUT_M / 2
+
+    def test_fewer_passes_leave_time_to_come_home(self) -> None:
+        # To the south, where it turns round, and past the corners: that is a little farther than straight home.
+        passes = [pass_over((0, -140), (0, -240), 0.0)]
+        spent_s = 50 + self.ROUND.from_pose(passes[0].end)[0]
+        assert spent_s > 50 + WAY.from_pose(passes[0].end)[0] + 1
+        for time_s, count in ((spent_s + 0.1, 1), (spent_s - 0.1, 0)):
+            assert self.ROUND.passes_within(Pose(0, -140, SOUTH), passes, time_s) == count
+
+    def test_where_no_way_leads_the_direct_one_counts(self) -> None:
+        walled = replace(WAY, keep_out=KeepOut((((-20, 20), (20, 20), (20, 24), (-20, 24)), ((-20, -24), (20, -24), (20, -20), (-20, -20)), ((-24, -24), (-20, -24), (-20, 24), (-24, 24)), ((20, -24), (24, -24), (24, 24), (20, 24)))))  # fmt: skip # noqa: E501
+        pose = Pose(0, -200, NORTH)
+        assert walled.from_pose(pose) == WAY.from_pose(pose)
+        assert walled.times_s(np.array([pose])) == pytest.approx(WAY.times_s(np.array([pose])))

@@ -7,11 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from zones import assert_keeps_radius, assert_stays_out
 
 from comms.said.messages import Look, Nav
-from planner.currents import Sailing
+from planner.currents import Current, Sailing
 from planner.dubins import Pose, shortest_path
+from planner.keep_out import KeepOut
+from planner.ways import shortest_way
 from sim_world.config import CurrentConfig
+from sim_world.motion import Motion, NoWayError
 from tests.sim_world.test_world import QUIET, A, Sea, follow
 
 EAST, WEST = math.pi / 2, 1.5 * math.pi
@@ -91,3 +95,47 @@ def test_across_the_stream_the_swath_lies_askew() -> None:
                 at_range = SWIMMER.sensor.curve.at(np.array([lateral_m / 0.8]))[0]
                 assert look.p_detect[side, :, number] == pytest.approx(np.where(seen, at_range, 0.0), abs=2e-4)
         assert plain.p_detect.shape == look.p_detect.shape
+
+
+class TestPastAZone:
+    ROCK = KeepOut((((180.0, -60.0), (220.0, -60.0), (220.0, 60.0), (180.0, 60.0)),), 2.0)
+
+    def motion(self, start: Pose) -> Motion:
+        return Motion(start, speed_mps=2.5, turn_radius_m=20.0, keep_out=self.ROCK, current=Current(1.5, EAST))
+
+    def test_it_sails_the_way_round_in_the_time_that_is_reckoned(self) -> None:
+        sailing = self.motion(Pose(0.0, 0.0, EAST))
+        ends_ms = sailing.go_to((400.0, 0.0), EAST, 0)
+        way = shortest_way(Pose(0.0, 0.0, EAST), Pose(400.0, 0.0, EAST), 20.0, self.ROCK)
+        assert way is not None
+        assert len(way) > 1
+        assert ends_ms / 1000 == pytest.approx(Sailing(2.5, 1.5, EAST).way_s(way), rel=2e-3)
+        assert sailing.pose_at(ends_ms) == pytest.approx((400.0, 0.0, EAST), abs=0.01)
+        poses = [sailing.pose_at(at_ms) for at_ms in range(0, ends_ms + 60_000, 250)]
+        assert_stays_out(poses, self.ROCK)
+        assert_keeps_radius(poses, 20.0, 4.0 * 0.25)
+
+    def test_it_goes_on_as_it_was_told_until_there_is_a_way_off(self) -> None:
+        # Northward it makes 2 m/s past the rock's west side, where no circle of 40 m fits between it and a wall.
+        gap = KeepOut((((30.0, -40.0), (60.0, -40.0), (60.0, 40.0), (30.0, 40.0)), ((-60.0, -40.0), (-30.0, -40.0), (-30.0, 40.0), (-60.0, 40.0))))  # fmt: skip # noqa: E501
+        sailing = Motion(
+            Pose(0.0, -300.0, 0.0), speed_mps=2.5, turn_radius_m=20.0, keep_out=gap, current=Current(1.5, EAST)
+        )
+        sailing.follow((0.0, -200.0), (0.0, 200.0), 20.0, 0)
+        at_ms = 140_000  # at 2 m/s it is 280 m on its way, at the beginning of the gap
+        assert sailing.pose_at(at_ms) == pytest.approx((0.0, -20.0, 0.0), abs=0.1)
+        before = sailing.pose_at(at_ms)
+        sailing.hold(at_ms)
+        assert sailing.pose_at(at_ms) == pytest.approx(before, abs=1e-6)
+        poses = [sailing.pose_at(time_ms) for time_ms in range(at_ms, at_ms + 250_000, 250)]
+        assert max(pose.y_m for pose in poses) > 40.0
+        assert_stays_out(poses, gap)
+        assert_keeps_radius(poses, 20.0, 4.0 * 0.25)
+
+    def test_home_it_comes_where_there_is_no_room_to_circle(self) -> None:
+        # Of a basin of 30 m, open to the south, no circle of 40 m keeps clear.
+        basin = KeepOut((((-25.0, 0.0), (-15.0, 0.0), (-15.0, 60.0), (-25.0, 60.0)), ((15.0, 0.0), (25.0, 0.0), (25.0, 60.0), (15.0, 60.0))))  # fmt: skip # noqa: E501
+        sailing = Motion(Pose(0.0, -100.0, 0.0), speed_mps=2.5, turn_radius_m=20.0, keep_out=basin)
+        with pytest.raises(NoWayError, match="to circle there"):
+            sailing.go_to((0.0, 30.0), 0.0, 0)
+        assert sailing.go_to((0.0, 30.0), 0.0, 0, loiters=False) == 52_000

@@ -11,7 +11,7 @@ from comms.wall.drive import ByWallClock
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 
-PATIENCE_S = 5.0
+PATIENCE_S = 10.0
 
 
 def main() -> None:

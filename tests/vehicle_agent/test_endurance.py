@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from by_hand import PRIMARY, run_info
 from one_node import OneNode
 
-from comms.said.announcement import Role
+from comms.said.announcement import Role, Vertex, Zone
 from comms.said.messages import (
     AgentState,
     Maneuver,
@@ -95,4 +96,28 @@ def test_no_track_is_begun_that_the_battery_does_not_last_for() -> None:
     # Each track of 200 m, with 20 m before and after it, takes 120 s and ends 200 m from home or more, or begins there.
     assert [one.message.kind for one in node.said if isinstance(one.message, Maneuver)][-1] is ManeuverKind.GOTO
     assert node.all(Plan)[-1].tracks == ()
+    assert node.all(AgentState)[-1].mode is Mode.RETURNING
+
+
+def test_round_ground_to_keep_out_of_it_is_farther_home_and_who_is_refused_asks_again() -> None:
+    # A zone of 100 m across lies between the vehicle and home, which is the origin.
+    zone = Zone((Vertex(50, -100), Vertex(150, -100), Vertex(150, 100), Vertex(50, 100)))
+    homing = Homing(WayHome((0, 0), Sailing(2.0), turn_radius_m=10.0), reserve_ms=0)
+    sonar = SideLooking(SonarShape("side", 40, 145))
+    config = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, 150_000, homing=homing)
+    node = OneNode(SurveyAgent(config), Role.SURVEY)
+    node.hear("run", replace(run_info(300, 200), keep_out=(zone,), keep_out_margin_m=2.0))
+    # By the beeline it lasts for 100 s home, round two corners of the zone for 2 * hypot(100, 100) + 100 m or so.
+    node.hear(f"veh/{PRIMARY}/nav", Nav(200, 0, 1.5 * math.pi, 2, 15, 0))
+    node.wait_until(10_000)
+    state = node.all(AgentState)[-1]
+    assert state.mode is Mode.RETURNING
+    taut_s = (2 * math.hypot(48, 102) + 104) / 2
+    assert 10 + taut_s < state.expected_end_ms / 1000 < 10 + taut_s + 15
+    number = [one.message.number for one in node.said if isinstance(one.message, Maneuver)][-1]
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(number, ManeuverState.REFUSED, 0, "no way"))
+    node.wait_until(20_000)
+    again = [one.message for one in node.said if isinstance(one.message, Maneuver)][-1]
+    assert (again.number, again.kind) == (number + 1, ManeuverKind.GOTO)
+    assert (again.end_x_m, again.end_y_m) == (0, 0)
     assert node.all(AgentState)[-1].mode is Mode.RETURNING

@@ -15,12 +15,12 @@ from hypothesis import strategies as st
 from one_node import OneNode
 from regions import regions
 
-from comms.said.announcement import Grid, Hole, Role, RunInfo, Vertex
-from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState, Mode, Plan
+from comms.said.announcement import Grid, Hole, Role, RunInfo, Vertex, Zone
+from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState, Mode, Plan, PlannedTrack
 from planner.footprints.side import SideLooking
 from planner.region import Region
 from planner.spacing_planners import AdaptiveSpacing
-from planner.types import SonarShape
+from planner.types import Point, SonarShape
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
@@ -180,3 +180,40 @@ class TestAnyArea:
         unseen = node._inside & (node.coverage.layer.sum_levels == 0)
         # Looks come in bins of 5 m, and places in centimetres: a few cells at the edges of what is seen may differ.
         assert unseen.sum() <= 0.01 * node._inside.sum()
+
+
+class TestGroundToKeepOutOf:
+    BUOY = ((196.0, 296.0), (204.0, 296.0), (204.0, 304.0), (196.0, 304.0))
+    FIELD = Region(((0.0, 0.0), (900.0, 0.0), (900.0, 600.0), (0.0, 600.0)))
+
+    def flown(self, zone: tuple[Point, ...], region: Region) -> tuple[SurveyAgent, list[PlannedTrack]]:
+        told = replace(
+            announced(region), keep_out=(Zone(tuple(Vertex(*corner) for corner in zone)),), keep_out_margin_m=1.5
+        )
+        agent = surveyor(told)
+        fly_all(agent, SEES_TO_130_M)
+        return node_of(agent), list(agent.last(Plan).tracks)
+
+    def test_a_track_that_it_cuts_is_flown_piece_by_piece_before_the_next_are_laid(self) -> None:
+        # A buoy on the line of a track; all of a pair's pieces are flown before that is decided on anew.
+        across_m = next(iter(node_of(surveyor(announced(self.FIELD))).ahead)).across_m
+        zone = tuple((x_m - 200.0 + across_m, y_m) for x_m, y_m in self.BUOY)
+        node, tracks = self.flown(zone, self.FIELD)
+        assert [track.number for track in tracks] == list(range(1, len(tracks) + 1))
+        assert all(track.flown for track in tracks)
+        pieces = [track for track in tracks if abs(track.across_m - across_m) < 1e-6]
+        # Grown it is 11 m wide. A circle of 20 m beside the track touches its corner, 5.5 m to the side, where it
+        # begins sqrt(20^2 - 14.5^2) = 13.8 m before it; before that come 20 m of run-out. Looked for metre by metre.
+        assert [(piece.start_y_m, piece.end_y_m) for piece in pieces] == [(0.0, 260.0), (340.0, 600.0)]
+        free = surveyor(announced(self.FIELD))
+        fly_all(free, SEES_TO_130_M)
+        assert len(tracks) == len(free.last(Plan).tracks) + 1
+        assert len(node.r_adpt_m) == len(node_of(free).r_adpt_m)
+
+    def test_no_track_enters_it_where_it_divides_the_area(self) -> None:
+        lane = ((-50.0, 250.0), (950.0, 250.0), (950.0, 310.0), (-50.0, 310.0))
+        _, tracks = self.flown(lane, self.FIELD)
+        ends_m = {(min(t.start_y_m, t.end_y_m), max(t.start_y_m, t.end_y_m)) for t in tracks}
+        assert all(high <= 250 - 20 - 20 - 1.5 or low >= 310 + 20 + 20 + 1.5 for low, high in ends_m)
+        assert any(high < 250 for _, high in ends_m)
+        assert any(low > 310 for low, _ in ends_m)

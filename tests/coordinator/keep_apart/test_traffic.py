@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from by_hand import vehicle
 from situations import strip
+from zones import assert_stays_out
 
 from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
@@ -20,6 +21,7 @@ from coordinator.keep_apart.courses import Course
 from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.dubins import Pose
+from planner.keep_out import KeepOut
 
 SERVED, OTHER = strip(7, 0, 20, length_m=100), strip(8, 60, 20, length_m=100)
 NORTH = 0.0
@@ -76,3 +78,29 @@ def test_a_primary_that_revisits_sails_the_run_out_of_its_last_track(told: Told)
     course = told(Traffic(), primary)
     assert course is not None
     assert course.at(12.0)[0] == pytest.approx((0, 318, NORTH))
+
+
+class TestGroundToKeepOutOf:
+    WALL = KeepOut((((20.0, -100.0), (40.0, -100.0), (40.0, 300.0), (20.0, 300.0)),), 1.5)
+
+    @pytest.mark.parametrize("told", [one for name, one in TOLD.items() if "better" not in name])
+    def test_courses_lead_round_it(self, told: Told) -> None:
+        course = told(Traffic(self.WALL), at(helper(), Mode.IDLE, 120))
+        assert course is not None
+        assert_stays_out([Pose(*pose) for pose in course.poses.tolist()], self.WALL)
+
+    def test_a_helper_beside_it_is_expected_to_circle_to_port(self) -> None:
+        beside = KeepOut((((8.0, 0.0), (20.0, 0.0), (20.0, 300.0), (8.0, 300.0)),), 1.5)
+        half_s = math.pi * 6 / 2
+        course = Traffic(beside).holding(at(helper(), Mode.IDLE, 120), None, 0.0)
+        assert course.at(half_s)[0].x_m == pytest.approx(-12, abs=0.2)
+        free = Traffic().holding(at(helper(), Mode.IDLE, 120), None, 0.0)
+        assert free.at(half_s)[0].x_m == pytest.approx(12, abs=0.2)
+
+    def test_it_is_told_to_wait_only_where_it_can_go_and_circle(self) -> None:
+        traffic, one = Traffic(self.WALL), at(helper(), Mode.IDLE, 120)
+        assert traffic.has_room(one, None, (60.0, 100.0), 0.0)
+        # Eastwards to 10 m before the wall: 1.5 m of margin leave 8.5 m, and a circle needs 6 m ahead.
+        assert traffic.has_room(one, None, (10.0, 120.0), 0.0)
+        assert not traffic.has_room(one, None, (14.0, 120.0), 0.0)
+        assert not traffic.has_room(one, None, (30.0, 120.0), 0.0)

@@ -3,12 +3,14 @@
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from flights import BRIEF
 
 from comms.session import Certificates
 from planner.spacing import track_offsets
@@ -337,3 +339,38 @@ def test_a_key_that_others_may_read_is_named(tmp_path: Path, capsys: pytest.Capt
         f"name; chmod 600 {files[2]} keeps them from it\n"
     )
     assert capsys.readouterr() == ("", "" if mode in (0o600, 0o400) else told)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+@pytest.mark.parametrize("arguments", [["scenarios"], ["check", "tellaro"], ["run", str(BRIEF), "--bus", "local"]])
+def test_standard_output_that_cannot_be_written_is_told_in_a_sentence(tmp_path: Path, arguments: list[str]) -> None:
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [Path(sys.executable).with_name("secondlook"), *arguments],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=tmp_path,
+            check=False,
+            timeout=60,
+        )
+    assert (done.returncode, done.stderr) == (1, "standard output cannot be written: No space left on device\n")
+
+
+LOADING = """
+import os, signal, sys
+from secondlook import installed_command
+
+def loading(name):
+    os.kill(os.getpid(), signal.SIGINT)
+
+installed_command.import_module = loading
+installed_command.main()
+"""
+
+
+def test_ctrl_c_while_the_program_is_loaded_ends_it_without_a_word() -> None:
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", LOADING], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")

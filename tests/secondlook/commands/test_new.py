@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
+from kml import extended, kml, kml_ring
 from pyproj import Geod, Transformer
 
 from secondlook import cli
@@ -81,7 +82,9 @@ def test_a_chart_has_what_is_drawn_and_names_what_is_left_out(folder: Path) -> N
         ChartStart("primary", (59.8795, 10.4995), 0.0),
         ChartStart("north boat", (59.8792, 10.4995), 90.0),
     )
-    assert chart.left_out == ("feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, start",)
+    assert chart.left_out == (
+        "feature 4 (Lighthouse): a Point of unknown role; must be area, hole, keep_out, priority, start",
+    )
 
 
 def test_the_only_polygon_is_the_area(folder: Path) -> None:
@@ -105,19 +108,25 @@ def test_a_chart_in_a_utm_zone_is_the_same_one(folder: Path) -> None:
         assert np.array(ring) == pytest.approx(np.array(same), abs=1e-8)
 
 
-def kml(*placemarks: str) -> bytes:
-    head = '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document><Folder>'
-    return f"{head}{''.join(f'<Placemark>{one}</Placemark>' for one in placemarks)}</Folder></Document></kml>".encode()
+MOORINGS = [(10.506, 59.8812), (10.507, 59.8812), (10.507, 59.8815)]
 
 
-def kml_ring(ring: list[tuple[float, float]], side: str = "outer") -> str:
-    words = " ".join(f"{longitude},{latitude},0" for longitude, latitude in [*ring, ring[0]])
-    return f"<{side}BoundaryIs><LinearRing><coordinates>\n{words}\n</coordinates></LinearRing></{side}BoundaryIs>"
-
-
-def extended(**data: object) -> str:
-    inner = "".join(f'<Data name="{key}"><value>{value}</value></Data>' for key, value in data.items())
-    return f"<ExtendedData>{inner}</ExtendedData>"
+@pytest.mark.parametrize("name", ["keep-out moorings", "Keep out", "KEEP_OUT 3", "keepouts: moorings"])
+def test_ground_to_keep_out_of_is_taken_from_a_chart(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    area, zone = feature(polygon(L_SHAPE), role="area"), feature(polygon(MOORINGS), name=name)
+    draw({"type": "FeatureCollection", "features": [area, zone]})
+    assert read_chart(folder / "bay.geojson").keep_out == (tuple((north, east) for east, north in MOORINGS),)
+    assert command(monkeypatch, "new", "bay.geojson", "--out", "bay.yaml") == 0
+    assert capsys.readouterr().err == ""
+    made = load_scenario("bay.yaml")
+    (zone_m,) = made.area.keep_out
+    assert shapely.Polygon(zone_m).area == pytest.approx(geodesic_m2(MOORINGS), rel=1e-5)
+    text = Path("bay.yaml").read_text()
+    named = text[: text.index("area:")] + "area: {file: bay.geojson, cell_m: 5}\n" + text[text.index("mission:") :]
+    Path("named.yaml").write_text(named)
+    assert load_scenario("named.yaml").area.keep_out == made.area.keep_out
 
 
 def test_a_chart_in_kml_is_the_same_one(folder: Path) -> None:
@@ -139,7 +148,8 @@ def made(folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFi
     assert command(monkeypatch, "new", "bay.geojson", "--out", "bay.yaml") == 0
     told = capsys.readouterr()
     assert told.err == (
-        "bay.geojson: feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, start; left out\n"
+        "bay.geojson: feature 4 (Lighthouse): a Point of unknown role; must be area, hole, keep_out, priority, start; "
+        "left out\n"
     )
     assert told.out.startswith("bay.yaml: 446 m by 560 m from latitude 59.88, longitude 10.5; ")
     return load_scenario("bay.yaml")
@@ -374,8 +384,8 @@ def test_a_scenario_may_name_the_chart(write: Write, valid_text: str, tmp_path: 
 @pytest.mark.parametrize(
     ("chart", "area", "said"),
     [
-        (BAY, "file: bay.geojson", "feature 4 (Lighthouse): a Point of unknown role; must be area, hole, priority, "
-            "start; secondlook new leaves such features out"),
+        (BAY, "file: bay.geojson", "feature 4 (Lighthouse): a Point of unknown role; must be area, hole, keep_out, "
+            "priority, start; secondlook new leaves such features out"),
         (b"", "file: bay.geojson", "the file is empty; must be GeoJSON or KML"),
         (DRAWN, f"file: bay.geojson\n  {SQUARE}", "must be left out beside polygon_m"),
         (DRAWN, "file: bay.geojson\n  holes_deg: []", "must be left out beside holes_deg"),

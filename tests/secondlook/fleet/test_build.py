@@ -10,10 +10,11 @@ from one_node import received
 
 from comms.said.announcement import Role, RosterVehicle, RunInfo
 from comms.said.topics import RUN
+from comms.said.wire import record_of
 from planner.area import SurveyArea
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
-from secondlook.scenario import load_scenario, make_scenario
+from secondlook.scenario import ScenarioError, load_scenario, make_scenario
 from sim_world.config import CurrentConfig, SettlingConfig
 
 
@@ -44,6 +45,46 @@ def around(x_m: float, y_m: float, radius_m: float, corners: int) -> list[list[f
         ]
         for index in range(corners)
     ]
+
+
+class TestGroundToKeepOutOf:
+    ROCK = "area.keep_out_m=[[[100, 100], [200, 100], [150.004, 200]]]"
+
+    def test_it_is_announced_with_how_far_all_stay_off(self) -> None:
+        run = announced(self.ROCK)
+        assert run.keep_out_outlines == (((100, 100), (200, 100), (150, 200)),)
+        assert run.keep_out_margin_m == 1.5
+        off = announced(self.ROCK, "vehicles.helper.position_error_m=4", "vehicles.primary.position_drift_m_per_h=9")
+        assert off.keep_out_margin_m == 51.5  # 9 m an hour for the 20,000 s that the mission may last
+
+    def test_without_it_nothing_of_it_is_said(self) -> None:
+        with_it, without = (record_of(RunInfo).encode(announced(*said)) for said in ((self.ROCK,), ()))
+        assert len(with_it) == len(without) + 2
+        assert without == with_it[:2] + without[2:3] + with_it[3:-2]  # but the scenario's hash
+
+    def test_a_start_in_it_or_too_near_to_it_is_refused(self) -> None:
+        def beside(x_m: float) -> str:
+            return f"area.keep_out_m=[[[-100, -100], [{x_m}, -100], [{x_m}, 0], [-100, 0]]]"
+
+        with pytest.raises(ScenarioError, match=r"must all start outside area\.keep_out_m, but primary starts in it"):
+            announced(beside(-30))
+        with pytest.raises(
+            UserError, match=r"vehicles\.primary\.start must be 1\.5 m or more from ground to keep out of"
+        ):
+            announced(beside(-41))
+        assert announced(beside(-42)).keep_out
+
+    def test_so_is_a_home(self) -> None:
+        def home(x_m: float) -> str:
+            return f"vehicles.helper.home={{x_m: {x_m}, y_m: 150}}"
+
+        with pytest.raises(ScenarioError, match=r"must all have their home outside .*, but that of helper lies in it"):
+            announced(self.ROCK, home(150))
+        with pytest.raises(
+            UserError, match=r"vehicles\.helper\.home must be 1\.5 m or more from ground to keep out of"
+        ):
+            announced(self.ROCK, home(124))
+        assert announced(self.ROCK, home(120)).keep_out
 
 
 class TestTheAnnouncement:

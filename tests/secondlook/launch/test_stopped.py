@@ -23,7 +23,7 @@ SLOW = (
     "vehicles.primary.speed_mps=0.06",
     "vehicles.primary.endurance_s=360000",
 )  # some seconds of wall time in lockstep
-STOPPED_S = 1.5 * PATIENCE_S
+STOPPED_S = 1.2 * PATIENCE_S
 
 
 @pytest.fixture(scope="module")

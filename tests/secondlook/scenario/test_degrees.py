@@ -30,6 +30,7 @@ def ring(*corners_m: tuple[float, float]) -> str:
 
 SQUARE_M = ((0.0, 0.0), (500.0, 0.0), (500.0, 400.0), (0.0, 400.0))
 HOLE_M = ((100.0, 100.0), (150.0, 100.0), (100.0, 150.0))
+ROCK_M = ((300.0, 200.0), (350.0, 200.0), (300.0, 450.0))
 LANE_M = ((0.0, 0.0), (500.0, 0.0), (500.0, 60.0))
 START_DEG = "{latitude_deg: 59.881, longitude_deg: 10.5, heading_deg: 90}"
 PLACE = "origin: {latitude_deg: 59.88, longitude_deg: 10.5}\n"
@@ -63,6 +64,14 @@ def test_degrees_become_the_metres_to_the_millimetre(write: Write, text: str) ->
     # A degree of latitude at 59.88 N is 111.411 km.
     assert (start.x_m, start.y_m, start.heading_deg) == pytest.approx((0.0, 111.411, 90.0), abs=0.002)
     assert scenario.vehicles["helper"].start == Start(x_m=0.0, y_m=-40.0)
+
+
+def test_so_do_those_of_ground_to_keep_out_of(write: Write, text: str) -> None:
+    zoned = text.replace("  holes_deg", f"  keep_out_deg: [{ring(*ROCK_M)}]\n  holes_deg")
+    (zone,) = load_scenario(write(zoned)).area.keep_out
+    assert close(zone, ROCK_M)
+    with pytest.raises(ScenarioError, match=r"keep_out_deg: .* must be left out beside keep_out_m"):
+        load_scenario(write(zoned.replace("  holes_deg", "  keep_out_m: []\n  holes_deg")))
 
 
 def test_it_is_kept_in_metres_and_loads_as_an_equal_one(write: Write, text: str) -> None:
@@ -159,6 +168,7 @@ def in_utm(valid_text: str) -> str:
     """The valid text with UTM metres wherever they are allowed; one start has a zone of its own."""
     area = (
         f"polygon_utm_m: {utm_ring(*SQUARE_M)}\n  epsg: 32632\n  holes_utm_m: [{utm_ring(*HOLE_M)}]\n"
+        f"  keep_out_utm_m: [{utm_ring(*ROCK_M)}]\n"
         f"  priorities: [{{polygon_utm_m: {utm_ring(*LANE_M)}, weight: 3}}]"
     )
     east, north = utm(30.0, -40.0)
@@ -175,11 +185,22 @@ def test_utm_metres_become_the_metres_to_the_millimetre(write: Write, in_utm: st
     assert (scenario.origin.latitude_deg, scenario.origin.longitude_deg) == pytest.approx(ORIGIN, abs=2e-9)
     assert close(scenario.area.polygon_m, SQUARE_M)
     assert close(scenario.area.holes_m[0], HOLE_M)
+    assert close(scenario.area.keep_out[0], ROCK_M)
     assert close(scenario.area.priorities[0].polygon_m, LANE_M)
     for vehicle in ("primary", "helper"):
         start = scenario.vehicles[vehicle].start
         assert (start.x_m, start.y_m) == pytest.approx((30.0, -40.0), abs=0.0015)
     assert "utm" not in scenario.to_yaml()
+
+
+@pytest.mark.parametrize("own", ["", ", epsg: 25832"])
+def test_a_home_in_utm_metres_is_as_a_start_in_them(write: Write, in_utm: str, own: str) -> None:
+    east, north = utm(250.0, -35.0)
+    home = f"vehicles.primary.home={{easting_m: {east:.4f}, northing_m: {north:.4f}{own}}}"
+    scenario = load_scenario(write(in_utm), [home])
+    assert scenario.vehicles["primary"].home_m == pytest.approx((250.0, -35.0), abs=0.0015)
+    start = scenario.vehicles["helper"].start
+    assert scenario.vehicles["helper"].home_m == (start.x_m, start.y_m)
 
 
 def test_a_southern_zone_counts_northings_from_the_pole(write: Write, valid_text: str) -> None:

@@ -285,6 +285,22 @@ MISTAKES = {
             "must be the corners in order, but its sides cross"
         ],
     ),
+    "zone with crossing sides": (
+        POLYGON,
+        POLYGON + "\n  keep_out_m: [[[10, 10], [20, 20], [20, 10], [10, 20]]]",
+        [
+            "bad.yaml:4: area.keep_out_m: [[[10, 10], [20, 20], [20, 10], [10, 20]]] is not allowed; "
+            "must be the corners in order, but its sides cross"
+        ],
+    ),
+    "zones over all of the area": (
+        POLYGON,
+        POLYGON + "\n  keep_out_m: [[[-9, -9], [300, -9], [300, 409], [-9, 409]], [[300, 0], [600, 0], [300, 1500]]]",
+        [
+            "bad.yaml:4: area.keep_out_m: [[[-9, -9], [300, -9], [300, 409], [-9, 409]], [[300, 0],... is not allowed; "
+            "must leave some of the area to survey"
+        ],
+    ),
     "priority elsewhere": (
         POLYGON,
         POLYGON + "\n  priorities: [{polygon_m: [[900, 0], [950, 0], [950, 50]], weight: 3}]",

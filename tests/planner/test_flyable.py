@@ -1,0 +1,69 @@
+"""What of tracks can be flown beside ground to keep out of, and what can be reached."""
+
+from __future__ import annotations
+
+import pytest
+import shapely
+
+from planner.flyable import flyable_pieces, reachable
+from planner.keep_out import NOWHERE, KeepOut
+from planner.types import Point, Track
+
+NORTH = Track(4, 10.0, (10.0, 0.0), (10.0, 400.0))
+SOUTH = Track(5, 30.0, (30.0, 400.0), (30.0, 0.0))
+RADIUS_M, RUN_IN_M = 20.0, 15.0
+
+
+def band(low_m: float, high_m: float) -> tuple[Point, ...]:
+    return ((-200.0, low_m), (200.0, low_m), (200.0, high_m), (-200.0, high_m))
+
+
+def ends(tracks: list[Track]) -> list[tuple[int, float, float]]:
+    return [(track.number, round(track.start[1], 6), round(track.end[1], 6)) for track in tracks]
+
+
+def test_those_with_room_stay_as_they_are() -> None:
+    assert flyable_pieces([NORTH, SOUTH], NOWHERE, RADIUS_M, RUN_IN_M) == [NORTH, SOUTH]
+    beyond = KeepOut((band(435.1, 500.0),))
+    assert flyable_pieces([NORTH, SOUTH], beyond, RADIUS_M, RUN_IN_M) == [NORTH, SOUTH]
+
+
+def test_one_ends_before_a_zone_with_room_to_turn_and_to_run_out() -> None:
+    # 20 m for the turn and 15 m of run-out before 400 m; looked for metre by metre from the run-in's beginning.
+    found = flyable_pieces([NORTH, SOUTH], KeepOut((band(400.0, 500.0),)), RADIUS_M, RUN_IN_M)
+    assert ends(found) == [(4, 0.0, 365.0), (5, 365.0, 0.0)]
+
+
+def test_one_that_is_cut_in_two_is_flown_piece_by_piece_and_all_are_numbered_through() -> None:
+    found = flyable_pieces([NORTH, SOUTH], KeepOut((band(190.0, 210.0),)), RADIUS_M, RUN_IN_M)
+    low, high = 155.0, pytest.approx(245.0)
+    assert ends(found) == [(4, 0.0, low), (5, high, 400.0), (6, 400.0, high), (7, low, 0.0)]
+    assert [track.across_m for track in found] == [10.0, 10.0, 30.0, 30.0]
+
+
+def test_a_sonar_that_sees_ahead_flies_earlier_and_has_room_for_that() -> None:
+    # What is seen 30 m ahead is flown so much earlier: at its end there is 30 m more room, at its beginning less.
+    zone = KeepOut((band(400.0, 500.0),))
+    assert ends(flyable_pieces([NORTH], zone, RADIUS_M, RUN_IN_M, 30.0)) == [(4, 0.0, 395.0)]
+    assert ends(flyable_pieces([SOUTH], zone, RADIUS_M, RUN_IN_M, 30.0)) == [(5, 335.0, 0.0)]
+
+
+class TestReachable:
+    GROUND = shapely.box(0, 0, 100, 100)
+    WALL = ((40.0, -1e4), (60.0, -1e4), (60.0, 1e4), (40.0, 1e4))
+
+    def test_beyond_a_wall_nothing_is(self) -> None:
+        walled = KeepOut((self.WALL,))
+        # The wall has an end, but only ten kilometres off: what is enclosed is what cannot be reached.
+        assert reachable((0.0, 50.0), self.GROUND, walled).area == pytest.approx(8000)
+        box = KeepOut((((40.0, -9.0), (60.0, -9.0), (60.0, 109.0), (40.0, 109.0)),
+            ((60.0, -9.0), (120.0, -9.0), (120.0, -1.0), (60.0, -1.0)),
+            ((60.0, 101.0), (120.0, 101.0), (120.0, 109.0), (60.0, 109.0)),
+            ((110.0, -9.0), (120.0, -9.0), (120.0, 109.0), (110.0, 109.0))))  # fmt: skip
+        assert reachable((0.0, 50.0), self.GROUND, box).area == pytest.approx(4000)
+        assert reachable((80.0, 50.0), self.GROUND, box).area == pytest.approx(4000)
+        assert box.are_parted((0.0, 50.0), (80.0, 50.0))
+        assert not box.are_parted((0.0, 50.0), (200.0, 50.0))
+
+    def test_without_zones_all_is(self) -> None:
+        assert reachable((0.0, 0.0), self.GROUND, NOWHERE) is self.GROUND

@@ -1,0 +1,149 @@
+"""Ways past ground to keep out of: hand-computed lengths, and what holds of every way."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import assume, example, given, settings
+from hypothesis import strategies as st
+from zones import assert_keeps_radius, assert_stays_out, kept_out, places
+
+from planner.dubins import Pose, shortest_path
+from planner.keep_out import NOWHERE, KeepOut
+from planner.ways import Way, shortest_way, way_length_m, way_lengths_m, way_or_direct
+
+NORTH, EAST, SOUTH, WEST = (number * math.pi / 2 for number in range(4))
+SQUARE = KeepOut((((-50.0, -50.0), (50.0, -50.0), (50.0, 50.0), (-50.0, 50.0)),))
+RADIUS_M = 10.0
+INWARD_M = RADIUS_M / math.sqrt(2)
+"""The circle that touches a corner of the square from within has its centre so far from either side's line."""
+
+
+def sampled(way: Way, step_m: float) -> list[Pose]:
+    return [
+        path.pose_at(float(at_m))
+        for path in way
+        for at_m in np.append(np.arange(0.0, path.length_m, step_m), path.length_m)
+    ]
+
+
+def found(start: Pose, end: Pose, keep_out: KeepOut = SQUARE) -> Way:
+    way = shortest_way(start, end, RADIUS_M, keep_out)
+    assert way is not None
+    return way
+
+
+def test_with_nothing_in_the_way_it_is_the_shortest_path() -> None:
+    start, end = Pose(-100, 100, EAST), Pose(100, 120, NORTH)
+    path = shortest_path(start, end, RADIUS_M)
+    assert shortest_way(start, end, RADIUS_M, NOWHERE) == (path,)
+    assert shortest_way(start, end, RADIUS_M, SQUARE) == (path,)
+
+
+def test_past_a_square_it_goes_by_tangents_and_arcs_at_two_corners() -> None:
+    # From a turn to port at the start, whose circle is centred at (-100, 10), to a turn to starboard at the corner:
+    # between two circles that are turned on in different senses the tangent is sqrt(d^2 - (2 r)^2) long.
+    east_m, north_m = 50 + INWARD_M, 40 - INWARD_M
+    apart_m = math.hypot(east_m, north_m)
+    tangent_m = math.sqrt(apart_m**2 - 4 * RADIUS_M**2)
+    turned_rad = math.atan2(north_m, east_m) + math.asin(2 * RADIUS_M / apart_m)
+    along_the_side_m = 100 - 2 * INWARD_M
+    expected_m = 2 * (RADIUS_M * turned_rad + tangent_m + RADIUS_M * turned_rad) + along_the_side_m
+    way = found(Pose(-100, 0, EAST), Pose(100, 0, EAST))
+    assert way_length_m(way) == pytest.approx(expected_m, abs=1e-6)
+    assert expected_m == pytest.approx(244.688, abs=1e-3)
+    # It touches the corner on its way, north or south alike.
+    assert min(math.dist((pose.x_m, abs(pose.y_m)), (-50, 50)) for pose in sampled(way, 0.01)) < 0.01
+
+
+def test_round_one_corner_it_is_a_quarter_circle_between_straight_lines() -> None:
+    centre_m = 50 - INWARD_M
+    start, end = Pose(-centre_m - RADIUS_M, -40, NORTH), Pose(40, centre_m + RADIUS_M, EAST)
+    way = found(start, end)
+    assert way_length_m(way) == pytest.approx((centre_m + 40) + RADIUS_M * math.pi / 2 + (40 + centre_m), abs=1e-6)
+
+
+def test_the_margin_is_kept_to_the_zone_and_corners_are_turned_at_a_margin() -> None:
+    start, end = Pose(-100, 0, EAST), Pose(100, 0, EAST)
+    grown = KeepOut((((-48.0, -48.0), (48.0, -48.0), (48.0, 48.0), (-48.0, 48.0)),), 2.0)
+    assert way_length_m(found(start, end, grown)) == pytest.approx(way_length_m(found(start, end)), abs=1e-6)
+
+
+class TestNoWay:
+    RING = KeepOut(
+        (
+            ((-60.0, -60.0), (60.0, -60.0), (60.0, -50.0), (-60.0, -50.0)),
+            ((-60.0, 50.0), (60.0, 50.0), (60.0, 60.0), (-60.0, 60.0)),
+            ((-60.0, -60.0), (-50.0, -60.0), (-50.0, 60.0), (-60.0, 60.0)),
+            ((50.0, -60.0), (60.0, -60.0), (60.0, 60.0), (50.0, 60.0)),
+        )
+    )
+
+    def test_out_of_a_ring_there_is_none(self) -> None:
+        inside, outside = Pose(0, 0, EAST), Pose(100, 0, EAST)
+        assert shortest_way(inside, outside, RADIUS_M, self.RING) is None
+        assert shortest_way(inside, Pose(-20, 10, SOUTH), RADIUS_M, self.RING) is not None
+        direct = shortest_path(inside, outside, RADIUS_M)
+        assert way_or_direct(inside, outside, RADIUS_M, self.RING) == (direct,)
+        ends = np.array([outside], dtype=np.float64)
+        assert way_lengths_m(np.array([inside], dtype=np.float64), ends, RADIUS_M, self.RING) == np.inf
+
+    def test_to_a_place_in_a_zone_there_is_none(self) -> None:
+        assert shortest_way(Pose(-100, 0, EAST), Pose(0, 0, EAST), RADIUS_M, SQUARE) is None
+
+    def test_towards_a_wall_that_is_too_near_there_is_none(self) -> None:
+        assert shortest_way(Pose(-55, 0, EAST), Pose(-100, 0, WEST), RADIUS_M, SQUARE) is None
+        assert shortest_way(Pose(-61, 0, EAST), Pose(-100, 0, WEST), RADIUS_M, SQUARE) is not None
+
+
+@settings(max_examples=150)
+@given(kept_out, places, places, st.sampled_from((6.0, 15.0, 30.0)))
+@example(SQUARE, Pose(-51, 0, NORTH), Pose(51, 0, NORTH), 6.0)
+def test_every_way_stays_out_keeps_the_radius_and_arrives(
+    keep_out: KeepOut, start: Pose, end: Pose, radius_m: float
+) -> None:
+    way = shortest_way(start, end, radius_m, keep_out)
+    assume(way is not None)
+    assert way is not None
+    poses = sampled(way, 0.5)
+    assert poses[0] == pytest.approx(start)
+    assert poses[-1][:2] == pytest.approx(end[:2], abs=1e-6)
+    assert math.cos(poses[-1].heading_rad - end.heading_rad) == pytest.approx(1.0, abs=1e-9)
+    assert_stays_out(poses, keep_out)
+    assert_keeps_radius(poses, radius_m, 0.5)
+    assert way_length_m(way) >= shortest_path(start, end, radius_m).length_m - 1e-6
+
+
+@settings(max_examples=60)
+@given(kept_out, places, places)
+def test_a_way_back_is_as_long(keep_out: KeepOut, start: Pose, end: Pose) -> None:
+    there = shortest_way(start, end, RADIUS_M, keep_out)
+    first, last = (Pose(one.x_m, one.y_m, one.heading_rad + math.pi) for one in (end, start))
+    back = shortest_way(first, last, RADIUS_M, keep_out)
+    assert (there is None) == (back is None)
+    if there is not None and back is not None:
+        assert way_length_m(back) == pytest.approx(way_length_m(there), abs=1e-3)
+
+
+class TestEstimates:
+    def test_past_a_square_it_is_the_way_from_corner_to_corner_and_what_turns_add(self) -> None:
+        starts, ends = np.array([[-100.0, 0.0, EAST]]), np.array([[100.0, 0.0, EAST], [100.0, 100.0, NORTH]])
+        lengths_m = way_lengths_m(starts, ends, RADIUS_M, SQUARE)
+        # Straight on there are no turns: two hypotenuses and a side.
+        assert lengths_m[0, 0] == pytest.approx(2 * math.hypot(50, 50) + 100)
+        # The beeline to the north-east runs along the diagonal of the square's north-west corner: (-50, 25).
+        round_m = math.hypot(50, 50) + math.hypot(150, 50)
+        direct_m = shortest_path(Pose(*starts[0]), Pose(*ends[1]), RADIUS_M).length_m
+        assert lengths_m[0, 1] == pytest.approx(direct_m - math.hypot(200, 100) + round_m)
+
+    @settings(max_examples=40)
+    @given(kept_out, st.lists(places, min_size=1, max_size=4), st.lists(places, min_size=1, max_size=4))
+    def test_without_zones_between_they_are_those_of_shortest_paths(
+        self, keep_out: KeepOut, starts: list[Pose], ends: list[Pose]
+    ) -> None:
+        table = way_lengths_m(np.array(starts), np.array(ends), RADIUS_M, keep_out)
+        bare = way_lengths_m(np.array(starts), np.array(ends), RADIUS_M, NOWHERE)
+        assert table.shape == (len(starts), len(ends))
+        assert (table >= bare - 1e-6).all()
