@@ -3,6 +3,7 @@ grow."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -19,6 +20,7 @@ def filling(at_ms: int | None, hear: Callable[[Received], None]) -> Iterator[Cal
     import resource  # noqa: PLC0415 - not on every system
 
     least, most = resource.getrlimit(resource.RLIMIT_FSIZE)
+    compiles, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # a compiled module would be left cut short
 
     def hear_and_fill(received: Received) -> None:
         hear(received)
@@ -29,3 +31,4 @@ def filling(at_ms: int | None, hear: Callable[[Received], None]) -> Iterator[Cal
         yield hear_and_fill
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (least, most))
+        sys.dont_write_bytecode = compiles

@@ -61,13 +61,15 @@ def test_a_killed_launcher_leaves_all_but_the_last_second(tmp_path: Path, bus: s
 
 
 def run_with_room_for(most_bytes: int, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """A run where, as on a full disk, a write fails that would make a file larger, and part of it is written."""
+    """A run where, as on a full disk, a write fails that would make a file larger, and part of it is written. It writes
+    no compiled modules: Python would leave them cut short, for all to come."""
     return subprocess.run(
         [Path(sys.executable).with_name("secondlook"), "run", BRIEF, "--out", folder, *arguments],
         capture_output=True,
         text=True,
         check=False,
         timeout=60,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes)),
     )
 
