@@ -31,6 +31,7 @@ from comms.wall.words import TimeSignal, pack_time, unpack_hello
 from comms.words import unpack_last_word
 
 TIME_EVERY_S = 0.25
+HELD_TURN_S = 0.1  # while time stands still nothing comes due
 FROM = "clock/from/"
 
 
@@ -107,7 +108,7 @@ class WallHub:
             if self._under_way and not self._seat_closed:
                 self._post.publish(self._seat.act(clock.time.now_ms(now_s)))
             self._speak(now_s)
-            event = self._line.get(self._next_s(now_s) - self._now())
+            event = self._line.get(HELD_TURN_S if self._now.is_held else self._next_s(now_s) - self._now())
             for item in [] if event is None else self._post.receive(event, self._all_kept):
                 match item:
                     case Received():
