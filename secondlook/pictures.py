@@ -4,7 +4,6 @@ residual risk has come down. From the messages alone; needs matplotlib, and Pill
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,20 +17,18 @@ from PIL import Image
 
 from comms.said.announcement import RunInfo
 from comms.said.messages import CoverageTile, StripState
-from planner.types import FloatArray
 from secondlook.errors import UserError
 from secondlook.files import whole_file
-from secondlook.recorded import RiskMap
+from secondlook.recorded import RecordedMission, RiskMap
 from secondlook.recorded.metrics import Metrics
-from secondlook.recorded.mission import Mission
 from secondlook.recorded.second_looks import StripRecord
 from secondlook.recorded.vehicles import PathRecord
+from secondlook.report.charts import risk_series
 
 UNSEEN = (0.62, 0.64, 0.67)
 OPEN: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "dotted"}
 WITH_A_VEHICLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "linestyle": "solid"}
 ENDED = (StripState.DONE, StripState.WITHDRAWN, StripState.FAILED)
-CURVE_POINTS = 200
 MARGIN = 0.02  # around what is drawn, as a share of the longer side
 WAKE_S = 600.0  # of a vehicle's way, so much is drawn behind it
 
@@ -39,12 +36,12 @@ WAKE_S = 600.0  # of a vehicle's way, so much is drawn behind it
 class MissionPicture:
     """Draws a mission at one time after another, never back. `width_px`: of the picture, which is 9/16 as high."""
 
-    def __init__(self, mission: Mission, width_px: int = 1280) -> None:
+    def __init__(self, mission: RecordedMission, width_px: int = 1280) -> None:
         self._mission = mission
         self._told = mission.received(RunInfo, CoverageTile)
         self._waiting = next(self._told, None)
         self._metrics = Metrics()
-        self._curve = _risk_curve(mission)
+        self._curve = risk_series(mission).samples
         self._figure = Figure(figsize=(12.8, 7.2), dpi=width_px / 12.8, layout="constrained")
         self._map, self._risk = self._figure.subplots(1, 2, width_ratios=(2.2, 1.0))
         colours = mpl.colormaps["tab10"].colors  # type: ignore[attr-defined]
@@ -65,7 +62,7 @@ class MissionPicture:
             drawn.remove()
         self._moving = [*self._strips(t_s), *self._vehicles(t_s)]
         self._now.set_xdata([t_s, t_s])
-        mean = float(np.interp(t_s, self._curve[0], self._curve[1]))
+        mean = float(np.interp(t_s, [one.t_s for one in self._curve], [one.mean for one in self._curve]))
         self._map.set_title(f"{self._mission.run.scenario}, {t_s:.0f} s", loc="left")
         self._risk.set_title(f"mean residual risk {mean:.3f}", loc="left")
         return self._figure
@@ -114,9 +111,9 @@ class MissionPicture:
             frameon=False,
             fontsize="small",
         )
-        times_s, mean, worst = self._curve
-        self._risk.plot(times_s, mean, color="tab:blue", label="mean")
-        self._risk.plot(times_s, worst, color="tab:red", label="worst 30 %")
+        times_s = [one.t_s for one in self._curve]
+        self._risk.plot(times_s, [one.mean for one in self._curve], color="tab:blue", label="mean")
+        self._risk.plot(times_s, [one.worst30_mean for one in self._curve], color="tab:red", label="worst 30 %")
         self._risk.set_xlim(0, max(self._mission.end_s, 1.0))
         self._risk.set_ylim(0, 1.02)
         self._risk.set_xlabel("time, s")
@@ -141,7 +138,7 @@ class MissionPicture:
                 yield from self._map.plot(x_m[-1], y_m[-1], "o", color=colour, markeredgecolor="white")
 
 
-def write_picture(mission: Mission, t_s: float | None, path: Path, width_px: int) -> None:
+def write_picture(mission: RecordedMission, t_s: float | None, path: Path, width_px: int) -> None:
     """Writes a PNG of a mission at a time, or at its end. Raises UserError for a time beyond that."""
     if t_s is not None and not 0 <= t_s <= mission.end_s:
         raise UserError(f"--time {t_s:g}: is not within the mission; must be from 0 to {mission.end_s:g}")
@@ -151,7 +148,7 @@ def write_picture(mission: Mission, t_s: float | None, path: Path, width_px: int
 
 
 def write_video(
-    mission: Mission, path: Path, width_px: int, lasts_s: float, frames_hz: float, told: Callable[[float], None]
+    mission: RecordedMission, path: Path, width_px: int, lasts_s: float, frames_hz: float, told: Callable[[float], None]
 ) -> None:
     """Writes an animated WebP of a whole mission that takes `lasts_s` seconds to see, its last picture shown for two
     more. `told`: called with the share that is drawn after each picture."""
@@ -185,19 +182,3 @@ def _state_at(strip: StripRecord, t_s: float) -> StripState | None:
     """A strip's state at a time; None before it was cut."""
     known = [event.state for event in strip.history if event.t_s <= t_s]
     return known[-1] if known else None
-
-
-def _risk_curve(mission: Mission) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Times, mean residual risk and that of the worst 30 %."""
-    metrics, values = Metrics(), [(0.0, 1.0, 1.0)]
-    every_s = mission.end_s / CURVE_POINTS
-    for one in mission.received(RunInfo, CoverageTile):
-        due_s = every_s * len(values)
-        risk = metrics.risk() if one.t_s > due_s else None
-        if risk is not None:
-            values += [(due_s, risk.mean, risk.worst30_mean)] * math.ceil((one.t_s - due_s) / every_s)
-        metrics.hear(one)
-    risk = metrics.risk()
-    values += [] if risk is None else [(mission.end_s, risk.mean, risk.worst30_mean)]
-    times_s, mean, worst = np.array(values).T
-    return times_s, mean, worst
