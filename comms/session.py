@@ -199,7 +199,6 @@ def _on_several_hosts(
         "scouting/gossip/enabled": False,
         "scouting/delay": 0,
         "transport/link/tx/lease": round(LEASE_S * 1000),
-        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
         "transport/link/tx/queue/congestion_control/block/wait_before_close": round(BLOCK_S * 1e6),
     }  # fmt: skip
     if certificates is not None:
@@ -227,6 +226,7 @@ def _basic(mode: str, listen: Iterable[str], connect: Iterable[str]) -> dict[str
         "connect/retry": {
             "period_init_ms": round(first_s * 1000), "period_max_ms": round(most_s * 1000), "period_increase_factor": 2,
         },
+        "transport/link/tx/queue/congestion_control/drop/wait_before_drop": round(DROP_S * 1e6),
         "transport/shared_memory/enabled": False,  # a killed process would leave segments behind
         "transport/link/rx/max_message_size": LARGEST_MESSAGE_BYTES,
         "transport/unicast/accept_pending": MOST_AT_THE_DOOR,

@@ -117,7 +117,7 @@ class SurveyAgent(Agent):
         if status.state is ManeuverState.ACCEPTED:
             one = self._pass(self.ahead[0])
             free_ms = status.ends_ms + self.endurance.run_out_ms(one, self.config.run_in_m)
-            if not self.endurance.lasts_from(one.end, free_ms):
+            if self.config.homing is not None and not self.endurance.lasts_from(one.end, free_ms):
                 self.turn_home(now_ms)
         elif status.state is ManeuverState.ON_TRACK:
             self.mode = Mode.SURVEY

@@ -88,12 +88,11 @@ def _lost(flight: Flight, said: Received[StripStatus]) -> str | None:
 
 
 def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) -> list[str]:
-    overs = flight.said(MissionOver)
-    primary_s = flight.summary["time"]["primary_s"]
-    if not overs or primary_s is None:
+    overs, surveyed_ms = flight.said(MissionOver), _surveyed_ms(flight)
+    if not overs or surveyed_ms is None:
         return []
     over_ms = overs[0].header.sent_ms
-    if over_ms >= int(1000 * flight.scenario.mission.ends_s(primary_s)):
+    if over_ms >= int(flight.scenario.mission.ends_s(surveyed_ms / 1000) * 1000):
         return []
     return [
         f"strip {number} was still {last.message.state.value} when the mission was over at {over_ms / 1000:.3f} s,"
@@ -101,6 +100,21 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
         for number, last in strips.items()
         if not last.message.state.has_ended
     ]
+
+
+def _surveyed_ms(flight: Flight) -> int | None:
+    """When the last primary had surveyed all, as far as the coordinator was told: one of whom it hears nothing it gives
+    up. None where it was told of none."""
+    ends_ms: dict[str, tuple[int, int]] = {}
+    its_lives = lives(flight, "coordinator")
+    for at_ms, one in reached(flight, "coordinator", its_lives[-1]) if its_lives else []:
+        if isinstance(one.message, AgentState) and one.sender in flight.scenario.survey_vehicles:
+            incarnation, _ = ends_ms.get(one.sender, (-1, 0))
+            if one.header.incarnation > incarnation:
+                ends_ms.pop(one.sender, None)
+                if one.message.mode.has_ended:
+                    ends_ms[one.sender] = one.header.incarnation, at_ms
+    return max((at_ms for _, at_ms in ends_ms.values()), default=None)
 
 
 def _books_differ(flight: Flight) -> list[str]:

@@ -70,9 +70,11 @@ def test_who_waits_goes_home_while_it_may_circle_once_more() -> None:
     assert not FOR_EVER.is_low(here, 10**9, circles=True)
 
 
-def survey(endurance_ms: int) -> OneNode:
+HOME = Homing(WayHome((0, 0), Sailing(2.0), turn_radius_m=10.0), reserve_ms=0)
+
+
+def survey(endurance_ms: int, homing: Homing | None = HOME) -> OneNode:
     """A primary of 2 m/s that is to come home to the origin, told of the run and of nothing else."""
-    homing = Homing(WayHome((0, 0), Sailing(2.0), turn_radius_m=10.0), reserve_ms=0)
     sonar = SideLooking(SonarShape("side", 40, 145))
     config = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, endurance_ms, homing=homing)
     node = OneNode(SurveyAgent(config), Role.SURVEY)
@@ -80,9 +82,15 @@ def survey(endurance_ms: int) -> OneNode:
     return node
 
 
-@pytest.mark.parametrize(("ends_ms", "goes_home"), [(100_000, False), (900_000, True)])
-def test_a_track_that_takes_too_long_is_left_for_home_wherever_that_is_left_from(ends_ms: int, goes_home: bool) -> None:
-    node = survey(1_000_000)
+@pytest.mark.parametrize(
+    ("ends_ms", "homing", "goes_home"),
+    [(100_000, HOME, False), (900_000, HOME, True), (1_100_000, None, False)],
+    ids=["it lasts", "too long", "it need not come home"],
+)
+def test_a_track_that_takes_too_long_is_left_for_home_wherever_that_is_left_from(
+    ends_ms: int, homing: Homing | None, goes_home: bool
+) -> None:
+    node = survey(1_000_000, homing)
     node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.ACCEPTED, ends_ms, ""))
     orders = [one.message for one in node.said if isinstance(one.message, Maneuver)]
     assert [one.kind for one in orders] == [ManeuverKind.FOLLOW, ManeuverKind.GOTO][: 1 + goes_home]
@@ -102,9 +110,8 @@ def test_no_track_is_begun_that_the_battery_does_not_last_for() -> None:
 def test_round_ground_to_keep_out_of_it_is_farther_home_and_who_is_refused_asks_again() -> None:
     # A zone of 100 m across lies between the vehicle and home, which is the origin.
     zone = Zone((Vertex(50, -100), Vertex(150, -100), Vertex(150, 100), Vertex(50, 100)))
-    homing = Homing(WayHome((0, 0), Sailing(2.0), turn_radius_m=10.0), reserve_ms=0)
     sonar = SideLooking(SonarShape("side", 40, 145))
-    config = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, 150_000, homing=homing)
+    config = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, 150_000, homing=HOME)
     node = OneNode(SurveyAgent(config), Role.SURVEY)
     node.hear("run", replace(run_info(300, 200), keep_out=(zone,), keep_out_margin_m=2.0))
     # By the beeline it lasts for 100 s home, round two corners of the zone for 2 * hypot(100, 100) + 100 m or so.
