@@ -87,7 +87,7 @@ class KnownFleet:
                 log.info("%s is lost: nothing heard of it since %.0f s", name, vehicle.heard_ms / 1000)
         for vehicle in self.surveying:
             if now_ms - vehicle.stirred_ms >= self._given_up_after_ms:
-                vehicle.finished_ms = now_ms
+                vehicle.give_up(now_ms)
                 how = "nothing heard of it" if vehicle.lost else "it has not stirred"
                 log.warning("%s is given up: %s since %.0f s", vehicle.entry.vehicle, how, vehicle.stirred_ms / 1000)
         return lost

@@ -188,11 +188,16 @@ class KnownVehicle:
         if state.mode.is_out_of_work and self.finished_ms is None:
             self.ended_early = True
         if state.mode.has_ended:
+            if self.finished_ms is None or self._surveyed_in is None:
+                self.finished_ms = now_ms
             self._surveyed_in = header.incarnation
-            self.finished_ms = now_ms if self.finished_ms is None else self.finished_ms
         elif self._surveyed_in != header.incarnation and stirs:  # given up too early, or started anew
             self.finished_ms = None
         return True
+
+    def give_up(self, now_ms: int) -> None:
+        """The mission goes on as if it had surveyed all, until it says when it has."""
+        self.finished_ms, self._surveyed_in = now_ms, None
 
     def hear_survey(self, header: Header, message: Plan | Curve) -> bool:
         """Hears its plan, or P(y) as it was measured on a track; the newest counts. Returns whether it was news."""

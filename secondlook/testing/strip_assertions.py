@@ -88,11 +88,10 @@ def _lost(flight: Flight, said: Received[StripStatus]) -> str | None:
 
 
 def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) -> list[str]:
-    overs, surveyed_ms = flight.said(MissionOver), _surveyed_ms(flight)
-    if not overs or surveyed_ms is None:
-        return []
-    over_ms = overs[0].header.sent_ms
-    if over_ms >= int(flight.scenario.mission.ends_s(surveyed_ms / 1000) * 1000):
+    overs = flight.said(MissionOver)
+    over_ms = overs[0].header.sent_ms if overs else 0
+    surveyed_ms = _surveyed_ms(flight, over_ms)
+    if surveyed_ms is None or over_ms >= int(flight.scenario.mission.ends_s(surveyed_ms / 1000) * 1000):
         return []
     return [
         f"strip {number} was still {last.message.state.value} when the mission was over at {over_ms / 1000:.3f} s,"
@@ -102,18 +101,18 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
     ]
 
 
-def _surveyed_ms(flight: Flight) -> int | None:
-    """When the last primary had surveyed all, as far as the coordinator was told: one of whom it hears nothing it gives
-    up. None where it was told of none."""
+def _surveyed_ms(flight: Flight, over_ms: int) -> int | None:
+    """When the last primary had surveyed all, as far as the coordinator was told before the mission was over: one of
+    whom it hears nothing it gives up. None where it was told of none."""
     ends_ms: dict[str, tuple[int, int]] = {}
     its_lives = lives(flight, "coordinator")
     for at_ms, one in reached(flight, "coordinator", its_lives[-1]) if its_lives else []:
-        if isinstance(one.message, AgentState) and one.sender in flight.scenario.survey_vehicles:
-            incarnation, _ = ends_ms.get(one.sender, (-1, 0))
-            if one.header.incarnation > incarnation:
-                ends_ms.pop(one.sender, None)
-                if one.message.mode.has_ended:
-                    ends_ms[one.sender] = one.header.incarnation, at_ms
+        if one.sender not in flight.scenario.survey_vehicles or at_ms > over_ms:
+            continue
+        if isinstance(one.message, AgentState) and one.header.incarnation > ends_ms.get(one.sender, (-1, 0))[0]:
+            ends_ms.pop(one.sender, None)
+            if one.message.mode.has_ended:
+                ends_ms[one.sender] = one.header.incarnation, at_ms
     return max((at_ms for _, at_ms in ends_ms.values()), default=None)
 
 
