@@ -97,7 +97,7 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
         f"strip {number} was still {last.message.state.value} when the mission was over at {over_ms / 1000:.3f} s,"
         " before its deadline"
         for number, last in strips.items()
-        if not last.message.state.has_ended
+        if not last.message.state.has_ended and last.header.incarnation == overs[0].header.incarnation
     ]
 
 
