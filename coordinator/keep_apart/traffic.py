@@ -63,7 +63,8 @@ class Traffic:
         if strip is not None:
             return self._sweep(vehicle, strip)
         errand = self._errands.get(vehicle.entry.vehicle)
-        if errand is not None and now_s < errand.arrives_s:
+        # Until it has said where it is there, it circles where it was sent, not where it was heard on its way.
+        if errand is not None and vehicle.heard_ms / 1000 < errand.arrives_s:
             return errand
         return self._rest(vehicle)
 

@@ -80,6 +80,21 @@ def test_a_primary_that_revisits_sails_the_run_out_of_its_last_track(told: Told)
     assert course.at(12.0)[0] == pytest.approx((0, 318, NORTH))
 
 
+def test_until_it_is_heard_there_a_helper_circles_where_it_was_sent() -> None:
+    # 80 m at 2 m/s: it is there at 40 s, and says so at 50 s.
+    traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+    traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+    one.heard_ms = 10_000
+    for now_s in (20.0, 48.0):
+        course = traffic.course(at(one, Mode.IDLE, 140), None, now_s)
+        assert course is not None
+        assert course.at(40.0)[0] == pytest.approx((0, 200, NORTH))
+    one.heard_ms = 50_000
+    course = traffic.course(at(one, Mode.IDLE, 190), None, 50.0)
+    assert course is not None
+    assert course.at(50.0)[0] == pytest.approx((0, 190, NORTH))
+
+
 class TestGroundToKeepOutOf:
     WALL = KeepOut((((20.0, -100.0), (40.0, -100.0), (40.0, 300.0), (20.0, 300.0)),), 1.5)
 
