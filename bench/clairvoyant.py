@@ -1,14 +1,16 @@
 """How near an allocator comes to who knows everything beforehand.
 
 python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--first-seed N] [--seconds S] [--jobs J]
-                            [--set KEY=VALUE]
+                            [--set KEY=VALUE] [--objective mean|worst30|both]
 python -m bench.clairvoyant --run RUN [--seconds S]      a recorded run; --json for programs, with either
 
 For each seed: the bound on the residual risk (times m2) that a schedule can remove (`clairvoyant_bound` says why none
 removes more), the most that was removed by the best schedule found (`clairvoyant_schedule`, which begins with what the
 contenders flew) or by a contender, and what each contender removed; then what mean residual risk that leaves, and the
 ratios. All are counted alike, by the true P_d of the helpers, contenders look by look as they were flown; what the
-mission's map told, from what the vehicles made of their P_d, is compared with that at the end. S is the processor time
+mission's map told, from what the vehicles made of their P_d, is compared with that at the end. The schedule is searched
+by the mean, or by another of the coordinator's objectives; what it and each contender leave of the worst 30 % stands in
+a table of its own. S is the processor time
 of the search for the schedule, which a busy machine makes longer but not worse.
 """
 
@@ -32,9 +34,10 @@ import secondlook
 from bench.clairvoyant_bound import upper_bound
 from bench.clairvoyant_schedule import best_schedule
 from bench.flown_looks import FlownLooks, legs_flown
-from bench.legs import Schedule
+from bench.legs import Schedule, Simulator
 from bench.removable import Clairvoyance, Removable
 from comms.node import Received
+from coordinator.cut.ground import OBJECTIVES
 from secondlook.compare.flights import Failure, contenders, fly
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
@@ -47,9 +50,11 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Flown:
-    """What a contender flew: its looks, the legs that a search may begin with, and what the mission's map told."""
+    """What a contender flew: what its looks removed, and left of the worst 30 %, what the mission's map told that they
+    removed, and the legs that a search may begin with."""
 
     removed_m2: float
+    worst30: float
     measured_m2: float
     schedule: Schedule
 
@@ -58,7 +63,9 @@ class Flown:
 class Row:
     """One seed. `removed_m2`: by contender, what its looks removed, None for a mission that failed; `measured_m2`: the
     same as the mission's map told. `there_m2`: all the risk that the survey alone left on `area_m2`. `found_m2`: what
-    the best schedule found removes, of so many `legs`. `search_s`: processor time of the search for it.
+    the best schedule found removes, of so many `legs`; `started_m2`: by how much the schedule that the search began
+    with made the objective less. `worst30`: the residual risk of the worst 30 % that the survey, that schedule and
+    each contender leave. `search_s`: processor time of the search.
 
     Raises ValueError where one of these contradicts another.
     """
@@ -72,6 +79,7 @@ class Row:
     legs: int
     removed_m2: dict[str, float | None]
     measured_m2: dict[str, float | None]
+    worst30: dict[str, float | None]
     search_s: float
 
     def __post_init__(self) -> None:
@@ -96,7 +104,7 @@ class Row:
     @property
     def left(self) -> dict[str, float | None]:
         """The mean residual risk that the survey alone leaves, and what each of these does."""
-        reached_m2 = {"survey": 0.0, **self.reached_m2}
+        reached_m2 = {"survey": 0.0, "schedule": self.found_m2, **self.reached_m2}
         return {name: None if m2 is None else (self.there_m2 - m2) / self.area_m2 for name, m2 in reached_m2.items()}
 
     @property
@@ -112,20 +120,27 @@ class Row:
             )
 
 
-def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seconds: float) -> Row:
+def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seconds: float, objective: str) -> Row:
     """Bound and best schedule of one mission; the search knows what was flown, by contender, None for a failure."""
     bound = upper_bound(mission)
-    best = best_schedule(mission, bound, seconds, seed, [one.schedule for one in flown.values() if one])
+    known = [one.schedule for one in flown.values() if one]
+    best = best_schedule(mission, bound, seconds, seed, known, OBJECTIVES[objective])
+    left = Simulator(mission).left(best.schedule)
     return Row(
         seed=seed,
         area_m2=float(np.count_nonzero(mission.inside)) * mission.grid.cell_area_m2,
         there_m2=mission.total_m2,
         bound_m2=bound.removed_m2,
-        found_m2=best.removed_m2,
+        found_m2=mission.gain_m2(left, OBJECTIVES["mean"]),
         started_m2=best.started_m2,
         legs=sum(len(legs) for legs in best.schedule),
         removed_m2={name: one.removed_m2 if one else None for name, one in flown.items()},
         measured_m2={name: one.measured_m2 if one else None for name, one in flown.items()},
+        worst30={
+            "survey": mission.left(mission.risk).worst30_mean,
+            "schedule": mission.left(left).worst30_mean,
+            **{name: one.worst30 if one else None for name, one in flown.items()},
+        },
         search_s=seconds,
     )
 
@@ -147,10 +162,12 @@ class Heard:
     def flown(self, measured_m2: float) -> Flown:
         """What the helpers flew."""
         mission = self.clairvoyance.removable()
-        return Flown(self.looks.removed_m2(mission), measured_m2, legs_flown(self.looks.looks, mission))
+        left = mission.risk * self.looks.leaves(mission.grid)
+        legs = legs_flown(self.looks.looks, mission)
+        return Flown(self.looks.removed_m2(mission), mission.left(left).worst30_mean, measured_m2, legs)
 
 
-def one_seed(scenario: Scenario, names: Sequence[str], seconds: float) -> Row:
+def one_seed(scenario: Scenario, names: Sequence[str], seconds: float, objective: str = "mean") -> Row:
     """Flies the seed with each contender, and solves it."""
     alone = Heard(contenders(scenario, ["none"])[0].scenario)
     survey = fly(alone.scenario, alone.hear)
@@ -167,10 +184,10 @@ def one_seed(scenario: Scenario, names: Sequence[str], seconds: float) -> Row:
         if not np.array_equal(heard.clairvoyance.removable().risk, mission.risk):
             raise ValueError(f"seed {scenario.seed}: with {contender.name} the survey is another than without helpers")
         flown[contender.name] = heard.flown(result.removed_m2)
-    return solve(mission, scenario.seed, flown, seconds)
+    return solve(mission, scenario.seed, flown, seconds, objective)
 
 
-def one_run(folder: Path, seconds: float) -> Row:
+def one_run(folder: Path, seconds: float, objective: str) -> Row:
     """Solves a recorded run."""
     scenario = load_scenario(str(folder / "scenario.yaml"))
     heard = Heard(scenario)
@@ -181,7 +198,8 @@ def one_run(folder: Path, seconds: float) -> Row:
     if alone is None or fleet is None:
         raise UserError(f"{folder}: the run ended before the mission began")
     flown = heard.flown((alone.mean - fleet.mean) * alone.cells * scenario.area.cell_m**2)
-    return solve(heard.clairvoyance.removable(), scenario.seed, {scenario.coordinator.allocator: flown}, seconds)
+    removable = heard.clairvoyance.removable()
+    return solve(removable, scenario.seed, {scenario.coordinator.allocator: flown}, seconds, objective)
 
 
 def summary(rows: list[Row]) -> dict[str, Any]:
@@ -220,6 +238,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--objective", choices=["mean", "worst30", "both"], default="mean")
     parser.add_argument("--run", type=Path)
     parser.add_argument("--json", action="store_true")
     return parser.parse_args()
@@ -248,7 +267,8 @@ def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
         task = progress.add_task("", total=arguments.seeds)
         seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
         missions = (scenario.model_copy(update={"seed": seed}) for seed in seeds)
-        for job in as_completed([pool.submit(one_seed, one, allocators, arguments.seconds) for one in missions]):
+        terms = allocators, arguments.seconds, arguments.objective
+        for job in as_completed([pool.submit(one_seed, one, *terms) for one in missions]):
             rows.append(job.result())
             progress.update(task, completed=len(rows))
 
@@ -269,6 +289,7 @@ def _print(rows: list[Row]) -> None:
     rows = sorted(rows, key=lambda row: row.seed)
     _print_table("residual risk removed, m2", [(row.seed, row.reached_m2) for row in rows], ".0f")
     _print_table("mean residual risk left", [(row.seed, row.left) for row in rows], ".4f")
+    _print_table("residual risk left of the worst 30 %", [(row.seed, row.worst30) for row in rows], ".4f")
     for name, ratios in summary(rows).items():
         if name == "best_to_bound":
             print(f"best, of the bound: mean {ratios['mean']:.3f}, least {ratios['least']:.3f}")
@@ -289,7 +310,7 @@ def main() -> None:
     failure = ""
     try:
         if arguments.run:
-            rows.append(one_run(arguments.run, arguments.seconds))
+            rows.append(one_run(arguments.run, arguments.seconds, arguments.objective))
         else:
             _solve_all(arguments, rows)
     except UserError as error:

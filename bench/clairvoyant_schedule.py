@@ -20,6 +20,7 @@ import numpy as np
 from bench.clairvoyant_bound import Bound
 from bench.legs import Leg, Schedule, Simulator
 from bench.removable import Removable
+from coordinator.cut.ground import OBJECTIVES, Objective
 
 PRICES = (0.5, 0.7, 1.0)
 """Of a look, as shares of that at the bound."""
@@ -29,33 +30,39 @@ TURN_STEPS = 3
 SURVIVORS = 0.3
 """Share of the schedules that are annealed further, after each round."""
 HOTTEST, COLDEST = (1e-2, 1e-3), 1e-5
-"""Temperatures of annealing, as shares of what is removed: where the first round begins, where the others do, and where
+"""Temperatures of annealing, as shares of what is gained: where the first round begins, where the others do, and where
 all end."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """The best schedule found; `started_m2`: what the best that annealing began with removes."""
+    """The best schedule found, how much less it makes the objective, times the area, and how much less the best that
+    annealing began with does."""
 
-    removed_m2: float
+    gain_m2: float
     schedule: Schedule
     started_m2: float
 
 
 def best_schedule(
-    mission: Removable, bound: Bound, seconds: float, seed: int, known: Sequence[Schedule] = ()
+    mission: Removable,
+    bound: Bound,
+    seconds: float,
+    seed: int,
+    known: Sequence[Schedule] = (),
+    objective: Objective = OBJECTIVES["mean"],
 ) -> Solution:
     """Searches for about so many seconds of processor time. `known`: schedules to begin with; the result is at least as
     good as each of them."""
     began_s = time.process_time()
-    simulator = Simulator(mission)
+    simulator = Simulator(mission, objective)
     starts = [*known, lanes(mission, across=False), lanes(mission, across=True)]
     prices_m2 = [bound.price_m2 * share for share in PRICES]
     candidates = [leg for price_m2 in prices_m2 for way in (False, True) for leg in _cut(mission, price_m2, across=way)]
     candidates += [leg for schedule in starts for legs in schedule for leg in legs]
     chance = np.random.default_rng(seed)
-    found = [(simulator.removed_m2(start), simulator.in_time(start)) for start in starts]
-    started_m2 = max(removed_m2 for removed_m2, _ in found)
+    found = [(simulator.gain_m2(start), simulator.in_time(start)) for start in starts]
+    started_m2 = max(gain_m2 for gain_m2, _ in found)
     counts = _rounds(len(found))
     left_s = seconds - (time.process_time() - began_s)
     for number, count in enumerate(counts):
@@ -119,11 +126,11 @@ def _annealed(
 ) -> tuple[float, Schedule]:
     """The best schedule on a walk through schedules that begins at `start`, and at the temperature `hottest`."""
     began_s = time.process_time()
-    now, now_m2 = start, simulator.removed_m2(start)
+    now, now_m2 = start, simulator.gain_m2(start)
     best, best_m2 = now, now_m2
     while (share := (time.process_time() - began_s) / max(seconds, 1e-9)) < 1:
         changed = _changed(now, candidates, simulator.mission, chance)
-        changed_m2 = simulator.removed_m2(changed)
+        changed_m2 = simulator.gain_m2(changed)
         temperature = max(best_m2, 1.0) * hottest * (COLDEST / hottest) ** share
         if changed_m2 >= now_m2 or chance.random() < math.exp((changed_m2 - now_m2) / temperature):
             now, now_m2 = simulator.in_time(changed), changed_m2

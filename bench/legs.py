@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bench.removable import LegHelper, Removable
+from coordinator.cut.ground import OBJECTIVES, Objective
 from planner.dubins import Pose, shortest_path
 from planner.types import FloatArray
 
@@ -31,25 +32,34 @@ Schedule = tuple[tuple[Leg, ...], ...]
 
 @dataclass
 class Simulator:
-    """Flies schedules exactly: shortest Dubins paths, straight run-ins, no turns within a leg."""
+    """Flies schedules exactly: shortest Dubins paths, straight run-ins, no turns within a leg. `objective`: by which
+    schedules are judged."""
 
     mission: Removable
+    objective: Objective = OBJECTIVES["mean"]
     _ways_m: dict[tuple[float, ...], float] = field(default_factory=dict)
     _looks: dict[tuple[int, int, bool], tuple[slice, FloatArray]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._cell_m = self.mission.grid.cell_m
-        self._worth_m2 = self.mission.risk * self.mission.grid.cell_area_m2
+
+    def gain_m2(self, schedule: Schedule) -> float:
+        """How much less a schedule makes the objective, times the area."""
+        return self.mission.gain_m2(self.left(schedule), self.objective)
 
     def removed_m2(self, schedule: Schedule) -> float:
-        """The risk that a schedule removes, times the area: what is passed until the deadline counts."""
-        left_m2 = self._worth_m2.copy()
+        """The risk that a schedule removes, times the area."""
+        return self.mission.gain_m2(self.left(schedule), OBJECTIVES["mean"])
+
+    def left(self, schedule: Schedule) -> FloatArray:
+        """The residual risk that a schedule leaves, grid shape: what is passed until the deadline counts."""
+        left = self.mission.risk.copy()
         for helper, legs in enumerate(schedule):
             for leg, begins_s in zip(legs, self.begins_s(helper, legs), strict=True):
                 if begins_s >= self._until_s(helper):
                     break
-                self._look(helper, leg, begins_s, left_m2)
-        return self.mission.total_m2 - float(left_m2.sum())
+                self._look(helper, leg, begins_s, left)
+        return left
 
     def in_time(self, schedule: Schedule) -> Schedule:
         """The schedule without the legs that would begin after the deadline or a helper's endurance."""
@@ -110,15 +120,15 @@ class Simulator:
     def _until_s(self, helper: int) -> float:
         return min(self.mission.ends_s, self.mission.helpers[helper].lasts_s)
 
-    def _look(self, helper: int, leg: Leg, begins_s: float, left_m2: FloatArray) -> None:
+    def _look(self, helper: int, leg: Leg, begins_s: float, left: FloatArray) -> None:
         place, first, end, up, across = leg
         lines, leaves = self._swath(helper, place, across)
         step_s = self._cell_m / self.mission.helpers[helper].speed_mps
         passed = math.floor((self.mission.ends_s - begins_s) / step_s + 0.5)  # up to the middle of the last
         if passed < end - first:
             first, end = (first, first + passed) if up else (end - passed, end)
-        ground_m2 = left_m2.T if across else left_m2
-        ground_m2[first:end, lines] *= leaves[first:end]
+        ground = left.T if across else left
+        ground[first:end, lines] *= leaves[first:end]
 
     def _swath(self, helper: int, place: int, across: bool) -> tuple[slice, FloatArray]:
         """The lines of cells in a leg's swath, and the share of the risk of each of their cells that a look leaves."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from bench.swath import Swath
 from comms.node import Received
+from coordinator.cut.ground import Objective
 from planner.dubins import Pose
+from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
@@ -72,6 +75,24 @@ class Removable:
     def extent(self, *, across: bool) -> tuple[int, int]:
         """How many cells a leg may be long, and on how many lines it may lie."""
         return self.grid.shape[::-1] if across else self.grid.shape
+
+    def left(self, risk: FloatArray) -> RiskStatistics:
+        """Of the residual risk that is left, grid shape."""
+        return risk_statistics(risk, self.inside, self.inside)
+
+    def gain_m2(self, risk: FloatArray, objective: Objective) -> float:
+        """How much less the objective is with this residual risk than with the survey's alone, times the area."""
+        gain = 0.0
+        if objective.mean:
+            gain += objective.mean * float((self.risk - risk).sum())
+        if objective.worst:
+            there = self._there
+            gain += objective.worst * (there.worst30_mean - self.left(risk).worst30_mean) * there.cells
+        return gain * self.grid.cell_area_m2
+
+    @cached_property
+    def _there(self) -> RiskStatistics:
+        return self.left(self.risk)
 
     @property
     def total_m2(self) -> float:

@@ -17,6 +17,7 @@ from bench.legs import Leg, Simulator
 from bench.removable import LegHelper, LegSensor, Removable, leg_helpers
 from bench.swath import Swath
 from comms.said.messages import CoverageTile, Maneuver, ManeuverKind
+from coordinator.cut.ground import OBJECTIVES
 from coordinator.cut.strips import strip_of
 from coordinator.cut.window import Window
 from planner.dubins import Pose
@@ -271,8 +272,8 @@ class TestTheSearch:
         made = replace(mission(risk, ends_s=60 + 5 * seed), helpers=(helper(run_in_m=0.0),))
         bound = upper_bound(made)
         best = best_schedule(made, bound, 0.8, seed)
-        assert 0.55 * bound.removed_m2 <= best.removed_m2 <= bound.removed_m2 + 1e-6
-        assert best.removed_m2 == pytest.approx(Simulator(made).removed_m2(best.schedule))
+        assert 0.55 * bound.removed_m2 <= best.gain_m2 <= bound.removed_m2 + 1e-6
+        assert best.gain_m2 == pytest.approx(Simulator(made).removed_m2(best.schedule))
         for leg in best.schedule[0]:
             steps, lines = made.extent(across=leg.across)
             assert 0 <= leg.first < leg.end <= steps
@@ -286,14 +287,41 @@ class TestTheSearch:
         made = mission(risk, ends_s=50.0)
         best = best_schedule(made, upper_bound(made), 1.0, 1)
         assert [leg[:3] for leg in best.schedule[0] if leg.across] == [(3, 0, COLUMNS)]
-        assert best.removed_m2 >= 3 * COLUMNS * 25 * 0.5
+        assert best.gain_m2 >= 3 * COLUMNS * 25 * 0.5
+
+    def test_by_the_worst_it_goes_where_it_is_bad_and_by_the_mean_where_much_is_removed(self) -> None:
+        # Helpers see a third of the area in 60 s. Far away 30 % of it are bad, near by looks take more.
+        risk = np.full((ROWS, COLUMNS), 0.6)
+        risk[:, 8:] = 1.0
+        made = mission(risk, ends_s=60.0)
+        sensors = made.helpers[0].sensors
+        for sensor, columns in zip(sensors, (np.s_[:, :, 8:], np.s_[:, 8:, :]), strict=True):
+            sensor.p_detect[columns] = 0.2
+        left = {
+            name: made.left(
+                Simulator(made).left(best_schedule(made, upper_bound(made), 1.0, 1, (), OBJECTIVES[name]).schedule)
+            )
+            for name in ("mean", "worst30")
+        }
+        assert left["mean"].mean < left["worst30"].mean
+        assert left["worst30"].worst30_mean < left["mean"].worst30_mean
+
+    def test_what_is_gained_by_hand(self) -> None:
+        risk = np.linspace(0, 1, ROWS * COLUMNS).reshape(ROWS, COLUMNS)
+        made = mission(risk)
+        # All of it is halved: 72 cells of a mean of 0.5, the worst 22 of them of 1 - 21 / 71 / 2.
+        assert made.gain_m2(risk / 2, OBJECTIVES["mean"]) == pytest.approx(0.25 * 72 * 25)
+        worst = 1 - 21 / 71 / 2
+        assert made.gain_m2(risk / 2, OBJECTIVES["worst30"]) == pytest.approx(worst / 2 * 72 * 25)
+        both = (0.7 * 0.25 + 0.3 * worst / 2) * 72 * 25
+        assert made.gain_m2(risk / 2, OBJECTIVES["both"]) == pytest.approx(both)
 
     def test_it_is_no_worse_than_what_it_knows(self) -> None:
         risk = np.random.default_rng(1).uniform(0, 1, (ROWS, COLUMNS))
         made = mission(risk, ends_s=60, helpers=2)
         known = ((Leg(3, 1, 5), Leg(6, 0, 4, up=False)), (Leg(4, 2, 9, across=True),))
         best = best_schedule(made, upper_bound(made), 0.05, 1, [known])
-        assert best.removed_m2 >= best.started_m2 >= Simulator(made).removed_m2(known) > 0
+        assert best.gain_m2 >= best.started_m2 >= Simulator(made).removed_m2(known) > 0
 
     @pytest.mark.parametrize("across", [False, True])
     def test_lanes_cover_the_area_once(self, across: bool) -> None:

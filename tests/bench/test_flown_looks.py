@@ -180,6 +180,10 @@ class TestAFlownMission:
         assert none == 0
         assert 0 < greedy <= row.best_m2 <= row.bound_m2 < row.there_m2
         assert 0 < across <= row.best_m2
+        survey, left = row.worst30["survey"], row.worst30["greedy"]
+        assert survey is not None
+        assert left is not None
+        assert row.worst30["none"] == survey > left > (row.left["greedy"] or 1.0)
 
     def test_a_search_that_knows_it_begins_with_it(self) -> None:
         row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 0.3)
@@ -226,6 +230,7 @@ class TestARow:
         legs=1,
         removed_m2={"plan": 50.0, "none": None},
         measured_m2={"plan": 51.0, "none": None},
+        worst30={"survey": 0.9, "schedule": 0.5, "plan": 0.6, "none": None},
         search_s=1.0,
     )
 
@@ -240,7 +245,9 @@ class TestARow:
         assert ratios["best_to_bound"]["mean"] == pytest.approx(7 / 8)
 
     def test_what_is_left_by_hand(self) -> None:
-        assert self.ROW.left == {"survey": 0.5, "bound": 0.1, "best": 0.2, "plan": 0.25, "none": None}
+        assert self.ROW.left == {
+            "survey": 0.5, "schedule": 0.2, "bound": 0.1, "best": 0.2, "plan": 0.25, "none": None
+        }  # fmt: skip
 
     def test_what_contradicts_itself_is_told(self) -> None:
         told = r"seed 3: plan removes 80\.1 m2, and the bound must be at least that, not 80\.0 m2"
