@@ -186,7 +186,7 @@ def test_the_digest_is_the_same_on_a_busy_machine(tmp_path: Path, digest: str) -
 
 # Of these no more than the first strips' second looks, by this time: all of it takes long over Zenoh.
 UNTIL_S = {
-    "wide": 700,
+    "wide": 320,
     "five-helpers": 1000,
     "two-helpers": 1500,
     "turns": 2000,
