@@ -22,6 +22,8 @@ MARGIN_S = 10.0
 """Nothing is begun that leaves less beside the reserve: words that are lost, and asked for again, take their time."""
 ARRIVALS = 16
 """Headings of arrival that are compared where a way home leads round ground to keep out of, beside the direct one."""
+DETOUR = 3.0
+"""A way past zones is never so many times as long as is expected of it, circles that its turns add included."""
 _FULL_TURN_RAD = 2 * math.pi
 _ROUNDING_RAD = 1e-7
 
@@ -65,6 +67,15 @@ class WayHome:
         further_m[~np.isfinite(further_m)] = 0.0
         times_s: FloatArray = time_s + further_m / self.sailing.slowest_mps
         return times_s
+
+    def is_well_within(self, pose: Pose, time_s: float) -> bool:
+        """Whether it takes so much less than a time, by what is known without looking for the way past the zones, that
+        nobody need look for it. Without zones False: looking takes no longer."""
+        if not self.keep_out:
+            return False
+        about_s = float(self.times_s(np.array([pose], dtype=np.float64))[0])
+        circle_s = _FULL_TURN_RAD * self.turn_radius_m / self.sailing.slowest_mps
+        return DETOUR * (about_s + DETOUR * circle_s) < time_s
 
     def passes_within(self, pose: Pose, passes: Sequence[Pass], time_s: float) -> int:
         """How many passes, the first ones, can be flown in their order from a pose so that there is time to come home
