@@ -109,8 +109,10 @@ class WayHome:
             time_s = np.where(to_port, *lengths_m[::-1]) / self.sailing.speed_mps
         else:
             turn_rad, straight_m = np.where(to_port, *turns_rad[::-1]), np.where(to_port, *straights_m[::-1])
-            time_s = self.sailing.turns_s(self.turn_radius_m, heading_rad, turn_rad)
-            time_s += straight_m / self.sailing.made_good_mps(arrival_rad)
+            time_s = self.sailing.turns_s(self.turn_radius_m, poses, turn_rad)
+            turned_x_m = self.home[0] - straight_m * np.sin(arrival_rad)
+            turned_y_m = self.home[1] - straight_m * np.cos(arrival_rad)
+            time_s += self.sailing.straights_s(straight_m, np.stack([turned_x_m, turned_y_m, arrival_rad], axis=-1))
         there = np.hypot(self.home[0] - x_m, self.home[1] - y_m) <= THERE_M
         return np.where(there, 0.0, time_s), arrival_rad
 

@@ -44,7 +44,7 @@ class Endurance:
         """How long the run-out of a pass takes where that counts, as the vehicle must come home; else 0."""
         if self.homing is None:
             return 0
-        return round(self.homing.way.sailing.straight_s(run_in_m, one.end.heading_rad) * 1000)
+        return round(self.homing.way.sailing.straight_s(run_in_m, one.end) * 1000)
 
     def lasts_from(self, pose: Pose, at_ms: int, margin_ms: int = 0) -> bool:
         """Whether the vehicle comes home with its reserve, and a margin, from a pose in which it is at a time."""

@@ -98,7 +98,7 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     # The last track's run-out comes after its end.
     start, keep_out = _start(vehicle), keep_out_of(scenario)
     homeward, end = way_home_of(vehicle, scenario.current, keep_out), passes[-1].end if passes else start
-    run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end.heading_rad)
+    run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end)
     home_s = run_out_s + homeward.from_pose(end)[0]
     lasts_for = homeward.passes_within(start, passes, vehicle.endurance_s - vehicle.kept_s - MARGIN_S)
     uncovered_share = float(missed.sum() / max(1, inside.sum()))

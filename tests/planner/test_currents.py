@@ -19,17 +19,20 @@ from planner.ways import shortest_way
 NORTH, EAST, SOUTH, WEST = (quarter * math.pi / 2 for quarter in range(4))
 # 2.5 m/s through water that flows east at 1.5 m/s: 4 with it, 1 against it, and 2 across it, as 2^2 + 1.5^2 = 2.5^2.
 EASTWARD = Sailing(2.5, 1.5, EAST)
+ZERO = np.array(0.0)
 
 
 @pytest.mark.parametrize(("course_rad", "mps"), [(EAST, 4.0), (WEST, 1.0), (NORTH, 2.0), (SOUTH, 2.0)])
 def test_a_leg_of_100_m(course_rad: float, mps: float) -> None:
-    assert EASTWARD.straight_s(100, course_rad) == pytest.approx(100 / mps)
+    assert EASTWARD.straight_s(100, Pose(0, 0, course_rad)) == pytest.approx(100 / mps)
     assert made_good_mps(course_rad, 2.5, Current(1.5, EAST).flow_mps(0)) == pytest.approx(mps)
 
 
 def test_a_tide_is_reckoned_with_as_it_runs_against() -> None:
     tidal = Sailing(2.5, 1.5, EAST, tidal=True)
-    assert [tidal.straight_s(100, course_rad) for course_rad in (EAST, WEST)] == pytest.approx([100.0, 100.0])
+    assert [tidal.straight_s(100, Pose(0, 0, course_rad)) for course_rad in (EAST, WEST)] == pytest.approx(
+        [100.0, 100.0]
+    )
 
 
 def test_still_water_takes_the_length_over_the_speed() -> None:
@@ -40,7 +43,7 @@ def test_still_water_takes_the_length_over_the_speed() -> None:
 def test_a_whole_circle_takes_as_long_as_its_steps() -> None:
     steps = np.linspace(0, 2 * math.pi, 200_001)
     headings = (steps[1:] + steps[:-1]) / 2
-    took_s = float((10 * np.diff(steps) / EASTWARD.made_good_mps(headings)).sum())
+    took_s = float((10 * np.diff(steps) / EASTWARD.made_good_mps(headings, ZERO, ZERO)).sum())
     circle = DubinsPath(Pose(0, 0, NORTH), 10, (1, 0, 0), (20 * math.pi, 0, 0))
     assert EASTWARD.path_s(circle) == pytest.approx(took_s, rel=2e-3)
     assert took_s > 20 * math.pi / 2.5
@@ -49,7 +52,7 @@ def test_a_whole_circle_takes_as_long_as_its_steps() -> None:
 def test_a_turn_and_a_straight_follow_each_other() -> None:
     # A quarter to starboard, from north to east, and 40 m with the stream.
     path = DubinsPath(Pose(0, 0, NORTH), 10, (1, 0, 0), (5 * math.pi, 40, 0))
-    turn_s = float(EASTWARD.turns_s(10, np.array(NORTH), np.array(math.pi / 2)))
+    turn_s = float(EASTWARD.turns_s(10, np.array([0, 0, NORTH]), np.array(math.pi / 2)))
     assert 5 * math.pi / 4 < turn_s < 5 * math.pi / 2
     assert EASTWARD.path_s(path) == pytest.approx(turn_s + 10)
     times_s, lengths_m = EASTWARD.knots([path])
@@ -78,7 +81,7 @@ def test_what_is_made_good_less_the_flow_is_what_is_swum(
     swum_mps = math.hypot(mps * math.sin(course_rad) - flow_mps[0], mps * math.cos(course_rad) - flow_mps[1])
     assert mps > 0
     assert swum_mps == pytest.approx(speed_mps)
-    reckoned = Sailing(speed_mps, share * speed_mps, set_rad).made_good_mps(np.array(course_rad))
+    reckoned = Sailing(speed_mps, share * speed_mps, set_rad).made_good_mps(np.array(course_rad), ZERO, ZERO)
     assert float(reckoned) == pytest.approx(mps)
 
 
