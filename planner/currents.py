@@ -4,9 +4,11 @@ the ground what the stream leaves it."""
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
+from typing import TypeVar
 
 import numpy as np
 
@@ -52,39 +54,68 @@ class FlowGrid:
 
     def flow_mps(self, time_s: float, place: Point) -> Flow:
         """The flow at a time and a place."""
-        step, share = _between(self.time_s, np.array(time_s))
-        flows = self._at(np.array(place[0]), np.array(place[1]), slice(int(step), int(step) + 2))
-        (east_mps, north_mps) = (float(one[0] + share * (one[-1] - one[0])) for one in flows)
-        return east_mps, north_mps
+        axes, nodes = self._listed
+        (at, share), (row, share_y), (column, share_x) = map(_node, axes, (time_s, place[1], place[0]))
 
-    def flows_mps(self, x_m: FloatArray, y_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The flows at places, at each of the times; shape (times, ...)."""
-        return self._at(x_m, y_m, slice(None))
-
-    def _at(self, x_m: FloatArray, y_m: FloatArray, times: slice) -> tuple[FloatArray, FloatArray]:
-        column, share_x = _between(self.x_m, x_m)
-        row, share_y = _between(self.y_m, y_m)
-        next_column, next_row = np.minimum(column + 1, self.x_m.size - 1), np.minimum(row + 1, self.y_m.size - 1)
-
-        def at(values: FloatArray) -> FloatArray:
-            values = values[times]
+        def then(time: int, part: int) -> float:
             south, north = (
-                values[:, one, column] + share_x * (values[:, one, next_column] - values[:, one, column])
-                for one in (row, next_row)
+                _mixed(
+                    nodes[time][one][column][part], nodes[time][one][min(column + 1, len(axes[2]) - 1)][part], share_x
+                )
+                for one in (row, min(row + 1, len(axes[1]) - 1))
             )
-            found: FloatArray = south + share_y * (north - south)
-            return found
+            return _mixed(south, north, share_y)
 
-        return at(self.east_mps), at(self.north_mps)
+        after = min(at + 1, len(axes[0]) - 1)
+        return _mixed(then(at, 0), then(after, 0), share), _mixed(then(at, 1), then(after, 1), share)
+
+    @cached_property
+    def _listed(self) -> tuple[tuple[list[float], ...], list[list[list[list[float]]]]]:
+        """Times, rows and columns, and the flow at each: one at a time lists are faster."""
+        axes = self.time_s.tolist(), self.y_m.tolist(), self.x_m.tolist()
+        return axes, np.stack([self.east_mps, self.north_mps], axis=-1).tolist()
+
+    def flows_mps(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """The flows at places, at each of the times: to the east, then to the north; shape (2, times, ...)."""
+        column, share_x = _nodes(self.x_m, x_m)
+        row, share_y = _nodes(self.y_m, y_m)
+        next_column = np.minimum(column + 1, self.x_m.size - 1)
+        south, north = (
+            _mixed(self._flows[:, :, one, column], self._flows[:, :, one, next_column], share_x)
+            for one in (row, np.minimum(row + 1, self.y_m.size - 1))
+        )
+        return _mixed(south, north, share_y)
+
+    @cached_property
+    def _flows(self) -> FloatArray:
+        return np.stack([self.east_mps, self.north_mps])
 
 
-def _between(nodes: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray]:
-    """Of each of some values the node before it, and how far it is on the way to the next, [0, 1]."""
-    if nodes.size == 1:
+Value = TypeVar("Value", float, FloatArray)
+
+
+def _mixed(one: Value, other: Value, share: Value) -> Value:
+    """On the way from one to another, of two that are alike exactly the one."""
+    return one + share * (other - one)
+
+
+def _node(axis: list[float], at: float) -> tuple[int, float]:
+    """The node before a place on an axis, and how far it is on the way to the next, [0, 1]."""
+    if at <= axis[0] or len(axis) == 1:
+        return 0, 0.0
+    if at >= axis[-1]:
+        return len(axis) - 1, 0.0
+    before = bisect_right(axis, at) - 1
+    return before, (at - axis[before]) / (axis[before + 1] - axis[before])
+
+
+def _nodes(axis: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray]:
+    """The same of many places."""
+    if axis.size == 1:
         return np.zeros(np.shape(at), dtype=np.intp), np.zeros(np.shape(at))
-    inside = np.clip(at, nodes[0], nodes[-1])
-    before = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, nodes.size - 2)
-    return before, (inside - nodes[before]) / (nodes[before + 1] - nodes[before])
+    inside = np.minimum(np.maximum(at, axis[0]), axis[-1])
+    before = np.minimum(np.searchsorted(axis, inside, side="right") - 1, axis.size - 2)
+    return before, (inside - axis[before]) / (axis[before + 1] - axis[before])
 
 
 @dataclass(frozen=True)
