@@ -35,6 +35,9 @@ pictures: .venv/.test-ready
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run headland --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 4995 --out docs/headland.png
+	@rm -rf runs/pictures
+	@$(BIN)/secondlook run harbour --out runs/pictures
+	@$(BIN)/secondlook picture runs/pictures --time 900 --out docs/harbour.png
 
 # The pages that are made from the program, and of all pages the site: site/index.html.
 docs: .venv/.test-ready

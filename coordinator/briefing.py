@@ -101,7 +101,7 @@ class Briefing:
             swath_m=sees.reach.strip_width_m,
             beside_m=sees.reach.beside_m,
             lead_m=sees.lead_m,
-            way_home=way_home_of(entry, vehicle.keep_out),
+            way_home=way_home_of(entry, vehicle.keep_out, vehicle.flows),
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
             sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,

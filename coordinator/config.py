@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from coordinator.allocate.situation import Allocator
+from planner.currents import FlowGrid
 from planner.region import Region
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 
@@ -36,7 +37,8 @@ class CoordinatorConfig:
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
     `across`: whether strips may run across the tracks, too.
     `priorities`: ground whose residual risk counts more, or less.
-    `separation_m`: how near to each other vehicles may come, 0 for as near as it happens."""
+    `separation_m`: how near to each other vehicles may come, 0 for as near as it happens.
+    `flows`: of the water, where they are not alike everywhere."""
 
     allocator: Allocator
     deadline_factor: float
@@ -51,3 +53,4 @@ class CoordinatorConfig:
     across: bool = True
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
     priorities: tuple[PriorityGround, ...] = ()
+    flows: FlowGrid | None = None

@@ -23,6 +23,7 @@ from coordinator.outbox import Outbox
 from coordinator.strip_cutting import StripCutting
 from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
+from planner.flyable import reachable_cells
 from planner.footprints import footprint_of
 from planner.region import Region
 
@@ -89,13 +90,17 @@ class Coordinator:
 
     def _begin(self, run: RunInfo, now_ms: int) -> None:
         config, agenda, outbox = self.config, self._agenda, self._outbox
-        inside = Region(run.outline, run.hole_outlines, run.keep_out_outlines).inside(run.grid.spec)
-        self.fleet = fleet = KnownFleet(run, config.lost_after_ms, now_ms)
+        region = Region(run.outline, run.hole_outlines, run.keep_out_outlines)
+        inside = region.inside(run.grid.spec)
+        self.fleet = fleet = KnownFleet(run, config.lost_after_ms, now_ms, config.flows)
         ledger = Ledger(self._first_number)
         helpers = [one.entry for one in fleet.helpers]
+        # Where none of them comes to from its home no second look goes.
+        homes = [(one.home_x_m, one.home_y_m) for one in helpers]
+        in_reach = reachable_cells(homes, region, run.grid.spec, fleet.keep_out)
         narrowest = min(helpers, key=lambda one: footprint_of(one.sonar).reach.strip_width_m, default=None)
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
-        expected = ExpectedMap(fleet, inside, p_detect)
+        expected = ExpectedMap(fleet, in_reach, p_detect)
         self._strips = strips = StripLife(ledger, fleet, inside, expected, agenda, outbox)
         self._end = MissionEnd(config, fleet, strips, agenda, outbox)
         if narrowest is not None:
@@ -104,7 +109,7 @@ class Coordinator:
             if config.strips == "beforehand":
                 self._fixed = Beforehand(self._cutting, self._briefing, fleet, strips)
             elif config.strips != "reacting":
-                self._fixed = Lanes(inside, fleet, strips, across=config.strips == "lanes_across")
+                self._fixed = Lanes(in_reach, fleet, strips, across=config.strips == "lanes_across")
         allocator = config.allocator if self._fixed is None else self._fixed.routes
         self._dispatch = Dispatch(config, allocator, fleet, inside, strips, agenda, outbox)
         self.has_begun = True

@@ -12,6 +12,7 @@ from comms.said.announcement import RunInfo
 from comms.said.messages import CoverageTile
 from coordinator.cut.window import Window
 from coordinator.vehicles import KnownVehicle
+from planner.currents import FlowGrid
 from planner.fleet_map import FleetMap
 from planner.keep_out import KeepOut
 from planner.risk import LevelArray
@@ -26,15 +27,15 @@ it. One that stands still may hear nothing, and then never surveys, though it sa
 class KnownFleet:
     """The fleet that the run's announcement names: `vehicles`, by name, and of these the `primaries`, which survey.
 
-    `keep_out`: what none may enter. `map`: the tiles of all, joined. `lost_after_ms`: age of a vehicle's state from
-    which it counts as lost.
+    `keep_out`: what none may enter. `flows`: of the water, where they are not alike everywhere. `map`: the tiles of
+    all, joined. `lost_after_ms`: age of a vehicle's state from which it counts as lost.
     """
 
-    def __init__(self, run: RunInfo, lost_after_ms: int, now_ms: int) -> None:
+    def __init__(self, run: RunInfo, lost_after_ms: int, now_ms: int, flows: FlowGrid | None = None) -> None:
         self.map = FleetMap(run.grid.spec, run.rho)
         self.keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
         self.vehicles = {
-            one.vehicle: KnownVehicle(one, heard_ms=now_ms, stirred_ms=now_ms, keep_out=self.keep_out)
+            one.vehicle: KnownVehicle(one, heard_ms=now_ms, stirred_ms=now_ms, keep_out=self.keep_out, flows=flows)
             for one in run.vehicles
         }
         self.primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}

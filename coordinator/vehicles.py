@@ -15,7 +15,7 @@ from coordinator.arrivals import Arrivals
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.ledger import StripRecord
-from planner.currents import Sailing
+from planner.currents import FlowGrid, Sailing
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
@@ -28,7 +28,12 @@ log = logging.getLogger("secondlook.coordinator")
 
 
 def expected_end_ms(
-    entry: RosterVehicle, state: AgentState | None, plan: Plan | None, heard_ms: int, keep_out: KeepOut = NOWHERE
+    entry: RosterVehicle,
+    state: AgentState | None,
+    plan: Plan | None,
+    heard_ms: int,
+    keep_out: KeepOut = NOWHERE,
+    flows: FlowGrid | None = None,
 ) -> int | None:
     """Milliseconds since the mission's start; None where that cannot be told.
 
@@ -40,36 +45,37 @@ def expected_end_ms(
         return None
     if state.mode is Mode.RETURNING:
         return max(heard_ms, state.expected_end_ms)
-    ahead = [track for track in plan.tracks if not track.flown]
+    ahead, sailing = [track for track in plan.tracks if not track.flown], sailing_of(entry, flows)
     at_ms, pose = heard_ms, Pose(state.x_m, state.y_m, state.heading_rad)
     if ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         at_ms = max(at_ms, state.expected_end_ms)
         pose = pass_of(ahead[0], entry).end
         ahead = ahead[1:]
-        run_out_s = sailing_of(entry).straight_s(entry.run_in_m, pose.heading_rad)
+        run_out_s = sailing.straight_s(entry.run_in_m, pose)
         at_ms += round(run_out_s * 1000) if ahead else 0
     if not ahead:
         return at_ms
     passes = [pass_of(track, entry) for track in ahead]
     # The last track's run-out comes after its end.
-    sailing = sailing_of(entry)
     if sailing.is_in_still_water:
         way_m = distance_over(pose, passes, entry.turn_radius_m, keep_out)
         takes_s = (way_m - entry.run_in_m) / entry.speed_mps
     else:
         takes_s = sailing.passes_s(passes, entry.turn_radius_m, pose, keep_out)
-        takes_s -= sailing.straight_s(entry.run_in_m, passes[-1].end.heading_rad)
+        takes_s -= sailing.straight_s(entry.run_in_m, passes[-1].end)
     return at_ms + round(takes_s * 1000)
 
 
-def sailing_of(entry: RosterVehicle) -> Sailing:
-    """What a vehicle makes good, as it is reckoned with."""
-    return Sailing(entry.speed_mps, entry.drift_mps, entry.set_rad, tidal=entry.is_tidal)
+def sailing_of(entry: RosterVehicle, flows: FlowGrid | None = None) -> Sailing:
+    """What a vehicle makes good, as it is reckoned with. `flows`: of the water, where they are not alike everywhere;
+    they count where the current does."""
+    flows = flows if entry.drift_mps else None
+    return Sailing(entry.speed_mps, entry.drift_mps, entry.set_rad, tidal=entry.is_tidal, grid=flows)
 
 
-def way_home_of(entry: RosterVehicle, keep_out: KeepOut = NOWHERE) -> WayHome:
+def way_home_of(entry: RosterVehicle, keep_out: KeepOut = NOWHERE, flows: FlowGrid | None = None) -> WayHome:
     """A vehicle's way home, as it is reckoned with."""
-    return WayHome((entry.home_x_m, entry.home_y_m), sailing_of(entry), entry.turn_radius_m, keep_out)
+    return WayHome((entry.home_x_m, entry.home_y_m), sailing_of(entry, flows), entry.turn_radius_m, keep_out)
 
 
 def pass_of(track: PlannedTrack, entry: RosterVehicle) -> Pass:
@@ -116,7 +122,7 @@ class KnownVehicle:
     strip. `asked_back`: the strip that it was last asked to give back, 0 for none. `failures`: strips in a row that it
     has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and
     `curves`: P(y) by track, 0 for that of earlier missions, for a primary. `arrivals`: what has come of its tiles and
-    hotspots. `keep_out`: what it may not enter.
+    hotspots. `keep_out`: what it may not enter. `flows`: of the water, where they are not alike everywhere.
     """
 
     entry: RosterVehicle
@@ -137,11 +143,17 @@ class KnownVehicle:
     stirred_ms: int = 0
     ended_early: bool = False
     keep_out: KeepOut = NOWHERE
+    flows: FlowGrid | None = None
     _plan_order: Order = _NONE_YET
     _curve_orders: dict[int, Order] = field(default_factory=dict)
     _surveyed_in: int | None = None
     _state_order: Order = _NONE_YET
     _task_orders: dict[int, Order] = field(default_factory=dict)
+
+    @property
+    def sailing(self) -> Sailing:
+        """What it makes good, as it is reckoned with."""
+        return sailing_of(self.entry, self.flows)
 
     @property
     def is_idle(self) -> bool:
@@ -258,7 +270,7 @@ class KnownVehicle:
         """When a primary has surveyed all, or is expected to have; None where nobody can tell."""
         if self.finished_ms is not None:
             return self.finished_ms
-        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms, self.keep_out)
+        return expected_end_ms(self.entry, self.state, self.plan, self.heard_ms, self.keep_out, self.flows)
 
     def tells_news_of(self, strip: int, header: Header) -> bool:
         """Whether a message about a strip is newer than all that it has told of it; notes it."""

@@ -26,6 +26,7 @@ from secondlook.scenario import (
     Coordinator,
     Current,
     Curve,
+    GridCurrent,
     Home,
     Mission,
     Origin,
@@ -39,6 +40,7 @@ from secondlook.scenario import (
     UniformSeabed,
 )
 from secondlook.scenario.area import Priority
+from secondlook.scenario.current import CurrentFromFile
 from secondlook.scenario.degrees import AreaInDegrees, OriginInUtm, PlaceInDegrees, PriorityInDegrees
 from secondlook.scenario.sensor import SENSORS, SensorBase
 from secondlook.scenario.vehicle import VehicleBase
@@ -63,7 +65,8 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("Origin", "`origin`", (Origin, OriginInUtm)),
     ("Mission", "`mission`", (Mission,)),
     ("Seabed", "`seabed`", (UniformSeabed, PatchySeabed)),
-    ("Current", "`current`", (Current,)),
+    ("Current", "`current`", (Current, CurrentFromFile)),
+    ("Current on a grid", "`current`", (GridCurrent,)),
     ("Targets", "`targets`", (Targets,)),
     ("Every vehicle", "`vehicles.ID`", (SurveyVehicle, RevisitVehicle)),
     ("Vehicles that survey", "`vehicles.ID`", (SurveyVehicle,)),

@@ -11,9 +11,10 @@ import shapely
 from shapely.geometry.base import BaseGeometry
 
 from planner.dubins import Pose
-from planner.keep_out import KeepOut
+from planner.keep_out import TOUCHES_M, KeepOut
+from planner.region import ON_BOUNDARY_M, Region
 from planner.sweep import pass_over, shifted
-from planner.types import BoolArray, Point, Track
+from planner.types import BoolArray, GridSpec, Point, Track
 
 SHORTEST_PIECE_M = 20.0
 """A piece of a track that is shorter is not worth its turns."""
@@ -72,12 +73,22 @@ def reachable(place: Point, ground: BaseGeometry, keep_out: KeepOut) -> BaseGeom
     if not keep_out:
         return ground
     about = shapely.box(*shapely.union_all([ground, keep_out.ground, shapely.Point(place)]).bounds).buffer(AROUND_M)
-    waters = [
-        part for part in shapely.get_parts(about.difference(keep_out.ground)) if part.covers(shapely.Point(place))
-    ]
+    here = shapely.Point(place)
+    waters = [part for part in shapely.get_parts(about.difference(keep_out.ground)) if part.dwithin(here, TOUCHES_M)]
     # What lies in the margin is seen from where one can come.
     near = shapely.union_all(waters).buffer(2 * keep_out.margin_m).difference(keep_out.true_ground)
     return ground.intersection(near)
+
+
+def reachable_cells(places: Iterable[Point], region: Region, grid: GridSpec, keep_out: KeepOut) -> BoolArray:
+    """The region's cells that `reachable` finds from at least one of some places, shape of the grid."""
+    cells = region.inside(grid)
+    if keep_out:
+        ground = shapely.union_all([reachable(place, region.polygon, keep_out) for place in places])
+        rows, columns = np.nonzero(cells)
+        x_m, y_m = grid.frame.to_mission(grid.across_m[columns], grid.along_m[rows])
+        cells[rows, columns] = shapely.intersects_xy(ground.buffer(ON_BOUNDARY_M), x_m, y_m)
+    return cells
 
 
 def _runs(values: BoolArray) -> list[tuple[int, int]]:

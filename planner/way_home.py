@@ -22,6 +22,8 @@ MARGIN_S = 10.0
 """Nothing is begun that leaves less beside the reserve: words that are lost, and asked for again, take their time."""
 ARRIVALS = 16
 """Headings of arrival that are compared where a way home leads round ground to keep out of, beside the direct one."""
+DETOUR = 3.0
+"""A way past zones is never so many times as long as is expected of it, circles that its turns add included."""
 _FULL_TURN_RAD = 2 * math.pi
 _ROUNDING_RAD = 1e-7
 
@@ -66,6 +68,15 @@ class WayHome:
         times_s: FloatArray = time_s + further_m / self.sailing.slowest_mps
         return times_s
 
+    def is_well_within(self, pose: Pose, time_s: float) -> bool:
+        """Whether it takes so much less than a time, by what is known without looking for the way past the zones, that
+        nobody need look for it. Without zones False: looking takes no longer."""
+        if not self.keep_out:
+            return False
+        about_s = float(self.times_s(np.array([pose], dtype=np.float64))[0])
+        circle_s = _FULL_TURN_RAD * self.turn_radius_m / self.sailing.slowest_mps
+        return DETOUR * (about_s + DETOUR * circle_s) < time_s
+
     def passes_within(self, pose: Pose, passes: Sequence[Pass], time_s: float) -> int:
         """How many passes, the first ones, can be flown in their order from a pose so that there is time to come home
         before `time_s` have passed."""
@@ -98,8 +109,10 @@ class WayHome:
             time_s = np.where(to_port, *lengths_m[::-1]) / self.sailing.speed_mps
         else:
             turn_rad, straight_m = np.where(to_port, *turns_rad[::-1]), np.where(to_port, *straights_m[::-1])
-            time_s = self.sailing.turns_s(self.turn_radius_m, heading_rad, turn_rad)
-            time_s += straight_m / self.sailing.made_good_mps(arrival_rad)
+            time_s = self.sailing.turns_s(self.turn_radius_m, poses, turn_rad)
+            turned_x_m = self.home[0] - straight_m * np.sin(arrival_rad)
+            turned_y_m = self.home[1] - straight_m * np.cos(arrival_rad)
+            time_s += self.sailing.straights_s(straight_m, np.stack([turned_x_m, turned_y_m, arrival_rad], axis=-1))
         there = np.hypot(self.home[0] - x_m, self.home[1] - y_m) <= THERE_M
         return np.where(there, 0.0, time_s), arrival_rad
 

@@ -10,9 +10,11 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
 from PIL import Image
 
 from comms.said.announcement import RunInfo
@@ -27,6 +29,8 @@ from secondlook.report.charts import risk_series
 
 UNSEEN = (0.62, 0.64, 0.67)
 OPEN: dict[str, Any] = {"color": "black", "linewidth": 0.9, "linestyle": "dotted"}
+KEEP_OUT: dict[str, Any] = {"facecolor": "0.9", "edgecolor": "0.45", "hatch": "///", "linewidth": 0.8}
+PRIORITY: dict[str, Any] = {"color": "deeppink", "linewidth": 1.2, "linestyle": "dashed"}
 WITH_A_VEHICLE: dict[str, Any] = {"color": "black", "linewidth": 1.8, "linestyle": "solid"}
 ENDED = (StripState.DONE, StripState.WITHDRAWN, StripState.FAILED)
 MARGIN = 0.02  # around what is drawn, as a share of the longer side
@@ -89,6 +93,10 @@ class MissionPicture:
         cells: QuadMesh = axes.pcolormesh(x_m, y_m, _shown(risk), cmap=colours, vmin=0, vmax=1, rasterized=True)
         for outline in (run.outline, *run.hole_outlines):
             axes.plot(*np.array([*outline, outline[0]]).T, color="0.2", linewidth=1)
+        for zone in self._mission.keep_out:
+            axes.add_patch(Polygon(np.array(zone.exterior.coords), **KEEP_OUT))
+        for outline in (one for priority in self._mission.priorities for one in priority.outlines_m):
+            axes.plot(*np.array([*outline, outline[0]]).T, **PRIORITY)
         self._figure.colorbar(
             cells, ax=axes, label="residual risk (grey: not seen)", orientation="horizontal", shrink=0.6
         )
@@ -100,11 +108,7 @@ class MissionPicture:
         axes.set_xlabel("east, m")
         axes.set_ylabel("north, m")
         axes.legend(
-            handles=[
-                *(Line2D([], [], color=colour, marker="o", label=name) for name, colour in self._colours.items()),
-                Line2D([], [], label="strip, open", **OPEN),
-                Line2D([], [], label="strip, with a vehicle", **WITH_A_VEHICLE),
-            ],
+            handles=self._explained(),
             loc="upper left",
             bbox_to_anchor=(0, -0.12),
             ncols=5,
@@ -120,6 +124,16 @@ class MissionPicture:
         self._risk.grid(alpha=0.3)
         self._risk.legend(frameon=False, loc="lower left")
         return cells
+
+    def _explained(self) -> list[Artist]:
+        """What the legend tells."""
+        return [
+            *(Line2D([], [], color=colour, marker="o", label=name) for name, colour in self._colours.items()),
+            Line2D([], [], label="strip, open", **OPEN),
+            Line2D([], [], label="strip, with a vehicle", **WITH_A_VEHICLE),
+            *([Patch(label="no vehicle may enter", **KEEP_OUT)] if self._mission.keep_out else []),
+            *([Line2D([], [], label="priority", **PRIORITY)] if self._mission.priorities else []),
+        ]
 
     def _strips(self, t_s: float) -> Iterator[Line2D]:
         for strip in self._mission.strips:

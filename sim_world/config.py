@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from comms.said.wire import IDENTIFIER
+from planner.currents import FlowGrid
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.footprints import FOOTPRINTS
@@ -154,12 +155,14 @@ class SettlingConfig:
 @dataclass(frozen=True)
 class CurrentConfig:
     """A current towards the compass heading `set_rad`. With `period_s` it flows to and fro, at `drift_mps` at most.
-    `over_ground`: vehicles keep their speed over the ground; else that through the water."""
+    `over_ground`: vehicles keep their speed over the ground; else that through the water. With a `grid` it flows as
+    that tells, at `drift_mps` at most."""
 
     drift_mps: float
     set_rad: float
     period_s: float | None = None
     over_ground: bool = False
+    grid: FlowGrid | None = None
 
     def __post_init__(self) -> None:
         _require(0.0 <= self.drift_mps <= 100.0, "drift_mps", self.drift_mps, "0 to 100")

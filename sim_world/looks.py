@@ -173,12 +173,18 @@ class Looks:
     ) -> FloatArray:
         range_m, bearing_rad = swath.range_m(along_m, lateral_m), swath.bearing_rad(along_m, lateral_m)
         sees: BoolArray | None = None
+        ahead_m = swath.first_along_m + min(swath.bins, self._config.sensor.bins_per_look) * swath.along_bin_m
+        place = (
+            swath.origin_x_m + ahead_m * math.sin(swath.heading_rad),
+            swath.origin_y_m + ahead_m * math.cos(swath.heading_rad),
+        )
         if self._steadiness.shears_looks:
-            crab_rad = self._steadiness.crab_rad(swath.heading_rad, time_s)
+            crab_rad = self._steadiness.crab_rad(swath.heading_rad, time_s, place)
             track_m = math.hypot(maneuver.end_x_m - maneuver.start_x_m, maneuver.end_y_m - maneuver.start_y_m)
             range_m, bearing_rad, sees = swath.askew(along_m, lateral_m, crab_rad, track_m)
         p_detect = self._sonar.p_detect(range_m, bearing_rad, self._config.altitude_m, position_m, time_s)
-        left = self._steadiness.factor(maneuver.run_in_m + swath.seen_from_m(along_m), swath.heading_rad, time_s)
+        straight_m = maneuver.run_in_m + swath.seen_from_m(along_m)
+        left = self._steadiness.factor(straight_m, swath.heading_rad, time_s, place)
         return p_detect * left if sees is None else np.where(sees, p_detect * left, 0.0)
 
     def _stream(self, name: str, number: int) -> np.random.Generator:

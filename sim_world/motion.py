@@ -171,9 +171,9 @@ class CarriedPath(Path):
 
     def made_good_mps(self, distance_m: float, time_s: float) -> float:
         """The speed over the ground at a distance from the start, so long after it."""
-        course_rad = self.pose_after(distance_m).heading_rad
-        flow_mps = self._current.flow_mps(self.start_ms / 1000.0 + time_s)
-        return made_good_mps(course_rad, self.speed_mps, flow_mps)
+        pose = self.pose_after(distance_m)
+        flow_mps = self._current.flow_mps(self.start_ms / 1000.0 + time_s, pose[:2])
+        return made_good_mps(pose.heading_rad, self.speed_mps, flow_mps)
 
     def _go_on(self) -> None:
         """A step more, at the speed in its middle."""

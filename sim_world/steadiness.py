@@ -9,7 +9,7 @@ import numpy as np
 
 from comms.node import random_stream
 from planner.currents import Current, Flow, along_and_across_mps
-from planner.types import FloatArray
+from planner.types import FloatArray, Point
 from sim_world.config import CurrentConfig, VehicleConfig
 
 CRAB_STEEPNESS = 4
@@ -35,6 +35,8 @@ def make_current(config: CurrentConfig | None, seed: int) -> Stream:
     """The current of a world; when one that flows to and fro is slack is drawn."""
     if config is None:
         return STILL_WATER
+    if config.grid is not None:
+        return Stream(config.drift_mps, config.set_rad, grid=config.grid, over_ground=config.over_ground)
     slack_s = random_stream(seed, "world", "current").uniform(0.0, config.period_s or 0.0)
     return Stream(config.drift_mps, config.set_rad, config.period_s, slack_s, over_ground=config.over_ground)
 
@@ -70,18 +72,20 @@ class Steadiness:
         """Whether its swath lies askew to its track."""
         return self._current.carries
 
-    def crab_rad(self, heading_rad: float, time_s: float) -> float:
-        """How far its bow points off a track, to starboard above 0."""
-        flow_mps = self._current.flow_mps(time_s)
+    def crab_rad(self, heading_rad: float, time_s: float, place: Point = (0.0, 0.0)) -> float:
+        """How far its bow points off a track at a place, to starboard above 0."""
+        flow_mps = self._current.flow_mps(time_s, place)
         return crab_rad(heading_rad, self._speed_mps, flow_mps, over_ground=self._current.over_ground)
 
-    def factor(self, straight_m: FloatArray, heading_rad: float, time_s: float) -> FloatArray:
+    def factor(
+        self, straight_m: FloatArray, heading_rad: float, time_s: float, place: Point = (0.0, 0.0)
+    ) -> FloatArray:
         """The share of P_d that is left, [0, 1], shape of `straight_m`: how far the vehicle has gone straight since its
-        last turn, >= 0, on a track along the compass heading `heading_rad`."""
+        last turn, >= 0, on a track along the compass heading `heading_rad`; it is at `place`."""
         left = np.ones_like(straight_m)
         if self._settling is not None:
             left -= self._settling.share * np.maximum(0.0, 1.0 - straight_m / self._settling.length_m)
         if self._half_at_crab_rad is not None:
-            angle_rad = abs(self.crab_rad(heading_rad, time_s))
+            angle_rad = abs(self.crab_rad(heading_rad, time_s, place))
             left /= 1.0 + (angle_rad / self._half_at_crab_rad) ** CRAB_STEEPNESS
         return left

@@ -44,14 +44,15 @@ class Endurance:
         """How long the run-out of a pass takes where that counts, as the vehicle must come home; else 0."""
         if self.homing is None:
             return 0
-        return round(self.homing.way.sailing.straight_s(run_in_m, one.end.heading_rad) * 1000)
+        return round(self.homing.way.sailing.straight_s(run_in_m, one.end) * 1000)
 
     def lasts_from(self, pose: Pose, at_ms: int, margin_ms: int = 0) -> bool:
         """Whether the vehicle comes home with its reserve, and a margin, from a pose in which it is at a time."""
         if self.homing is None:
             return self.left(at_ms) > 0.0
-        home_ms = at_ms + round(self.homing.way.from_pose(pose)[0] * 1000)
-        return home_ms + margin_ms <= self._endurance_ms - self.homing.reserve_ms
+        left_ms = self._endurance_ms - self.homing.reserve_ms - at_ms - margin_ms
+        way = self.homing.way
+        return way.is_well_within(pose, left_ms / 1000) or round(way.from_pose(pose)[0] * 1000) <= left_ms
 
     def lasts_for(self, pose: Pose, passes: Sequence[Pass], now_ms: int) -> int:
         """For how many of some passes it lasts, the first ones, flown in their order from a pose now."""

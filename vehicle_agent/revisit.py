@@ -153,7 +153,7 @@ class SecondLooks:
         config = self.config
         if self._sailing.is_in_still_water:
             return round((way_m + sweep.length_m - config.run_in_m) / config.speed_mps * 1000)
-        run_out_s = self._sailing.straight_s(config.run_in_m, sweep.leave.heading_rad)
+        run_out_s = self._sailing.straight_s(config.run_in_m, sweep.passes[-1].end)
         keep_out = self._agent.keep_out.nearer()
         return round((self._sailing.passes_s(sweep.passes, config.turn_radius_m, pose, keep_out) - run_out_s) * 1000)
 

@@ -58,9 +58,9 @@ def expected_service(one: OpenStrip, helper: Helper) -> Service:
         sonar_on_s = (sweep.length_m - 2 * helper.run_in_m) / helper.speed_mps
     else:
         way = way_or_direct(helper.free_at, sweep.entry, radius_m, helper.keep_out)
-        to_begin_s = helper.sailing.way_s(way) + helper.sailing.straight_s(helper.run_in_m, sweep.entry.heading_rad)
+        to_begin_s = helper.sailing.way_s(way) + helper.sailing.straight_s(helper.run_in_m, sweep.entry)
         sonar_on_s = _sonar_on_s(sweep, helper)
-        run_out_s = helper.sailing.straight_s(helper.run_in_m, sweep.leave.heading_rad)
+        run_out_s = helper.sailing.straight_s(helper.run_in_m, sweep.leave)
     begins_s = helper.free_s + to_begin_s
     ends_s = begins_s + sonar_on_s
     return Service(
@@ -73,8 +73,8 @@ def expected_service(one: OpenStrip, helper: Helper) -> Service:
 
 def _sonar_on_s(sweep: Sweep, helper: Helper) -> float:
     """From the first run-in's end to the last run-out's beginning, in a current."""
-    sailing, headings_rad = helper.sailing, (sweep.entry.heading_rad, sweep.leave.heading_rad)
-    ends_s = sum(sailing.straight_s(helper.run_in_m, heading_rad) for heading_rad in headings_rad)
+    sailing = helper.sailing
+    ends_s = sum(sailing.straight_s(helper.run_in_m, end) for end in (sweep.entry, sweep.leave))
     return sailing.passes_s(sweep.passes, helper.turn_radius_m, keep_out=helper.keep_out) - ends_s
 
 
@@ -111,7 +111,7 @@ class StripTable:
         if not helper.sailing.is_in_still_water:
             on_s = [_sonar_on_s(one, helper) for way in filled for one in way]
             self.sonar_on_s = np.array(on_s, dtype=np.float64).reshape(shape)
-        self.run_out_s = helper.run_in_s(self.leave[:, :, 2])
+        self.run_out_s = helper.run_in_s(self.leave)
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
         self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 
@@ -122,10 +122,11 @@ class StripTable:
         sailing = self.helper.sailing
         if sailing.is_in_still_water:
             return (way_m + self.helper.run_in_m) / self.helper.speed_mps
-        # By the bearing of the entry: what turns make of it is told when it is offered.
+        # By the bearing of the entry and the flow half-way there: what turns make of it is told when it is offered.
         east_m, north_m = (self.entry[:, :, axis] - poses[:, axis, np.newaxis, np.newaxis] for axis in (0, 1))
-        way_s = way_m / sailing.made_good_mps(np.arctan2(east_m, north_m))
-        to_begin_s: FloatArray = way_s + self.helper.run_in_s(self.entry[:, :, 2])
+        x_m, y_m = self.entry[:, :, 0] - east_m / 2, self.entry[:, :, 1] - north_m / 2
+        way_s = way_m / sailing.made_good_mps(np.arctan2(east_m, north_m), x_m, y_m)
+        to_begin_s: FloatArray = way_s + self.helper.run_in_s(self.entry)
         return to_begin_s
 
     def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:

@@ -60,18 +60,19 @@ class Helper:
         """What it makes good over the ground."""
         return Sailing(self.speed_mps) if self.way_home is None else self.way_home.sailing
 
-    def run_in_s(self, headings_rad: FloatArray) -> FloatArray:
-        """How long run-ins and run-outs along headings take, same shape."""
+    def run_in_s(self, poses: FloatArray) -> FloatArray:
+        """How long run-ins that begin in poses take, or run-outs about there; x, y and heading along a last axis of 3,
+        shape without it."""
         if self.sailing.is_in_still_water:
-            return np.full(np.shape(headings_rad), self.run_in_m / self.speed_mps)
-        return self.run_in_m / self.sailing.made_good_mps(headings_rad)
+            return np.full(poses.shape[:-1], self.run_in_m / self.speed_mps)
+        return self.sailing.straights_s(np.full(poses.shape[:-1], self.run_in_m), poses)
 
     def home_s(self, poses: FloatArray) -> FloatArray:
         """How long its battery must last after sweeps: until it is home, where it must come home, from the poses in
         which it leaves them, behind the run-out; shape (n, 3). Shape (n,)."""
         if self.way_home is None:
             return np.zeros(len(poses))
-        return self.way_home.times_s(poses) + self.run_in_s(poses[:, 2])
+        return self.way_home.times_s(poses) + self.run_in_s(poses)
 
 
 @dataclass(frozen=True)

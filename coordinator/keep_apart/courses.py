@@ -12,7 +12,7 @@ import numpy as np
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan
 from coordinator.vehicles import pass_of, sailing_of
-from planner.currents import Sailing
+from planner.currents import FlowGrid, Sailing
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep, shifted
@@ -91,17 +91,26 @@ def lying_still(pose: Pose, from_s: float) -> Course:
 
 
 def survey_course(
-    entry: RosterVehicle, state: AgentState, plan: Plan | None, heard_s: float, keep_out: KeepOut = NOWHERE
+    entry: RosterVehicle,
+    state: AgentState,
+    plan: Plan | None,
+    heard_s: float,
+    keep_out: KeepOut = NOWHERE,
+    flows: FlowGrid | None = None,
 ) -> Course:
     """The course of a primary along all tracks that it has planned, from what it said at `heard_s`."""
-    pose, radius_m = Pose(state.x_m, state.y_m, state.heading_rad), entry.turn_radius_m
+    pose, radius_m, sailing = (
+        Pose(state.x_m, state.y_m, state.heading_rad),
+        entry.turn_radius_m,
+        sailing_of(entry, flows),
+    )
     tracks = plan.tracks if plan is not None else ()
     ahead = [track for track in tracks if not track.flown] if state.mode is not Mode.FINISHED else []
     if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         # When the track ends is known more exactly than where the vehicle was last.
         end = pass_of(ahead.pop(0), entry).end
         left_s = max(0.0, state.expected_end_ms / 1000 - heard_s)
-        left_m = left_s / sailing_of(entry).straight_s(1.0, end.heading_rad) + entry.run_in_m
+        left_m = left_s / sailing.straight_s(1.0, end) + entry.run_in_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
         left_m = survey_run_out_left_m(entry, plan, pose)
@@ -111,7 +120,7 @@ def survey_course(
         one = pass_of(track, entry)
         paths += [*way_or_direct(here, one.begin, radius_m, keep_out), straight(one.begin, one.length_m, radius_m)]
         here = one.end
-    return course(pose, heard_s, sailing_of(entry), radius_m, paths, keep_out)
+    return course(pose, heard_s, sailing, radius_m, paths, keep_out)
 
 
 def sweep_course(

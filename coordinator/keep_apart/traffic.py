@@ -16,7 +16,7 @@ from coordinator.keep_apart.courses import (
     survey_run_out_left_m,
     sweep_course,
 )
-from coordinator.vehicles import KnownVehicle, sailing_of, way_home_of
+from coordinator.vehicles import KnownVehicle, way_home_of
 from planner.dubins import DubinsPath, Pose
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
@@ -74,7 +74,7 @@ class Traffic:
         entry, run_out_m = vehicle.entry, self._run_out_m(vehicle, pose)
         sweep = self._sweep_from(pose, vehicle, other)
         radius_m, keep_out = entry.turn_radius_m, self._keep_out
-        laid = sweep_course(pose, start_s, sailing_of(entry), radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
+        laid = sweep_course(pose, start_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
         return laid, sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
@@ -83,7 +83,7 @@ class Traffic:
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
         way = way_or_direct(end, _arrival(end, place), entry.turn_radius_m, self._keep_out)
-        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out, *way], self._keep_out)
+        return course(pose, start_s, vehicle.sailing, entry.turn_radius_m, [run_out, *way], self._keep_out)
 
     def has_room(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> bool:
         """Whether a helper that leaves what it does can go to a place and circle there."""
@@ -100,7 +100,7 @@ class Traffic:
         """The course of a helper that leaves what it does and circles where it is."""
         pose, start_s = self._here(vehicle, now_s, strip)
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
-        return course(pose, start_s, sailing_of(entry), entry.turn_radius_m, [run_out], self._keep_out)
+        return course(pose, start_s, vehicle.sailing, entry.turn_radius_m, [run_out], self._keep_out)
 
     def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
         """A helper was sent to a strip."""
@@ -125,7 +125,7 @@ class Traffic:
         known = self._surveys.get(name)
         # One that should have sailed its tracks, or has none yet, is where it was heard last.
         if known is None or known[0] != told or (known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s):
-            laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000, self._keep_out)
+            laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000, self._keep_out, vehicle.flows)
             known = self._surveys[name] = told, vehicle.heard_ms, laid
         return known[2]
 
@@ -141,7 +141,7 @@ class Traffic:
             run_out_m = 0.0 if entered else self._run_out_m(vehicle, pose)
             radius_m = entry.turn_radius_m
             laid = sweep_course(
-                *(pose, heard_s, sailing_of(entry), radius_m, sweep),
+                *(pose, heard_s, vehicle.sailing, radius_m, sweep),
                 entered=entered,
                 run_out_m=run_out_m,
                 keep_out=self._keep_out,
@@ -161,8 +161,8 @@ class Traffic:
             if state.mode is Mode.RETURNING:
                 run_out = self._run_out(vehicle, pose)
                 end = run_out.pose_at(run_out.length_m)
-                way = way_home_of(entry, self._keep_out).way(end)
-                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [run_out, *way], self._keep_out)
+                way = way_home_of(entry, self._keep_out, vehicle.flows).way(end)
+                laid = course(pose, heard_s, vehicle.sailing, entry.turn_radius_m, [run_out, *way], self._keep_out)
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
 
@@ -175,12 +175,12 @@ class Traffic:
             heard_s = vehicle.heard_ms / 1000
             pose = Pose(state.x_m, state.y_m, state.heading_rad)
             if entry.role.surveys and not entry.role.revisits:
-                laid = survey_course(entry, state, vehicle.plan, heard_s, self._keep_out)
+                laid = survey_course(entry, state, vehicle.plan, heard_s, self._keep_out, vehicle.flows)
             elif not (entry.role.surveys or vehicle.offers or entry.vehicle in self._errands):
                 laid = lying_still(pose, heard_s)
             else:
                 run_out = self._run_out(vehicle, pose)
-                laid = course(pose, heard_s, sailing_of(entry), entry.turn_radius_m, [run_out], self._keep_out)
+                laid = course(pose, heard_s, vehicle.sailing, entry.turn_radius_m, [run_out], self._keep_out)
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
 

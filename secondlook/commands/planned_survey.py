@@ -23,7 +23,7 @@ from planner.types import Point, Track
 from planner.way_home import MARGIN_S
 from planner.ways import shortest_way
 from secondlook.errors import UserError
-from secondlook.fleet.roster import way_home_of
+from secondlook.fleet.roster import flows_of, way_home_of
 from secondlook.fleet.survey_area import keep_out_of, plan_for, region_for, region_of, track_heading_rad
 from secondlook.launch.run_display import in_seconds
 from secondlook.recorded import GeographicOrigin
@@ -97,8 +97,9 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
     start, keep_out = _start(vehicle), keep_out_of(scenario)
-    homeward, end = way_home_of(vehicle, scenario.current, keep_out), passes[-1].end if passes else start
-    run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end.heading_rad)
+    homeward = way_home_of(vehicle, scenario.current, keep_out, flows_of(scenario))
+    end = passes[-1].end if passes else start
+    run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end)
     home_s = run_out_s + homeward.from_pose(end)[0]
     lasts_for = homeward.passes_within(start, passes, vehicle.endurance_s - vehicle.kept_s - MARGIN_S)
     uncovered_share = float(missed.sum() / max(1, inside.sum()))

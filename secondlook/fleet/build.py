@@ -17,9 +17,11 @@ from planner.region import Region
 from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
-from secondlook.fleet.roster import endurance_ms_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
+from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
 from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
+    AnyCurrent,
+    GridCurrent,
     PatchySeabed,
     RevisitVehicle,
     Scenario,
@@ -84,6 +86,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
                     f"vehicles.{name}.{key} must be {keep_out.margin_m:g} m or more from ground to keep out of, "
                     "as all stay so far off"
                 )
+    flows = flows_of(scenario)
     run_info = RunInfo(
         schema=SCHEMA_VERSION,
         scenario=scenario.name,
@@ -100,7 +103,9 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
             grid.rows,
         ),
         rho=scenario.mission.rho,
-        vehicles=tuple(roster_vehicle(name, vehicle, scenario.current) for name, vehicle in scenario.vehicles.items()),
+        vehicles=tuple(
+            roster_vehicle(name, vehicle, scenario.current, flows) for name, vehicle in scenario.vehicles.items()
+        ),
         holes=tuple(Hole(_outline(hole)) for hole in scenario.area.holes_m),
         keep_out=tuple(Zone(tuple(Vertex(*corner) for corner in zone)) for zone in keep_out.zones),
         keep_out_margin_m=keep_out.margin_m,
@@ -146,7 +151,7 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
 
 def _agent_spec(scenario: Scenario, name: str, vehicle: SurveyVehicle | RevisitVehicle, heading_rad: float) -> NodeSpec:
     footprint, endurance_ms = footprint_of(vehicle.sonar), endurance_ms_of(vehicle)
-    homing = Homing(way_home_of(vehicle, scenario.current), reserve_ms_of(vehicle))
+    homing = Homing(way_home_of(vehicle, scenario.current, flows=flows_of(scenario)), reserve_ms_of(vehicle))
     revisit = RevisitConfig(
         vehicle=name,
         footprint=footprint,
@@ -191,12 +196,15 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         ),
         seabed=_seabed(scenario.seabed),
         targets=TargetsConfig(scenario.targets.count),
-        current=None
-        if current is None
-        else CurrentConfig(
-            current.drift_mps, math.radians(current.set_deg), current.period_s, over_ground=current.keeps == "ground"
-        ),
+        current=None if current is None else _current(current),
     )
+
+
+def _current(current: AnyCurrent) -> CurrentConfig:
+    over_ground = current.keeps == "ground"
+    if isinstance(current, GridCurrent):
+        return CurrentConfig(current.fastest[0], 0.0, over_ground=over_ground, grid=current.grid)
+    return CurrentConfig(current.drift_mps, math.radians(current.set_deg), current.period_s, over_ground=over_ground)
 
 
 def _seabed(seabed: UniformSeabed | PatchySeabed) -> SeabedConfig:
@@ -259,5 +267,6 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         strips=scenario.coordinator.strips,
         objective=scenario.coordinator.objective,
         separation_m=scenario.mission.separation_m,
+        flows=flows_of(scenario),
         priorities=tuple(PriorityGround((one.polygon_m,), one.weight) for one in scenario.area.priorities),
     )

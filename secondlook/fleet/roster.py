@@ -7,16 +7,21 @@ import math
 import numpy as np
 
 from comms.said.announcement import Role, RosterVehicle
-from planner.currents import Sailing
+from planner.currents import FlowGrid, Sailing
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
 from planner.way_home import WayHome
-from secondlook.scenario import Current, RevisitVehicle, SurveyVehicle
+from secondlook.scenario import AnyCurrent, GridCurrent, RevisitVehicle, Scenario, SurveyVehicle
 
 
-def roster_vehicle(name: str, vehicle: SurveyVehicle | RevisitVehicle, current: Current | None = None) -> RosterVehicle:
+def roster_vehicle(
+    name: str,
+    vehicle: SurveyVehicle | RevisitVehicle,
+    current: AnyCurrent | None = None,
+    flows: FlowGrid | None = None,
+) -> RosterVehicle:
     """A vehicle as it is announced."""
-    sailing = sailing_of(vehicle, current)
+    sailing = sailing_of(vehicle, current, flows)
     sonar = vehicle.sonar
     return RosterVehicle(
         vehicle=name,
@@ -60,19 +65,33 @@ def reserve_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
     return round(vehicle.kept_s * 1000)
 
 
-def sailing_of(vehicle: SurveyVehicle | RevisitVehicle, current: Current | None) -> Sailing:
-    """What it makes good in a current, as it is reckoned with."""
+def flows_of(scenario: Scenario) -> FlowGrid | None:
+    """The flows that are reckoned with until the mission's time limit; None where they are alike everywhere."""
+    current = scenario.current
+    return current.grid.until(scenario.mission.time_limit_s) if isinstance(current, GridCurrent) else None
+
+
+def sailing_of(
+    vehicle: SurveyVehicle | RevisitVehicle, current: AnyCurrent | None, flows: FlowGrid | None = None
+) -> Sailing:
+    """What it makes good in a current, as it is reckoned with. `flows`: see `flows_of`."""
     if current is None or current.keeps == "ground":
         return Sailing(vehicle.speed_mps)
+    if isinstance(current, GridCurrent):
+        flows = current.grid if flows is None else flows
+        return Sailing(vehicle.speed_mps, flows.fastest_mps, grid=flows)
     tidal = current.period_s is not None
     return Sailing(vehicle.speed_mps, current.drift_mps, math.radians(current.set_deg), tidal=tidal)
 
 
 def way_home_of(
-    vehicle: SurveyVehicle | RevisitVehicle, current: Current | None, keep_out: KeepOut = NOWHERE
+    vehicle: SurveyVehicle | RevisitVehicle,
+    current: AnyCurrent | None,
+    keep_out: KeepOut = NOWHERE,
+    flows: FlowGrid | None = None,
 ) -> WayHome:
     """Its way home, as it is reckoned with; its agent hears of ground to keep out of from the run's announcement."""
-    return WayHome(vehicle.home_m, sailing_of(vehicle, current), vehicle.turn_radius_m, keep_out)
+    return WayHome(vehicle.home_m, sailing_of(vehicle, current, flows), vehicle.turn_radius_m, keep_out)
 
 
 def role_of(vehicle: SurveyVehicle | RevisitVehicle) -> Role:

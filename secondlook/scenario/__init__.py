@@ -4,12 +4,12 @@ Use `load_scenario`, `make_scenario`, `bundled_scenarios`, `scenario_hash` and t
 """
 
 from secondlook.scenario.area import Area
+from secondlook.scenario.current import AnyCurrent, Current, GridCurrent
 from secondlook.scenario.degrees import Origin
 from secondlook.scenario.errors import Place, Problem, ScenarioError
 from secondlook.scenario.load import bundled_scenarios, load_scenario, make_scenario
 from secondlook.scenario.model import (
     Coordinator,
-    Current,
     Mission,
     PatchySeabed,
     Scenario,
@@ -21,10 +21,12 @@ from secondlook.scenario.sensor import Curve
 from secondlook.scenario.vehicle import Home, RevisitVehicle, Settling, Start, SurveyVehicle, body_of
 
 __all__ = [
+    "AnyCurrent",
     "Area",
     "Coordinator",
     "Current",
     "Curve",
+    "GridCurrent",
     "Home",
     "Mission",
     "Origin",

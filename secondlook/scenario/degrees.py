@@ -16,6 +16,7 @@ from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES,
 from secondlook.geography import GeographicOrigin, UnknownGridError, utm_to_degrees, utm_zone
 from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
+from secondlook.scenario.current import Current, CurrentFromFile, FlowFileError, GridCurrent, read_flows
 from secondlook.scenario.errors import KeyPath
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import Mapping, check_pair, refused
@@ -127,8 +128,9 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
     Priority: PriorityInDegrees,
     Start: PlaceInDegrees,
     Home: PlaceInDegrees,
+    Current: CurrentFromFile,
 }
-"""What may be given in degrees or UTM metres in place of keys of a mapping."""
+"""What may be given in degrees, in UTM metres or in a file in place of keys of a mapping."""
 
 _GIVES: dict[str, tuple[str, ...]] = {
     "polygon_deg": ("polygon_m",),
@@ -163,6 +165,7 @@ _NOT_BESIDE = {
     "epsg": ("polygon_m", "x_m", "y_m"),
     "file": tuple(f"{key}_{ending}" for key in ("polygon", "holes", "keep_out") for ending in ("m", "deg", "utm_m")),
 }
+_NOT_BESIDE_FLOWS = (Current.model_fields.keys() | GridCurrent.model_fields.keys()) - {"keeps"}
 _SEVERAL = ("holes", "keep_out")  # keys, without their ending, that hold several rings
 _NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
@@ -221,7 +224,7 @@ class _Frame:
 
 def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
     """Turns all that is given in degrees or UTM metres into metres about the scenario's origin, to the millimetre;
-    files that draw an area are looked for in the folder."""
+    files that draw an area or hold a current are looked for in the folder."""
     turned = InMetres(copy.deepcopy(data))
     for path, holder, model in _holders(turned.data):
         given = {key: holder[key] for key in model.model_fields if key in holder}
@@ -250,6 +253,9 @@ def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
                 turned.errors.append(error.details)
         for key in given:
             del holder[key]
+    current = turned.data.get("current")
+    if isinstance(current, dict) and "file" in current:
+        _take_flows(turned, current, folder)
     return turned
 
 
@@ -269,6 +275,33 @@ def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value]
             place = vehicle.get(name) if isinstance(vehicle, dict) else None
             if isinstance(place, dict):
                 yield ("vehicles", key, name), place, PlaceInDegrees
+
+
+def _take_flows(turned: InMetres, current: dict[str, Value], folder: Path) -> None:
+    """Puts the flows that a current's file holds in its place."""
+    path, file = ("current", "file"), current.pop("file")
+    turned.written["current",] = path, file
+    turned.written["current", "keeps"] = ("current", "keeps"), current.get("keeps")
+    try:
+        if not isinstance(file, str):
+            raise _RefusedError(path, file, "must be a text")
+        if others := [key for key in current if key in _NOT_BESIDE_FLOWS]:
+            raise _RefusedError(path, file, f"must be left out beside {' and '.join(others)}")
+        table = read_flows(folder / file)
+        origin = None
+        if table.is_in_degrees:
+            if turned.data.get("origin") is None:
+                raise _RefusedError(path, file, _NEEDS_ORIGIN)
+            origin = GeographicOrigin(**Origin.model_validate(turned.data["origin"]).model_dump())
+        current.update(table.written(origin))
+        return
+    except FlowFileError as error:
+        turned.errors.append(_RefusedError(path, file, str(error)).details)
+    except _RefusedError as error:
+        turned.errors.append(error.details)
+    except ValidationError:
+        pass  # of the origin: told when the whole is validated
+    del turned.data["current"]
 
 
 def _epsg(data: dict[str, Value], path: KeyPath, own: int | None) -> int:

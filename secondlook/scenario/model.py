@@ -11,6 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME
 from secondlook.scenario.area import Area
+from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
@@ -21,7 +22,6 @@ from secondlook.scenario.values import (
     Mapping,
     OpenShare,
     Share,
-    Speed,
     check_pair,
     check_utc,
     plug_in,
@@ -127,22 +127,6 @@ class PatchySeabed(Mapping):
         return pair
 
 
-class Current(Mapping):
-    """A current, everywhere alike. Every vehicle is faster: it keeps its track by crabbing. What that does to its sonar
-    besides, `sensor.half_at_crab_deg` tells."""
-
-    set_deg: Heading
-    """Compass heading towards which it flows."""
-    drift_mps: Speed
-    """How fast the water flows, at most."""
-    period_s: Annotated[float, Field(ge=1, le=1e7)] | None = None
-    """With a period it flows to and fro, as in a seiche or a tide, and when it is slack is drawn from the seed. Left
-    out, it is steady."""
-    keeps: Literal["water", "ground"] = "water"
-    """Of which kind the speed is that vehicles keep: through the `water`, so that with the stream they make good more
-    than against it, or over the `ground`, whatever that takes."""
-
-
 class Targets(Mapping):
     """The targets on the seabed, spread at random; no agent knows of them, they serve evaluation alone."""
 
@@ -206,7 +190,7 @@ class Scenario(Mapping):
     """When the mission ends, and how its risk is computed."""
     seabed: Annotated[UniformSeabed | PatchySeabed, Field(discriminator="kind")] = UniformSeabed()
     """What lowers P_d, and where."""
-    current: Current | None = None
+    current: AnyCurrent | None = None
     """How the water flows; left out, not at all."""
     targets: Targets = Targets()
     """What there is to find."""
@@ -214,6 +198,14 @@ class Scenario(Mapping):
     """An entry for each vehicle, under its id (a-z, 0-9, `_` and `-`); at least one surveys."""
     coordinator: Coordinator = Coordinator()
     """How strips are cut and given out."""
+
+    @field_validator("current")
+    @classmethod
+    def _check_covers(cls, current: AnyCurrent | None, info: ValidationInfo) -> AnyCurrent | None:
+        area: Area | None = info.data.get("area")
+        if isinstance(current, GridCurrent) and area is not None and (told := current.outside(area.polygon_m)):
+            raise refused(f"must cover the area, but {told}")
+        return current
 
     @field_validator("vehicles")
     @classmethod
@@ -226,7 +218,11 @@ class Scenario(Mapping):
     @classmethod
     def _check_starts(cls, vehicles: dict[str, Vehicle], info: ValidationInfo) -> dict[str, Vehicle]:
         zones = info.data["area"].keep_out if "area" in info.data else ()
+        current = info.data.get("current")
         for key, vehicle in vehicles.items():
+            places = [(vehicle.start.x_m, vehicle.start.y_m), vehicle.home_m]
+            if isinstance(current, GridCurrent) and (told := current.outside(places)):
+                raise refused(f"must all start, and have their home, where the current is given, but {key}: {told}")
             start, home = shapely.Point(vehicle.start.x_m, vehicle.start.y_m), shapely.Point(vehicle.home_m)
             if any(shapely.Polygon(zone).intersects(start) for zone in zones):
                 raise refused(f"must all start outside area.keep_out_m, but {key} starts in it")
@@ -248,8 +244,9 @@ class Scenario(Mapping):
         current = info.data.get("current")
         if current is not None:
             for key, vehicle in vehicles.items():
-                if vehicle.speed_mps <= current.drift_mps:
-                    raise refused(f"must be faster than the current, {current.drift_mps:g} m/s, but {key} is not")
+                fastest_mps, where = current.fastest
+                if vehicle.speed_mps <= fastest_mps:
+                    raise refused(f"must be faster than the current, {fastest_mps:.4g} m/s{where}, but {key} is not")
         return vehicles
 
     @field_validator("vehicles")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.currents import Current, Sailing, made_good_mps
+from planner.currents import Current, FlowGrid, Sailing, made_good_mps
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import KeepOut
 from planner.sweep import pass_over
@@ -19,17 +19,20 @@ from planner.ways import shortest_way
 NORTH, EAST, SOUTH, WEST = (quarter * math.pi / 2 for quarter in range(4))
 # 2.5 m/s through water that flows east at 1.5 m/s: 4 with it, 1 against it, and 2 across it, as 2^2 + 1.5^2 = 2.5^2.
 EASTWARD = Sailing(2.5, 1.5, EAST)
+ZERO = np.array(0.0)
 
 
 @pytest.mark.parametrize(("course_rad", "mps"), [(EAST, 4.0), (WEST, 1.0), (NORTH, 2.0), (SOUTH, 2.0)])
 def test_a_leg_of_100_m(course_rad: float, mps: float) -> None:
-    assert EASTWARD.straight_s(100, course_rad) == pytest.approx(100 / mps)
+    assert EASTWARD.straight_s(100, Pose(0, 0, course_rad)) == pytest.approx(100 / mps)
     assert made_good_mps(course_rad, 2.5, Current(1.5, EAST).flow_mps(0)) == pytest.approx(mps)
 
 
 def test_a_tide_is_reckoned_with_as_it_runs_against() -> None:
     tidal = Sailing(2.5, 1.5, EAST, tidal=True)
-    assert [tidal.straight_s(100, course_rad) for course_rad in (EAST, WEST)] == pytest.approx([100.0, 100.0])
+    assert [tidal.straight_s(100, Pose(0, 0, course_rad)) for course_rad in (EAST, WEST)] == pytest.approx(
+        [100.0, 100.0]
+    )
 
 
 def test_still_water_takes_the_length_over_the_speed() -> None:
@@ -40,7 +43,7 @@ def test_still_water_takes_the_length_over_the_speed() -> None:
 def test_a_whole_circle_takes_as_long_as_its_steps() -> None:
     steps = np.linspace(0, 2 * math.pi, 200_001)
     headings = (steps[1:] + steps[:-1]) / 2
-    took_s = float((10 * np.diff(steps) / EASTWARD.made_good_mps(headings)).sum())
+    took_s = float((10 * np.diff(steps) / EASTWARD.made_good_mps(headings, ZERO, ZERO)).sum())
     circle = DubinsPath(Pose(0, 0, NORTH), 10, (1, 0, 0), (20 * math.pi, 0, 0))
     assert EASTWARD.path_s(circle) == pytest.approx(took_s, rel=2e-3)
     assert took_s > 20 * math.pi / 2.5
@@ -49,7 +52,7 @@ def test_a_whole_circle_takes_as_long_as_its_steps() -> None:
 def test_a_turn_and_a_straight_follow_each_other() -> None:
     # A quarter to starboard, from north to east, and 40 m with the stream.
     path = DubinsPath(Pose(0, 0, NORTH), 10, (1, 0, 0), (5 * math.pi, 40, 0))
-    turn_s = float(EASTWARD.turns_s(10, np.array(NORTH), np.array(math.pi / 2)))
+    turn_s = float(EASTWARD.turns_s(10, np.array([0, 0, NORTH]), np.array(math.pi / 2)))
     assert 5 * math.pi / 4 < turn_s < 5 * math.pi / 2
     assert EASTWARD.path_s(path) == pytest.approx(turn_s + 10)
     times_s, lengths_m = EASTWARD.knots([path])
@@ -78,7 +81,7 @@ def test_what_is_made_good_less_the_flow_is_what_is_swum(
     swum_mps = math.hypot(mps * math.sin(course_rad) - flow_mps[0], mps * math.cos(course_rad) - flow_mps[1])
     assert mps > 0
     assert swum_mps == pytest.approx(speed_mps)
-    reckoned = Sailing(speed_mps, share * speed_mps, set_rad).made_good_mps(np.array(course_rad))
+    reckoned = Sailing(speed_mps, share * speed_mps, set_rad).made_good_mps(np.array(course_rad), ZERO, ZERO)
     assert float(reckoned) == pytest.approx(mps)
 
 
@@ -104,3 +107,115 @@ def test_passes_past_a_zone_take_the_way_round_it() -> None:
     # At 4 m/s at most it takes longer than the taut line at that, 2 m/s less than the whole of it across the stream.
     taut_m = math.hypot(40, 40) + 20 + math.hypot(140, 40)
     assert 50 + taut_m / 4 < EASTWARD.passes_s(passes, 10, keep_out=zone) < 50 + 1.2 * taut_m / 2
+
+
+# It flows east, not at all in the south and at 1.5 m/s 100 m further north; an hour later the other way.
+SHEAR = FlowGrid(
+    np.array([0.0, 400.0]),
+    np.array([0.0, 100.0]),
+    np.array([0.0, 3600.0]),
+    np.array([[[0.0, 0.0], [1.5, 1.5]], [[0.0, 0.0], [-1.5, -1.5]]]),
+    np.zeros((2, 2, 2)),
+)
+AT_FIRST = SHEAR.until(0.0)
+
+
+def alike(east_mps: float, north_mps: float) -> FlowGrid:
+    """The same flow everywhere, on a grid that is not even."""
+    places = np.array([-500.0, -20.0, 700.0]), np.array([-300.0, 500.0])
+    return FlowGrid(*places, np.array([0.0]), np.full((1, 2, 3), east_mps), np.full((1, 2, 3), north_mps))
+
+
+class TestFlowsFromPlaceToPlace:
+    @pytest.mark.parametrize(
+        ("time_s", "place", "east_mps"),
+        [
+            (0, (0, 50), 0.75),
+            (0, (200, 20), 0.3),
+            (900, (200, 100), 0.75),
+            (1800, (200, 100), 0.0),
+            (3600, (400, 100), -1.5),
+            (-5, (-80, 170), 1.5),
+            (9999, (999, 10), -0.15),
+        ],
+    )
+    def test_between_places_and_times_it_is_linear_and_beyond_as_at_the_edge(
+        self, time_s: float, place: tuple[float, float], east_mps: float
+    ) -> None:
+        assert Current(1.5, 0.0, grid=SHEAR).flow_mps(time_s, place) == pytest.approx((east_mps, 0.0))
+
+    def test_on_a_square_it_is_bilinear(self) -> None:
+        corners = np.array([[[1.0, 2.0], [3.0, 5.0]]])
+        grid = FlowGrid(np.array([0.0, 10.0]), np.array([0.0, 10.0]), np.array([0.0]), corners, -corners)
+        # A quarter east and half north: 1.25 in the south, 3.5 in the north.
+        assert grid.flow_mps(0, (2.5, 5)) == pytest.approx((2.375, -2.375))
+
+    def test_along_the_shear_and_across_it(self) -> None:
+        sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
+        assert sailing.straight_s(130, Pose(0, 50, EAST)) == pytest.approx(130 / 3.25)
+        assert sailing.straight_s(140, Pose(350, 50, WEST)) == pytest.approx(140 / 1.75)
+        # Northward dy / sqrt(2.5^2 - (1.5 y / 100)^2), summed from 0 to 100 m.
+        across_s = 100 / 1.5 * math.asin(1.5 / 2.5)
+        assert sailing.straight_s(100, Pose(10, 0, NORTH)) == pytest.approx(across_s, rel=1e-6)
+        path = DubinsPath(Pose(10, 0, NORTH), 10, (0, 0, 0), (100, 0, 0))
+        assert sailing.path_s(path) == pytest.approx(across_s, rel=1e-6)
+        times_s, lengths_m = sailing.knots([path])
+        halfway_s = 100 / 1.5 * math.asin(0.75 / 2.5)
+        assert np.interp(50, lengths_m, times_s) == pytest.approx(halfway_s, rel=1e-3)
+
+    def test_a_turn_is_reckoned_where_it_is(self) -> None:
+        sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
+        # Half a turn to starboard from (0, 40) northward: a circle about (30, 40), from 40 to 70 m north and back.
+        steps = np.linspace(0, math.pi, 200_001)
+        angles = (steps[1:] + steps[:-1]) / 2
+        along_mps = 1.5 * (40 + 30 * np.sin(angles)) / 100
+        mps = along_mps * np.sin(angles) + np.sqrt(2.5**2 - (along_mps * np.cos(angles)) ** 2)
+        took_s = float((30 * np.diff(steps) / mps).sum())
+        path = DubinsPath(Pose(0, 40, NORTH), 30, (1, 0, 0), (30 * math.pi, 0, 0))
+        assert sailing.path_s(path) == pytest.approx(took_s, rel=1e-4)
+
+    def test_of_its_times_the_slowest_counts(self) -> None:
+        sailing = Sailing(2.5, 1.5, grid=SHEAR)
+        for heading_rad in (EAST, WEST):
+            assert sailing.straight_s(100, Pose(300, 100, heading_rad)) == pytest.approx(100.0)
+        assert SHEAR.until(1.0).time_s.tolist() == [0, 3600]
+        assert AT_FIRST.time_s.tolist() == [0]
+        assert (SHEAR.fastest_mps, sailing.slowest_mps) == (1.5, 1.0)
+
+    @given(
+        st.floats(0, 2 * math.pi),
+        st.floats(0, 0.9),
+        st.tuples(st.floats(-400, 400), st.floats(-200, 300), st.floats(0, 6.28)),
+    )
+    def test_one_that_is_alike_everywhere_is_as_set_and_drift(
+        self, set_rad: float, share: float, there: tuple[float, float, float]
+    ) -> None:
+        drift_mps = 2.0 * share
+        known = Sailing(2.0, drift_mps, set_rad)
+        told = Sailing(2.0, drift_mps, grid=alike(drift_mps * math.sin(set_rad), drift_mps * math.cos(set_rad)))
+        way = shortest_way(Pose(0, 0, NORTH), Pose(*there), 12.0, KeepOut())
+        assert way is not None
+        assert told.way_s(way) == pytest.approx(known.way_s(way), rel=2e-3)  # turns have points of their own
+        homes = [WayHome((30.0, -40.0), one, 12.0).from_pose(Pose(*there)) for one in (told, known)]
+        assert homes[0] == pytest.approx(homes[1], rel=1e-6)
+
+    @given(
+        st.lists(st.floats(-1, 1), min_size=24, max_size=24),
+        st.floats(-50, 150),
+        st.floats(-50, 150),
+        st.floats(-10, 20),
+        st.floats(0, 6.28),
+    )
+    def test_it_is_never_faster_than_at_some_place_and_one_by_one_is_as_many_at_once(
+        self, flows: list[float], x_m: float, y_m: float, time_s: float, course_rad: float
+    ) -> None:
+        east_mps, north_mps = np.array(flows).reshape(2, 2, 2, 3)
+        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 100.0]), np.array([0.0, 10.0])
+        grid = FlowGrid(*axes, east_mps, north_mps)
+        east, north = grid.flow_mps(time_s, (x_m, y_m))
+        assert math.hypot(east, north) <= grid.fastest_mps + 1e-9
+        many = grid.flows_mps(np.array([x_m]), np.array([y_m]))
+        share = min(max(time_s / 10, 0), 1)
+        assert (east, north) == pytest.approx(many[:, 0, 0] + share * (many[:, 1, 0] - many[:, 0, 0]))
+        made_good = Sailing(1.6, grid.fastest_mps, grid=grid).made_good_mps(*map(np.array, (course_rad, x_m, y_m)))
+        assert float(made_good) <= made_good_mps(course_rad, 1.6, (east, north)) + 1e-9

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 import shapely
 
-from planner.flyable import flyable_pieces, reachable
+from planner.flyable import flyable_pieces, reachable, reachable_cells
 from planner.keep_out import NOWHERE, KeepOut
-from planner.types import Point, Track
+from planner.region import Region
+from planner.types import GridSpec, Point, SweepFrame, Track
 
 NORTH = Track(4, 10.0, (10.0, 0.0), (10.0, 400.0))
 SOUTH = Track(5, 30.0, (30.0, 400.0), (30.0, 0.0))
@@ -51,15 +53,16 @@ def test_a_sonar_that_sees_ahead_flies_earlier_and_has_room_for_that() -> None:
 class TestReachable:
     GROUND = shapely.box(0, 0, 100, 100)
     WALL = ((40.0, -1e4), (60.0, -1e4), (60.0, 1e4), (40.0, 1e4))
+    BOX = KeepOut((((40.0, -9.0), (60.0, -9.0), (60.0, 109.0), (40.0, 109.0)),
+        ((60.0, -9.0), (120.0, -9.0), (120.0, -1.0), (60.0, -1.0)),
+        ((60.0, 101.0), (120.0, 101.0), (120.0, 109.0), (60.0, 109.0)),
+        ((110.0, -9.0), (120.0, -9.0), (120.0, 109.0), (110.0, 109.0))))  # fmt: skip
 
     def test_beyond_a_wall_nothing_is(self) -> None:
         walled = KeepOut((self.WALL,))
         # The wall has an end, but only ten kilometres off: what is enclosed is what cannot be reached.
         assert reachable((0.0, 50.0), self.GROUND, walled).area == pytest.approx(8000)
-        box = KeepOut((((40.0, -9.0), (60.0, -9.0), (60.0, 109.0), (40.0, 109.0)),
-            ((60.0, -9.0), (120.0, -9.0), (120.0, -1.0), (60.0, -1.0)),
-            ((60.0, 101.0), (120.0, 101.0), (120.0, 109.0), (60.0, 109.0)),
-            ((110.0, -9.0), (120.0, -9.0), (120.0, 109.0), (110.0, 109.0))))  # fmt: skip
+        box = self.BOX
         assert reachable((0.0, 50.0), self.GROUND, box).area == pytest.approx(4000)
         assert reachable((80.0, 50.0), self.GROUND, box).area == pytest.approx(4000)
         assert box.are_parted((0.0, 50.0), (80.0, 50.0))
@@ -67,3 +70,19 @@ class TestReachable:
 
     def test_without_zones_all_is(self) -> None:
         assert reachable((0.0, 0.0), self.GROUND, NOWHERE) is self.GROUND
+
+    def test_of_cells_those_count_that_anybody_comes_to(self) -> None:
+        # 10 by 10 cells of 10 m, with their centres 5 m from the edge: the wall takes columns 4 and 5.
+        grid = GridSpec(SweepFrame(5.0, 0.0, 0.0), 10.0, 10, 10)
+        region = Region(((0, 0), (100, 0), (100, 100), (0, 100)), keep_out=self.BOX.zones)
+
+        def columns(*places: Point) -> list[int]:
+            cells = reachable_cells(places, region, grid, self.BOX)
+            assert (cells == cells[0]).all()
+            return list(np.flatnonzero(cells[0]).tolist())
+
+        assert columns((0.0, 50.0)) == [0, 1, 2, 3]
+        assert columns((80.0, 50.0)) == [6, 7, 8, 9]
+        assert columns((0.0, 50.0), (80.0, 50.0)) == [0, 1, 2, 3, 6, 7, 8, 9]
+        assert columns() == []
+        assert reachable_cells([], Region(region.outline), grid, NOWHERE).all()

@@ -12,11 +12,13 @@ from hypothesis import strategies as st
 
 from planner.currents import Sailing
 from planner.dubins import Pose, shortest_path
-from planner.keep_out import KeepOut
+from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import pass_over
 from planner.way_home import WayHome
 
 NORTH, EAST, SOUTH = 0.0, math.pi / 2, math.pi
+# Between them there is a gap of 40 m, and home lies in the bay to the north of it.
+HEADLANDS = KeepOut((((-300, 20), (-20, 20), (-20, 60), (-300, 60)), ((20, 20), (300, 20), (300, 60), (20, 60))), 1.5)
 WAY = WayHome((0.0, 0.0), Sailing(2.0), turn_radius_m=10.0)
 
 
@@ -45,6 +47,18 @@ class TestByHand:
     def test_many_at_once_are_as_one_by_one(self) -> None:
         poses = np.array([[40.0, 0.0, NORTH], [0.0, -100.0, SOUTH], [0.0, 0.0, EAST], [3.0, 4.0, EAST]])
         assert WAY.times_s(poses).tolist() == [WAY.from_pose(Pose(*pose))[0] for pose in poses.tolist()]
+
+
+@given(st.floats(-250, 250), st.floats(-200, 15), st.floats(0, 6.28), st.floats(1, 20), st.floats(10, 4000))
+def test_what_is_well_within_a_time_takes_no_longer(
+    x_m: float, y_m: float, heading_rad: float, radius_m: float, time_s: float
+) -> None:
+    home = WayHome((0.0, 100.0), Sailing(2.0, 0.8, EAST), radius_m, HEADLANDS)
+    pose = Pose(x_m, y_m, heading_rad)
+    assert not (home.is_well_within(pose, time_s) and home.from_pose(pose)[0] > time_s)
+    assert home.is_well_within(pose, 100_000.0)
+    assert not home.is_well_within(pose, home.from_pose(pose)[0])
+    assert not replace(home, keep_out=NOWHERE).is_well_within(pose, 100_000.0)
 
 
 @given(st.floats(-200, 200), st.floats(-200, 200), st.floats(0, 6.28))

@@ -7,19 +7,30 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flights import BRIEF
+from matplotlib.figure import Figure
 from PIL import Image
 
 import secondlook
 from secondlook.cli import main
-from secondlook.pictures import UNSEEN, MissionPicture, write_video
+from secondlook.pictures import PRIORITY, UNSEEN, MissionPicture, write_video
+from secondlook.testing import Fleet
 
 SMALL_PX = 640
+PRIORITY_THERE = "area.priorities=[{polygon_m: [[0, 0], [80, 0], [80, 50]], weight: 2}]"
 
 
 def unseen(picture: Image.Image) -> int:
     """How many pixels are as grey as ground that nobody has looked at."""
     pixels = np.asarray(picture.convert("RGB"), dtype=np.int64)
     return int((np.abs(pixels - np.rint(np.array(UNSEEN) * 255)).max(axis=2) <= 2).sum())
+
+
+def told(picture: Figure) -> set[str]:
+    """What the legend of the map tells."""
+    legend = picture.axes[0].get_legend()
+    assert legend is not None
+    return {text.get_text() for text in legend.get_texts()}
 
 
 def test_ground_that_is_not_seen_is_grey_and_grows_less(brief_run: Path) -> None:
@@ -32,6 +43,18 @@ def test_ground_that_is_not_seen_is_grey_and_grows_less(brief_run: Path) -> None
     assert 0.2 * 640 * 0.2 * 360 < first < 0.7 * 640 * 0.7 * 360
     assert 0.05 * first < middle < 0.8 * first
     assert last < 0.05 * first
+
+
+def test_ground_to_keep_out_of_and_priorities_are_drawn(tmp_path: Path) -> None:
+    pictures = []
+    for more in ((), ("area.keep_out_m=[[[0, 60], [60, 60], [60, 140], [0, 140]]]",), (PRIORITY_THERE,)):
+        flight = Fleet(BRIEF, folder=tmp_path, overrides=("mission.deadline_s=5", *more), record=True).run()
+        pictures.append(MissionPicture(secondlook.load(flight.folder), SMALL_PX).at(5.0))
+    assert [len(one.axes[0].patches) for one in pictures] == [0, 1, 0]
+    pink = [[one for one in drawn.axes[0].lines if one.get_color() == PRIORITY["color"]] for drawn in pictures]
+    assert [len(lines) for lines in pink] == [0, 0, 1]
+    assert np.unique(pink[2][0].get_xydata(), axis=0).tolist() == [[0, 0], [80, 0], [80, 50]]
+    assert [told(one) - told(pictures[0]) for one in pictures[1:]] == [{"no vehicle may enter"}, {"priority"}]
 
 
 def test_the_picture_at_a_time_is_the_same_whatever_was_drawn_before(brief_run: Path) -> None:

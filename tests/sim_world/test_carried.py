@@ -10,7 +10,7 @@ import pytest
 from zones import assert_keeps_radius, assert_stays_out
 
 from comms.said.messages import Look, Nav
-from planner.currents import Current, Sailing
+from planner.currents import Current, FlowGrid, Sailing
 from planner.dubins import Pose, shortest_path
 from planner.keep_out import KeepOut
 from planner.ways import shortest_way
@@ -95,6 +95,39 @@ def test_across_the_stream_the_swath_lies_askew() -> None:
                 at_range = SWIMMER.sensor.curve.at(np.array([lateral_m / 0.8]))[0]
                 assert look.p_detect[side, :, number] == pytest.approx(np.where(seen, at_range, 0.0), abs=2e-4)
         assert plain.p_detect.shape == look.p_detect.shape
+
+
+# It flows east, not at all along y = 0 and at 1.5 m/s from 100 m further north on.
+SHEAR = CurrentConfig(
+    1.5,
+    0.0,
+    grid=FlowGrid(
+        np.array([0.0, 1.0]),
+        np.array([0.0, 100.0]),
+        np.array([0.0]),
+        np.array([[[0.0, 0.0], [1.5, 1.5]]]),
+        np.zeros((1, 2, 2)),
+    ),
+)
+
+
+def test_across_a_shear_it_makes_good_what_the_stream_leaves_it_at_each_place() -> None:
+    told = sea(SHEAR, heading_rad=0.0).order("a", follow(1, (0.0, 0.0), (0.0, 100.0), run_in_m=0.0)).until(60_000)
+    # dy / sqrt(2.5^2 - (1.5 y / 100)^2), summed from 0.
+    passed_ms = [1000 * 100 / 1.5 * math.asin(1.5 * y_m / 100 / 2.5) for y_m in (20, 40, 60, 80, 100)]
+    assert told.statuses()[0][2] == pytest.approx(passed_ms[-1], abs=2)
+    assert [at_ms for at_ms, _ in told.said(Look)] == pytest.approx(passed_ms, abs=2)
+
+
+def test_in_a_shear_each_look_is_askew_by_the_stream_where_it_ends() -> None:
+    order = follow(1, (0.0, 0.0), (0.0, 100.0), run_in_m=0.0)
+    looks = sea(SHEAR, heading_rad=0.0).order("a", order).until(60_000).looks()
+    assert len(looks) == 5
+    for number, look in enumerate(looks[1:4], start=2):
+        cos = math.sqrt(1 - (1.5 * number / 5 / 2.5) ** 2)
+        for place in range(9):  # up to 40 m: farther off one side lies beyond the track's ends
+            at_range = SWIMMER.sensor.curve.at(np.array([5.0 * place / cos]))[0]
+            assert look.p_detect[:, :, place].max() == pytest.approx(at_range, abs=2e-4)
 
 
 class TestPastAZone:

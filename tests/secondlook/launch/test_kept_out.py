@@ -12,10 +12,12 @@ from flights import BRIEF
 from comms.said.messages import ManeuverState, ManeuverStatus, Plan, StripState
 from planner.keep_out import KeepOut
 from secondlook import load
+from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.errors import UserError
 from secondlook.launch.run_display import closing_table
 from secondlook.recorded.geojson import to_geojson
 from secondlook.report.page import report_page
+from secondlook.scenario import load_scenario
 from secondlook.testing import (
     Fleet,
     Flight,
@@ -23,7 +25,10 @@ from secondlook.testing import (
     assert_home_before_empty,
     assert_kept_apart,
     assert_kept_out,
+    assert_maps_converged,
+    assert_no_message_dropped,
     assert_no_strip_lost,
+    assert_one_strip_at_a_time,
 )
 from sim_world.config import VehicleConfig
 from sim_world.steadiness import Stream
@@ -116,6 +121,35 @@ def test_what_cannot_be_reached_is_left_out(tmp_path: Path) -> None:
     assert_all_finished(flight)
     assert set(refused(flight)) == {"no way to the track stays out of ground to keep out of"}
     assert flight.summary["risk"]["uncovered_share"] > 0.4
+    # Behind the wall no strip is cut, as nobody could be sent there.
+    assert len(flight.strips) > 3
+    assert all(one.polygon.centroid.x < 300 for one in flight.strips)
+
+
+@pytest.mark.parametrize("seed", [7, 11])
+def test_in_the_harbour_all_stay_out_and_apart_and_come_home(tmp_path: Path, seed: int) -> None:
+    flight = Fleet("harbour", folder=tmp_path, seed=seed).run()
+    assert_kept_out(flight)
+    assert_kept_apart(flight)
+    assert_home_before_empty(flight, "inspector")
+    assert_all_finished(flight)
+    assert_no_strip_lost(flight)
+    assert_one_strip_at_a_time(flight)
+    assert_no_message_dropped(flight)
+    assert_maps_converged(flight)
+    assert refused(flight) == []
+    served_by = {one.vehicle for one in flight.strips if one.state is StripState.DONE}
+    assert served_by == {"scout", "inspector"}
+    (fairway,) = flight.summary["priorities"]
+    assert fairway["mean"] < 0.7 * fairway["mean_primary_alone"]
+    assert fairway["mean"] < flight.summary["risk"]["mean"]
+
+
+def test_in_the_harbour_there_is_a_way_to_all_of_it() -> None:
+    scenario = load_scenario("harbour")
+    (survey,) = surveys = planned_surveys(scenario)
+    assert (survey.warning, unreachable(scenario, surveys)) == ("", [])
+    assert survey.plan.track_count > 5
 
 
 @pytest.mark.parametrize("begin", ["nearest", "nw"])

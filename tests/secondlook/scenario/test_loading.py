@@ -66,6 +66,7 @@ def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
         "clear",
         "five-helpers",
         "forward-looking",
+        "harbour",
         "headland",
         "paper",
         "patchy",

@@ -710,8 +710,8 @@ def test_a_file_that_is_no_scenario_is_told(write: Write, content: bytes, expect
 
 def test_a_name_that_is_not_bundled_is_told_with_those_that_are() -> None:
     there_are = (
-        "there are clear, five-helpers, forward-looking, headland, paper, patchy, ripples, tellaro, turns, "
-        "two-helpers, wide"
+        "there are clear, five-helpers, forward-looking, harbour, headland, paper, patchy, ripples, tellaro, "
+        "turns, two-helpers, wide"
     )
     assert lines_of("telaro") == [f"telaro: no such scenario, did you mean tellaro? ({there_are})"]
     assert lines_of("xyz") == [f"xyz: no such scenario ({there_are})"]
