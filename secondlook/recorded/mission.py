@@ -42,8 +42,9 @@ from secondlook.geography import GeographicOrigin
 from secondlook.recorded.closest_approach import Closest
 from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord, contacts, priorities, targets
 from secondlook.recorded.kept_out import Entered
+from secondlook.recorded.message_records import Damage
 from secondlook.recorded.metrics import Metrics
-from secondlook.recorded.mission_files import read_messages
+from secondlook.recorded.mission_files import read_recording
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
 from secondlook.recorded.vehicles import Activity, Ending, PathRecord, TrackRecord, activities, paths, tracks
 
@@ -67,6 +68,7 @@ class Mission(ABC):
 
     folder: Path
     summary: Mapping[str, Any]
+    _not_begun = "the run ended before the mission began"
 
     @abstractmethod
     def received(self, *kinds: type, keys: str = "**") -> Iterator[Received]:
@@ -91,7 +93,7 @@ class Mission(ABC):
     def run(self) -> RunInfo:
         """What was announced at the start: area, grid, vehicles."""
         if not self.has_begun:
-            raise UserError(f"{self.folder}: the run ended before the mission began")
+            raise UserError(f"{self.folder}: {self._not_begun}")
         return self.said(RunInfo)[0].message
 
     @property
@@ -203,6 +205,8 @@ class RecordedMission(Mission):
     """Made by `secondlook.load`, from the files of a run; a message that cannot be read raises UserError.
 
     `scenario`: scenario.yaml, the scenario as it was run, empty where the run was killed before it could write it.
+    `damage`: what cannot be read of messages.mpk, and so is missing here, in words as `str(damage)`; None where nothing
+    is known to be missing.
     """
 
     def __init__(
@@ -212,10 +216,14 @@ class RecordedMission(Mission):
         summary: Mapping[str, Any],
         scenario: Mapping[str, Any],
         messages: Sequence[tuple[str, bytes]],
+        damage: Damage | None = None,
     ) -> None:
         self.folder = folder
         self.summary = summary
         self.scenario = scenario
+        self.damage = damage
+        if damage is not None and damage.missing:
+            self._not_begun = "what announces the mission is among the messages that are missing"
         self._messages = messages
         self._topics = {key: topic_of(key) for key in {key for key, _ in messages}}
 
@@ -320,11 +328,13 @@ def load_run(run: str | os.PathLike[str]) -> RecordedMission:
     messages = folder / "messages.mpk"
     if not messages.exists():
         raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
+    recording = read_recording(messages)
     return RecordedMission(
         folder,
         summary=_mapping(folder / "summary.json", json.loads),
         scenario=_mapping(folder / "scenario.yaml", yaml.safe_load),
-        messages=read_messages(messages),
+        messages=recording.messages,
+        damage=recording.damage,
     )
 
 

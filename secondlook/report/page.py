@@ -91,7 +91,8 @@ def kind_figures(strips: Sequence[StripRecord], before: RiskMap, after: RiskMap)
 
 def report_page(mission: RecordedMission) -> str:
     """The whole page, which needs no other file. Of a run that ended before the mission began it tells that alone."""
-    flown = _flown(mission) if mission.has_begun else {}
+    never_began = not mission.has_begun and not (mission.damage and mission.damage.missing)
+    flown = {} if never_began else _flown(mission)
     return _template().render(
         mission=mission,
         summary=mission.summary,
