@@ -49,6 +49,8 @@ def replay(
             f"{run}: was flown by the wall clock, where what a node hears and when is never quite the same, and so "
             "cannot be repeated; must be a run in lockstep, without --real-time"
         )
+    if damage is not None:
+        typer.echo(f"{run / 'messages.mpk'}: {damage}", err=True)
     if damage is not None and damage.missing:
         typer.echo(
             f"{node}: cannot be replayed exactly, as messages are missing that it may have heard or said", err=True

@@ -177,7 +177,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     warn_of(summary)
     try:
         write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
-        write_report(folder)
+        write_report(folder, quiet=failure is not None)
     except UserError as error:
         failure = failure or str(error)
     if failure is not None:

@@ -74,6 +74,8 @@ class Damage:
     read_until_s: float | None
 
     def __str__(self) -> str:
+        if self.read_until_s is not None and self.unreadable[-1][0] == 0:
+            return "was cut off before its first message"
         inner = self.unreadable if self.read_until_s is None else self.unreadable[:-1]
         damaged = [_unreadable_told(inner)] if inner else []
         damaged += [_missing_told(self.missing)] if inner or self.missing else []
@@ -144,7 +146,7 @@ def damage_of(found: list[Record], messages: list[Record], size: int) -> Damage 
         if one.start > end:
             unreadable.append((end, one.start - end))
         end = one.end
-    if end < size:
+    if end < size or not found:
         unreadable.append((end, size - end))
     missing, before = [], None
     for one in messages:
@@ -154,5 +156,5 @@ def damage_of(found: list[Record], messages: list[Record], size: int) -> Damage 
         before = one
     if not unreadable and not missing:
         return None
-    until_s = None if end == size else 0.0 if before is None else before.sent_s
+    until_s = None if found and end == size else 0.0 if before is None else before.sent_s
     return Damage(tuple(unreadable), tuple(missing), until_s)

@@ -315,12 +315,12 @@ def chosen_keys(keys: str, vehicles: tuple[str, ...], topics: tuple[Topic, ...] 
         raise UserError(str(error)) from error
 
 
-def load_run(run: str | os.PathLike[str]) -> RecordedMission:
+def load_run(run: str | os.PathLike[str], *, quiet: bool = False) -> RecordedMission:
     """The mission of a run's folder, of one that failed or was cut off as far as it came.
 
     Summary and scenario are empty mappings where their files are missing or empty, or the summary is cut short; of the
-    latter, and of messages that are cut off, the log tells. Raises UserError, in one sentence, for what
-    is not the folder of a recorded run.
+    latter, and unless `quiet` of messages that were cut off or are damaged, the log tells in a sentence. Raises
+    UserError, in one sentence, for what is not the folder of a recorded run.
     """
     folder = Path(run)
     if not folder.is_dir():
@@ -329,6 +329,8 @@ def load_run(run: str | os.PathLike[str]) -> RecordedMission:
     if not messages.exists():
         raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
     recording = read_recording(messages)
+    if recording.damage is not None and not quiet:
+        log.warning("%s: %s", messages, recording.damage)
     return RecordedMission(
         folder,
         summary=_mapping(folder / "summary.json", json.loads),
@@ -350,10 +352,10 @@ def _mapping(path: Path, parse: Any) -> Mapping[str, Any]:
         return {}
     try:
         content = parse(text)
-    except json.JSONDecodeError:
-        log.warning("%s: is cut short, as if it were not there", path)
-        return {}
-    except (ValueError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
+        if isinstance(error, json.JSONDecodeError) and "\n" not in text[error.pos :].rstrip():
+            log.warning("%s: is cut short, as if it were not there", path)
+            return {}
         raise UserError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: is not a mapping; must be as the run wrote it")

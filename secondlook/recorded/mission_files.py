@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import enum
 import json
-import logging
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
@@ -27,8 +26,6 @@ from secondlook.recorded.message_records import (
     record,
     records_in,
 )
-
-log = logging.getLogger("secondlook.recorded")
 
 NOT_FOR_PEOPLE = (LOOK, COVERAGE, NAV)  # looks and tiles are arrays, positions are better drawn
 
@@ -84,8 +81,7 @@ class Recording(NamedTuple):
 
 
 def read_recording(path: Path) -> Recording:
-    """All that can be read of a messages.mpk. Where it was cut off or is damaged, the log says in one sentence what
-    cannot be read and what is missing.
+    """All that can be read of a messages.mpk, also of one that was cut off or is damaged.
 
     Raises UserError, in one sentence, for what is not such a file or is one of another version.
     """
@@ -94,10 +90,7 @@ def read_recording(path: Path) -> Recording:
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; must be the messages.mpk of a recorded run") from error
     found = list(records_in(content))
-    if not found and HEAD.startswith(content):
-        log.warning("%s: was cut off before its first message", path)
-        return Recording([], None)
-    if not found:
+    if not found and not HEAD.startswith(content):
         old = content.startswith(BEGIN_OF_VERSION_1)
         what = "is of an older secondlook, which wrote no checksums; must be read by that, or flown again"
         raise UserError(f"{path}: {what if old else 'is not a file of messages'}")
@@ -112,8 +105,6 @@ def read_recording(path: Path) -> Recording:
         damage = damage_of(found, messages, len(content))
     except WireError as error:
         raise UserError(f"{path}: holds what is no message: {error}") from error
-    if damage is not None:
-        log.warning("%s: %s", path, damage)
     return Recording([(one.key, one.payload) for one in messages], damage)
 
 

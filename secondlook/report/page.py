@@ -164,7 +164,7 @@ def _targets(mission: RecordedMission, after: RiskMap) -> TargetFigures | None:
 
 def _settings(mission: RecordedMission) -> str:
     file = mission.folder / "scenario.yaml"
-    return file.read_text(encoding="utf-8") if file.exists() else ""
+    return file.read_text(encoding="utf-8", errors="replace") if file.exists() else ""
 
 
 def _text(name: str) -> str:
@@ -189,12 +189,12 @@ def _template() -> jinja2.Template:
 REPORT = "report.html"
 
 
-def write_report(run: str | os.PathLike[str]) -> Path:
-    """Writes report.html into the folder of a run, in place of one that is there; its path.
+def write_report(run: str | os.PathLike[str], *, quiet: bool = False) -> Path:
+    """Writes report.html into the folder of a run, in place of one that is there; its path. `quiet`: as of `load_run`.
 
     Raises UserError, in one sentence, for what is no recorded run and where the file cannot be written.
     """
-    mission = load_run(run)
+    mission = load_run(run, quiet=quiet)
     path = mission.folder / REPORT
     page = report_page(mission)
     write_whole(path, page)

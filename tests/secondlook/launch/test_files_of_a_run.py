@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 from flights import BRIEF, events, flight, until
+from required import missing_for_small_disks, require
 
 import secondlook
 from secondlook.cli import main as secondlook_main
@@ -89,6 +90,40 @@ def test_a_full_disk_ends_the_run_in_one_sentence(tmp_path: Path, most_bytes: in
     assert (mission.summary["ending"], mission.summary["failure"]) == ("failed", sentence.partition("; what was")[0])
     assert events(folder)
     assert not list(folder.glob(".*"))
+
+
+ON_A_SMALL_DISK = """
+mount -t tmpfs -o size=$1k none $2 || exit 99
+cd $2
+shift 2
+"$@"
+code=$?
+cp -R out ../copy
+exit $code
+"""
+"""Arguments: kilobytes, a folder for the disk, and what to run there; its folder `out` is copied beside the disk."""
+
+
+@pytest.mark.parametrize("kilobytes", [60, 360, 560])
+def test_on_a_disk_without_room_for_anything_more_the_summary_has_room(tmp_path: Path, kilobytes: int) -> None:
+    require(missing_for_small_disks())
+    disk, program = tmp_path / "disk", str(Path(sys.executable).with_name("secondlook"))
+    disk.mkdir()
+    run = [program, "run", str(BRIEF), "--out", "out", "--bus", "local"]
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", ON_A_SMALL_DISK, "sh", str(kilobytes), str(disk), *run],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    (sentence,) = done.stderr.splitlines()
+    assert sentence.endswith(
+        ": No space left on device; must be a file that can be written; what was recorded is in out"
+    )
+    mission = secondlook.load(tmp_path / "copy")
+    assert (mission.summary["ending"], mission.summary["failure"]) == ("failed", sentence.partition("; what was")[0])
 
 
 def test_a_disk_that_is_full_from_the_start_is_told_before_anything_flies(tmp_path: Path) -> None:

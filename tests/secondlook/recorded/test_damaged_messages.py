@@ -140,9 +140,10 @@ def read_damaged(content: bytes, path: Path, *spoils: Spoil) -> Recording:
     return read_recording(path)
 
 
-def test_what_is_missing_is_told_in_one_sentence(
-    content: bytes, records: list[Record], spoilt: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_is_missing_is_told_in_one_sentence(content: bytes, records: list[Record], spoilt: Path) -> None:
+    def words(*spoils: Spoil) -> str:
+        return str(read_damaged(content, spoilt, *spoils).damage)
+
     before, first, *_, last, behind = records[199:206]
     between = f"5 messages are missing between {sent_s(before):.3f} s and {sent_s(behind):.3f} s"
     zeros = (first.end - 5, last.start + 5, bytes(last.start - first.end + 10))
@@ -151,37 +152,34 @@ def test_what_is_missing_is_told_in_one_sentence(
     assert damage is not None
     assert damage.unreadable == ((first.start, last.end - first.start),)
     assert damage.missing == (Missing(5, sent_s(before), sent_s(behind)),)
-    told = [f"{last.end - first.start} bytes at offset {first.start} cannot be read, {between}"]
-
-    read_damaged(content, spoilt, (first.start, last.end, b""))
-    told.append(between)
-    read_damaged(content, spoilt, (first.start, first.start, b"junk"))
-    told.append(f"4 bytes at offset {first.start} cannot be read, no message is missing")
-    read_damaged(content, spoilt, (0, 10, b"x" * 10))
-    told.append(f"{len(HEAD)} bytes at offset 0 cannot be read, no message is missing")
-    later, after = records[300], records[301]
-    read_damaged(content, spoilt, (later.start + 20, later.start + 21, b""), zeros)
-    told.append(
-        f"{last.end - first.start + later.end - later.start - 1} bytes in 2 places from offset {first.start} to "
-        f"{later.end - 1} cannot be read, 6 messages are missing between {sent_s(before):.3f} s and "
-        f"{sent_s(after):.3f} s, in 2 places"
+    assert str(damage) == (
+        f"is damaged: {last.end - first.start} bytes at offset {first.start} cannot be read, {between}"
     )
-    assert caplog.messages == [f"{spoilt}: is damaged: {one}" for one in told]
+    assert words((first.start, last.end, b"")) == f"is damaged: {between}"
+    nothing = "cannot be read, no message is missing"
+    assert words((first.start, first.start, b"junk")) == f"is damaged: 4 bytes at offset {first.start} {nothing}"
+    assert words((0, 10, b"x" * 10)) == f"is damaged: {len(HEAD)} bytes at offset 0 {nothing}"
+    later, after = records[300], records[301]
+    many = last.end - first.start + later.end - later.start - 1
+    assert words((later.start + 20, later.start + 21, b""), zeros) == (
+        f"is damaged: {many} bytes in 2 places from offset {first.start} to {later.end - 1} cannot be read, "
+        f"6 messages are missing between {sent_s(before):.3f} s and {sent_s(after):.3f} s, in 2 places"
+    )
 
 
-def test_an_end_that_is_damaged_is_told_apart(
-    content: bytes, records: list[Record], spoilt: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_an_end_that_is_damaged_is_told_apart(content: bytes, records: list[Record], spoilt: Path) -> None:
     last, size = records[-9], len(content)
     lost = f"its last {size - last.end} bytes, from offset {last.end} on, and what came after {sent_s(last):.3f} s"
     ends = f"was cut off or is damaged at its end: {lost}, are lost"
     read, damage = read_damaged(content, spoilt, (last.end, size, bytes(size - last.end)))
     assert len(read) == len(records) - 8
     assert damage is not None
-    assert (damage.missing, damage.read_until_s) == ((), sent_s(last))
-    read_damaged(content, spoilt, (last.end, size, bytes(size - last.end)), (0, 1, b"x"))
+    assert (damage.missing, damage.read_until_s, str(damage)) == ((), sent_s(last), ends)
+    _, damage = read_damaged(content, spoilt, (last.end, size, bytes(size - last.end)), (0, 1, b"x"))
     inner = f"is damaged: {len(HEAD)} bytes at offset 0 cannot be read, no message is missing"
-    assert caplog.messages == [f"{spoilt}: {ends}", f"{spoilt}: {inner}; it {ends}"]
+    assert str(damage) == f"{inner}; it {ends}"
+    for at in (0, 5, len(HEAD) - 1):
+        assert str(read_damaged(content, spoilt, (at, size, b"")).damage) == "was cut off before its first message"
 
 
 def test_a_flipped_bit_anywhere_in_a_message_costs_this_one_alone(
@@ -222,11 +220,11 @@ def test_what_can_be_read_is_reported_and_what_is_missing_said_once(
 
 
 @pytest.mark.parametrize("node", ["world", "coordinator"])
-def test_a_replay_cannot_be_exact_and_says_so(damaged_copy: Path, node: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_replay_cannot_be_exact_and_says_so(damaged_copy: Path, node: str) -> None:
+    what = f"{damaged_copy}/messages.mpk: {secondlook.load(damaged_copy).damage}"
     done = CliRunner().invoke(app, ["replay", str(damaged_copy), "--node", node])
     said = f"{node}: cannot be replayed exactly, as messages are missing that it may have heard or said\n"
-    assert (done.exit_code, done.output) == (1, said)
-    assert len(caplog.messages) == 1
+    assert (done.exit_code, done.output) == (1, f"{what}\n{said}")
 
 
 def test_without_the_announcement_messages_are_read_and_a_report_is_refused(
