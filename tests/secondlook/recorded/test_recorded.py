@@ -315,6 +315,10 @@ SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
     "no messages": (lambda run: (run / "messages.mpk").unlink(), "run: holds no messages.mpk; must be the folder of a"),
     "not messages": (lambda run: (run / "messages.mpk").write_text("Hello"), "messages.mpk: is not a file of messages"),
     "not a summary": (lambda run: (run / "summary.json").write_text("[1]"), "summary.json: is not a mapping; must be"),
+    "a damaged summary": (
+        lambda run: (run / "summary.json").write_text('{\n  "seed": 3,\n  "ending" "over"\n}\n'),
+        "summary.json: cannot be read: Expecting ':' delimiter: line 3",
+    ),
     "broken scenario": (lambda run: (run / "scenario.yaml").write_text("a: ["), "scenario.yaml: cannot be read: while"),
 }
 
