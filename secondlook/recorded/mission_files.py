@@ -99,7 +99,7 @@ def read_recording(path: Path) -> Recording:
         by_number.setdefault(one.number, one)
     head = by_number.pop(0, None)
     if head is not None and head.payload != VERSIONS:
-        raise UserError(f"{path}: is a file of version {_dotted(head.payload)}; must be of {_dotted(VERSIONS)}")
+        raise UserError(f"{path}: is of {_in_words(head.payload)}; must be of {_in_words(VERSIONS)}")
     messages = [one for _, one in sorted(by_number.items())]
     try:
         damage = damage_of(found, messages, len(content))
@@ -108,8 +108,9 @@ def read_recording(path: Path) -> Recording:
     return Recording([(one.key, one.payload) for one in messages], damage)
 
 
-def _dotted(versions: bytes) -> str:
-    return ".".join(map(str, unpack(versions)))
+def _in_words(versions: bytes) -> str:
+    file, schema = unpack(versions)
+    return f"file version {file} with messages of schema version {schema}"
 
 
 def read_messages(path: Path) -> list[tuple[str, bytes]]:
