@@ -201,7 +201,8 @@ EXIT_CODES = (
         "1",
         "it was tried and did not come right, and a sentence on standard error or in the output says why: a mission "
         "failed, was interrupted (Ctrl-C, SIGTERM, SIGHUP) or not over by its time limit; of several missions one was, "
-        "or in one something did not hold; a node does not say the same again; nobody reads what is printed",
+        "or in one something did not hold; a node does not say the same again, or not all that it heard is left; "
+        "nobody reads what is printed",
     ),
     ("2", "wrong use or bad input, told in a sentence: nothing was flown"),
     ("130", "Ctrl-C in a command that flies nothing, such as `check` or `report`"),

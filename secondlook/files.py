@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +16,7 @@ from comms.errors import FileError
 from secondlook.errors import UserError
 
 FLUSH_EVERY_S = 0.5  # of the wall clock
+ROOM_BYTES = 1 << 18
 
 
 class CannotWriteError(UserError, FileError):
@@ -50,6 +52,20 @@ def write_whole(path: Path, content: str) -> None:
     """Writes a text as a file, whole or not at all; see `whole_file`. Raises CannotWriteError."""
     with whole_file(path) as file:
         file.write(content.encode())
+
+
+@contextmanager
+def room_kept(folder: Path) -> Iterator[None]:
+    """Within it a file without a name takes up room in a folder, as far as there is any: what is written afterwards,
+    such as a summary which says that the disk was full, finds that free. Raises CannotWriteError."""
+    try:
+        room = tempfile.TemporaryFile(dir=folder, buffering=0)  # noqa: SIM115 - closed below
+    except OSError as error:
+        raise CannotWriteError(folder, error) from error
+    with room:
+        with contextlib.suppress(OSError):
+            room.write(os.urandom(ROOM_BYTES))  # which no file system makes smaller
+        yield
 
 
 class GrowingFile:

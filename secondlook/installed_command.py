@@ -52,6 +52,8 @@ def hidden_in(folder: Path) -> Path | None:
 FAILED, WRONG_USE = 1, 2
 """Exit codes: of a mission that failed, of wrong use and bad input; 0 is done."""
 NOT_WRITABLE = (errno.ENOSPC, errno.EPIPE, errno.EIO, errno.EBADF)
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+NO_FOLDER = "No usable temporary directory"  # as tempfile says where the disk is full
 
 
 @contextmanager
@@ -71,7 +73,7 @@ def _ended_by_ctrl_c() -> Iterator[None]:
 
 def main() -> None:
     """Checks the rooms, then runs the command line. Ctrl-C while that is still being loaded ends it without a word,
-    standard output that cannot be written with a sentence."""
+    standard output that cannot be written, and a full disk that nobody else has told of, with a sentence."""
     try:
         check_rooms()
         with _ended_by_ctrl_c():
@@ -81,8 +83,12 @@ def main() -> None:
         sys.stderr.write(f"{error}\n")
         sys.exit(WRONG_USE)
     except OSError as error:
-        if error.filename is not None or error.errno not in NOT_WRITABLE:
+        told = str(error.strerror)
+        if error.filename is None and error.errno in NOT_WRITABLE:
+            sys.stderr.write(f"standard output cannot be written: {told}\n")
+            sys.stdout = None  # nothing is left to be written when the interpreter ends
+        elif error.errno in NO_ROOM or told.startswith(NO_FOLDER):
+            sys.stderr.write(f"{error.filename or 'a passing file cannot be made'}: {told}\n")
+        else:
             raise
-        sys.stderr.write(f"standard output cannot be written: {error.strerror}\n")
-        sys.stdout = None  # nothing is left to be written when the interpreter ends
         sys.exit(FAILED)

@@ -17,7 +17,7 @@ from comms.said.topics import RUN
 from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
-from secondlook.recorded.mission_files import read_messages
+from secondlook.recorded.mission_files import read_recording
 from secondlook.recorded.replay import replay_node
 from secondlook.scenario import load_scenario
 
@@ -43,12 +43,19 @@ def replay(
 ) -> None:
     """Feed one node of a recorded mission what it heard, and tell the first difference in what it says."""
     scenario_file = run / "scenario.yaml"
-    recording = read_messages(run / "messages.mpk")
+    recording, damage = read_recording(run / "messages.mpk")
     if _by_wall_clock(recording):
         raise UserError(
             f"{run}: was flown by the wall clock, where what a node hears and when is never quite the same, and so "
             "cannot be repeated; must be a run in lockstep, without --real-time"
         )
+    if damage is not None:
+        typer.echo(f"{run / 'messages.mpk'}: {damage}", err=True)
+    if damage is not None and damage.missing:
+        typer.echo(
+            f"{node}: cannot be replayed exactly, as messages are missing that it may have heard or said", err=True
+        )
+        raise typer.Exit(DIFFERS)
     fleet = build_fleet(load_scenario(str(scenario_file)), record=False)
     if node not in fleet.specs:
         raise UserError(f"--node {node}: not a node of this mission; must be one of {', '.join(fleet.specs)}")

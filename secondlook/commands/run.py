@@ -162,7 +162,7 @@ def run(
                 failure = str(error)
             else:
                 failure = ""
-        unreported = "" if no_record or no_report else _report(folder)
+        unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure))
         if failure:
             sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
             for log in traceback_files(folder / LOGS):
@@ -194,10 +194,10 @@ def _check(bus: BusName, real_time: float | None, *, keep_going: bool, live: boo
         raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
 
 
-def _report(folder: Path) -> str:
+def _report(folder: Path, *, quiet: bool) -> str:
     """Writes the report; why it cannot be, or nothing."""
     try:
-        write_report(folder)
+        write_report(folder, quiet=quiet)
     except UserError as error:
         return str(error)
     return ""

@@ -186,12 +186,12 @@ class Failure:
 def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
     """Flies a mission; its files lie in a folder that is gone afterwards. `watch`: see `RunOptions`."""
     notes = _Notes()
-    with tempfile.TemporaryDirectory(prefix="secondlook-compare-") as folder:
-        try:
+    try:
+        with tempfile.TemporaryDirectory(prefix="secondlook-compare-") as folder:
             options = RunOptions(Path(folder), bus="local", record=False, progress=notes.take, watch=watch)
             summary = run_mission(scenario, options)
-        except RunFailedError as error:
-            return Failure(scenario.seed, str(error))
+    except (RunFailedError, UserError, OSError) as error:  # of the last two one where the disk is full
+        return Failure(scenario.seed, str(error))
     primary_s, mission_s = summary["time"]["primary_s"], summary["time"]["mission_s"]
     if primary_s is None or summary["risk"] is None:
         return Failure(scenario.seed, "the mission was over before the survey")

@@ -23,7 +23,7 @@ from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
-from secondlook.files import CannotWriteError, write_whole
+from secondlook.files import CannotWriteError, room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
@@ -94,9 +94,11 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode)
     options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
     write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
-    observer = Observer(options.folder, with_messages=options.record, progress=options.progress, watch=options.watch)
-    run = _Run(scenario, fleet, observer, options)
-    with log_to_file(options.folder / LOGS / "launcher.txt"):
+    with room_kept(options.folder), log_to_file(options.folder / LOGS / "launcher.txt"):
+        observer = Observer(
+            options.folder, with_messages=options.record, progress=options.progress, watch=options.watch
+        )
+        run = _Run(scenario, fleet, observer, options)
         result, ending, failure = run.fly()
         summary = summarise(
             scenario,

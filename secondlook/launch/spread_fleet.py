@@ -24,7 +24,7 @@ from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.seats import ListenerSeat, NodeSeat, Seat
 from secondlook.errors import UserError
-from secondlook.files import write_whole
+from secondlook.files import room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import (
     OBSERVER,
@@ -149,16 +149,17 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     began_s, begun_utc = time.perf_counter(), datetime.now(UTC)
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
     write_whole(folder / "scenario.yaml", scenario.to_yaml())
-    observer = Observer(folder, with_messages=True)
     recorder = node_spec(Role.RECORDER, recorder_config(scenario, folder / "mission.rrd"))
     outcome = _Outcome()
-    try:
-        listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
-        outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, fleet.routing()))
-        tell_supervisor(OVER)
-        failure = outcome.failure(scenario)
-    except NodeError as error:
-        failure = str(error)
+    with room_kept(folder):
+        observer = Observer(folder, with_messages=True)
+        try:
+            listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
+            outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, fleet.routing()))
+            tell_supervisor(OVER)
+            failure = outcome.failure(scenario)
+        except NodeError as error:
+            failure = str(error)
     summary = summarise(
         scenario,
         observer,
@@ -176,7 +177,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     warn_of(summary)
     try:
         write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
-        write_report(folder)
+        write_report(folder, quiet=failure is not None)
     except UserError as error:
         failure = failure or str(error)
     if failure is not None:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from secondlook.geography import GeographicOrigin
     from secondlook.recorded.geojson import to_geojson
     from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord
+    from secondlook.recorded.message_records import Damage
     from secondlook.recorded.mission import RecordedMission, load_run
     from secondlook.recorded.second_looks import HotspotRecord, StripEvent, StripRecord
     from secondlook.recorded.vehicles import Activity, PathRecord, TrackRecord
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "geojson": ("GeographicOrigin", "to_geojson"),
     "ground": ("ContactRecord", "RiskMap", "TargetRecord"),
+    "message_records": ("Damage",),
     "mission": ("RecordedMission", "load_run"),
     "second_looks": ("HotspotRecord", "StripEvent", "StripRecord"),
     "vehicles": ("Activity", "PathRecord", "TrackRecord"),
@@ -26,6 +28,7 @@ _NAMES = {
 __all__ = [
     "Activity",
     "ContactRecord",
+    "Damage",
     "GeographicOrigin",
     "HotspotRecord",
     "PathRecord",

@@ -42,8 +42,9 @@ from secondlook.geography import GeographicOrigin
 from secondlook.recorded.closest_approach import Closest
 from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord, contacts, priorities, targets
 from secondlook.recorded.kept_out import Entered
+from secondlook.recorded.message_records import Damage
 from secondlook.recorded.metrics import Metrics
-from secondlook.recorded.mission_files import read_messages
+from secondlook.recorded.mission_files import read_recording
 from secondlook.recorded.second_looks import HotspotRecord, StripRecord, hotspots, strips
 from secondlook.recorded.vehicles import Activity, Ending, PathRecord, TrackRecord, activities, paths, tracks
 
@@ -67,6 +68,7 @@ class Mission(ABC):
 
     folder: Path
     summary: Mapping[str, Any]
+    _not_begun = "the run ended before the mission began"
 
     @abstractmethod
     def received(self, *kinds: type, keys: str = "**") -> Iterator[Received]:
@@ -91,7 +93,7 @@ class Mission(ABC):
     def run(self) -> RunInfo:
         """What was announced at the start: area, grid, vehicles."""
         if not self.has_begun:
-            raise UserError(f"{self.folder}: the run ended before the mission began")
+            raise UserError(f"{self.folder}: {self._not_begun}")
         return self.said(RunInfo)[0].message
 
     @property
@@ -203,6 +205,8 @@ class RecordedMission(Mission):
     """Made by `secondlook.load`, from the files of a run; a message that cannot be read raises UserError.
 
     `scenario`: scenario.yaml, the scenario as it was run, empty where the run was killed before it could write it.
+    `damage`: what cannot be read of messages.mpk, and so is missing here, in words as `str(damage)`; None where nothing
+    is known to be missing.
     """
 
     def __init__(
@@ -212,10 +216,14 @@ class RecordedMission(Mission):
         summary: Mapping[str, Any],
         scenario: Mapping[str, Any],
         messages: Sequence[tuple[str, bytes]],
+        damage: Damage | None = None,
     ) -> None:
         self.folder = folder
         self.summary = summary
         self.scenario = scenario
+        self.damage = damage
+        if damage is not None and damage.missing:
+            self._not_begun = "what announces the mission is among the messages that are missing"
         self._messages = messages
         self._topics = {key: topic_of(key) for key in {key for key, _ in messages}}
 
@@ -307,12 +315,12 @@ def chosen_keys(keys: str, vehicles: tuple[str, ...], topics: tuple[Topic, ...] 
         raise UserError(str(error)) from error
 
 
-def load_run(run: str | os.PathLike[str]) -> RecordedMission:
+def load_run(run: str | os.PathLike[str], *, quiet: bool = False) -> RecordedMission:
     """The mission of a run's folder, of one that failed or was cut off as far as it came.
 
     Summary and scenario are empty mappings where their files are missing or empty, or the summary is cut short; of the
-    latter, and of messages that are cut off, the log tells. Raises UserError, in one sentence, for what
-    is not the folder of a recorded run.
+    latter, and unless `quiet` of messages that were cut off or are damaged, the log tells in a sentence. Raises
+    UserError, in one sentence, for what is not the folder of a recorded run.
     """
     folder = Path(run)
     if not folder.is_dir():
@@ -320,11 +328,15 @@ def load_run(run: str | os.PathLike[str]) -> RecordedMission:
     messages = folder / "messages.mpk"
     if not messages.exists():
         raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
+    recording = read_recording(messages)
+    if recording.damage is not None and not quiet:
+        log.warning("%s: %s", messages, recording.damage)
     return RecordedMission(
         folder,
         summary=_mapping(folder / "summary.json", json.loads),
         scenario=_mapping(folder / "scenario.yaml", yaml.safe_load),
-        messages=read_messages(messages),
+        messages=recording.messages,
+        damage=recording.damage,
     )
 
 
@@ -340,10 +352,10 @@ def _mapping(path: Path, parse: Any) -> Mapping[str, Any]:
         return {}
     try:
         content = parse(text)
-    except json.JSONDecodeError:
-        log.warning("%s: is cut short, as if it were not there", path)
-        return {}
-    except (ValueError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
+        if isinstance(error, json.JSONDecodeError) and "\n" not in text[error.pos :].rstrip():
+            log.warning("%s: is cut short, as if it were not there", path)
+            return {}
         raise UserError(f"{path}: cannot be read: {' '.join(str(error).split())}") from error
     if not isinstance(content, dict):
         raise UserError(f"{path}: is not a mapping; must be as the run wrote it")

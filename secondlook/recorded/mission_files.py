@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import enum
 import json
-import logging
 from dataclasses import fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
-
-import msgpack
+from typing import Any, NamedTuple, Self
 
 from comms.node import Received
-from comms.said.codec import SCHEMA_VERSION
+from comms.said.codec import unpack
 from comms.said.topics import COVERAGE, LOOK, NAV
+from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.files import GrowingFile
+from secondlook.recorded.message_records import (
+    BEGIN_OF_VERSION_1,
+    HEAD,
+    VERSIONS,
+    Damage,
+    Record,
+    damage_of,
+    record,
+    records_in,
+)
 
-log = logging.getLogger("secondlook.recorded")
-
-FILE_FORMAT = "secondlook-messages"
-_HEAD: bytes = msgpack.packb([FILE_FORMAT, SCHEMA_VERSION])
 NOT_FOR_PEOPLE = (LOOK, COVERAGE, NAV)  # looks and tiles are arrays, positions are better drawn
 
 
@@ -30,17 +34,17 @@ class MissionFiles:
     """Writes both files as the messages come; what was written stays readable if the run is cut off. Raises
     CannotWriteError.
 
-    `messages.mpk` is a stream of MessagePack values: first `[format, schema version]`, then `[key, payload]` for each
-    message. `events.jsonl` has one JSON object a line: time, key and fields.
+    `messages.mpk` is a stream of records as in `message_records`. `events.jsonl` has one JSON object a line: time, key
+    and fields.
     """
 
     def __init__(self, folder: Path, *, with_messages: bool) -> None:
         self._events = GrowingFile(folder / "events.jsonl")
         self._messages = GrowingFile(folder / "messages.mpk") if with_messages else None
-        self._pack = msgpack.Packer().pack
+        self._number = 0
         self._json = json.JSONEncoder(separators=(", ", ": "), check_circular=False, default=_plain).encode
         if self._messages is not None:
-            self._messages.write(_HEAD)
+            self._messages.write(HEAD)
 
     def __enter__(self) -> Self:
         return self
@@ -53,7 +57,8 @@ class MissionFiles:
     def write(self, received: Received) -> None:
         """Writes one message."""
         if self._messages is not None:
-            self._messages.write(self._pack([received.key, received.payload]))
+            self._number += 1
+            self._messages.write(record(self._number, received.key, received.payload))
         if received.topic not in NOT_FOR_PEOPLE:
             event = {"t_s": received.t_s, "key": received.key, **_plain(received.message)}
             self._events.write(f"{self._json(event)}\n".encode())
@@ -67,35 +72,50 @@ class MissionFiles:
                 self._messages.close()
 
 
-def read_messages(path: Path) -> list[tuple[str, bytes]]:
-    """Key (below the run id) and payload of every message in a messages.mpk, in the order of sending.
+class Recording(NamedTuple):
+    """Key (below the run id) and payload of each message of a messages.mpk, in the order of sending, and what cannot be
+    read of it; None where that is nothing."""
 
-    A file that was cut off in the middle of a message is read up to there, and the log says so. Raises
-    UserError, in one sentence, for what is not such a file or is one of another version.
+    messages: list[tuple[str, bytes]]
+    damage: Damage | None
+
+
+def read_recording(path: Path) -> Recording:
+    """All that can be read of a messages.mpk, also of one that was cut off or is damaged.
+
+    Raises UserError, in one sentence, for what is not such a file or is one of another version.
     """
-    found: list[tuple[str, bytes]] = []
     try:
-        with path.open("rb") as file:
-            stream = msgpack.Unpacker(file)
-            head = next(stream, None)
-            if head is None and _HEAD.startswith(path.read_bytes()):
-                log.warning("%s: was cut off before its first message", path)
-                return found
-            if type(head) is not list or len(head) != 2 or head[0] != FILE_FORMAT:
-                raise UserError(f"{path}: is not a file of messages")
-            if head[1] != SCHEMA_VERSION:
-                raise UserError(f"{path}: holds messages of schema version {head[1]}; must be version {SCHEMA_VERSION}")
-            for entry in stream:
-                if type(entry) is not list or [type(one) for one in entry] != [str, bytes]:
-                    raise UserError(f"{path}: message {len(found) + 1} is not a key and a payload")
-                found.append((entry[0], entry[1]))
-            if stream.tell() < path.stat().st_size:
-                log.warning("%s: was cut off in the middle of message %d; read up to there", path, len(found) + 1)
+        content = path.read_bytes()
     except OSError as error:
         raise UserError(f"{path}: {error.strerror}; must be the messages.mpk of a recorded run") from error
-    except (ValueError, msgpack.UnpackException) as error:
-        raise UserError(f"{path}: cannot be read behind message {len(found)}: {error}") from error
-    return found
+    found = list(records_in(content))
+    if not found and not HEAD.startswith(content):
+        old = content.startswith(BEGIN_OF_VERSION_1)
+        what = "is of an older secondlook, which wrote no checksums; must be read by that, or flown again"
+        raise UserError(f"{path}: {what if old else 'is not a file of messages'}")
+    by_number: dict[int, Record] = {}
+    for one in found:  # what stands there twice counts once
+        by_number.setdefault(one.number, one)
+    head = by_number.pop(0, None)
+    if head is not None and head.payload != VERSIONS:
+        raise UserError(f"{path}: is of {_in_words(head.payload)}; must be of {_in_words(VERSIONS)}")
+    messages = [one for _, one in sorted(by_number.items())]
+    try:
+        damage = damage_of(found, messages, len(content))
+    except WireError as error:
+        raise UserError(f"{path}: holds what is no message: {error}") from error
+    return Recording([(one.key, one.payload) for one in messages], damage)
+
+
+def _in_words(versions: bytes) -> str:
+    file, schema = unpack(versions)
+    return f"file version {file} with messages of schema version {schema}"
+
+
+def read_messages(path: Path) -> list[tuple[str, bytes]]:
+    """Key and payload of each message alone; see `read_recording`."""
+    return read_recording(path).messages
 
 
 @cache

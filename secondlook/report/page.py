@@ -91,7 +91,8 @@ def kind_figures(strips: Sequence[StripRecord], before: RiskMap, after: RiskMap)
 
 def report_page(mission: RecordedMission) -> str:
     """The whole page, which needs no other file. Of a run that ended before the mission began it tells that alone."""
-    flown = _flown(mission) if mission.has_begun else {}
+    never_began = not mission.has_begun and not (mission.damage and mission.damage.missing)
+    flown = {} if never_began else _flown(mission)
     return _template().render(
         mission=mission,
         summary=mission.summary,
@@ -163,7 +164,7 @@ def _targets(mission: RecordedMission, after: RiskMap) -> TargetFigures | None:
 
 def _settings(mission: RecordedMission) -> str:
     file = mission.folder / "scenario.yaml"
-    return file.read_text(encoding="utf-8") if file.exists() else ""
+    return file.read_text(encoding="utf-8", errors="replace") if file.exists() else ""
 
 
 def _text(name: str) -> str:
@@ -188,12 +189,12 @@ def _template() -> jinja2.Template:
 REPORT = "report.html"
 
 
-def write_report(run: str | os.PathLike[str]) -> Path:
-    """Writes report.html into the folder of a run, in place of one that is there; its path.
+def write_report(run: str | os.PathLike[str], *, quiet: bool = False) -> Path:
+    """Writes report.html into the folder of a run, in place of one that is there; its path. `quiet`: as of `load_run`.
 
     Raises UserError, in one sentence, for what is no recorded run and where the file cannot be written.
     """
-    mission = load_run(run)
+    mission = load_run(run, quiet=quiet)
     path = mission.folder / REPORT
     page = report_page(mission)
     write_whole(path, page)

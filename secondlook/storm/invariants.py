@@ -258,7 +258,7 @@ def check_failed(error: str, plan: TroublePlan, folder: Path, heard: Heard) -> l
     if match is None or folder not in Path(match[1]).parents:
         return [Violation("a full disk is told", heard.now_s, "run", error)]
     try:
-        there = [(one.key, one.payload) for one in load_run(folder).messages()]
+        there = [(one.key, one.payload) for one in load_run(folder, quiet=True).messages()]
     except UserError as unreadable:
         return [Violation("what is on disk is read back", heard.now_s, "run", str(unreadable))]
     if there != [(one.key, one.payload) for one in heard][: len(there)]:

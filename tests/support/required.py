@@ -28,3 +28,11 @@ def missing_for_namespaces() -> str | None:
         return f"network namespaces cannot be made (it needs root): {made.stderr.strip()}"
     subprocess.run(["ip", "netns", "delete", name], check=True)
     return None
+
+
+def missing_for_small_disks() -> str | None:
+    """What making a disk of some kilobytes lacks here."""
+    if shutil.which("unshare") is None:
+        return "small disks cannot be made: there is no unshare (util-linux)"
+    made = subprocess.run(["unshare", "-rm", "true"], capture_output=True, text=True, check=False)
+    return None if made.returncode == 0 else f"small disks cannot be made (it needs namespaces): {made.stderr.strip()}"

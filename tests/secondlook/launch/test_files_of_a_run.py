@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,6 +16,7 @@ from typing import Any
 
 import pytest
 from flights import BRIEF, events, flight, until
+from required import missing_for_small_disks, require
 
 import secondlook
 from secondlook.cli import main as secondlook_main
@@ -60,11 +63,11 @@ def test_a_killed_launcher_leaves_all_but_the_last_second(tmp_path: Path, bus: s
     assert drawn_ms / 1000 >= killed_s - lost
 
 
-def run_with_room_for(most_bytes: int, folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """A run where, as on a full disk, a write fails that would make a file larger, and part of it is written. It writes
-    no compiled modules: Python would leave them cut short, for all to come."""
+def with_room_for(most_bytes: int, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """A command where, as on a full disk, a write fails that would make a file larger, and part of it is written. It
+    writes no compiled modules: Python would leave them cut short, for all to come."""
     return subprocess.run(
-        [Path(sys.executable).with_name("secondlook"), "run", BRIEF, "--out", folder, *arguments],
+        [Path(sys.executable).with_name("secondlook"), *arguments],
         capture_output=True,
         text=True,
         check=False,
@@ -78,7 +81,7 @@ def run_with_room_for(most_bytes: int, folder: Path, *arguments: str) -> subproc
 @pytest.mark.parametrize("most_bytes", [3_000, 20_001, 60_000, 100_003])
 def test_a_full_disk_ends_the_run_in_one_sentence(tmp_path: Path, most_bytes: int, bus: str) -> None:
     folder = tmp_path / "out"
-    done = run_with_room_for(most_bytes, folder, "--bus", bus, "--no-report")
+    done = with_room_for(most_bytes, "run", BRIEF, "--out", folder, "--bus", bus)
     assert (done.returncode, done.stdout) == (1, "")
     (sentence,) = done.stderr.splitlines()
     path, _, what = sentence.partition(": ")
@@ -91,11 +94,81 @@ def test_a_full_disk_ends_the_run_in_one_sentence(tmp_path: Path, most_bytes: in
     assert not list(folder.glob(".*"))
 
 
+ON_A_SMALL_DISK = """
+mount -t tmpfs -o size=$1k none $2 || exit 99
+cd $2
+shift 2
+"$@"
+code=$?
+cp -R out ../copy
+exit $code
+"""
+"""Arguments: kilobytes, a folder for the disk, and what to run there; its folder `out` is copied beside the disk."""
+
+
+@pytest.mark.parametrize("kilobytes", [60, 360, 560])
+def test_on_a_disk_without_room_for_anything_more_the_summary_has_room(tmp_path: Path, kilobytes: int) -> None:
+    require(missing_for_small_disks())
+    disk, program = tmp_path / "disk", str(Path(sys.executable).with_name("secondlook"))
+    disk.mkdir()
+    run = [program, "run", str(BRIEF), "--out", "out", "--bus", "local"]
+    done = subprocess.run(
+        ["unshare", "-rm", "sh", "-c", ON_A_SMALL_DISK, "sh", str(kilobytes), str(disk), *run],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    (sentence,) = done.stderr.splitlines()
+    assert sentence.endswith(
+        ": No space left on device; must be a file that can be written; what was recorded is in out"
+    )
+    mission = secondlook.load(tmp_path / "copy")
+    assert (mission.summary["ending"], mission.summary["failure"]) == ("failed", sentence.partition("; what was")[0])
+
+
 def test_a_disk_that_is_full_from_the_start_is_told_before_anything_flies(tmp_path: Path) -> None:
-    done = run_with_room_for(100, tmp_path / "out", "--bus", "local")
+    done = with_room_for(100, "run", BRIEF, "--out", tmp_path / "out", "--bus", "local")
     scenario = tmp_path / "out" / "scenario.yaml"
     assert (done.returncode, done.stderr) == (2, f"{scenario}: File too large; must be a file that can be written\n")
     assert list((tmp_path / "out").iterdir()) == []
+
+
+COMPARE = ("compare", str(BRIEF), "--allocators", "none", "--seeds", "1", "--jobs", "1", "--out")
+
+
+@pytest.mark.parametrize(
+    ("most_bytes", "command", "code", "told", "left"),
+    [
+        (5_000, ("report", "RUN"), 2, "RUN/report.html", []),
+        (5_000, ("picture", "RUN", "--out", "OUT/a.png"), 2, "OUT/a.png", []),
+        (5_000, ("video", "RUN", "--seconds", "1", "--frames", "2", "--out", "OUT/a.webp"), 2, "OUT/a.webp", []),
+        (5_000, ("geojson", "RUN", "--out", "OUT/a.json"), 2, "--out OUT/a.json", []),
+        (60_000, ("export", "RUN", "--out", "OUT"), 2, "OUT/mission.geojson", []),
+        (1_000, ("storm", "--seed", "1", "--out", "OUT"), 2, "OUT/plan.yaml", []),
+        (1_000, (*COMPARE, "OUT"), 1, r"none, seed 1: /.+/scenario\.yaml", []),
+        (70_000, (*COMPARE, "OUT"), 2, "--out OUT/risk.png", ["compare.json"]),
+        (0, (*COMPARE, "OUT"), 1, "a passing file cannot be made", []),
+    ],
+)
+def test_whoever_writes_tells_of_a_full_disk_and_leaves_nothing_cut_short(
+    charted_run: Path, tmp_path: Path, most_bytes: int, command: tuple[str, ...], code: int, told: str, left: list[str]
+) -> None:
+    run, out = tmp_path / "run", tmp_path / "out"
+    shutil.copytree(charted_run, run)
+    out.mkdir()
+
+    def placed(word: str) -> str:
+        return word.replace("RUN", str(run)).replace("OUT", str(out))
+
+    done = with_room_for(most_bytes, *map(placed, command))
+    assert done.returncode == code
+    sentence = rf"{placed(told)}: File too large(; must be a file that can be written)?"
+    assert re.fullmatch(sentence, done.stderr.strip())
+    assert [one.name for one in out.iterdir()] == left
+    assert not list(run.glob(".*"))
+    assert not (run / "report.html").exists()
 
 
 def test_a_recording_that_cannot_be_written_at_all_is_named(tmp_path: Path) -> None:

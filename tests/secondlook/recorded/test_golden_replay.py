@@ -16,9 +16,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from comms.said.codec import SCHEMA_VERSION, decode, encode
+from comms.said.codec import decode, encode
 from comms.said.topics import topic_of
 from secondlook.cli import app
+from secondlook.recorded.message_records import HEAD, record
 from secondlook.recorded.mission_files import read_messages
 
 GOLDEN = Path(__file__).with_name("golden")
@@ -66,8 +67,8 @@ def changed(golden: Path, folder: Path, key: str, change: Callable[[Any], Any]) 
     assert found is not None
     header, message = decode(entries[place][1], found[0].message)
     entries[place] = (key, encode(header, change(message)))
-    packed = b"".join(msgpack.packb(list(entry)) for entry in entries)
-    (folder / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", SCHEMA_VERSION]) + packed)
+    packed = b"".join(record(number, *entry) for number, entry in enumerate(entries, start=1))
+    (folder / "messages.mpk").write_bytes(HEAD + packed)
     for name in ("scenario.yaml", "summary.json"):
         (folder / name).write_bytes((golden / name).read_bytes())
     return folder

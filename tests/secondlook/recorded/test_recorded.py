@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-import msgpack
 import numpy as np
 import pytest
 import shapely
@@ -25,13 +24,14 @@ from hypothesis.extra.numpy import arrays
 import secondlook
 from comms.node import Received
 from comms.said.announcement import RunInfo
-from comms.said.codec import SCHEMA_VERSION, Header
+from comms.said.codec import Header
 from comms.said.messages import AgentState, Message, MissionOver, Mode, Plan, PlannedTrack, StripState, StripStatus
 from comms.said.topics import MISSION_OVER, PLAN, STATE, STRIP, Topic
 from planner.risk import risk_statistics
 from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
 from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
+from secondlook.recorded.message_records import HEAD, record
 from secondlook.recorded.second_looks import strips
 from secondlook.recorded.vehicles import activities, tracks
 
@@ -81,7 +81,7 @@ def test_keys_that_no_message_can_have_are_refused(mission: RecordedMission, bri
         UserError, match=r"^no key is like 'agent/h/[*]'; there are run, .*, and the vehicles primary, help"
     ):
         mission.messages("agent/h/*")
-    (brief_copy / "messages.mpk").write_bytes(msgpack.packb(["secondlook-messages", SCHEMA_VERSION]))
+    (brief_copy / "messages.mpk").write_bytes(HEAD)
     assert list(secondlook.load(brief_copy).messages("agent/h/*")) == []  # who may be there nobody has said
 
 
@@ -275,7 +275,7 @@ def test_a_run_that_was_cut_off_is_read_as_far_as_it_came(brief_copy: Path) -> N
     assert 0 < len(list(mission.messages())) < whole
     assert mission.said(Plan)
     assert mission.risk().statistics.cells == mission.risk(0).statistics.cells
-    messages.write_bytes(msgpack.packb(["secondlook-messages", SCHEMA_VERSION]))
+    messages.write_bytes(HEAD)
     mission = secondlook.load(brief_copy)
     assert not mission.has_begun
     assert mission.end_s == 0
@@ -315,6 +315,10 @@ SPOILT: dict[str, tuple[Callable[[Path], object], str]] = {
     "no messages": (lambda run: (run / "messages.mpk").unlink(), "run: holds no messages.mpk; must be the folder of a"),
     "not messages": (lambda run: (run / "messages.mpk").write_text("Hello"), "messages.mpk: is not a file of messages"),
     "not a summary": (lambda run: (run / "summary.json").write_text("[1]"), "summary.json: is not a mapping; must be"),
+    "a damaged summary": (
+        lambda run: (run / "summary.json").write_text('{\n  "seed": 3,\n  "ending" "over"\n}\n'),
+        "summary.json: cannot be read: Expecting ':' delimiter: line 3",
+    ),
     "broken scenario": (lambda run: (run / "scenario.yaml").write_text("a: ["), "scenario.yaml: cannot be read: while"),
 }
 
@@ -331,7 +335,8 @@ def test_what_is_no_run_is_refused_in_one_sentence(brief_copy: Path, spoilt: str
 
 def test_a_message_that_cannot_be_read_is_named(brief_copy: Path) -> None:
     with (brief_copy / "messages.mpk").open("ab") as file:
-        file.write(msgpack.packb(["agent/primary/plan", b"nonsense"]))
+        number = len(list(secondlook.load(brief_copy).messages())) + 1
+        file.write(record(number, "agent/primary/plan", b"nonsense"))
     mission = secondlook.load(brief_copy)
     assert mission.said(AgentState)
     with pytest.raises(UserError, match=r"messages\.mpk: message \d+, agent/primary/plan, cannot be read: not "):

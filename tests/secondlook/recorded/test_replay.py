@@ -9,16 +9,16 @@ import msgpack
 import pytest
 from typer.testing import CliRunner
 
-from comms.said.codec import SCHEMA_VERSION, decode, encode
+from comms.said.codec import decode, encode
 from comms.said.messages import StripStatus
 from comms.wall.drive import ByWallClock
 from secondlook.cli import app
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.recorded.message_records import FILE_FORMAT, HEAD, record
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import load_scenario
 
-HEAD = msgpack.packb(["secondlook-messages", SCHEMA_VERSION])
 BAY = """
 name: bay
 area: {polygon_m: [[0, 0], [300, 0], [300, 100], [0, 100]]}
@@ -79,7 +79,7 @@ def rewrite(run: Path, folder: Path, change: object) -> Path:
     shutil.copytree(run, copy)
     entries = read_messages(run / "messages.mpk")
     changed = change(entries)  # type: ignore[operator]
-    packed = b"".join(msgpack.packb([key, payload]) for key, payload in changed)
+    packed = b"".join(record(number, *entry) for number, entry in enumerate(changed, start=1))
     (copy / "messages.mpk").write_bytes(HEAD + packed)
     return copy
 
@@ -125,9 +125,15 @@ def test_a_recording_that_was_cut_off_is_replayed_as_far_as_it_goes(run: Path, t
     [
         (None, "No such file or directory; must be the messages.mpk of a recorded run"),
         (b"hello", "is not a file of messages"),
-        (msgpack.packb(["secondlook-messages", 999]), "holds messages of schema version 999; must be version 2"),
-        (HEAD + msgpack.packb([1, 2]), "message 1 is not a key and a payload"),
-        (HEAD + b"\xc1", "cannot be read behind message 0"),
+        (
+            record(0, FILE_FORMAT, msgpack.packb([2, 999])),
+            "is of file version 2 with messages of schema version 999; must be of file version 2",
+        ),
+        (
+            msgpack.packb(["secondlook-messages", 2]) + msgpack.packb(["run", b""]),
+            "is of an older secondlook, which wrote",
+        ),
+        (HEAD + record(2, "run", b"no message"), "holds what is no message: not a list of 7 parts of schema version 2"),
     ],
 )
 def test_what_is_no_recording_is_refused(tmp_path: Path, content: bytes | None, sentence: str) -> None:

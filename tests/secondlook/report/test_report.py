@@ -197,6 +197,12 @@ def test_the_command_writes_it_and_says_where(
     assert command(gone) == (2, "", f"{gone}: there is no such folder; must be the folder of a run\n")
 
 
+def test_a_damaged_word_in_the_scenario_is_shown_as_damaged(brief_copy: Path) -> None:
+    scenario = (brief_copy / "scenario.yaml").read_bytes()
+    (brief_copy / "scenario.yaml").write_bytes(b"description: a b\xffy\n" + scenario)
+    assert "a b\N{REPLACEMENT CHARACTER}y" in Page(report_page(secondlook.load(brief_copy))).told
+
+
 def announced(name: str, seed: int) -> RecordedMission:
     """A mission that was announced, and no more."""
     run = build_fleet(load_scenario(name, seed=seed), record=False).run_info
