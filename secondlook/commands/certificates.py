@@ -17,8 +17,8 @@ import typer
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import certified_when_spread
-from secondlook.launch.spread_fleet import ROUTER
 from secondlook.scenario import Scenario, load_scenario
+from secondlook.scenario.vehicle import ROUTER
 
 MOST_DAYS = 3650
 _DOMAIN_NAME = re.compile(r"(?=.*[A-Za-z])[A-Za-z0-9._-]{1,253}")
@@ -66,8 +66,6 @@ def certificates(
 
 def _nodes(mission: Scenario) -> list[str]:
     """Whose certificates the fleet needs."""
-    if ROUTER in mission.vehicles:
-        raise UserError(f"vehicles.{ROUTER}: cannot have a certificate; must be another name than the router's")
     return [ROUTER, *(spec.host for spec in certified_when_spread(build_fleet(mission, record=True).roster))]
 
 

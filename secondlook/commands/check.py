@@ -9,7 +9,6 @@ import typer
 
 from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.commands.scenarios import names_beginning_with
-from secondlook.fleet.build import build_fleet
 from secondlook.scenario import load_scenario
 
 
@@ -25,7 +24,6 @@ def check(
     """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
     battery is too small for that, and what cannot be reached past ground to keep out of."""
     valid = load_scenario(scenario, set_ or ())
-    build_fleet(valid, record=False)
     surveys = planned_surveys(valid)
     across_m, along_m = valid.area.extent_m
     vehicles = ", ".join(f"{key} ({vehicle.role})" for key, vehicle in valid.vehicles.items())

@@ -54,13 +54,13 @@ def compare(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
 ) -> None:
     """Fly the same seeds with several allocators, and compare what they leave."""
-    if out is not None:
-        _prepare(out)
     mission = load_scenario(scenario, set_ or ())
     objective = objective_of(mission)
     chosen = contenders(mission, [name.strip() for name in allocators.split(",")] if allocators else ())
     for contender in chosen:
         build_fleet(contender.scenario, record=False)
+    if out is not None:
+        _prepare(out)
     flown: Flown = {}
     numbers = range(first_seed, first_seed + seeds)
     shown = sys.stderr.isatty() and not as_json

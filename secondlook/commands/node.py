@@ -16,6 +16,7 @@ from comms.said.announcement import LARGEST_SEED
 from comms.session import Certificates
 from secondlook.commands.run import check_factor
 from secondlook.errors import UserError
+from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import COORDINATOR, WORLD
 from secondlook.launch.run_folder import run_folder
 from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
@@ -24,6 +25,7 @@ from secondlook.scenario import Scenario, load_scenario
 
 _FORM = re.compile(r"(?P<protocol>tcp|tls)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})")
 LARGEST_PORT = 65_535
+LONGEST_WAIT_S = 1_000_000
 OF_OTHERS = 0o066
 """The bits of a file's mode by which its group and others may read or write it."""
 
@@ -126,7 +128,9 @@ RestartOption = Annotated[
         RESTART, help="Start its process again when it dies by a signal or a failure, ever later and so many times."
     ),
 ]
-Wait = Annotated[float, typer.Option(metavar="SECONDS", min=0.1, help="So long the router may take to be there.")]
+Wait = Annotated[
+    float, typer.Option(metavar="SECONDS", min=0.1, max=LONGEST_WAIT_S, help="So long the router may take to be there.")
+]
 
 
 @node_app.command()
@@ -234,6 +238,7 @@ def recorder(
         out = out.with_name(f"{out.name}-{starts_before() + 1}")
     mission = load_scenario(scenario, set_ or (), seed)
     link = _link(mission, connect, None, run, insecure, tls_ca, tls_cert, tls_key, wait)
+    build_fleet(mission, record=False)  # refuses what makes none, before there is a folder
     raise typer.Exit(run_recorder(mission, link, run_folder(out, mission.name)))
 
 

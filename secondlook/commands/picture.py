@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -50,7 +51,7 @@ def video(
 
     path = run / "video.webp" if out is None else out
     mission = load_run(run)
-    with Progress(console=Console(stderr=True), transient=True) as progress:
+    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
         task = progress.add_task("drawing", total=1.0)
         write_video(mission, path, width, seconds, frames, lambda share: progress.update(task, completed=share))
     typer.echo(str(path))

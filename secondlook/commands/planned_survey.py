@@ -23,6 +23,7 @@ from planner.types import Point, Track
 from planner.way_home import MARGIN_S
 from planner.ways import shortest_way
 from secondlook.errors import UserError
+from secondlook.fleet.build import build_fleet
 from secondlook.fleet.roster import flows_of, way_home_of
 from secondlook.fleet.survey_area import keep_out_of, plan_for, region_for, region_of, track_heading_rad
 from secondlook.launch.run_display import in_seconds
@@ -30,6 +31,7 @@ from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
 from secondlook.scenario import Scenario, SurveyVehicle
 
+LONGEST_S = 1e7
 LEAST_SHARE = 1e-4
 """Less of the area than this is rounding."""
 
@@ -75,8 +77,9 @@ class PlannedSurvey:
 
 
 def planned_surveys(scenario: Scenario) -> list[PlannedSurvey]:
-    """Of all survey vehicles, in the scenario's order. Raises UserError where a spacing planner of the user's fails,
-    and for a plan that no message can hold."""
+    """Of all survey vehicles, in the scenario's order. Raises UserError where the scenario makes no fleet or a spacing
+    planner of the user's fails, and for a plan that no message or mission can hold."""
+    build_fleet(scenario, record=False)  # refuses what makes none
     heading_rad = track_heading_rad(scenario)
     return [_planned(scenario, name, vehicle, heading_rad) for name, vehicle in scenario.survey_vehicles.items()]
 
@@ -84,6 +87,11 @@ def planned_surveys(scenario: Scenario) -> list[PlannedSurvey]:
 def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad: float) -> PlannedSurvey:
     plan = plan_for(scenario, name, heading_rad)
     tracks = plan.all_tracks
+    if not tracks:
+        raise UserError(
+            f"vehicles.{name}: no track of its survey has room beside ground to keep out of; must have less of "
+            "turn_radius_m and run_in_m, or the area more room"
+        )
     if len(tracks) > MOST_TRACKS:
         raise UserError(
             f"vehicles.{name}.range_m: {vehicle.told_range_m:g} is not allowed; must be larger, or the area smaller, "
@@ -97,13 +105,17 @@ def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad:
     passes = [pass_over(track.start, track.end, vehicle.run_in_m, lead_m) for track in tracks]
     # The last track's run-out comes after its end.
     start, keep_out = _start(vehicle), keep_out_of(scenario)
-    homeward = way_home_of(vehicle, scenario.current, keep_out, flows_of(scenario))
-    end = passes[-1].end if passes else start
+    homeward, end = way_home_of(vehicle, scenario.current, keep_out, flows_of(scenario)), passes[-1].end
     run_out_s = homeward.sailing.straight_s(vehicle.run_in_m, end)
     home_s = run_out_s + homeward.from_pose(end)[0]
     lasts_for = homeward.passes_within(start, passes, vehicle.endurance_s - vehicle.kept_s - MARGIN_S)
     uncovered_share = float(missed.sum() / max(1, inside.sum()))
     takes_s = homeward.sailing.passes_s(passes, vehicle.turn_radius_m, start, keep_out) - run_out_s
+    if not takes_s <= LONGEST_S:
+        raise UserError(
+            f"vehicles.{name}.speed_mps: {vehicle.speed_mps:g} is not allowed; must be larger, or the area smaller or "
+            f"nearer, as its survey takes {in_seconds(takes_s)}, longer than a mission may, {LONGEST_S:g} s"
+        )
     return PlannedSurvey(name, vehicle, heading_rad, plan, uncovered_share, takes_s, home_s, lasts_for)
 
 

@@ -24,13 +24,14 @@ from secondlook.scenario import load_scenario
 DIFFERS = 1
 
 
-def _by_wall_clock(recording: Sequence[tuple[str, bytes]]) -> bool:
-    """Whether the run was announced so."""
-    for key, payload in recording:
-        if key == RUN.key():
-            with contextlib.suppress(WireError):  # of a message that is damaged the replay itself tells
-                announced = decode(payload, RunInfo)[1]
-                return isinstance(announced, RunInfo) and announced.mode is ClockMode.WALL
+def _by_wall_clock(run: Path, recording: Sequence[tuple[str, bytes]]) -> bool:
+    """Whether the run was announced so. Raises UserError where it was not announced at all."""
+    payload = next((payload for key, payload in recording if key == RUN.key()), None)
+    if payload is None:
+        raise UserError(f"{run}: the run ended before the mission began")
+    with contextlib.suppress(WireError):  # of a message that is damaged the replay itself tells
+        announced = decode(payload, RunInfo)[1]
+        return isinstance(announced, RunInfo) and announced.mode is ClockMode.WALL
     return False
 
 
@@ -44,7 +45,7 @@ def replay(
     """Feed one node of a recorded mission what it heard, and tell the first difference in what it says."""
     scenario_file = run / "scenario.yaml"
     recording, damage = read_recording(run / "messages.mpk")
-    if _by_wall_clock(recording):
+    if _by_wall_clock(run, recording):
         raise UserError(
             f"{run}: was flown by the wall clock, where what a node hears and when is never quite the same, and so "
             "cannot be repeated; must be a run in lockstep, without --real-time"

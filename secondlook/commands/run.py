@@ -20,6 +20,7 @@ from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import UserError
+from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.run_display import closing_table, progress_display
@@ -145,10 +146,11 @@ def run(
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
 ) -> None:
     """Fly a mission, and write what happened."""
-    _check(bus, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
+    _check(bus, processes, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
+    build_fleet(mission, record=False)  # refuses what makes none, before there is a folder
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
@@ -180,7 +182,16 @@ def run(
         raise typer.Exit(MISSION_FAILED)
 
 
-def _check(bus: BusName, real_time: float | None, *, keep_going: bool, live: bool, web: bool, no_record: bool) -> None:
+def _check(
+    bus: BusName,
+    processes: int | None,
+    real_time: float | None,
+    *,
+    keep_going: bool,
+    live: bool,
+    web: bool,
+    no_record: bool,
+) -> None:
     """Raises UserError for options that do not go together."""
     if web and not live:
         raise UserError("--web: says how to show a mission --live; must go with --live")
@@ -190,6 +201,8 @@ def _check(bus: BusName, real_time: float | None, *, keep_going: bool, live: boo
         check_factor(REAL_TIME, real_time)
     if keep_going and real_time is None:
         raise UserError(f"{KEEP_GOING}: is not allowed in lockstep, where a run is to repeat; must go with {REAL_TIME}")
+    if processes is not None and bus is BusName.local:
+        raise UserError("--processes: is not allowed with --bus local, where all is one process")
     if keep_going and bus is BusName.local:
         raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
 

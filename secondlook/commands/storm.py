@@ -16,6 +16,7 @@ from comms.said.announcement import LARGEST_SEED
 from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
 from secondlook.errors import UserError
 from secondlook.files import write_whole
+from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.storm.campaign import Outcomes, agreement, fly_storms, storm_of, times_reached
@@ -23,6 +24,7 @@ from secondlook.storm.canaries import CANARIES, Find, find_canaries
 from secondlook.storm.fly import Outcome, fly_storm, latest_flight
 from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
+from secondlook.testing.fleet import Fleet
 from secondlook.testing.plan import TroublePlan, load_plan
 from secondlook.worker_pool import worker_pool
 
@@ -71,8 +73,12 @@ def storm(
     if set_ and scenario is None:
         raise UserError("--set: not allowed without a scenario, as fleets are drawn then")
     mission = None if scenario is None else load_scenario(scenario, set_ or ())
+    if mission is not None:
+        build_fleet(mission, record=False)  # refuses what makes none, before there is a folder
     if canaries and (plan is not None or seed is not None):
         raise UserError("--canaries: not allowed beside --plan or --seed; must be flown with a range, --seeds A..B")
+    if seeds is not None and (plan is not None or seed is not None):
+        raise UserError("--seeds: not allowed beside --plan or --seed; a range is flown without")
     if plan is not None:
         if scenario is not None or seed is not None:
             raise UserError("--plan: not allowed beside a scenario or --seed; the plan holds both")
@@ -96,6 +102,7 @@ def _range_of(seeds: str) -> range:
 
 
 def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:
+    Fleet.of_plan(plan, folder=folder)  # refuses trouble that does not fit the fleet, before there is a folder
     make_folder(folder)
     if flights:
         plan = _shrunk(plan, folder, bus, flights)

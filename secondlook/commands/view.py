@@ -16,13 +16,17 @@ from secondlook.errors import UserError
 from viz.recording_viewer import RecordingViewer, is_empty, is_recording, is_whole, repair
 from viz.viewer_program import ViewerError, check_display
 
+LONGEST_S = 10_000_000  # no mission is longer
+
 
 def view(
     run: Annotated[Path, typer.Argument(help="The folder of a run.")],
     web: Annotated[bool, typer.Option("--web", help="In a browser on this machine, not in a window.")] = False,
     at: Annotated[
         float | None,
-        typer.Option(min=0, metavar="SECONDS", help="Simulated time at which the window shows it, paused."),
+        typer.Option(
+            min=0, max=LONGEST_S, metavar="SECONDS", help="Simulated time at which the window shows it, paused."
+        ),
     ] = None,
 ) -> None:
     """Open the recording of a run in Rerun. Ends with the window, or with Ctrl-C."""

@@ -14,7 +14,7 @@ from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Watch
-from secondlook.scenario import Scenario, make_scenario
+from secondlook.scenario import Scenario, ScenarioError, make_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR
 from secondlook.worker_pool import worker_pool
 
@@ -136,7 +136,10 @@ def _scenario_of(scenario: Scenario, name: str) -> Scenario:
         except Exception as error:
             raise UserError(f"--allocators: {name} is not allowed; {error}, or {' or '.join(BASELINES)}") from error
         data["coordinator"]["allocator"] = name
-    return make_scenario(data)
+    try:
+        return make_scenario(data)
+    except ScenarioError as error:
+        raise UserError(f"--allocators: {name} is not allowed; with it {error.problems[0].text}") from error
 
 
 @dataclass(frozen=True)

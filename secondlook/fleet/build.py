@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import shapely
@@ -74,9 +75,14 @@ def build_fleet(scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode
 
 def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     heading_rad = track_heading_rad(scenario)
-    grid = region_of(scenario).about(heading_rad).grid(scenario.area.cell_m)
-    for primary in scenario.survey_vehicles.values():
-        region_for(scenario, primary, heading_rad)  # refuses a part that is none
+    region, cell_m = region_of(scenario), scenario.area.cell_m
+    grid = region.about(heading_rad).grid(cell_m)
+    # Where a cell fits in, whichever way it is turned, there is a cell's middle.
+    if region.polygon.buffer(-cell_m).is_empty and not region.inside(grid).any():
+        raise ValueError(f"area.cell_m, {cell_m:g}, must be smaller, as no cell of the map has its middle in the area")
+    for name, primary in scenario.survey_vehicles.items():
+        with _named(f"vehicles.{name}.part: "):
+            region_for(scenario, primary, heading_rad)  # refuses a part that is none
     keep_out = keep_out_of(scenario)
     for name, vehicle in scenario.vehicles.items():
         places = {"start": (vehicle.start.x_m, vehicle.start.y_m), "home": vehicle.home_m}
@@ -140,8 +146,7 @@ def _outline(polygon_m: Sequence[Point]) -> tuple[Vertex, ...]:
     """Corners as they travel, in whole centimetres; of a convex outline without those that rounding makes dents of."""
     corners = dict.fromkeys((round(x_m, 2), round(y_m, 2)) for x_m, y_m in polygon_m)
     hull = shapely.MultiPoint(list(corners)).convex_hull
-    if not isinstance(hull, shapely.Polygon):
-        raise ValueError("an area that has none in whole centimetres cannot be surveyed")
+    assert isinstance(hull, shapely.Polygon), "the scenario is one in whole centimetres"
     given = shapely.Polygon(polygon_m)
     if given.convex_hull.area - given.area > AS_CONVEX * given.area:
         return tuple(Vertex(*corner) for corner in corners)
@@ -222,7 +227,9 @@ def _seabed(seabed: UniformSeabed | PatchySeabed) -> SeabedConfig:
 
 
 def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
-    sensor, settling = vehicle.sensor, vehicle.settling
+    settling = vehicle.settling
+    with _named(f"vehicles.{name}.sensor."):
+        sensor = _sensor(vehicle)
     return VehicleConfig(
         vehicle=name,
         start_x_m=vehicle.start.x_m,
@@ -236,21 +243,35 @@ def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
         position_error_m=vehicle.position_error_m,
         position_drift_mps=vehicle.position_drift_m_per_h / 3600,
         settling=None if settling is None else SettlingConfig(settling.share, settling.length_m),
-        sensor=SensorConfig(
-            curve=vehicle.detection_curve,
-            footprint=vehicle.sonar.footprint,
-            near_m=vehicle.sonar.near_m,
-            half_angle_rad=vehicle.sonar.half_angle_rad,
-            along_bin_m=sensor.along_bin_m,
-            range_bin_m=sensor.range_bin_m,
-            look_m=sensor.look_m,
-            noise_cell=sensor.noise_cell,
-            noise_track=sensor.noise_track,
-            sonar=None if sensor.sonar is None else SONAR.maker(sensor.sonar),
-            seabed_share=1.0 if sensor.seabed_share is None else sensor.seabed_share,
-            half_at_crab_rad=None if sensor.half_at_crab_deg is None else math.radians(sensor.half_at_crab_deg),
-        ),
+        sensor=sensor,
     )
+
+
+def _sensor(vehicle: SurveyVehicle | RevisitVehicle) -> SensorConfig:
+    sensor = vehicle.sensor
+    return SensorConfig(
+        curve=vehicle.detection_curve,
+        footprint=vehicle.sonar.footprint,
+        near_m=vehicle.sonar.near_m,
+        half_angle_rad=vehicle.sonar.half_angle_rad,
+        along_bin_m=sensor.along_bin_m,
+        range_bin_m=sensor.range_bin_m,
+        look_m=sensor.look_m,
+        noise_cell=sensor.noise_cell,
+        noise_track=sensor.noise_track,
+        sonar=None if sensor.sonar is None else SONAR.maker(sensor.sonar),
+        seabed_share=1.0 if sensor.seabed_share is None else sensor.seabed_share,
+        half_at_crab_rad=None if sensor.half_at_crab_deg is None else math.radians(sensor.half_at_crab_deg),
+    )
+
+
+@contextmanager
+def _named(key: str) -> Iterator[None]:
+    """What a room refuses within it is told with the key of the scenario that it is about."""
+    try:
+        yield
+    except ValueError as error:
+        raise ValueError(f"{key}{error}") from error
 
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:

@@ -22,9 +22,8 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError
+from secondlook.scenario.vehicle import AUTHORITY
 
-AUTHORITY = "ca"
-"""What the authority's files are called."""
 OF_OTHERS = 0o077
 """The bits of a folder's mode by which its group and others may look into it or change it."""
 EARLIER = timedelta(days=1)
@@ -46,18 +45,16 @@ def certify(
 
     Args:
         folder: Where `NAME.pem` and `NAME.key` go, those of the authority as `ca`; new or empty, its owner's alone.
-        hosts: For each name, which becomes the certificate's common name, the hosts and addresses for which it holds
-            beside that: those at which others connect to it.
+        hosts: For each name, another than that, which becomes the certificate's common name, the hosts and addresses
+            for which it holds beside that: those at which others connect to it.
         now: With a time zone.
         days: How long they are valid, at least 1; with `add` no longer than the authority.
         add: By the authority that is in the folder.
 
     Raises:
-        UserError: The folder is not as it is to be, a file cannot be written, or a name is the authority's. Nothing in
-            the folder was changed then.
+        UserError: The folder is not as it is to be, or a file cannot be written. Nothing in the folder was changed
+            then.
     """
-    if AUTHORITY in hosts:
-        raise UserError(f"{AUTHORITY}: cannot have a certificate; must be another name than the authority's")
     _prepare(folder, add)
     end = now + timedelta(days=days)
     if add:

@@ -13,6 +13,9 @@ from planner.keep_out import NOWHERE, KeepOut
 from planner.way_home import WayHome
 from secondlook.scenario import AnyCurrent, GridCurrent, RevisitVehicle, Scenario, SurveyVehicle
 
+LEAST_P_DETECT = 0.001
+"""Of a pass, on average: a second look of less is worth nothing, and far less is announced as nothing."""
+
 
 def roster_vehicle(
     name: str,
@@ -20,7 +23,7 @@ def roster_vehicle(
     current: AnyCurrent | None = None,
     flows: FlowGrid | None = None,
 ) -> RosterVehicle:
-    """A vehicle as it is announced."""
+    """A vehicle as it is announced. Raises ValueError for one whose sonar sees next to nothing."""
     sailing = sailing_of(vehicle, current, flows)
     sonar = vehicle.sonar
     return RosterVehicle(
@@ -31,7 +34,7 @@ def roster_vehicle(
         run_in_m=vehicle.run_in_m,
         near_m=sonar.near_m,
         far_m=sonar.far_m,
-        p_detect=_mean_p_detect(vehicle),
+        p_detect=_mean_p_detect(name, vehicle),
         endurance_ms=endurance_ms_of(vehicle),
         footprint=sonar.footprint,
         half_angle_rad=sonar.half_angle_rad,
@@ -45,19 +48,25 @@ def roster_vehicle(
     )
 
 
-def _mean_p_detect(vehicle: SurveyVehicle | RevisitVehicle) -> float:
-    """The mean of P(y) of a pass, over the lateral ranges that it reaches."""
+def _mean_p_detect(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> float:
+    """The mean of P(y) of a pass, over the lateral ranges that it reaches. Raises ValueError where that is next to
+    nothing."""
     footprint = footprint_of(vehicle.sonar)
     curve = footprint.pass_curve(vehicle.detection_curve)
     near_m, far_m = footprint.reach.near_m, footprint.reach.far_m
     within = curve.range_m[(curve.range_m > near_m) & (curve.range_m < far_m)]
     range_m = np.concatenate([[near_m], within, [far_m]])
-    return float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
+    mean = float(np.trapezoid(curve.at(range_m), range_m)) / (far_m - near_m)
+    if mean < LEAST_P_DETECT:
+        raise ValueError(
+            f"vehicles.{name}.sensor must detect something, with a P_d of {LEAST_P_DETECT} or more on average"
+        )
+    return mean
 
 
 def endurance_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:
     """How long its battery lasts, in whole milliseconds."""
-    return max(1, round(vehicle.endurance_s * 1000))
+    return round(vehicle.endurance_s * 1000)
 
 
 def reserve_ms_of(vehicle: SurveyVehicle | RevisitVehicle) -> int:

@@ -43,9 +43,9 @@ from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise
 from secondlook.report import write_report
 from secondlook.scenario import Scenario
+from secondlook.scenario.vehicle import ROUTER
 
 FAILED = 1
-ROUTER = "router"
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _seat(nodes: Mapping[str, Node], node_id: str, fleet: Fleet, link: Link, sta
             store.close()
             raise
     except StoreRefusedError as error:
-        raise UserError(str(error)) from error
+        raise UserError(f"--state {error}") from error
 
 
 def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 import shapely
 import yaml
+from pydantic import BaseModel, ValidationError
 
 from comms.node import Received
 from comms.said.announcement import RunInfo
@@ -252,7 +253,10 @@ class RecordedMission(Mission):
     @cached_property
     def origin(self) -> GeographicOrigin | None:
         """Where the mission frame is on Earth; None where the scenario does not say."""
-        return GeographicOrigin(**self.scenario["origin"]) if "origin" in self.scenario else None
+        try:
+            return GeographicOrigin(**self.scenario["origin"]) if "origin" in self.scenario else None
+        except (TypeError, ValueError):
+            raise UserError(f"{self.folder / 'scenario.yaml'}: origin must be as the run wrote it") from None
 
     @cached_property
     def start_utc(self) -> datetime | None:
@@ -315,6 +319,19 @@ def chosen_keys(keys: str, vehicles: tuple[str, ...], topics: tuple[Topic, ...] 
         raise UserError(str(error)) from error
 
 
+class _Times(BaseModel):
+    mission_s: float
+    wall_s: float
+
+
+class _Summary(BaseModel):
+    """What of a summary is reckoned with, and not only shown."""
+
+    begun_utc: str | None = None
+    factor: float | None = None
+    time: _Times | None = None
+
+
 def load_run(run: str | os.PathLike[str], *, quiet: bool = False) -> RecordedMission:
     """The mission of a run's folder, of one that failed or was cut off as far as it came.
 
@@ -328,12 +345,18 @@ def load_run(run: str | os.PathLike[str], *, quiet: bool = False) -> RecordedMis
     messages = folder / "messages.mpk"
     if not messages.exists():
         raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
+    summary = _mapping(folder / "summary.json", json.loads)
+    try:
+        _Summary.model_validate(summary)
+    except ValidationError as error:
+        key = ".".join(map(str, error.errors()[0]["loc"]))
+        raise UserError(f"{folder / 'summary.json'}: {key} must be as the run wrote it") from None
     recording = read_recording(messages)
     if recording.damage is not None and not quiet:
         log.warning("%s: %s", messages, recording.damage)
     return RecordedMission(
         folder,
-        summary=_mapping(folder / "summary.json", json.loads),
+        summary=summary,
         scenario=_mapping(folder / "scenario.yaml", yaml.safe_load),
         messages=recording.messages,
         damage=recording.damage,

@@ -45,6 +45,9 @@ def _check_outline(corners: tuple[Point, ...]) -> tuple[Point, ...]:
         raise refused(f"must be metres, {SMALLEST_EXTENT_M:g} or more across; degrees go under a key that ends in _deg")
     if not Polygon(corners).is_valid:
         raise refused("must be the corners in order, but its sides cross")
+    announced = dict.fromkeys((round(x_m, 2), round(y_m, 2)) for x_m, y_m in corners)
+    if len(announced) < 3 or not Polygon(announced).is_valid:
+        raise refused("must keep its sides apart in whole centimetres, in which it is announced")
     return corners
 
 
@@ -104,6 +107,13 @@ class Area(Mapping):
     def extent_m(self) -> tuple[float, float]:
         """Extent across and along the tracks; of the narrowest rectangle about it where their heading is `auto`."""
         return _extent_m(self.polygon_m, self.track_heading_deg)
+
+    @field_validator("polygon_m")
+    @classmethod
+    def _check_extent(cls, polygon_m: tuple[Point, ...]) -> tuple[Point, ...]:
+        if min(_extent_m(polygon_m, "auto")) < SMALLEST_EXTENT_M:
+            raise refused(f"must be {SMALLEST_EXTENT_M:g} m or more across, wherever it is measured")
+        return polygon_m
 
     @field_validator("holes_m")
     @classmethod

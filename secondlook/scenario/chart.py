@@ -196,6 +196,8 @@ def _features(found: dict[str, Any]) -> Iterator[_Feature]:
     match found:
         case {"type": "FeatureCollection", "features": list(features)}:
             pass
+        case {"type": "FeatureCollection"}:
+            raise ChartError("a FeatureCollection without features is not allowed; must have a list of them")
         case {"type": "Feature"}:
             features = [found]
         case {"type": "Polygon" | "MultiPolygon"}:

@@ -31,6 +31,7 @@ _FULLER: dict[type[BaseModel] | None, tuple[type[BaseModel] | None, str]] = {
 }
 
 _ALLOWED = {
+    "bool_type": "must be true or false",
     "dict_type": "must be a mapping",
     "finite_number": "must be a finite number",
     "float_type": "must be a number",

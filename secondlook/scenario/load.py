@@ -123,12 +123,12 @@ def _text(source: str) -> str:
         with Path(source).open("rb") as file:
             return decode(file.read(LARGEST_FILE_BYTES + 1), source)
     except IsADirectoryError:
-        problem = "a folder; must be a YAML file"
+        problem = "a folder; must be a YAML file" if source else "must be a scenario's name or a YAML file"
     except (FileNotFoundError, NotADirectoryError):
         problem = _unknown(source)
     except (OSError, ValueError) as error:
         problem = f"cannot be read: {getattr(error, 'strerror', None) or error}"
-    raise ScenarioError([Problem(Place(source), problem)])
+    raise ScenarioError([Problem(Place(source or "''"), problem)])
 
 
 def _unknown(source: str) -> str:

@@ -16,9 +16,9 @@ from secondlook.scenario.degrees import Origin
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
 from secondlook.scenario.values import (
+    LEAST,
     Duration,
     Heading,
-    Length,
     Mapping,
     OpenShare,
     Share,
@@ -30,6 +30,9 @@ from secondlook.scenario.values import (
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, VehicleId, body_of
 
 DEADLINE_FACTOR = 1.05
+MOST_TOLD = 5  # of what is missing
+Extent = Annotated[float, Field(ge=0.1, le=1000)]
+PartOf = Annotated[float, Field(ge=0, lt=1)]
 Headings = Annotated[tuple[Heading, Heading], BeforeValidator(check_pair), Field(strict=False)]
 
 
@@ -103,9 +106,9 @@ class PatchySeabed(Mapping):
     """How many fields of sand ripples."""
     vegetation_patches: Annotated[int, Field(ge=0, le=1000)] = 10
     """How many patches of vegetation."""
-    scale_m: Annotated[tuple[Length, Length], BeforeValidator(check_pair), Field(strict=False)] = (40.0, 200.0)
+    scale_m: Annotated[tuple[Extent, Extent], BeforeValidator(check_pair), Field(strict=False)] = (40.0, 200.0)
     """Least and largest extent of one."""
-    strength: Annotated[tuple[Share, Share], BeforeValidator(check_pair), Field(strict=False)] = (0.3, 0.8)
+    strength: Annotated[tuple[PartOf, PartOf], BeforeValidator(check_pair), Field(strict=False)] = (0.3, 0.8)
     """Least and largest share of P_d that one takes."""
     ripple_crests_deg: Headings | None = None
     """From which to which heading the crests of the ripples run, at most 180 degrees apart, as swell from one side
@@ -144,9 +147,9 @@ class Coordinator(Mapping):
     """`package.module:Class` of a whole coordinator of your own."""
     lost_after_s: Annotated[float, Field(ge=20, le=1e7)] = 30.0
     """A vehicle not heard of for so long counts as lost. Agents tell their state every 10 s: one may be late."""
-    min_strip_m: Length = 30.0
+    min_strip_m: Annotated[float, Field(ge=1, le=1000)] = 30.0
     """Least length of a strip."""
-    max_strip_m: Annotated[float, Field(gt=0, le=10_000)] = 2000.0
+    max_strip_m: Annotated[float, Field(ge=1, le=10_000)] = 2000.0
     """Largest length of a strip, at least `min_strip_m`."""
     worth_risk: OpenShare = 0.05
     """Mean residual risk, times the weight of the ground, over the helper's swath from which a further metre of strip
@@ -245,8 +248,11 @@ class Scenario(Mapping):
         if current is not None:
             for key, vehicle in vehicles.items():
                 fastest_mps, where = current.fastest
-                if vehicle.speed_mps <= fastest_mps:
-                    raise refused(f"must be faster than the current, {fastest_mps:.4g} m/s{where}, but {key} is not")
+                if vehicle.speed_mps < fastest_mps + LEAST:
+                    least_mps = fastest_mps + LEAST
+                    raise refused(
+                        f"must be faster than the current, {least_mps:.4g} m/s or more{where}, but {key} is not"
+                    )
         return vehicles
 
     @field_validator("vehicles")
@@ -260,7 +266,8 @@ class Scenario(Mapping):
             f"{share} of {count}" for count in counts for share in range(1, count + 1) if (share, count) not in shares
         ]
         if missing:
-            raise refused(f"must survey the whole area together, but nobody has share {', '.join(missing)}")
+            told = ", ".join(missing[:MOST_TOLD]) + (", and so on" if len(missing) > MOST_TOLD else "")
+            raise refused(f"must survey the whole area together, but nobody has share {told}")
         return vehicles
 
     @property

@@ -66,6 +66,13 @@ class PlugInKind:
         maker: Callable[..., Any] = found
         return maker
 
+    def check_made(self, made: Any, text: str) -> None:
+        """Raises PlugInError where what the maker `text` has made is none: a function may make anything."""
+        for method, arguments in self.methods.items():
+            if not callable(getattr(made, method, None)):
+                must = f"{self.what} must have {method}({', '.join(arguments)})"
+                raise PlugInError(f"makes a {type(made).__name__}; {must}")
+
     def _names(self) -> str:
         names = " or ".join([*self.ours, f"package.module:Class of {self.what}"])
         return names.replace(" or ", ", ", len(self.ours) - 1)
@@ -147,7 +154,9 @@ NODE = PlugInKind(
 def made(kind: PlugInKind, text: str, **arguments: object) -> Any:
     """The plug-in that `text` names, made of these arguments. Raises UserError where there is none or that fails."""
     try:
-        return kind.maker(text)(**arguments)
+        found = kind.maker(text)(**arguments)
+        kind.check_made(found, text)
+        return found
     except PlugInError as error:
         raise UserError(f"{text}: {error}") from error
     except NO_FAILURES:

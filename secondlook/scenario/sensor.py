@@ -15,6 +15,7 @@ from secondlook.scenario import bundled
 from secondlook.scenario.plug_ins import CURVE, SONAR, PlugInError
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import (
+    LEAST,
     TOLERANCE,
     Bin,
     Length,
@@ -132,7 +133,7 @@ class SensorBase(Mapping):
     """Bin of a look along the track, in whole centimetres."""
     range_bin_m: Bin = 1.0
     """Bin of a look over range, in whole centimetres."""
-    look_m: Length = 20.0
+    look_m: Annotated[Length, Field(validate_default=True)] = 20.0
     """Length of track in one look, a multiple of `along_bin_m`."""
 
     @field_validator("along_bin_m", "range_bin_m")
@@ -178,8 +179,8 @@ class SideSensor(SensorBase):
 
     def check_nadir_gap(self, nadir_gap_m: float) -> None:
         """Refuses a nadir gap that leaves nothing to be seen."""
-        if self.reach_m <= nadir_gap_m:
-            raise refused(f"must see beyond nadir_gap_m, {nadir_gap_m:g}")
+        if self.reach_m < nadir_gap_m + LEAST:
+            raise refused(f"must see beyond nadir_gap_m, {nadir_gap_m:g}, by {LEAST:g} or more")
 
     def shape(self, nadir_gap_m: float) -> SonarShape:
         """What ground it sees, from the nadir gap on."""
@@ -191,15 +192,16 @@ class WedgeSensor(SensorBase):
     Its `curve` is over the distance from the vehicle; it makes a look at the beginning of each `look_m`."""
 
     footprint: Literal["wedge"]
-    half_angle_deg: Annotated[float, Field(gt=0, le=90)]
+    half_angle_deg: Annotated[float, Field(ge=1, le=90)]
     """Of a wedge: how far it sees to either side of the bow."""
     near_m: LengthOrZero = 0.0
     """Of a wedge: from which distance on it sees; the farthest is `range_m`, or its curve's last."""
 
     @model_validator(mode="after")
     def _check_depth(self) -> Self:
-        if self.reach_m <= self.near_m + self.look_m:
-            raise refused(f"must see farther than near_m and look_m together, {self.near_m + self.look_m:g}")
+        if self.reach_m < self.near_m + self.look_m + LEAST:
+            least_m = self.near_m + self.look_m
+            raise refused(f"must see farther than near_m and look_m together, {least_m:g}, by {LEAST:g} or more")
         return self
 
     def check_nadir_gap(self, nadir_gap_m: float) -> None:

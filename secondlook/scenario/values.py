@@ -17,18 +17,21 @@ from secondlook.scenario.plug_ins import PlugInError, PlugInKind
 TOLERANCE = 1e-6
 """By how much numbers may differ that must fit each other."""
 
+LEAST = 0.01
+"""Lengths travel in whole centimetres: less would be nothing; and who makes less a second gets nowhere."""
+
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-Length = Annotated[float, Field(gt=0, le=1000)]
+Length = Annotated[float, Field(ge=LEAST, le=1000)]
 LengthOrZero = Annotated[float, Field(ge=0, le=1000)]
-Bin = Annotated[float, Field(gt=0, le=100)]
-Duration = Annotated[float, Field(gt=0, le=1e7)]
-Speed = Annotated[float, Field(gt=0, le=30)]
+Bin = Annotated[float, Field(ge=LEAST, le=100)]
+Duration = Annotated[float, Field(ge=1, le=1e7)]
+Speed = Annotated[float, Field(ge=LEAST, le=30)]
 Heading = Annotated[float, Field(ge=0, lt=360)]
 Share = Annotated[float, Field(ge=0, le=1)]
 OpenShare = Annotated[float, Field(gt=0, lt=1)]
 # P_d above 0.999 would need more than the coverage map's largest value.
 PDetect = Annotated[float, Field(ge=0, le=0.999)]
-Noise = Annotated[float, Field(ge=0, le=5)]
+Noise = Annotated[float, Field(ge=0, le=2)]
 
 
 def refused(allowed: str) -> PydanticCustomError:

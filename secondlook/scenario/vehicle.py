@@ -30,13 +30,15 @@ from secondlook.scenario.values import (
 RESERVE_SHARE = 0.1
 _SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
 
-RESERVED_IDS = tuple(sorted(role.value for role in Role if role.is_single))
-"""Ids of the nodes that are no vehicles."""
+AUTHORITY, ROUTER = "ca", "router"
+"""What is certified beside the nodes of a fleet spread over hosts: its authority, and what all connect to."""
+RESERVED_IDS = tuple(sorted({AUTHORITY, ROUTER, *(role.value for role in Role if role.is_single)}))
+"""Ids of the nodes that are no vehicles, and names of other certificates."""
 
 
 def _check_free(vehicle_id: str) -> str:
     if vehicle_id in RESERVED_IDS:
-        raise refused(f"must be none of {', '.join(RESERVED_IDS)}, which other nodes are called")
+        raise refused(f"must be none of {', '.join(RESERVED_IDS)}, which others are called")
     return vehicle_id
 
 
@@ -157,7 +159,7 @@ class SurveyVehicle(VehicleBase):
     role: Literal["survey"]
     altitude_m: Length = 15.0
     run_in_m: LengthOrZero = 20.0
-    range_m: Length | None = None
+    range_m: Annotated[float, Field(ge=1, le=1000)] | None = None
     """r_max, the range that it is told to plan with until it has flown the first pair of tracks; at least 3 times
     `nadir_gap_m`. Left out, r_eff of `prior_curve`."""
     spacing: Annotated[str, plug_in(SPACING)] = "adaptive"

@@ -6,16 +6,18 @@ import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
 
 from secondlook.errors import UserError
+from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
 from secondlook.scenario.errors import ScenarioError
 from secondlook.scenario.explain import explain
 from secondlook.scenario.text import LARGEST_FILE_BYTES, Value, decode, dump, read
-from secondlook.scenario.values import Duration, Mapping, Share
+from secondlook.scenario.values import Mapping, Share, refused
 from secondlook.testing.trouble import Trouble
 
+Duration = Annotated[float, Field(gt=0, le=1e7)]
 TimeOrZero = Annotated[float, Field(ge=0, le=1e7)]
 """Simulated seconds since the mission's start."""
 KeyText = Annotated[str, Field(max_length=200)]
@@ -130,6 +132,15 @@ class TroublePlan(Mapping):
     """From when on the core is left alone."""
     trouble: Annotated[tuple[AnyTrouble, ...], Field(strict=False, max_length=10_000)] = ()
     """What goes wrong: entries with `what`, the name of a method of `Trouble`, and that method's arguments."""
+
+    @field_validator("core")
+    @classmethod
+    def _check_core(cls, core: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
+        if "scenario" in info.data:
+            nodes = [COORDINATOR, *info.data["scenario"].vehicles]
+            if not set(core) <= set(nodes):
+                raise refused(f"must be some of {', '.join(nodes)}")
+        return core
 
     def to_yaml(self) -> str:
         """This plan as a file that loads as an equal one."""

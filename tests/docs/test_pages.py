@@ -56,9 +56,9 @@ def test_the_scenario_reference_names_all_that_may_be_chosen() -> None:
 def test_the_scenario_reference_tells_values_and_defaults() -> None:
     page = (ROOT / "docs/reference/scenario.md").read_text(encoding="utf-8")
     assert "| `deadline_factor` | number in [1, 100] | `1.05` |" in page
-    assert "| `altitude_m` | number in (0, 1000] | `15`; `5` |" in page
+    assert "| `altitude_m` | number in [0.01, 1000] | `15`; `5` |" in page
     assert "| `nadir_gap_m` | number in [0, 1000] | *required*; `0` |" in page
-    assert "| `scale_m` | pair of numbers in (0, 1000] | `[40, 200]` |" in page
+    assert "| `scale_m` | pair of numbers in [0.1, 1000] | `[40, 200]` |" in page
     assert "| `curve` | [mapping](#detection-curve) or text | none |" in page
 
 

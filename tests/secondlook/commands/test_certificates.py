@@ -190,61 +190,6 @@ def test_where_one_file_cannot_be_written_none_is(command: Certificates) -> None
     assert contents(Path("own")) == before
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (
-            (BRIEF,),
-            "--host: is missing; must be the name or address by which the router is found, as in --connect",
-        ),
-        (
-            (BRIEF, *HERE, "--host", "third=192.0.2.1"),
-            "--host third=192.0.2.1: third is no node of the fleet; must be router or world or primary or helper or "
-            "coordinator or recorder",
-        ),
-        *(
-            (
-                (BRIEF, "--host", host),
-                f"--host {host}: is no host to connect to; must be a name or an address, as in tls/HOST:PORT",
-            )
-            for host in ("0.0.0.0", "[::]", "tls/192.0.2.1:7447", "192.0.2.1:7447", "192.0.2.256", "*.example", "")
-        ),
-        ((BRIEF, *HERE, "--add"), "--out own: No such file or directory; must be a folder that can be written"),
-        (
-            (BRIEF, *HERE, "--set", "vehicles.helper.speed=1"),
-            "--set vehicles.helper.speed=1: vehicles.helper.speed: 1 is not allowed; no such key, did you mean "
-            "speed_mps?",
-        ),
-    ],
-)
-def test_wrong_use_is_told_in_one_sentence(command: Certificates, arguments: tuple[str | Path, ...], said: str) -> None:
-    assert command("--out", "own", *arguments) == (2, "", f"{said}\n")
-    assert not Path("own").exists()
-
-
-@pytest.mark.parametrize(
-    ("days", "bound"), [("0", "greater than or equal to 1"), ("3651", "less than or equal to 3650")]
-)
-def test_days_have_bounds(command: Certificates, days: str, bound: str) -> None:
-    code, out, err = command(BRIEF, "--out", "own", *HERE, "--days", days)
-    assert (code, out) == (2, "")
-    assert err.endswith(f"Error: Invalid value for '--days': Input should be {bound}\n")
-    assert not Path("own").exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("ca", "ca: cannot have a certificate; must be another name than the authority's\n"),
-        ("router", "vehicles.router: cannot have a certificate; must be another name than the router's\n"),
-    ],
-)
-def test_a_vehicle_whose_files_would_be_anothers_is_refused(command: Certificates, name: str, said: str) -> None:
-    Path("clash.yaml").write_text(BRIEF.read_text().replace("  helper:\n", f"  {name}:\n"))
-    assert command("clash.yaml", "--out", "own", *HERE) == (2, "", said)
-    assert not Path("own").exists()
-
-
 def test_a_host_of_one_that_has_its_certificate_is_refused(command: Certificates) -> None:
     command(BRIEF, "--out", "own", *HERE)
     Path("own/world.pem").unlink()

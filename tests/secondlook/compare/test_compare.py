@@ -380,20 +380,6 @@ class TestCommand:
         assert (code, out) == (2, "")
         assert err == "--out: the plot needs matplotlib, not installed here; the extra secondlook[plots] has it\n"
 
-    def test_an_out_that_holds_anything_is_refused_and_stays_as_it_is(
-        self, command: Command, by_hand: None, tmp_path: Path
-    ) -> None:
-        (tmp_path / "compare.json").write_text("of another comparison")
-        code, out, err = command("--out", str(tmp_path))
-        told = f"--out {tmp_path}: holds compare.json already; must be a new or empty folder\n"
-        assert (code, out, err) == (2, "", told)
-        assert (tmp_path / "compare.json").read_text() == "of another comparison"
-
-    def test_an_out_that_is_a_file_is_refused(self, command: Command, tmp_path: Path) -> None:
-        (tmp_path / "taken").write_text("")
-        code, _, err = command("--out", str(tmp_path / "taken"))
-        assert (code, err) == (2, f"--out {tmp_path / 'taken'}: File exists; must be a folder that can be written\n")
-
 
 def test_ctrl_c_ends_it_with_a_sentence_and_leaves_no_process_and_no_file(tmp_path: Path) -> None:
     process = subprocess.Popen(

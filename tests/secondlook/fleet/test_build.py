@@ -152,14 +152,6 @@ class TestTheAnnouncement:
         own = load_scenario("tellaro", overrides).vehicles["helper"].sonar
         assert helper(announced(*overrides)).sonar == own
 
-    def test_an_endurance_below_a_millisecond_is_one(self) -> None:
-        assert helper(announced("vehicles.helper.endurance_s=0.0001")).endurance_ms == 1
-
-    def test_an_area_thinner_than_a_centimetre_is_refused(self) -> None:
-        scenario = load_scenario("tellaro", ["area.polygon_m=[[0, 0], [5, 0], [5, 0.004]]", "area.cell_m=0.001"])
-        with pytest.raises(UserError, match="an area that has none in whole centimetres"):
-            build_fleet(scenario, record=False)
-
 
 class TestTheWorld:
     def test_what_lowers_p_detect_comes_to_it_in_radians(self) -> None:

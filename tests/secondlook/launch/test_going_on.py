@@ -154,7 +154,7 @@ def test_nodes_of_a_spread_fleet_go_on_by_their_memories(tmp_path: Path) -> None
         late = fleet.node("agent", "helper", name="late", more=again)
         assert late.ends() == 2
         assert late.said == (
-            "state/helper.sqlite: is of a mission that is over; must be moved away, or another folder given\n"
+            "--state state/helper.sqlite: is of a mission that is over; must be moved away, or another folder given\n"
         )
         assert (tmp_path / "state" / "helper.sqlite").read_bytes() == before
 
@@ -170,7 +170,7 @@ def test_what_is_not_ours_is_refused_before_anything_else(fleet: SpreadFleet) ->
     (fleet.folder / "state" / "world.sqlite").write_bytes(b"SQLite format 3")
     world = fleet.node("world", more=["--state", "state", "--restart", "on-failure"])
     assert world.ends() == 2
-    assert re.fullmatch(r"state/world\.sqlite: is cut short or damaged: .*; must be moved away.*\n", world.said)
+    assert re.fullmatch(r"--state state/world\.sqlite: is cut short or damaged: .*; must be moved away.*\n", world.said)
     assert (fleet.folder / "state" / "world.sqlite").read_bytes() == b"SQLite format 3"
 
 

@@ -4,15 +4,12 @@ comes anew; what does not fit is refused in one sentence."""
 from __future__ import annotations
 
 import re
-import signal
 import socket
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from spread import PATIENT, SpreadFleet, interrupt, kill, loopback_endpoint, lost_of_what_is_kept, spread_fleet
-
-from secondlook import cli
 
 FACTOR = 15.0
 NODES = (("world",), ("agent", "primary"), ("agent", "helper"), ("coordinator",))
@@ -109,79 +106,3 @@ def test_an_endpoint_where_nobody_listens_is_told_in_one_sentence(fleet: SpreadF
     world = fleet.node("world", more=["--wait", "0.3"])
     assert world.ends() == 2
     assert world.said == f"no connection to {fleet.endpoint} within 0.3 s: nobody listens there\n"
-
-
-ALL_EXTERNAL = ("--set", "vehicles.primary.body=external", "--set", "vehicles.helper.body=external")
-TLS = ("--tls-ca", "ca.pem", "--tls-cert", "cert.pem", "--tls-key", "key.pem")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (
-            ("world", "brief.yaml", "--connect", "tcp/10.1.2.3:7447"),
-            "--connect tcp/10.1.2.3:7447: leaves this host, where anyone could listen and take part; must be a tls "
-            "endpoint, or go with --insecure",
-        ),
-        (
-            ("router", "brief.yaml", "--listen", "tcp/[::]:7447"),
-            "--listen tcp/[::]:7447: leaves this host, where anyone could listen and take part; must be a tls "
-            "endpoint, or go with --insecure",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "udp/127.0.0.1:7447"),
-            "--connect udp/127.0.0.1:7447: is no endpoint; must be tcp/HOST:PORT or tls/HOST:PORT",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "tcp/127.0.0.1:0"),
-            "--connect tcp/127.0.0.1:0: is no endpoint; must be tcp/HOST:PORT or tls/HOST:PORT",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "tls/10.1.2.3:7447"),
-            "--tls-ca: is missing, which a tls endpoint needs",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "tls/10.1.2.3:7447", *TLS),
-            "--tls-ca ca.pem: No such file or directory; must be a PEM file",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "tcp/127.0.0.1:7447", *TLS),
-            "--tls-ca: is for a tls endpoint, which tcp/127.0.0.1:7447 is not",
-        ),
-        (
-            ("agent", "brief.yaml", "third", "--connect", "tcp/127.0.0.1:7447"),
-            "third: is no vehicle of scenario brief; must be primary or helper",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "tcp/127.0.0.1:7447", *ALL_EXTERNAL),
-            "world: is no node of scenario brief that acts here; must be primary or helper or coordinator",
-        ),
-        (
-            ("world", "brief.yaml", "--connect", "tcp/127.0.0.1:7447", "--run", "a/b"),
-            "--run a/b: is not allowed; must be at most 64 of a-z, 0-9, _ and -",
-        ),
-        (
-            ("router", "brief.yaml", "--listen", "tcp/127.0.0.1:0", "--restart", "on-failure"),
-            "--listen tcp/127.0.0.1:0: is another port at each start; --restart needs one that stays",
-        ),
-        (
-            ("router", "brief.yaml", "--listen", "tcp/127.0.0.1:7447", "--factor", "0"),
-            "--factor 0: is not allowed; must be above 0, at most 1000",
-        ),
-    ],
-)
-def test_wrong_use_is_told_in_one_sentence(
-    arguments: tuple[str, ...],
-    said: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    (tmp_path / "brief.yaml").write_text(Path(__file__).parents[2].joinpath("support", "brief.yaml").read_text())
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", ["secondlook", "node", *arguments])
-    before = signal.getsignal(signal.SIGINT)
-    with pytest.raises(SystemExit) as stopped:
-        cli.main()
-    assert (stopped.value.code, capsys.readouterr().err) == (2, f"{said}\n")
-    assert signal.getsignal(signal.SIGINT) is before

@@ -118,21 +118,3 @@ def test_the_command_prints_or_writes_it(
     assert command(monkeypatch, run, "--origin", "44.08", "9.83", "--out", str(out)) == 0
     assert json.loads(out.read_text()) == json.loads(json.dumps(to_geojson(mission, PLACE)))
     assert capsys.readouterr().out == ""
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (("--origin", "90", "0"), "--origin: latitude 90 is not allowed; must be a number of degrees from -89 to 89"),
-        (("--out", "/dev/null/map"), "--out /dev/null/map: Not a directory; must be a file that can be written"),
-    ],
-)
-def test_the_command_refuses_in_one_sentence(
-    mission: RecordedMission,
-    arguments: tuple[str, ...],
-    said: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    assert command(monkeypatch, str(mission.folder), *arguments) == 2
-    assert capsys.readouterr().err == f"{said}\n"

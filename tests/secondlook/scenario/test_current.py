@@ -155,7 +155,7 @@ def test_every_vehicle_must_be_faster_and_start_where_it_is_given(load: Callable
     fast = [f"{x},{y},{1.5 if (x, y) == (250, 410) else 0},0" for x in (-10, 250, 510) for y in (-50, 410)]
     with pytest.raises(ScenarioError) as caught:
         load(HEADING + "\n".join(fast))
-    told = "must be faster than the current, 1.5 m/s at x 250, y 410, 0 s, but primary is not"
+    told = "must be faster than the current, 1.51 m/s or more at x 250, y 410, 0 s, but primary is not"
     assert str(caught.value).endswith(told)
     with pytest.raises(ScenarioError) as caught:
         load(HEADING + "\n".join(f"{x},{y},0,0" for x in (0, 500) for y in (0, 400)))

@@ -34,12 +34,6 @@ MUSCLE: dict[str, Any] = curve("muscle")
 TELLARO: dict[str, Any] = read(scenario_text("tellaro"), "tellaro").data
 
 
-def problems_of(*overrides: str, seed: int | None = None) -> list[str]:
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario("tellaro", overrides, seed)
-    return str(caught.value).splitlines()
-
-
 def load_text(folder: Path, text: str) -> Scenario:
     path = folder / "some.yaml"
     path.write_text(text, encoding="utf-8")
@@ -227,42 +221,6 @@ def test_overriding_leaves_the_document_as_it_was() -> None:
     changed = override(document, ["mission.rho=2", "mission"], seed=3)
     assert changed.data == {"mission": {"rho": 2}, "seed": 3}
     assert document == read("mission: {rho: 1}", "some.yaml")
-
-
-def test_a_wrong_override_is_told_with_the_option_in_place_of_the_line() -> None:
-    cases = {
-        "vehicles.primary.speed_mps=0": "vehicles.primary.speed_mps: 0 is not allowed; must be greater than 0",
-        "targets.cont=1": "targets.cont: 1 is not allowed; no such key, did you mean count?",
-        "coordinatr.allocator=none": (
-            'coordinatr: {"allocator": "none"} is not allowed; no such key, did you mean coordinator?'
-        ),
-        "vehicles.ghost.speed_mps=1": "vehicles.ghost: no such vehicle, there are primary, helper",
-        "vehicles.ghost={role: survey}": "vehicles.ghost: no such vehicle, there are primary, helper",
-        "seed.x=1": "seed: 7 is no mapping, so nothing in it can be set",
-        "seabed.kind.x=1": 'seabed.kind: "uniform" is no mapping, so nothing in it can be set',
-        "seed": "must be KEY=VALUE, KEY a dotted path such as mission.rho",
-        "=1": "must be KEY=VALUE, KEY a dotted path such as mission.rho",
-        "a..b=1": "must be KEY=VALUE, KEY a dotted path such as mission.rho",
-        "seed=": "seed: nothing is not allowed; must be a whole number",
-        "seed={a: 1, a: 2}": "a: given twice; the first is in line 1",
-        "mission={rho: 2}": "mission.rho: 2 is not allowed; must be at most 1",
-    }
-    for setting, expected in cases.items():
-        assert problems_of(setting) == [f"--set {setting}: {expected}"]
-    assert problems_of(seed=-1) == ["--seed -1: seed: -1 is not allowed; must be at least 0"]
-
-
-def test_an_override_that_is_not_yaml_is_told_with_its_column() -> None:
-    (line,) = problems_of("seed=[1")
-    assert line.startswith("--set seed=[1: column 3: not valid YAML: ")
-
-
-def test_a_file_and_an_override_that_disagree_are_told_where_the_rule_is_broken() -> None:
-    lines = [line.split("#")[0].strip() for line in scenario_text("tellaro").splitlines()]
-    number = lines.index("range_m: 145") + 1
-    assert problems_of("vehicles.primary.nadir_gap_m=60") == [
-        f"tellaro:{number}: vehicles.primary.range_m: 145 is not allowed; must be at least 3 times nadir_gap_m, 180"
-    ]
 
 
 @pytest.mark.parametrize("name", BUNDLED)

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.allocate.allocators import ALLOCATORS
 from secondlook.scenario import load_scenario
 
 OWN = """
@@ -26,10 +25,6 @@ class LastFirst:
 
 class Idle:
     def assign(self, situation):
-        return {}
-
-class OldFashioned:
-    def assign(self, strips, helpers):
         return {}
 
 class Clueless:
@@ -93,9 +88,6 @@ class HalfCharged(SurveyAgent):
 def tent():
     return DetectionCurve(np.array([5.0, 40.0, 75.0]), np.array([0.1, 0.6, 0.1]))
 
-def not_a_curve():
-    return 7
-
 class Quits:
     def assign(self, situation):
         raise SystemExit
@@ -103,10 +95,6 @@ class Quits:
 class Leaves(Idle):
     def assign(self, situation):
         raise GeneratorExit("no more")
-
-class NeverMade(Idle):
-    def __init__(self):
-        raise SystemExit(0)
 
 class QuitsPlanning(Every60):
     def decide(self, width_m, covered_m, r_eff_m):
@@ -119,11 +107,7 @@ class QuitsAtStart(SurveyAgent):
 class AgentNeverMade(SurveyAgent):
     def __init__(self, config):
         raise SystemExit(0)
-
-fine = "words"
 """
-
-OURS = ", ".join(ALLOCATORS)
 
 BAY = """
 name: bay
@@ -141,7 +125,6 @@ vehicles:
 def folder(tmp_path: Path) -> Path:
     """A user's folder: a module of parts and a scenario."""
     (tmp_path / "own.py").write_text(OWN)
-    (tmp_path / "quits.py").write_text("raise SystemExit(0)")
     (tmp_path / "bay.yaml").write_text(BAY)
     return tmp_path
 
@@ -190,65 +173,6 @@ def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path) -> Non
     sensor = load_scenario(run_folder / "scenario.yaml").vehicles["primary"].sensor
     assert sensor.curve is not None
     assert (sensor.curve.range_m, sensor.curve.p_detect) == ((5, 40, 75), (0.1, 0.6, 0.1))
-
-
-@pytest.mark.parametrize(
-    ("setting", "allowed"),
-    [
-        ("coordinator.allocator=own:OldFashioned", "an allocator must have assign(situation); missing a required"),
-        ("coordinator.allocator=own:Missing", "must be importable; own has no Missing"),
-        ("coordinator.allocator=nowhere:X", "must be importable; ModuleNotFoundError: No module named 'nowhere'"),
-        (
-            "coordinator.allocator=own:fine",
-            f"must be {OURS} or package.module:Class of an allocator; that is a str",
-        ),
-        (
-            "coordinator.allocator=own:tent:x",
-            f"must be {OURS} or package.module:Class of an allocator",
-        ),
-        ("vehicles.primary.spacing=own:LastFirst", "own:LastFirst must take (nadir_gap_m, told_range_m); "),
-        ("vehicles.primary.agent=own:Every60", "own:Every60 must take (config); "),
-        ("vehicles.helper.sensor.sonar=own:Every60", "own:Every60 must take (curve, seabed); "),
-    ],
-)
-def test_what_cannot_be_used_is_refused_before_anything_flies(folder: Path, setting: str, allowed: str) -> None:
-    code, _, error = run(folder, setting)
-    assert code == 2
-    key, _, value = setting.partition("=")
-    assert error.startswith(f'--set {setting}: {key}: "{value}" is not allowed; {allowed}')
-    assert error.count("\n") == 1
-    assert not (folder / "runs").exists()
-
-
-@pytest.mark.parametrize(
-    ("setting", "sentence"),
-    [
-        (
-            "coordinator.allocator=quits:X",
-            'coordinator.allocator: "quits:X" is not allowed; must be importable; SystemExit: 0 (quits.py, line 1)',
-        ),
-        (
-            "vehicles.primary.prior_curve=quits:X",
-            'vehicles.primary.prior_curve: "quits:X" is not allowed; must be importable; '
-            "SystemExit: 0 (quits.py, line 1)",
-        ),
-        (
-            "vehicles.primary.prior_curve=sys:exit",
-            'vehicles.primary.prior_curve: "sys:exit" is not allowed; must make a DetectionCurve; SystemExit',
-        ),
-    ],
-)
-def test_a_part_that_exits_before_anything_flies_is_refused(folder: Path, setting: str, sentence: str) -> None:
-    code, _, error = run(folder, setting)
-    assert (code, error) == (2, f"--set {setting}: {sentence}\n")
-    assert not (folder / "runs").exists()
-
-
-def test_a_part_that_exits_when_it_is_made_is_refused(folder: Path) -> None:
-    code, _, error = run(folder, "coordinator.allocator=own:NeverMade")
-    assert code == 2
-    line = 1 + OWN.splitlines().index("class NeverMade(Idle):") + 2
-    assert error == f"own:NeverMade cannot be made: SystemExit: 0 (own.py, line {line}, in __init__)\n"
 
 
 @pytest.mark.parametrize("bus", ["local", "zenoh"])
@@ -344,13 +268,3 @@ def test_an_answer_that_is_none_is_told_for_what_it_is(folder: Path, allocator: 
     code, _, error = run(folder, f"coordinator.allocator=own:{allocator}")
     assert code == 1
     assert re.search(rf"^coordinator has failed at \d+\.\d+ s: {re.escape(sentence)}", error, re.MULTILINE), error
-
-
-@pytest.mark.parametrize("made", ["own:not_a_curve", "own:Clueless"])
-def test_what_makes_no_curve_is_refused(folder: Path, made: str) -> None:
-    (folder / "bay.yaml").write_text(
-        BAY.replace("sensor: {p_detect: 0.3, range_m: 60}", f'sensor: {{curve: "{made}"}}')
-    )
-    code, _, error = run(folder)
-    assert code == 2
-    assert f'bay.yaml:7: vehicles.primary.sensor.curve: "{made}" is not allowed; must make a DetectionCurve' in error
