@@ -112,7 +112,8 @@ class _Swarm:
         for kind in kinds:
             if self._rng.random() < 0.4:
                 trouble += kind()
-        return trouble + self._for_good() + self._second_surveys()
+        for_good = self._for_good()
+        return trouble + self._second_surveys() + for_good  # what befalls a node in the order of time
 
     def _late_joins(self) -> list[_Entry]:
         joined = [node for node in self._nodes if self._rng.random() < 0.3]
