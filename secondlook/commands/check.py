@@ -1,4 +1,4 @@
-"""`secondlook check`: is a scenario valid, and how will its area be surveyed?"""
+"""`secondlook check`: is a scenario valid, how will its area be surveyed, and what will the mission come to?"""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.planned_survey import planned_surveys, unreachable
+from secondlook.commands.run import tell_expectation
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.fleet.build import build_fleet
+from secondlook.preflight import expected_mission
 from secondlook.scenario import load_scenario
 
 
@@ -22,8 +24,9 @@ def check(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
 ) -> None:
-    """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
-    battery is too small for that, and what cannot be reached past ground to keep out of."""
+    """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, what the mission
+    is expected to come to, who can do nothing in it, and what cannot be reached past ground to keep out of. One that
+    cannot end within its limits is refused."""
     valid = load_scenario(scenario, set_ or ())
     build_fleet(valid, record=False)
     surveys = planned_surveys(valid)
@@ -32,7 +35,6 @@ def check(
     typer.echo(f"{scenario}: valid; {across_m:g} m by {along_m:g} m, {vehicles}")
     for survey in surveys:
         typer.echo(survey.sentence)
-        if survey.warning:
-            sys.stderr.write(f"{survey.warning}\n")
     for sentence in unreachable(valid, surveys):
         sys.stderr.write(f"{sentence}\n")
+    tell_expectation(expected_mission(valid))

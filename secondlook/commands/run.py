@@ -24,6 +24,7 @@ from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_missio
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.run_display import closing_table, progress_display
 from secondlook.launch.run_folder import run_folder, traceback_files
+from secondlook.preflight import MissionExpectation, expected_mission
 from secondlook.report import write_report
 from secondlook.scenario import load_scenario
 
@@ -90,6 +91,7 @@ RealTime = Annotated[
         help="By the wall clock, FACTOR times as fast, 1 if left out; not repeatable, so without a digest.",
     ),
 ]
+Anyway = Annotated[bool, typer.Option("--anyway", help="Fly a mission even if it cannot end within its limits.")]
 KEEP_GOING = "--keep-going"
 KeepGoing = Annotated[
     bool,
@@ -143,12 +145,14 @@ def run(
     live: Live = False,
     web: Web = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
+    anyway: Anyway = False,
 ) -> None:
-    """Fly a mission, and write what happened."""
+    """Tell what a mission is expected to come to, fly it, and write what happened."""
     _check(bus, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
+    tell_expectation(expected_mission(mission), anyway=anyway, quiet=as_json)
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
@@ -178,6 +182,16 @@ def run(
             sys.stderr.write(f"{', '.join(empty)}: the battery was empty before it was home\n")
     if failure or unreported or empty:
         raise typer.Exit(MISSION_FAILED)
+
+
+def tell_expectation(expected: MissionExpectation, *, anyway: bool = False, quiet: bool = False) -> None:
+    """Prints what a mission is expected to come to, warnings alone if `quiet`. Raises UserError for one that cannot end
+    within its limits, unless it is to be flown `anyway`."""
+    if not quiet:
+        typer.echo("\n".join(expected.sentences))
+    sys.stderr.writelines(f"{sentence}\n" for sentence in expected.warnings)
+    if expected.refusals and not anyway:
+        raise UserError("\n".join(expected.refusals))
 
 
 def _check(bus: BusName, real_time: float | None, *, keep_going: bool, live: bool, web: bool, no_record: bool) -> None:
