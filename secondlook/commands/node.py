@@ -14,12 +14,13 @@ import typer
 
 from comms.said.announcement import LARGEST_SEED
 from comms.session import Certificates
-from secondlook.commands.run import check_factor
+from secondlook.commands.run import Anyway, check_factor, tell_expectation
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import COORDINATOR, WORLD
 from secondlook.launch.run_folder import run_folder
 from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
 from secondlook.launch.supervisor import Supervisor, starts_before
+from secondlook.preflight import expected_mission
 from secondlook.scenario import Scenario, load_scenario
 
 _FORM = re.compile(r"(?P<protocol>tcp|tls)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})")
@@ -143,14 +144,18 @@ def router(
     tls_cert: Certificate = None,
     tls_key: Key = None,
     restart: RestartOption = Restart.never,
+    anyway: Anyway = False,
 ) -> None:
-    """What all others connect to: it routes, holds the clock and announces the run."""
+    """What all others connect to: it tells what the mission is expected to come to, routes, holds the clock and
+    announces the run."""
     check_endpoint("--listen", listen, insecure=insecure, any_port=True)
     if restart is Restart.on_failure and listen.endswith(":0"):
         raise UserError(f"--listen {listen}: is another port at each start; {RESTART} needs one that stays")
     _supervise_if_asked("router", restart)
     check_factor("--factor", factor)
     mission = load_scenario(scenario, set_ or (), seed)
+    if not starts_before():
+        tell_expectation(expected_mission(mission), anyway=anyway)
     link = Link(_run_id(run, mission), certificates([listen], tls_ca, tls_cert, tls_key), listen=listen)
     raise typer.Exit(run_router(mission, link, factor=factor, record=not no_record))
 

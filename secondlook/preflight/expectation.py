@@ -124,7 +124,8 @@ def expected_mission(scenario: Scenario) -> MissionExpectation:
     reasons = {name: why_idle(scenario, name, begins_s.get(name, 0.0), until_s) for name in may_revisit}
     idle = {name: why for name, why in reasons.items() if why}
     able = [name for name in may_revisit if name not in idle]
-    latest_s = until_s if able else min(survey_s, until_s)
+    # Where somebody may revisit strips are cut, and left open until then by those who can do nothing.
+    latest_s = until_s if may_revisit else min(survey_s, until_s)
     refused, remarks = _flown_too_far(scenario, surveys, able, latest_s)
     limit_s = mission.time_limit_s
     if survey_s <= limit_s < latest_s:
