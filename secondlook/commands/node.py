@@ -20,7 +20,6 @@ from secondlook.fleet.nodes import COORDINATOR, WORLD
 from secondlook.launch.run_folder import run_folder
 from secondlook.launch.spread_fleet import Link, run_node, run_recorder, run_router
 from secondlook.launch.supervisor import Supervisor, starts_before
-from secondlook.preflight import expected_mission
 from secondlook.scenario import Scenario, load_scenario
 
 _FORM = re.compile(r"(?P<protocol>tcp|tls)/(?P<host>\[[0-9A-Fa-f:.]+\]|[A-Za-z0-9._-]+):(?P<port>[0-9]{1,5})")
@@ -155,7 +154,7 @@ def router(
     check_factor("--factor", factor)
     mission = load_scenario(scenario, set_ or (), seed)
     if not starts_before():
-        tell_expectation(expected_mission(mission), anyway=anyway)
+        tell_expectation(mission, anyway=anyway)
     link = Link(_run_id(run, mission), certificates([listen], tls_ca, tls_cert, tls_key), listen=listen)
     raise typer.Exit(run_router(mission, link, factor=factor, record=not no_record))
 

@@ -16,6 +16,7 @@ import typer
 
 from comms.lockstep.drive import Lockstep
 from comms.said.announcement import LARGEST_SEED
+from comms.session import PATIENCE_S
 from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
 from secondlook.commands.scenarios import names_beginning_with
@@ -24,9 +25,10 @@ from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_missio
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.run_display import closing_table, progress_display
 from secondlook.launch.run_folder import run_folder, traceback_files
-from secondlook.preflight import MissionExpectation, expected_mission
+from secondlook.launch.watchdog import NoReturn, Watchdog
+from secondlook.preflight import expected_mission
 from secondlook.report import write_report
-from secondlook.scenario import load_scenario
+from secondlook.scenario import Scenario, load_scenario
 
 
 @contextmanager
@@ -152,7 +154,7 @@ def run(
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
-    tell_expectation(expected_mission(mission), anyway=anyway, quiet=as_json)
+    tell_expectation(mission, anyway=anyway, quiet=as_json)
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
@@ -184,9 +186,16 @@ def run(
         raise typer.Exit(MISSION_FAILED)
 
 
-def tell_expectation(expected: MissionExpectation, *, anyway: bool = False, quiet: bool = False) -> None:
+def tell_expectation(mission: Scenario, *, anyway: bool = False, quiet: bool = False) -> None:
     """Prints what a mission is expected to come to, warnings alone if `quiet`. Raises UserError for one that cannot end
-    within its limits, unless it is to be flown `anyway`."""
+    within its limits, unless it is to be flown `anyway`, and for a spacing planner that does not come back."""
+    try:
+        with Watchdog(PATIENCE_S) as watchdog:
+            watchdog.begin("what lays the tracks")
+            expected = expected_mission(mission)
+            watchdog.end()
+    except NoReturn as error:
+        raise UserError(str(error)) from error
     if not quiet:
         typer.echo("\n".join(expected.sentences))
     sys.stderr.writelines(f"{sentence}\n" for sentence in expected.warnings)

@@ -74,7 +74,9 @@ def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
 
 def test_a_mission_ends_well_and_leaves_no_process(landed: Landed) -> None:
     assert (landed.code, landed.err, landed.left) == (0, "", {})
-    assert landed.out.startswith("mission ")
+    expected, _, ended = landed.out.partition("\nmission ")
+    assert expected.splitlines()[0].startswith("primary: about 4 tracks and 0.8 km with turns in ")
+    assert ended
     assert "\x1b" not in landed.out + landed.err
 
 
@@ -253,7 +255,7 @@ def test_the_report_is_left_out_on_request(tmp_path: Path) -> None:
 
 
 def test_a_run_that_fails_has_a_report_that_says_so(tmp_path: Path) -> None:
-    flown = fly(tmp_path / "out", "--bus", "local", "--set", "mission.time_limit_s=20")
+    flown = fly(tmp_path / "out", "--bus", "local", "--anyway", "--set", "mission.time_limit_s=20")
     assert flown.code == 1
     assert flown.summary["failure"] in (flown.folder / "report.html").read_text()
 
@@ -267,7 +269,7 @@ def test_json_is_the_summary_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("bus", ["zenoh", "local"])
 def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path, bus: str) -> None:
-    flown = fly(tmp_path / "out", "--bus", bus, "--no-record", "--set", "mission.time_limit_s=20")
+    flown = fly(tmp_path / "out", "--bus", bus, "--no-record", "--anyway", "--set", "mission.time_limit_s=20")
     said = "the mission is not over at its time limit, mission.time_limit_s: 20"
     assert (flown.code, flown.out, flown.left) == (1, "", {})
     assert flown.err == f"{said}; what was recorded is in {flown.folder}\n"

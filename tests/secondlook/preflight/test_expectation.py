@@ -22,6 +22,7 @@ from secondlook.launch.processes import RunFailedError
 from secondlook.preflight import MissionExpectation
 from secondlook.scenario import Scenario, load_scenario, make_scenario
 from secondlook.scenario.bundled import scenario_names
+from secondlook.scenario.text import Value
 
 TOLERANCE = 0.05
 """Of tracks the last digit of what is seen decides, and one of ten more is a tenth."""
@@ -74,7 +75,7 @@ def test_a_bundled_mission_comes_to_what_is_told_before(name: str, tmp_path: Pat
 
 def two_tracks(**changes: Any) -> MissionExpectation:
     """Of a vehicle that is on its first run-in already, and whose second track lies two turn radii beside the first."""
-    data = {
+    data: dict[str, Value] = {
         "name": "two",
         "area": {"polygon_m": [[0, 0], [120, 0], [120, 400], [0, 400]], "track_heading_deg": 0},
         "vehicles": {
