@@ -143,8 +143,8 @@ def test_what_cannot_end_within_its_limits_is_refused_in_one_sentence_and_flown_
 ) -> None:
     limit = ("--set", "mission.time_limit_s=60")
     told = re.compile(
-        r"mission\.time_limit_s: 60 s ends the survey after about 2 of 4 tracks, as it takes about 106 s; must be larger "
-        r"by about 46 s, or flown with --anyway\n"
+        r"mission\.time_limit_s: 60 s ends the survey after about 2 of 4 tracks, as it takes about 106 s; must be "
+        r"larger by about 46 s, or flown with --anyway\n"
     )
     code, out, err = secondlook("check", str(BRIEF), *limit)
     assert code == 2
@@ -201,8 +201,8 @@ def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
         "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
         "primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered\n"
         "primary: about 8 tracks and 4.8 km with turns in 3211 s\n"
-        "the survey ends after about 3211 s, the mission is over after 3371 s at the latest; battery left then: primary "
-        "91%, helper 77%\n"
+        "the survey ends after about 3211 s, the mission is over after 3371 s at the latest; battery left then: "
+        "primary 91%, helper 77%\n"
     )
     assert secondlook("check", "tellaro") == (0, expected, "")
 
