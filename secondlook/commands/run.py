@@ -21,6 +21,7 @@ from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import UserError
+from secondlook.fleet.survey_area import SpacingFailedError
 from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.run_display import closing_table, progress_display
@@ -154,7 +155,8 @@ def run(
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
-    tell_expectation(mission, anyway=anyway, quiet=as_json)
+    with contextlib.suppress(SpacingFailedError):  # when it is flown that is told with the whole traceback
+        tell_expectation(mission, anyway=anyway, quiet=as_json)
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):

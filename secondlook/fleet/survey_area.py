@@ -95,9 +95,13 @@ def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
         return first_plan(region, heading_rad, *sonar, spacing, known, terms, flyable=flyable, begin=begin)
 
 
+class SpacingFailedError(UserError):
+    """A spacing planner of the user's has failed."""
+
+
 @contextmanager
 def lays_tracks(vehicle: SurveyVehicle) -> Iterator[None]:
-    """Within it the vehicle's spacing planner lays tracks. Raises UserError where one of the user's fails."""
+    """Within it the vehicle's spacing planner lays tracks. Raises SpacingFailedError where one of the user's fails."""
     try:
         yield
     except NO_FAILURES:
@@ -105,7 +109,7 @@ def lays_tracks(vehicle: SurveyVehicle) -> Iterator[None]:
     except BaseException as error:
         if vehicle.spacing in SPACING.ours:
             raise
-        raise UserError(f"{vehicle.spacing} has failed to lay tracks: {in_words(error)}") from error
+        raise SpacingFailedError(f"{vehicle.spacing} has failed to lay tracks: {in_words(error)}") from error
 
 
 def check_tracks(name: str, vehicle: SurveyVehicle, tracks: int) -> None:

@@ -48,6 +48,13 @@ def has_ended(pid: int, timeout_s: float) -> bool:
         os.close(handle)
 
 
+def without_expected(out: str) -> str:
+    """What `secondlook run` has printed after what it expects of the mission."""
+    lines = out.splitlines(keepends=True)
+    before = next((place for place, line in enumerate(lines, start=1) if line.startswith("the survey ends ")), 0)
+    return "".join(lines[before:])
+
+
 class Flight:
     """`secondlook run` as a user starts it, with standard output and error in pipes; or another program, which is given
     the folder and the arguments. `expected`: of what it prints the first lines, what is expected of the mission."""
@@ -92,10 +99,9 @@ class Flight:
     def finish(self, timeout_s: float = 60.0) -> tuple[int, str, str]:
         """Waits for the end; exit code and what was printed, but for what is expected of the mission."""
         out, err = self.process.communicate(timeout=timeout_s)
-        lines = out.splitlines(keepends=True)
-        before = next((place for place, line in enumerate(lines, start=1) if line.startswith("the survey ends ")), 0)
-        self.expected = tuple(lines[:before])
-        return self.process.returncode, "".join(lines[before:]), err
+        told = without_expected(out)
+        self.expected = tuple(out.removesuffix(told).splitlines())
+        return self.process.returncode, told, err
 
 
 @contextmanager
