@@ -24,8 +24,8 @@ from secondlook.scenario import Scenario, load_scenario, make_scenario
 from secondlook.scenario.bundled import scenario_names
 from secondlook.scenario.text import Value
 
-TOLERANCE = 0.05
-"""Of tracks the last digit of what is seen decides, and one of ten more is a tenth."""
+TOLERANCE = 0.01
+"""Where the same tracks are laid only rounding differs. With another noise one more or one less may be."""
 
 
 @dataclass
@@ -57,20 +57,34 @@ def fly(scenario: Scenario, folder: Path) -> Flown:
     return flown
 
 
-@pytest.mark.parametrize("name", scenario_names())
-def test_a_bundled_mission_comes_to_what_is_told_before(name: str, tmp_path: Path) -> None:
-    # Helpers do not bear on a survey; without strips the long ones are flown sooner, and all end at their deadline.
-    settings = ["coordinator.allocator=none", "area.cell_m=10"]
-    expected, flown = check_mission(name, settings), fly(load_scenario(name, settings), tmp_path)
+def assert_comes_to(expected: MissionExpectation, flown: Flown) -> None:
+    """Ways and durations of all surveys, and all batteries."""
+    summary = flown.summary
     assert expected.refusals == ()
-    assert expected.survey_s == pytest.approx(flown.summary["time"]["primary_s"], rel=TOLERANCE)
-    assert expected.latest_s == pytest.approx(flown.summary["time"]["mission_s"], rel=TOLERANCE)
+    assert expected.survey_s == pytest.approx(summary["time"]["primary_s"], rel=TOLERANCE)
+    assert summary["time"]["mission_s"] <= expected.latest_s * (1 + TOLERANCE)
     for one in expected.surveys:
         over_s, way_m = flown.ways[one.vehicle]
-        assert one.flown == one.tracks == pytest.approx(flown.summary["vehicles"][one.vehicle]["tracks"], abs=1)
+        assert one.flown == one.tracks == summary["vehicles"][one.vehicle]["tracks"]
         assert (one.over_s, one.way_m) == pytest.approx((over_s, way_m), rel=TOLERANCE)
-    left = {vehicle: told["battery_left"] for vehicle, told in flown.summary["vehicles"].items()}
-    assert expected.battery_left == pytest.approx(left, abs=0.02)
+    left = {vehicle: told["battery_left"] for vehicle, told in summary["vehicles"].items()}
+    assert expected.battery_left == pytest.approx(left, abs=0.015)  # strips may be done before the deadline
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_the_surveys_of_a_bundled_mission_come_to_what_is_told_before(name: str, tmp_path: Path) -> None:
+    mission = load_scenario(name)
+    alone = mission.model_copy(update={"vehicles": mission.survey_vehicles})  # a helper never holds them up
+    expected = check_mission(alone)
+    assert_comes_to(expected, fly(alone, tmp_path))
+    assert expected.latest_s == expected.survey_s
+
+
+@pytest.mark.parametrize("name", ["tellaro", "patchy", "five-helpers"])
+def test_a_bundled_mission_with_helpers_comes_to_what_is_told_before(name: str, tmp_path: Path) -> None:
+    expected = check_mission(name)
+    assert_comes_to(expected, fly(load_scenario(name), tmp_path))
+    assert expected.latest_s == pytest.approx(1.05 * expected.survey_s)
 
 
 def two_tracks(**changes: Any) -> MissionExpectation:
