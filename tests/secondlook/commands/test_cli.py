@@ -196,15 +196,16 @@ def test_check_counts_of_a_share_of_the_area_what_is_its_own(secondlook: SecondL
     assert [line.split("; ")[-1] for line in out.splitlines()[1:4]] == ["up to 145 m all is covered"] * 3
 
 
-def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
-    expected = (
-        "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
-        "primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered\n"
-        "primary: about 8 tracks and 4.8 km with turns in 3211 s\n"
-        "the survey ends after about 3211 s, the mission is over after 3371 s at the latest; battery left then: "
-        "primary 91%, helper 77%\n"
-    )
-    assert secondlook("check", "tellaro") == (0, expected, "")
+DOCS = Path(__file__).parents[3] / "docs" / "scenarios.md"
+
+
+def test_check_tells_what_the_docs_show(secondlook: SecondLook) -> None:
+    def shown(command: str) -> str:
+        return DOCS.read_text().split(f"```\n$ secondlook {command}\n")[1].split("```")[0]
+
+    assert secondlook("check", "tellaro") == (0, shown("check tellaro"), "")
+    limit = "tellaro --set mission.time_limit_s=2000"
+    assert secondlook("run", *limit.split())[::2] == (2, shown(f"run {limit}"))
 
 
 def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook: SecondLook) -> None:

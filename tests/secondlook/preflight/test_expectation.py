@@ -87,6 +87,24 @@ def test_a_bundled_mission_with_helpers_comes_to_what_is_told_before(name: str, 
     assert expected.latest_s == pytest.approx(1.05 * expected.survey_s)
 
 
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "current={set_deg: 60, drift_mps: 3}",
+        "current={set_deg: 0, drift_mps: 3, period_s: 90}",
+        "area.keep_out_m=[[[120, 30], [160, 30], [160, 60], [120, 60]]]",
+        "vehicles.primary.begin=ne",
+        "vehicles.primary.spacing=profile",
+    ],
+)
+def test_currents_ground_to_keep_out_of_and_spacing_are_reckoned_with(setting: str, tmp_path: Path) -> None:
+    mission = load_scenario(BRIEF, [setting])
+    alone = mission.model_copy(update={"vehicles": mission.survey_vehicles})
+    expected = check_mission(alone)
+    assert_comes_to(expected, fly(alone, tmp_path))
+    assert expected.survey_s != pytest.approx(check_mission(BRIEF).survey_s, rel=0.001)
+
+
 def two_tracks(**changes: Any) -> MissionExpectation:
     """Of a vehicle that is on its first run-in already, and whose second track lies two turn radii beside the first."""
     data: dict[str, Value] = {
