@@ -154,7 +154,7 @@ def router(
     check_factor("--factor", factor)
     mission = load_scenario(scenario, set_ or (), seed)
     if not starts_before():
-        tell_expectation(mission, anyway=anyway)
+        tell_expectation(mission, anyway=anyway, err=True)
     link = Link(_run_id(run, mission), certificates([listen], tls_ca, tls_cert, tls_key), listen=listen)
     raise typer.Exit(run_router(mission, link, factor=factor, record=not no_record))
 

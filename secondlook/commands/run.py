@@ -188,9 +188,10 @@ def run(
         raise typer.Exit(MISSION_FAILED)
 
 
-def tell_expectation(mission: Scenario, *, anyway: bool = False, quiet: bool = False) -> None:
-    """Prints what a mission is expected to come to, warnings alone if `quiet`. Raises UserError for one that cannot end
-    within its limits, unless it is to be flown `anyway`, and for a spacing planner that does not come back."""
+def tell_expectation(mission: Scenario, *, anyway: bool = False, quiet: bool = False, err: bool = False) -> None:
+    """Prints what a mission is expected to come to, warnings alone if `quiet`; `err`: all of it on standard error.
+    Raises UserError for one that cannot end within its limits, unless it is to be flown `anyway`, and for a spacing
+    planner that does not come back."""
     try:
         with Watchdog(PATIENCE_S) as watchdog:
             watchdog.begin("what lays the tracks")
@@ -199,7 +200,7 @@ def tell_expectation(mission: Scenario, *, anyway: bool = False, quiet: bool = F
     except NoReturn as error:
         raise UserError(str(error)) from error
     if not quiet:
-        typer.echo("\n".join(expected.sentences))
+        typer.echo("\n".join(expected.sentences), err=err)
     sys.stderr.writelines(f"{sentence}\n" for sentence in expected.warnings)
     if expected.refusals and not anyway:
         raise UserError("\n".join(expected.refusals))
