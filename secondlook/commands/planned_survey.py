@@ -30,7 +30,7 @@ from secondlook.fleet.survey_area import (
     region_of,
     track_heading_rad,
 )
-from secondlook.launch.run_display import in_seconds
+from secondlook.progress import in_seconds
 from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
 from secondlook.scenario import Scenario, SurveyVehicle

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from planner.way_home import MARGIN_S
 from secondlook.fleet.build import build_fleet, vehicle_config, world_config
 from secondlook.fleet.survey_area import check_tracks, lays_tracks, region_of
-from secondlook.launch.run_display import in_seconds
 from secondlook.preflight.dry_survey import DrySurvey, Sea, fly_dry
 from secondlook.preflight.helpers import why_idle
+from secondlook.progress import in_seconds
 from secondlook.scenario import Scenario, SurveyVehicle
 from secondlook.scenario.vehicle import RESERVE_SHARE
 from sim_world.seabed import make_seabed

@@ -10,7 +10,7 @@ from planner.footprints import footprint_of
 from planner.way_home import MARGIN_S
 from secondlook.fleet.roster import roster_vehicle, sailing_of
 from secondlook.fleet.survey_area import keep_out_of, region_of
-from secondlook.launch.run_display import in_seconds
+from secondlook.progress import in_seconds
 from secondlook.scenario import RevisitVehicle, Scenario, SurveyVehicle
 
 NOTHING_M2 = 1.0
