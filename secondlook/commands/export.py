@@ -11,12 +11,12 @@ from typing import Annotated
 
 import typer
 
-from secondlook import load
+from secondlook.commands.reading import EXPORT, GEOJSON, reading
 from secondlook.errors import UserError
 from secondlook.export.kml import to_kml
 from secondlook.export.risk_levels import qgis_style, risk_levels
 from secondlook.files import CannotWriteError, whole_file, write_whole
-from secondlook.recorded import GeographicOrigin, RecordedMission, to_geojson
+from secondlook.recorded import GeographicOrigin, RecordedMission, load_run, to_geojson
 from secondlook.recorded.geojson import collection, features_of
 
 Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
@@ -34,7 +34,8 @@ def geojson(
     """Write area, tracks, paths, hotspots, strips, contacts and missed targets as GeoJSON: in degrees with an origin,
     else in local metres."""
     place = _place(origin)
-    text = json.dumps(to_geojson(load(run), place))
+    with reading("geojson", GEOJSON) as on_read:
+        text = json.dumps(to_geojson(load_run(run, on_read), place))
     if out is None:
         typer.echo(text)
         return
@@ -54,7 +55,16 @@ def export(
 
     risk.tif needs secondlook[geotiff].
     """
-    mission, place = load(run), _place(origin)
+    place = _place(origin)
+    with reading("export", EXPORT) as on_read:
+        names = _export(run, load_run(run, on_read), place, out)
+    typer.echo("\n".join(names))
+    if find_spec("rasterio") is None:
+        typer.echo("risk.tif is left out: it needs rasterio, which the extra secondlook[geotiff] has", err=True)
+
+
+def _export(run: Path, mission: RecordedMission, place: GeographicOrigin | None, out: Path | None) -> list[str]:
+    """Writes all files; their paths."""
     place = place or mission.origin
     if place is None:
         raise UserError(f"{run}: the scenario has no origin; must be given: --origin LAT LON")
@@ -63,12 +73,12 @@ def export(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+    written = []
     for name, content in _files(mission, place):
         with whole_file(folder / name) as file:
             file.write(content)
-        typer.echo(folder / name)
-    if find_spec("rasterio") is None:
-        typer.echo("risk.tif is left out: it needs rasterio, which the extra secondlook[geotiff] has", err=True)
+        written.append(str(folder / name))
+    return written
 
 
 def _files(mission: RecordedMission, origin: GeographicOrigin) -> Iterator[tuple[str, bytes]]:

@@ -19,6 +19,7 @@ from comms.said.announcement import LARGEST_SEED
 from comms.session import PATIENCE_S
 from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
+from secondlook.commands.reading import REPORT, reading
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import UserError
 from secondlook.fleet.survey_area import SpacingFailedError
@@ -170,7 +171,7 @@ def run(
                 failure = str(error)
             else:
                 failure = ""
-        unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure))
+        unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure), shown=not as_json)
         if failure:
             sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
             for log in traceback_files(folder / LOGS):
@@ -220,10 +221,11 @@ def _check(bus: BusName, real_time: float | None, *, keep_going: bool, live: boo
         raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
 
 
-def _report(folder: Path, *, quiet: bool) -> str:
-    """Writes the report; why it cannot be, or nothing."""
+def _report(folder: Path, *, quiet: bool, shown: bool) -> str:
+    """Writes the report, and shows how far that is if `shown`; why it cannot be, or nothing."""
     try:
-        write_report(folder, quiet=quiet)
+        with reading("report", REPORT) if shown else contextlib.nullcontext() as on_read:
+            write_report(folder, on_read, quiet=quiet)
     except UserError as error:
         return str(error)
     return ""
