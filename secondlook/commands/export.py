@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,11 +11,12 @@ from typing import Annotated
 
 import typer
 
-from secondlook.commands.reading import EXPORT, GEOJSON, reading
+from secondlook.commands.reading import GEOJSON, reading
 from secondlook.errors import UserError
 from secondlook.export.kml import to_kml
-from secondlook.export.risk_levels import qgis_style, risk_levels
+from secondlook.export.risk_levels import NAMES, qgis_style, risk_levels
 from secondlook.files import CannotWriteError, whole_file, write_whole
+from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded import GeographicOrigin, RecordedMission, load_run, to_geojson
 from secondlook.recorded.geojson import collection, features_of
 
@@ -24,6 +25,9 @@ Origin = Annotated[
     tuple[float, float] | None,
     typer.Option(metavar="LAT LON", help="Where x 0, y 0 is, degrees WGS84; the scenario's origin if left out."),
 ]
+
+BEFORE_LEVELS = 0.1
+"""Share of the time for all files that goes by before the risk is cut by levels."""
 
 
 def geojson(
@@ -56,14 +60,20 @@ def export(
     risk.tif needs secondlook[geotiff].
     """
     place = _place(origin)
-    with reading("export", EXPORT) as on_read:
-        names = _export(run, load_run(run, on_read), place, out)
+    with shown_progress("export", begins="reading") as tell:
+        names = _export(run, load_run(run), place, out, lambda share: tell(share, no_remark))
     typer.echo("\n".join(names))
     if find_spec("rasterio") is None:
         typer.echo("risk.tif is left out: it needs rasterio, which the extra secondlook[geotiff] has", err=True)
 
 
-def _export(run: Path, mission: RecordedMission, place: GeographicOrigin | None, out: Path | None) -> list[str]:
+def _export(
+    run: Path,
+    mission: RecordedMission,
+    place: GeographicOrigin | None,
+    out: Path | None,
+    told: Callable[[float], None],
+) -> list[str]:
     """Writes all files; their paths."""
     place = place or mission.origin
     if place is None:
@@ -74,19 +84,25 @@ def _export(run: Path, mission: RecordedMission, place: GeographicOrigin | None,
     except OSError as error:
         raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
     written = []
-    for name, content in _files(mission, place):
+    for name, content in _files(mission, place, told):
         with whole_file(folder / name) as file:
             file.write(content)
         written.append(str(folder / name))
     return written
 
 
-def _files(mission: RecordedMission, origin: GeographicOrigin) -> Iterator[tuple[str, bytes]]:
+def _files(
+    mission: RecordedMission, origin: GeographicOrigin, told: Callable[[float], None]
+) -> Iterator[tuple[str, bytes]]:
     features = list(features_of(mission))
     yield "mission.geojson", json.dumps(collection(features, origin)).encode() + b"\n"
     yield "mission.kml", to_kml(mission.run.scenario, features, origin)
-    risk = mission.risk()
-    yield "risk-levels.geojson", json.dumps(collection(risk_levels(risk), origin)).encode() + b"\n"
+    told(BEFORE_LEVELS)
+    risk, levels = mission.risk(), []
+    for number, level in enumerate(risk_levels(risk), start=1):  # what takes longest
+        levels.append(level)
+        told(BEFORE_LEVELS + (1 - BEFORE_LEVELS) * number / len(NAMES))
+    yield "risk-levels.geojson", json.dumps(collection(levels, origin)).encode() + b"\n"
     yield "risk-levels.qml", qgis_style()
     if find_spec("rasterio") is not None:
         yield "risk.tif", import_module("secondlook.export.geotiff").to_geotiff(risk, origin)
