@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -165,28 +165,34 @@ def run(
             options = RunOptions(
                 folder, bus.value, processes, drive, record=not no_record, progress=progress, live_pipe=pipe
             )
+            summary, failure = dict[str, Any](), ""
             try:
                 summary = run_mission(mission, options)
             except RunFailedError as error:
                 failure = str(error)
-            else:
-                failure = ""
         unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure), shown=not as_json)
-        if failure:
-            sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
-            for log in traceback_files(folder / LOGS):
-                sys.stderr.write(f"The whole traceback is in {log}\n")
-        elif unreported:
-            sys.stderr.write(f"{unreported}\n")
-        if not failure and as_json:
-            typer.echo(json.dumps(summary, indent=2))
-        elif not failure:
-            closing_table(summary, folder)
-        empty = [] if failure else [name for name, one in summary["vehicles"].items() if one["ended"] == "empty"]
-        if empty:
-            sys.stderr.write(f"{', '.join(empty)}: the battery was empty before it was home\n")
-    if failure or unreported or empty:
+        is_well = _tell_end(folder, summary, failure, unreported, as_json=as_json)
+    if not is_well:
         raise typer.Exit(MISSION_FAILED)
+
+
+def _tell_end(folder: Path, summary: dict[str, Any], failure: str, unreported: str, *, as_json: bool) -> bool:
+    """Prints what came of a run, or why it has failed; returns whether all is well."""
+    if failure:
+        sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
+        for log in traceback_files(folder / LOGS):
+            sys.stderr.write(f"The whole traceback is in {log}\n")
+        return False
+    if unreported:
+        sys.stderr.write(f"{unreported}\n")
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+    else:
+        closing_table(summary, folder)
+    empty = [name for name, one in summary["vehicles"].items() if one["ended"] == "empty"]
+    if empty:
+        sys.stderr.write(f"{', '.join(empty)}: the battery was empty before it was home\n")
+    return not unreported and not empty
 
 
 def tell_expectation(mission: Scenario, *, anyway: bool = False, quiet: bool = False, err: bool = False) -> None:
