@@ -127,7 +127,7 @@ class _DryFlight:
         homing, pose, run_in_m = self._agent.endurance.homing, self._agent.pose, self._agent.config.run_in_m
         if homing is None or pose is None:
             return 0.0
-        run_out_s = homing.way.sailing.straight_s(run_in_m, pose.heading_rad)
+        run_out_s = homing.way.sailing.straight_s(run_in_m, pose)
         return run_out_s + homing.way.from_pose(shifted(pose[:2], pose.heading_rad, run_in_m))[0]
 
     def _sail_until(self, at_ms: int) -> None:

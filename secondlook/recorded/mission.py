@@ -331,9 +331,7 @@ def chosen_keys(keys: str, vehicles: tuple[str, ...], topics: tuple[Topic, ...] 
         raise UserError(str(error)) from error
 
 
-def load_run(
-    run: str | os.PathLike[str], on_read: OnRead | None = None, *, quiet: bool = False
-) -> RecordedMission:
+def load_run(run: str | os.PathLike[str], on_read: OnRead | None = None, *, quiet: bool = False) -> RecordedMission:
     """The mission of a run's folder, of one that failed or was cut off as far as it came; `on_read` is told now and
     then how much of it has been read.
 
