@@ -1,4 +1,4 @@
-"""`secondlook check`: is a scenario valid, and how will its area be surveyed?"""
+"""`secondlook check`: is a scenario valid, how will its area be surveyed, and what will the mission come to?"""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.planned_survey import planned_surveys, unreachable
+from secondlook.commands.run import expected_of, refuse, tell_expected
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.scenario import load_scenario
 
@@ -21,8 +22,9 @@ def check(
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
 ) -> None:
-    """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, and whether a
-    battery is too small for that, and what cannot be reached past ground to keep out of."""
+    """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, what the mission
+    is expected to come to, who can do nothing in it, and what cannot be reached past ground to keep out of. One that
+    cannot end within its limits is refused."""
     valid = load_scenario(scenario, set_ or ())
     surveys = planned_surveys(valid)
     across_m, along_m = valid.area.extent_m
@@ -30,7 +32,8 @@ def check(
     typer.echo(f"{scenario}: valid; {across_m:g} m by {along_m:g} m, {vehicles}")
     for survey in surveys:
         typer.echo(survey.sentence)
-        if survey.warning:
-            sys.stderr.write(f"{survey.warning}\n")
     for sentence in unreachable(valid, surveys):
         sys.stderr.write(f"{sentence}\n")
+    expected = expected_of(valid)
+    tell_expected(expected)
+    refuse(expected)

@@ -63,7 +63,7 @@ def compare(
         _prepare(out)
     flown: Flown = {}
     numbers = range(first_seed, first_seed + seeds)
-    shown = sys.stderr.isatty() and not as_json
+    shown = not as_json
     workers = jobs or os.cpu_count() or 1
 
     def fly(tell: Tell) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,12 +11,13 @@ from typing import Annotated
 
 import typer
 
-from secondlook import load
+from secondlook.commands.reading import GEOJSON, reading
 from secondlook.errors import UserError
 from secondlook.export.kml import to_kml
-from secondlook.export.risk_levels import qgis_style, risk_levels
+from secondlook.export.risk_levels import NAMES, qgis_style, risk_levels
 from secondlook.files import CannotWriteError, whole_file, write_whole
-from secondlook.recorded import GeographicOrigin, RecordedMission, to_geojson
+from secondlook.progress import no_remark, shown_progress
+from secondlook.recorded import GeographicOrigin, RecordedMission, load_run, to_geojson
 from secondlook.recorded.geojson import collection, features_of
 
 Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
@@ -24,6 +25,9 @@ Origin = Annotated[
     tuple[float, float] | None,
     typer.Option(metavar="LAT LON", help="Where x 0, y 0 is, degrees WGS84; the scenario's origin if left out."),
 ]
+
+BEFORE_LEVELS = 0.1
+"""Share of the time for all files that goes by before the risk is cut by levels."""
 
 
 def geojson(
@@ -34,7 +38,8 @@ def geojson(
     """Write area, tracks, paths, hotspots, strips, contacts and missed targets as GeoJSON: in degrees with an origin,
     else in local metres."""
     place = _place(origin)
-    text = json.dumps(to_geojson(load(run), place))
+    with reading("geojson", GEOJSON) as on_read:
+        text = json.dumps(to_geojson(load_run(run, on_read), place))
     if out is None:
         typer.echo(text)
         return
@@ -54,7 +59,22 @@ def export(
 
     risk.tif needs secondlook[geotiff].
     """
-    mission, place = load(run), _place(origin)
+    place = _place(origin)
+    with shown_progress("export", begins="reading") as tell:
+        names = _export(run, load_run(run), place, out, lambda share: tell(share, no_remark))
+    typer.echo("\n".join(names))
+    if find_spec("rasterio") is None:
+        typer.echo("risk.tif is left out: it needs rasterio, which the extra secondlook[geotiff] has", err=True)
+
+
+def _export(
+    run: Path,
+    mission: RecordedMission,
+    place: GeographicOrigin | None,
+    out: Path | None,
+    told: Callable[[float], None],
+) -> list[str]:
+    """Writes all files; their paths."""
     place = place or mission.origin
     if place is None:
         raise UserError(f"{run}: the scenario has no origin; must be given: --origin LAT LON")
@@ -63,20 +83,26 @@ def export(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
-    for name, content in _files(mission, place):
+    written = []
+    for name, content in _files(mission, place, told):
         with whole_file(folder / name) as file:
             file.write(content)
-        typer.echo(folder / name)
-    if find_spec("rasterio") is None:
-        typer.echo("risk.tif is left out: it needs rasterio, which the extra secondlook[geotiff] has", err=True)
+        written.append(str(folder / name))
+    return written
 
 
-def _files(mission: RecordedMission, origin: GeographicOrigin) -> Iterator[tuple[str, bytes]]:
+def _files(
+    mission: RecordedMission, origin: GeographicOrigin, told: Callable[[float], None]
+) -> Iterator[tuple[str, bytes]]:
     features = list(features_of(mission))
     yield "mission.geojson", json.dumps(collection(features, origin)).encode() + b"\n"
     yield "mission.kml", to_kml(mission.run.scenario, features, origin)
-    risk = mission.risk()
-    yield "risk-levels.geojson", json.dumps(collection(risk_levels(risk), origin)).encode() + b"\n"
+    told(BEFORE_LEVELS)
+    risk, levels = mission.risk(), []
+    for number, level in enumerate(risk_levels(risk), start=1):  # what takes longest
+        levels.append(level)
+        told(BEFORE_LEVELS + (1 - BEFORE_LEVELS) * number / len(NAMES))
+    yield "risk-levels.geojson", json.dumps(collection(levels, origin)).encode() + b"\n"
     yield "risk-levels.qml", qgis_style()
     if find_spec("rasterio") is not None:
         yield "risk.tif", import_module("secondlook.export.geotiff").to_geotiff(risk, origin)

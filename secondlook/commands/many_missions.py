@@ -1,16 +1,15 @@
-"""What commands that fly many missions share: a bar that grows, a sentence where they are broken off, a folder."""
+"""What commands that fly many missions share: how far they are, a sentence where they are broken off, a folder."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
 from pathlib import Path
-
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from secondlook.errors import UserError
 from secondlook.launch.signals import signals_interrupt
+from secondlook.progress import shown_progress
 
 FAILED = 1
 """The exit code where missions were flown, and something was wrong with one of them or with all."""
@@ -19,26 +18,20 @@ Tell = Callable[[int, str], None]
 
 
 def fly_watched(command: str, missions: str, total: int, fly: Callable[[Tell], None], *, shown: bool) -> str:
-    """Runs `fly`, which tells how far it is, under a bar on stderr if `shown`.
+    """Runs `fly`, which tells how far it is, with its progress on standard error if `shown`.
 
     `missions` is what they are called. Returns in a sentence what broke it off, Ctrl-C or the end of a process of its
     own; nothing if it came to its end.
     """
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[missions]}{task.fields[remark]}"),
-        TimeRemainingColumn(),
-    )
     flown = 0
-    with Progress(*columns, console=Console(stderr=True), transient=True, disable=not shown) as progress:
-        task = progress.add_task(command, total=total, missions=missions, remark="")
+    with shown_progress(command) if shown else nullcontext() as shown_to:
 
         def tell(done: int, remark: str) -> None:
             nonlocal flown
             flown = done
-            progress.update(task, completed=done, remark=f", {remark}" if remark else "")
+            if shown_to is not None:
+                told = f"{done} of {total} {missions}"
+                shown_to(done / total, lambda: f"{told}, {remark}" if remark else told)
 
         try:
             with signals_interrupt():

@@ -14,7 +14,7 @@ import typer
 
 from comms.said.announcement import LARGEST_SEED
 from comms.session import Certificates
-from secondlook.commands.run import check_factor
+from secondlook.commands.run import Anyway, check_factor, expected_of, refuse, tell_expected
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import COORDINATOR, WORLD
@@ -147,8 +147,10 @@ def router(
     tls_cert: Certificate = None,
     tls_key: Key = None,
     restart: RestartOption = Restart.never,
+    anyway: Anyway = False,
 ) -> None:
-    """What all others connect to: it routes, holds the clock and announces the run."""
+    """What all others connect to: it tells what the mission is expected to come to, routes, holds the clock and
+    announces the run."""
     check_endpoint("--listen", listen, insecure=insecure, any_port=True)
     if restart is Restart.on_failure and listen.endswith(":0"):
         raise UserError(f"--listen {listen}: is another port at each start; {RESTART} needs one that stays")
@@ -156,6 +158,11 @@ def router(
     check_factor("--factor", factor)
     mission = load_scenario(scenario, set_ or (), seed)
     link = Link(_run_id(run, mission), certificates([listen], tls_ca, tls_cert, tls_key), listen=listen)
+    if not starts_before():
+        expected = expected_of(mission)
+        if not anyway:
+            refuse(expected)
+        tell_expected(expected, err=True)
     raise typer.Exit(run_router(mission, link, factor=factor, record=not no_record))
 
 

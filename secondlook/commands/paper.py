@@ -33,7 +33,7 @@ def paper(
     _require_extra()
     if out is not None:
         make_folder(out)
-    runs = _measure(seeds, shown=sys.stderr.isatty() and not as_json)
+    runs = _measure(seeds, shown=not as_json)
     if as_json:
         typer.echo(json.dumps(entries_of(runs), indent=2))
     else:

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import Progress
 
+from secondlook.commands.reading import PICTURE, reading
 from secondlook.errors import UserError
+from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded import load_run
 
 Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
@@ -33,7 +32,8 @@ def picture(
     from secondlook.pictures import write_picture  # noqa: PLC0415
 
     path = run / "picture.png" if out is None else out
-    write_picture(load_run(run), time, path, width)
+    with reading("picture", PICTURE) as on_read:
+        write_picture(load_run(run, on_read), time, path, width)
     typer.echo(str(path))
 
 
@@ -50,10 +50,8 @@ def video(
     from secondlook.pictures import write_video  # noqa: PLC0415
 
     path = run / "video.webp" if out is None else out
-    mission = load_run(run)
-    with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:
-        task = progress.add_task("drawing", total=1.0)
-        write_video(mission, path, width, seconds, frames, lambda share: progress.update(task, completed=share))
+    with shown_progress("video", "drawn", begins="reading") as tell:
+        write_video(load_run(run), path, width, seconds, frames, lambda share: tell(share, no_remark))
     typer.echo(str(path))
 
 

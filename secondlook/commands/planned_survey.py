@@ -11,7 +11,6 @@ from typing import Any
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from comms.said.messages import MOST_TRACKS
 from planner.area import SurveyArea
 from planner.dubins import Pose
 from planner.first_plan import FirstPlan
@@ -25,8 +24,15 @@ from planner.ways import shortest_way
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.roster import flows_of, way_home_of
-from secondlook.fleet.survey_area import keep_out_of, plan_for, region_for, region_of, track_heading_rad
-from secondlook.launch.run_display import in_seconds
+from secondlook.fleet.survey_area import (
+    check_tracks,
+    keep_out_of,
+    plan_for,
+    region_for,
+    region_of,
+    track_heading_rad,
+)
+from secondlook.progress import in_seconds
 from secondlook.recorded import GeographicOrigin
 from secondlook.recorded.geojson import collection
 from secondlook.scenario import Scenario, SurveyVehicle
@@ -87,16 +93,7 @@ def planned_surveys(scenario: Scenario) -> list[PlannedSurvey]:
 def _planned(scenario: Scenario, name: str, vehicle: SurveyVehicle, heading_rad: float) -> PlannedSurvey:
     plan = plan_for(scenario, name, heading_rad)
     tracks = plan.all_tracks
-    if not tracks:
-        raise UserError(
-            f"vehicles.{name}: no track of its survey has room beside ground to keep out of; must have less of "
-            "turn_radius_m and run_in_m, or the area more room"
-        )
-    if len(tracks) > MOST_TRACKS:
-        raise UserError(
-            f"vehicles.{name}.range_m: {vehicle.told_range_m:g} is not allowed; must be larger, or the area smaller, "
-            f"as its survey has {len(tracks)} tracks, more than {MOST_TRACKS}"
-        )
+    check_tracks(name, vehicle, len(tracks))
     region = region_for(scenario, vehicle, heading_rad)
     grid = region.about(heading_rad).grid(scenario.area.cell_m)
     inside = region.inside(grid)

@@ -17,6 +17,7 @@ from comms.said.topics import RUN
 from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
+from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded.mission_files import read_recording
 from secondlook.recorded.replay import replay_node
 from secondlook.scenario import load_scenario
@@ -61,14 +62,16 @@ def replay(
     if node not in fleet.specs:
         raise UserError(f"--node {node}: not a node of this mission; must be one of {', '.join(fleet.specs)}")
     try:
-        result = replay_node(
-            node,
-            fleet.specs[node].make(),
-            Routing(fleet.roster),
-            recording,
-            whole=(run / "summary.json").exists(),
-            tolerance=tolerance,
-        )
+        with shown_progress("replay", begins="reading") as tell:
+            result = replay_node(
+                node,
+                fleet.specs[node].make(),
+                Routing(fleet.roster),
+                recording,
+                whole=(run / "summary.json").exists(),
+                tolerance=tolerance,
+                told=lambda share: tell(share, no_remark),
+            )
     except NodeError as error:
         typer.echo(f"{error}", err=True)
         raise typer.Exit(DIFFERS) from error

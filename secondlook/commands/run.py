@@ -10,23 +10,27 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from comms.lockstep.drive import Lockstep
 from comms.said.announcement import LARGEST_SEED
+from comms.session import PATIENCE_S
 from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
+from secondlook.commands.reading import REPORT, reading
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import UserError
-from secondlook.fleet.build import build_fleet
+from secondlook.fleet.survey_area import SpacingFailedError
 from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.run_display import closing_table, progress_display
 from secondlook.launch.run_folder import run_folder, traceback_files
+from secondlook.launch.watchdog import NoReturn, Watchdog
+from secondlook.preflight import MissionExpectation, expected_mission
 from secondlook.report import write_report
-from secondlook.scenario import load_scenario
+from secondlook.scenario import Scenario, load_scenario
 
 
 @contextmanager
@@ -91,6 +95,7 @@ RealTime = Annotated[
         help="By the wall clock, FACTOR times as fast, 1 if left out; not repeatable, so without a digest.",
     ),
 ]
+Anyway = Annotated[bool, typer.Option("--anyway", help="Fly a mission even if it cannot end within its limits.")]
 KEEP_GOING = "--keep-going"
 KeepGoing = Annotated[
     bool,
@@ -144,42 +149,80 @@ def run(
     live: Live = False,
     web: Web = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print summary.json alone.")] = False,
+    anyway: Anyway = False,
 ) -> None:
-    """Fly a mission, and write what happened."""
+    """Tell what a mission is expected to come to, fly it, and write what happened."""
     _check(bus, processes, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
     overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
     mission = load_scenario(scenario, overrides, seed)
     check_bodies(mission)
-    build_fleet(mission, record=False)  # refuses what makes none, before there is a folder
+    expected = None
+    with contextlib.suppress(SpacingFailedError):  # when it is flown that is told with the whole traceback
+        expected = expected_of(mission)
+        if not anyway:
+            refuse(expected)
     drive = Lockstep() if real_time is None else ByWallClock(real_time, keep_going, mission.coordinator.lost_after_s)
     gc.freeze()  # what is loaded by now stays: the collector need not go through it again and again
     with live_view(lambda: run_folder(out, mission.name), live=live, web=web) as (folder, pipe):
+        if expected is not None:
+            tell_expected(expected, quiet=as_json)
         with progress_display(mission.name, quiet=as_json) as progress:
             options = RunOptions(
                 folder, bus.value, processes, drive, record=not no_record, progress=progress, live_pipe=pipe
             )
+            summary, failure = dict[str, Any](), ""
             try:
                 summary = run_mission(mission, options)
             except RunFailedError as error:
                 failure = str(error)
-            else:
-                failure = ""
-        unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure))
-        if failure:
-            sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
-            for log in traceback_files(folder / LOGS):
-                sys.stderr.write(f"The whole traceback is in {log}\n")
-        elif unreported:
-            sys.stderr.write(f"{unreported}\n")
-        if not failure and as_json:
-            typer.echo(json.dumps(summary, indent=2))
-        elif not failure:
-            closing_table(summary, folder)
-        empty = [] if failure else [name for name, one in summary["vehicles"].items() if one["ended"] == "empty"]
-        if empty:
-            sys.stderr.write(f"{', '.join(empty)}: the battery was empty before it was home\n")
-    if failure or unreported or empty:
+        unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure), shown=not as_json)
+        is_well = _tell_end(folder, summary, failure, unreported, as_json=as_json)
+    if not is_well:
         raise typer.Exit(MISSION_FAILED)
+
+
+def _tell_end(folder: Path, summary: dict[str, Any], failure: str, unreported: str, *, as_json: bool) -> bool:
+    """Prints what came of a run, or why it has failed; returns whether all is well."""
+    if failure:
+        sys.stderr.write(f"{failure}; what was recorded is in {folder}\n")
+        for log in traceback_files(folder / LOGS):
+            sys.stderr.write(f"The whole traceback is in {log}\n")
+        return False
+    if unreported:
+        sys.stderr.write(f"{unreported}\n")
+    if as_json:
+        typer.echo(json.dumps(summary, indent=2))
+    else:
+        closing_table(summary, folder)
+    empty = [name for name, one in summary["vehicles"].items() if one["ended"] == "empty"]
+    if empty:
+        sys.stderr.write(f"{', '.join(empty)}: the battery was empty before it was home\n")
+    return not unreported and not empty
+
+
+def expected_of(mission: Scenario) -> MissionExpectation:
+    """What a mission is expected to come to. Raises UserError for a spacing planner that does not come back."""
+    try:
+        with Watchdog(PATIENCE_S) as watchdog:
+            watchdog.begin("what lays the tracks")
+            expected = expected_mission(mission)
+            watchdog.end()
+    except NoReturn as error:
+        raise UserError(str(error)) from error
+    return expected
+
+
+def refuse(expected: MissionExpectation) -> None:
+    """Raises UserError for a mission that cannot end within its limits."""
+    if expected.refusals:
+        raise UserError("\n".join(expected.refusals))
+
+
+def tell_expected(expected: MissionExpectation, *, quiet: bool = False, err: bool = False) -> None:
+    """Prints what a mission is expected to come to, warnings alone if `quiet`; `err`: all of it on standard error."""
+    if not quiet:
+        typer.echo("\n".join(expected.sentences), err=err)
+    sys.stderr.writelines(f"{sentence}\n" for sentence in expected.warnings)
 
 
 def _check(
@@ -207,10 +250,11 @@ def _check(
         raise UserError(f"{KEEP_GOING}: is not allowed with --bus local, where all is one process")
 
 
-def _report(folder: Path, *, quiet: bool) -> str:
-    """Writes the report; why it cannot be, or nothing."""
+def _report(folder: Path, *, quiet: bool, shown: bool) -> str:
+    """Writes the report, and shows how far that is if `shown`; why it cannot be, or nothing."""
     try:
-        write_report(folder, quiet=quiet)
+        with reading("report", REPORT) if shown else contextlib.nullcontext() as on_read:
+            write_report(folder, on_read, quiet=quiet)
     except UserError as error:
         return str(error)
     return ""

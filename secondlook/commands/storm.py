@@ -145,7 +145,7 @@ def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroubleP
 
             make_smaller(plan, fails, most_flights=flights, found=found)
 
-    failure = fly_watched("shrink", "flights", flights, fly, shown=sys.stderr.isatty())
+    failure = fly_watched("shrink", "flights", flights, fly, shown=True)
     if flown or failure:
         typer.echo(f"{what_is_left(plan, smallest)} {flown} flights.")
     if failure:
@@ -173,7 +173,7 @@ def _fly_many(
 
         fly_storms(mission, numbers, jobs, outcomes, progress, twice)
 
-    failure = fly_watched("storm", "storms", len(numbers), fly, shown=sys.stderr.isatty())
+    failure = fly_watched("storm", "storms", len(numbers), fly, shown=True)
     failed = sorted(number for number, outcome in outcomes.items() if outcome.violations)
     reached = times_reached(outcomes)
     if out is not None:
@@ -201,7 +201,7 @@ def _look_for_canaries(mission: Scenario | None, numbers: range, jobs: int, out:
     def fly(tell: Tell) -> None:
         find_canaries(mission, numbers, jobs, finds, lambda: tell(len(finds), ""))
 
-    failure = fly_watched("canaries", "planted bugs", len(CANARIES), fly, shown=sys.stderr.isatty())
+    failure = fly_watched("canaries", "planted bugs", len(CANARIES), fly, shown=True)
     width = max(map(len, CANARIES))
     for name in CANARIES:
         if name in finds:

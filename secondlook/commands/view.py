@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from secondlook.errors import UserError
+from secondlook.progress import shown_progress
 from viz.recording_viewer import RecordingViewer, is_empty, is_recording, is_whole, repair
 from viz.viewer_program import ViewerError, check_display
 
@@ -39,13 +40,18 @@ def view(
         with (
             contextlib.suppress(KeyboardInterrupt),
             _whole(recording) as whole,
-            RecordingViewer(whole, web=web, at_s=at) as viewer,
+            _opened(whole, web=web, at_s=at) as viewer,
         ):
             if web:
                 typer.echo(f"The mission is shown, until Ctrl-C, at\n{viewer.page}")
             viewer.wait()
     except ViewerError as error:
         raise UserError(str(error)) from error
+
+
+def _opened(recording: Path, *, web: bool, at_s: float | None) -> RecordingViewer:
+    with shown_progress("view", begins="opening"):
+        return RecordingViewer(recording, web=web, at_s=at_s)
 
 
 def _recording(run: Path) -> Path:
@@ -75,13 +81,18 @@ def _whole(recording: Path) -> Iterator[Path]:
     # A recorder that still writes would go on writing into the file that is no longer there.
     if (run / "summary.json").exists() and os.access(run, os.W_OK):
         repaired = recording.with_name("mission.rrd.repaired")
-        repair(recording, repaired)
+        _repair(recording, repaired)
         repaired.replace(recording)
         typer.echo(f"{recording} had lost its end; it is repaired, with all that was written", err=True)
         yield recording
         return
     with tempfile.TemporaryDirectory(prefix="secondlook-view-") as folder:
         copy = Path(folder) / recording.name
-        repair(recording, copy)
+        _repair(recording, copy)
         typer.echo(f"{recording} has no end yet; what is there until now is shown from a copy", err=True)
         yield copy
+
+
+def _repair(recording: Path, repaired: Path) -> None:
+    with shown_progress("view", begins=f"repairing {recording}"):
+        repair(recording, repaired)

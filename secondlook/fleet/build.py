@@ -123,7 +123,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     specs = {name: _agent_spec(scenario, name, vehicle, heading_rad) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
     if any(one.role is Role.WORLD for one in roster):
-        specs = {WORLD: node_spec(Role.WORLD, _world_config(scenario)), **specs}
+        specs = {WORLD: node_spec(Role.WORLD, world_config(scenario)), **specs}
     return Fleet(run_info, roster, specs, round(scenario.mission.time_limit_s * 1000))
 
 
@@ -189,7 +189,8 @@ def _agent_spec(scenario: Scenario, name: str, vehicle: SurveyVehicle | RevisitV
     return node_spec(Role.SURVEY, survey, vehicle.agent)
 
 
-def _world_config(scenario: Scenario) -> WorldConfig:
+def world_config(scenario: Scenario) -> WorldConfig:
+    """The sea, and the vehicles in it whose bodies are simulated."""
     current = scenario.current
     return WorldConfig(
         seed=scenario.seed,
@@ -197,7 +198,7 @@ def _world_config(scenario: Scenario) -> WorldConfig:
         holes=tuple(scenario.area.holes_m),
         keep_out=keep_out_of(scenario),
         vehicles=tuple(
-            _body(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
+            vehicle_config(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),
         seabed=_seabed(scenario.seabed),
         targets=TargetsConfig(scenario.targets.count),
@@ -226,7 +227,8 @@ def _seabed(seabed: UniformSeabed | PatchySeabed) -> SeabedConfig:
     )
 
 
-def _body(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
+def vehicle_config(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
+    """A vehicle's simulated body."""
     settling = vehicle.settling
     with _named(f"vehicles.{name}.sensor."):
         sensor = _sensor(vehicle)

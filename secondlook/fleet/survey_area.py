@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 
 from comms.errors import NO_FAILURES, in_words
+from comms.said.messages import MOST_TRACKS
 from planner.first_plan import FirstPlan, best_heading, first_plan
 from planner.flyable import flyable_pieces
 from planner.footprints import footprint_of
@@ -88,11 +91,36 @@ def plan_for(scenario: Scenario, name: str, heading_rad: float) -> FirstPlan:
     fleet = [roster_vehicle(other, one) for other, one in scenario.vehicles.items()]
     looks = helper_looks(fleet, name)
     terms = SpacingTerms(scenario.area.cell_m, scenario.mission.rho, vehicle.wanted_risk, looks)
-    try:
+    with lays_tracks(vehicle):
         return first_plan(region, heading_rad, *sonar, spacing, known, terms, flyable=flyable, begin=begin)
+
+
+class SpacingFailedError(UserError):
+    """A spacing planner of the user's has failed."""
+
+
+@contextmanager
+def lays_tracks(vehicle: SurveyVehicle) -> Iterator[None]:
+    """Within it the vehicle's spacing planner lays tracks. Raises SpacingFailedError where one of the user's fails."""
+    try:
+        yield
     except NO_FAILURES:
         raise
     except BaseException as error:
         if vehicle.spacing in SPACING.ours:
             raise
-        raise UserError(f"{vehicle.spacing} has failed to lay tracks: {in_words(error)}") from error
+        raise SpacingFailedError(f"{vehicle.spacing} has failed to lay tracks: {in_words(error)}") from error
+
+
+def check_tracks(name: str, vehicle: SurveyVehicle, tracks: int) -> None:
+    """Raises UserError for no track at all, and for more than a plan can tell of."""
+    if not tracks:
+        raise UserError(
+            f"vehicles.{name}: no track of its survey has room beside ground to keep out of; must have less of "
+            "turn_radius_m and run_in_m, or the area more room"
+        )
+    if tracks > MOST_TRACKS:
+        raise UserError(
+            f"vehicles.{name}.range_m: {vehicle.told_range_m:g} is not allowed; must be larger, or the area smaller, "
+            f"as its survey has {tracks} tracks, more than {MOST_TRACKS}"
+        )

@@ -3,87 +3,37 @@
 from __future__ import annotations
 
 import shlex
-import sys
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from secondlook.progress import in_seconds, shown_progress
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Progress as ProgressFunction
 from secondlook.recorded.vehicles import Ending
 
 REPORT, RECORDING = "report.html", "mission.rrd"
-LONG_S = 3600.0
 WIDEST = 10_000  # characters
-LINE_EVERY_S = 20.0
-"""Of the wall clock, where nobody watches a bar."""
-
-
-def in_seconds(duration_s: float) -> str:
-    """A duration for people: seconds, as all else is told in, and from an hour on also as h:mm:ss."""
-    told = f"{duration_s:.0f} s"
-    return f"{told} ({_clock(duration_s)})" if duration_s >= LONG_S else told
-
-
-def _clock(duration_s: float) -> str:
-    minutes, seconds = divmod(round(duration_s), 60)
-    return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}"
 
 
 @contextmanager
 def progress_display(name: str, *, quiet: bool) -> Iterator[ProgressFunction | None]:
     """On standard error simulated time, share of the survey flown, residual risk, and how long the survey is still
-    expected to take: a bar on a terminal, a line now and then elsewhere; None if `quiet`."""
+    expected to take; None if `quiet`."""
     if quiet:
         yield None
-    elif not sys.stderr.isatty():
-        yield ProgressLines(name).tell
-    else:
-        columns = (
-            TextColumn("{task.description}"),
-            BarColumn(),
-            TaskProgressColumn(),
-            TextColumn("{task.fields[told]}"),
-            TimeRemainingColumn(),
-        )
-        with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-            task = progress.add_task(name, total=1.0, told="starting")
-
-            def tell(metrics: Metrics) -> None:
-                progress.update(task, completed=metrics.share_flown(), told=_so_far(metrics))
-
-            yield tell
+        return
+    with shown_progress(name, "of the survey flown", begins="starting") as tell:
+        yield lambda metrics: tell(metrics.share_flown(), lambda: _so_far(metrics))
 
 
 def _so_far(metrics: Metrics) -> str:
     risk, told = metrics.risk(), f"{in_seconds(metrics.now_ms / 1000)} simulated"
     return told if risk is None else f"{told}, residual risk {risk.mean:.3f}, worst 30 % {risk.worst30_mean:.3f}"
-
-
-class ProgressLines:
-    """How far a run is, where standard error is no terminal: a line every 20 s of the wall clock, none of a run that is
-    over sooner. `now_s` is the wall time it begins at."""
-
-    def __init__(self, name: str, now_s: float | None = None) -> None:
-        self._name = name
-        self._began_s = self._told_s = time.monotonic() if now_s is None else now_s
-
-    def tell(self, metrics: Metrics, now_s: float | None = None) -> None:
-        """Prints a line if it is time for one."""
-        now_s = time.monotonic() if now_s is None else now_s
-        if now_s - self._told_s < LINE_EVERY_S:
-            return
-        self._told_s = now_s
-        share = metrics.share_flown()
-        left = f", about {_clock((now_s - self._began_s) * (1 / share - 1))} left of it" if 0 < share < 1 else ""
-        sys.stderr.write(f"{self._name}: {share:.0%} of the survey flown{left}; {_so_far(metrics)}\n")
-        sys.stderr.flush()
 
 
 def ending_of(name: str, vehicle: dict[str, Any]) -> Ending:

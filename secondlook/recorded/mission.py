@@ -53,6 +53,11 @@ log = logging.getLogger("secondlook.recorded")
 
 T = TypeVar("T")
 M = TypeVar("M", bound=Message)
+OnRead = Callable[[float], None]
+"""Is told how often messages have been read so far: 1 stands for all of them once."""
+MESSAGE_BYTES = 300
+"""Takes as long to read as the rest of a message does, about."""
+TOLD_EVERY_BYTES = 500_000
 
 
 class Mission(ABC):
@@ -218,7 +223,11 @@ class RecordedMission(Mission):
         scenario: Mapping[str, Any],
         messages: Sequence[tuple[str, bytes]],
         damage: Damage | None = None,
+        on_read: OnRead | None = None,
     ) -> None:
+        self._on_read = on_read
+        self._read_bytes = self._told_bytes = 0
+        self._all_bytes = sum(len(payload) + MESSAGE_BYTES for _, payload in messages)
         self.folder = folder
         self.summary = summary
         self.scenario = scenario
@@ -283,7 +292,14 @@ class RecordedMission(Mission):
         for entry in self._entries(wanted):
             topic = entry.topic
             header, message = self._read(entry, partial(decode, message_type=topic.message))
+            self._tell_read(len(entry.payload))
             yield Received(entry.key, topic, entry.vehicle, header, message, entry.payload)
+
+    def _tell_read(self, size: int) -> None:
+        self._read_bytes += size + MESSAGE_BYTES
+        if self._on_read is not None and self._read_bytes >= self._told_bytes + TOLD_EVERY_BYTES:
+            self._told_bytes = self._read_bytes
+            self._on_read(self._read_bytes / self._all_bytes)
 
     def _entries(self, wanted: Callable[[str, Topic], bool] = lambda _key, _topic: True) -> Iterator[_Entry]:
         chosen = {key: found for key, found in self._topics.items() if found is not None and wanted(key, found[0])}
@@ -332,8 +348,9 @@ class _Summary(BaseModel):
     time: _Times | None = None
 
 
-def load_run(run: str | os.PathLike[str], *, quiet: bool = False) -> RecordedMission:
-    """The mission of a run's folder, of one that failed or was cut off as far as it came.
+def load_run(run: str | os.PathLike[str], on_read: OnRead | None = None, *, quiet: bool = False) -> RecordedMission:
+    """The mission of a run's folder, of one that failed or was cut off as far as it came; `on_read` is told now and
+    then how much of it has been read.
 
     Summary and scenario are empty mappings where their files are missing or empty, or the summary is cut short; of the
     latter, and unless `quiet` of messages that were cut off or are damaged, the log tells in a sentence. Raises
@@ -360,6 +377,7 @@ def load_run(run: str | os.PathLike[str], *, quiet: bool = False) -> RecordedMis
         scenario=_mapping(folder / "scenario.yaml", yaml.safe_load),
         messages=recording.messages,
         damage=recording.damage,
+        on_read=on_read,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any
 
@@ -45,13 +45,14 @@ def replay_node(
     *,
     whole: bool,
     tolerance: float = 0.0,
+    told: Callable[[float], None] = lambda _share: None,
 ) -> ReplayResult:
     """Feeds a node its mail and wake-ups and compares what it publishes with what the recording has from it.
 
     `recording`: key and payload of every message. `whole`: the mission was recorded to its end; of one that was cut off
     only what the recording still holds is compared. `tolerance`: 0 compares byte for byte; else numbers with a fraction
-    may differ by as much, absolutely or relatively, and all else must be the same. Raises NodeError where the node
-    fails.
+    may differ by as much, absolutely or relatively, and all else must be the same. `told`: called with the share of the
+    mission's time that is replayed. Raises NodeError where the node fails.
     """
     intake = Intake(routing)
     messages = [received for key, payload in recording if (received := intake.open(key, payload)) is not None]
@@ -72,6 +73,7 @@ def replay_node(
     now_ms: int | None = 0
     times = sorted(due_times, reverse=True)
     while now_ms is not None and now_ms <= end_ms:
+        told(now_ms / max(1, end_ms))
         wake_ms, outgoing = runner.act(now_ms, start=now_ms == 0)
         for said in outgoing:
             if agreed == len(expected):

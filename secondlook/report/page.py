@@ -24,6 +24,7 @@ from planner.footprints import footprint_of
 from secondlook.files import write_whole
 from secondlook.recorded import RecordedMission, RiskMap, StripRecord, load_run
 from secondlook.recorded.ground import risk_in_priorities
+from secondlook.recorded.mission import OnRead
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
 from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map, vehicle_classes
@@ -189,12 +190,13 @@ def _template() -> jinja2.Template:
 REPORT = "report.html"
 
 
-def write_report(run: str | os.PathLike[str], *, quiet: bool = False) -> Path:
-    """Writes report.html into the folder of a run, in place of one that is there; its path. `quiet`: as of `load_run`.
+def write_report(run: str | os.PathLike[str], on_read: OnRead | None = None, *, quiet: bool = False) -> Path:
+    """Writes report.html into the folder of a run, in place of one that is there; its path. `on_read`, `quiet`: see
+    `secondlook.recorded.mission.load_run`.
 
     Raises UserError, in one sentence, for what is no recorded run and where the file cannot be written.
     """
-    mission = load_run(run, quiet=quiet)
+    mission = load_run(run, on_read, quiet=quiet)
     path = mission.folder / REPORT
     page = report_page(mission)
     write_whole(path, page)

@@ -48,9 +48,18 @@ def has_ended(pid: int, timeout_s: float) -> bool:
         os.close(handle)
 
 
+def without_expected(out: str) -> str:
+    """What `secondlook run` has printed after what it expects of the mission."""
+    lines = out.splitlines(keepends=True)
+    before = next((place for place, line in enumerate(lines, start=1) if line.startswith("the survey ends ")), 0)
+    return "".join(lines[before:])
+
+
 class Flight:
     """`secondlook run` as a user starts it, with standard output and error in pipes; or another program, which is given
-    the folder and the arguments."""
+    the folder and the arguments. `expected`: of what it prints the first lines, what is expected of the mission."""
+
+    expected: tuple[str, ...] = ()
 
     def __init__(self, folder: Path, *arguments: str, program: Path | None = None) -> None:
         self.folder = folder
@@ -88,9 +97,11 @@ class Flight:
         return events.exists() and events.stat().st_size > 0
 
     def finish(self, timeout_s: float = 60.0) -> tuple[int, str, str]:
-        """Waits for the end; exit code and what was printed."""
+        """Waits for the end; exit code and what was printed, but for what is expected of the mission."""
         out, err = self.process.communicate(timeout=timeout_s)
-        return self.process.returncode, out, err
+        told = without_expected(out)
+        self.expected = tuple(out.removesuffix(told).splitlines())
+        return self.process.returncode, told, err
 
 
 @contextmanager

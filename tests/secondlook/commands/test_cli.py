@@ -109,26 +109,57 @@ def test_a_survey_that_outlasts_its_battery_is_told(
         r"primary: its survey takes (\d+) s and (\d+) s home, longer than its endurance_s of 900 less 100 to spare; "
         r"it will go home after 1 of 3 tracks\n"
     )
-    for command in ("check", "plan"):
-        code, _, err = secondlook(command, name)
-        match = told.fullmatch(err)
-        assert code == 0
-        assert match is not None
-        assert int(match[1]) > 900
-        assert int(match[2]) > 400 / 1.5
+    code, _, err = secondlook("plan", name)
+    match = told.fullmatch(err)
+    assert code == 0
+    assert match is not None
+    assert int(match[1]) > 900
+    assert int(match[2]) > 400 / 1.5
+
+
+def test_what_cannot_end_within_its_limits_is_refused_in_one_sentence_and_flown_anyway(
+    secondlook: SecondLook, tmp_path: Path
+) -> None:
+    limit = ("--set", "mission.time_limit_s=60")
+    told = re.compile(
+        r"mission\.time_limit_s: 60 s ends the survey after about 2 of 4 tracks, as it takes about 106 s; must be "
+        r"larger by about 46 s, or flown with --anyway\n"
+    )
+    code, out, err = secondlook("check", str(BRIEF), *limit)
+    assert code == 2
+    assert out.splitlines()[2].startswith("primary: about 4 tracks and 0.8 km with turns in 106 s")
+    assert told.fullmatch(err)
+    run = ("run", str(BRIEF), *limit, "--bus", "local", "--no-record", "--out", str(tmp_path / "run"))
+    assert secondlook(*run) == (2, "", err)
+    assert not (tmp_path / "run").exists()
+    assert secondlook(*run, "--json") == (2, "", err)
+    code, _, err = secondlook(*run, "--anyway")
+    assert (code, err.split(";")[0]) == (1, "the mission is not over at its time limit, mission.time_limit_s: 60")
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["vehicles"]["primary"]["tracks"] == 2
+
+
+def test_a_router_refuses_it_as_well(secondlook: SecondLook) -> None:
+    words = ("node", "router", str(BRIEF), "--listen", "tcp/127.0.0.1:0", "--set", "mission.time_limit_s=60")
+    code, _, err = secondlook(*words)
+    assert code == 2
+    assert err.splitlines()[-1].startswith("mission.time_limit_s: 60 s ends the survey after about 2 of 4 tracks")
 
 
 def test_check_counts_of_a_share_of_the_area_what_is_its_own(secondlook: SecondLook) -> None:
     _, out, _ = secondlook("check", "wide")
-    assert [line.split("; ")[-1] for line in out.splitlines()[1:]] == ["up to 145 m all is covered"] * 3
+    assert [line.split("; ")[-1] for line in out.splitlines()[1:4]] == ["up to 145 m all is covered"] * 3
 
 
-def test_check_tells_that_a_scenario_is_valid(secondlook: SecondLook) -> None:
-    expected = (
-        "tellaro: valid; 1212 m by 400 m, primary (survey), helper (revisit)\n"
-        "primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered\n"
-    )
-    assert secondlook("check", "tellaro") == (0, expected, "")
+DOCS = Path(__file__).parents[3] / "docs" / "scenarios.md"
+
+
+def test_check_tells_what_the_docs_show(secondlook: SecondLook) -> None:
+    def shown(command: str) -> str:
+        return DOCS.read_text().split(f"```\n$ secondlook {command}\n")[1].split("```")[0]
+
+    assert secondlook("check", "tellaro") == (0, shown("check tellaro"), "")
+    limit = "tellaro --set mission.time_limit_s=2000"
+    assert secondlook("run", *limit.split())[::2] == (2, shown(f"run {limit}"))
 
 
 def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook: SecondLook) -> None:
@@ -202,7 +233,8 @@ def test_live_without_a_display_is_told_before_anything_flies(
     for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(variable, raising=False)
     expected = "--live: there is no display for the viewer's window; add --web to watch in a browser\n"
-    assert secondlook("run", "--live", "--out", str(tmp_path / "run")) == (2, "", expected)
+    code, _, err = secondlook("run", "--live", "--out", str(tmp_path / "run"))
+    assert (code, err) == (2, expected)
     assert not (tmp_path / "run").exists()
 
 

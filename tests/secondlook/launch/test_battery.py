@@ -138,7 +138,7 @@ def test_the_command_has_exit_code_1_where_a_battery_runs_empty(
     changed = ("vehicles.primary.endurance_s=60", "vehicles.primary.home={x_m: 5000, y_m: 0}")
     sets = [word for one in changed for word in ("--set", one)]
     with pytest.raises(SystemExit) as ended:
-        app(["run", str(BRIEF), "--bus", "local", "--no-record", "--out", str(tmp_path), *sets])
+        app(["run", str(BRIEF), "--bus", "local", "--no-record", "--out", str(tmp_path), "--anyway", *sets])
     assert ended.value.code == 1
     told = capsys.readouterr()
     assert told.err.splitlines()[-1] == "primary: the battery was empty before it was home"

@@ -100,7 +100,7 @@ def test_ctrl_c_ends_the_run(tmp_path: Path) -> None:
 
 
 def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path) -> None:
-    with flight(tmp_path / "out", *FAST, "--set", "mission.time_limit_s=20", "--no-record") as flying:
+    with flight(tmp_path / "out", *FAST, "--anyway", "--set", "mission.time_limit_s=20", "--no-record") as flying:
         code, _, err = flying.finish()
     said = "the mission is not over at its time limit, mission.time_limit_s: 20"
     assert (code, err) == (1, f"{said}; what was recorded is in {flying.folder}\n")

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from pathlib import Path
 
 import pytest
 from flights import BRIEF
 
-from secondlook.launch.run_display import ProgressLines, in_seconds
+from secondlook.launch.run_display import progress_display
+from secondlook.progress import in_seconds
 from secondlook.recorded.metrics import Metrics
 
 
@@ -29,29 +31,25 @@ def test_long_durations_are_told_in_hours_too(duration_s: float, told: str) -> N
 
 
 class Flown(Metrics):
-    """Figures of a mission that is so far."""
-
-    def __init__(self, now_ms: int, share: float) -> None:
-        super().__init__()
-        self.now_ms, self._share = now_ms, share
+    """Figures of a mission that is a quarter through its survey."""
 
     def share_flown(self) -> float:
-        """As told."""
-        return self._share
+        """A quarter."""
+        return 0.25
 
 
-def test_without_a_terminal_a_line_comes_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
-    lines = ProgressLines("bay", now_s=100.0)
-    lines.tell(Flown(10_000, 0.01), now_s=119.9)
-    assert capsys.readouterr().err == ""
-    # A quarter in 20 s: the other three take a minute.
-    lines.tell(Flown(900_000, 0.25), now_s=120.0)
-    told = "bay: 25% of the survey flown, about 0:01:00 left of it; 900 s simulated\n"
-    assert capsys.readouterr().err == told
-    lines.tell(Flown(1_000_000, 0.3), now_s=139.0)
-    assert capsys.readouterr().err == ""
-    lines.tell(Flown(4_424_000, 1.0), now_s=150.0)
-    assert capsys.readouterr().err == "bay: 100% of the survey flown; 4424 s (1:13:44) simulated\n"
+def test_what_is_told_of_a_run_now_and_then(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("secondlook.progress.LINE_EVERY_S", 0.0)
+    with progress_display("bay", quiet=False) as tell:
+        assert tell is not None
+        tell(Flown(900_000))
+    assert re.fullmatch(
+        r"bay: 25% of the survey flown, about \d:\d\d:\d\d left of it; 900 s simulated\n", capsys.readouterr().err
+    )
+    with progress_display("bay", quiet=True) as quiet:
+        assert quiet is None
 
 
 def test_after_a_run_each_line_says_how_to_open_what_there_is(

@@ -46,6 +46,7 @@ class Landed:
     out: str
     err: str
     left: dict[str, int]
+    expected: tuple[str, ...]
 
     @property
     def summary(self) -> dict[str, Any]:
@@ -56,7 +57,7 @@ class Landed:
 def fly(folder: Path, *arguments: str) -> Landed:
     with flight(folder, *arguments) as flying:
         code, out, err = flying.finish()
-        return Landed(folder, code, out, err, flying.children())
+        return Landed(folder, code, out, err, flying.children(), flying.expected)
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +77,11 @@ def test_a_mission_ends_well_and_leaves_no_process(landed: Landed) -> None:
     assert (landed.code, landed.err, landed.left) == (0, "", {})
     assert landed.out.startswith("mission ")
     assert "\x1b" not in landed.out + landed.err
+
+
+def test_what_is_expected_of_it_is_told_first(landed: Landed) -> None:
+    assert [line.partition(" tracks ")[0] for line in landed.expected[:-1]] == ["primary: about 4"]
+    assert landed.expected[-1].startswith("the survey ends after about 106 s, the mission is over after 111 s at the")
 
 
 def test_all_files_of_a_run_are_there_and_no_other(landed: Landed) -> None:
@@ -253,7 +259,7 @@ def test_the_report_is_left_out_on_request(tmp_path: Path) -> None:
 
 
 def test_a_run_that_fails_has_a_report_that_says_so(tmp_path: Path) -> None:
-    flown = fly(tmp_path / "out", "--bus", "local", "--set", "mission.time_limit_s=20")
+    flown = fly(tmp_path / "out", "--bus", "local", "--anyway", "--set", "mission.time_limit_s=20")
     assert flown.code == 1
     assert flown.summary["failure"] in (flown.folder / "report.html").read_text()
 
@@ -267,7 +273,7 @@ def test_json_is_the_summary_alone(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("bus", ["zenoh", "local"])
 def test_a_mission_that_is_not_over_in_time_fails_and_says_so(tmp_path: Path, bus: str) -> None:
-    flown = fly(tmp_path / "out", "--bus", bus, "--no-record", "--set", "mission.time_limit_s=20")
+    flown = fly(tmp_path / "out", "--bus", bus, "--no-record", "--anyway", "--set", "mission.time_limit_s=20")
     said = "the mission is not over at its time limit, mission.time_limit_s: 20"
     assert (flown.code, flown.out, flown.left) == (1, "", {})
     assert flown.err == f"{said}; what was recorded is in {flown.folder}\n"
