@@ -16,7 +16,7 @@ from planner.currents import FlowGrid, Sailing
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep, shifted
-from planner.types import FloatArray
+from planner.types import FloatArray, Point
 from planner.ways import way_or_direct
 
 STEP_S = 2.0
@@ -47,6 +47,14 @@ class Course:
         its last as then."""
         step = min(max(math.ceil(time_s / STEP_S), self.first), self.end - 1)
         return Pose(*self.poses[step - self.first].tolist()), step * STEP_S
+
+    def place_at(self, time_s: float) -> Point:
+        """Where the vehicle is, between two steps as if it went straight; before its first and after its last as
+        then."""
+        x_m, y_m = (
+            float(np.interp(time_s / STEP_S - self.first, range(len(self.poses)), self.poses[:, k])) for k in (0, 1)
+        )
+        return x_m, y_m
 
     def later(self, steps: int) -> Course:
         """The same, so many steps later; until then the vehicle is where it begins."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from comms.said.messages import AgentState, Mode
 from coordinator.keep_apart.courses import (
+    STEP_S,
     Course,
     course,
     lying_still,
@@ -35,6 +36,18 @@ class _Sweeping:
     course: Course
 
 
+@dataclass(frozen=True)
+class _Errand:
+    """A helper's way to a place at which it was told to wait."""
+
+    place: Point
+    course: Course
+
+
+OFF_COURSE_M = 10.0
+"""Of two ways to a place that are hardly longer than each other a vehicle may take the other than is expected."""
+
+
 class Traffic:
     """Courses are laid when asked for, and kept until something is heard that changes them. `keep_out`: round what all
     of them lead."""
@@ -45,7 +58,7 @@ class Traffic:
         self._sweeps: dict[str, _Sweeping] = {}
         self._entered: dict[str, Sweep] = {}
         """Of each helper the sweep that it has begun last."""
-        self._errands: dict[str, Course] = {}
+        self._errands: dict[str, _Errand] = {}
         self._rests: dict[str, tuple[int, Course]] = {}
 
     def course(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course | None:
@@ -64,8 +77,8 @@ class Traffic:
             return self._sweep(vehicle, strip)
         errand = self._errands.get(vehicle.entry.vehicle)
         # Until it has said where it is there, it circles where it was sent, not where it was heard on its way.
-        if errand is not None and vehicle.heard_ms / 1000 < errand.arrives_s:
-            return errand
+        if errand is not None and vehicle.heard_ms / 1000 < errand.course.arrives_s:
+            return self._on_errand(vehicle, errand)
         return self._rest(vehicle)
 
     def to_strip(self, vehicle: KnownVehicle, strip: Strip | None, other: Strip, now_s: float) -> tuple[Course, Sweep]:
@@ -109,7 +122,7 @@ class Traffic:
 
     def sent_aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> None:
         """A helper was told to wait at a place."""
-        self._errands[vehicle.entry.vehicle] = self.aside(vehicle, strip, place, now_s)
+        self._errands[vehicle.entry.vehicle] = _Errand(place, self.aside(vehicle, strip, place, now_s))
 
     def _here(self, vehicle: KnownVehicle, now_s: float, strip: Strip | None = None) -> tuple[Pose, float]:
         state = vehicle.state
@@ -165,6 +178,21 @@ class Traffic:
                 laid = course(pose, heard_s, vehicle.sailing, entry.turn_radius_m, [run_out, *way], self._keep_out)
             known = self._rests[entry.vehicle] = vehicle.heard_ms, laid
         return known[1]
+
+    def _on_errand(self, vehicle: KnownVehicle, errand: _Errand) -> Course:
+        """Laid anew from where it was heard, if that is off its course; where it is at the place already, it rests."""
+        state, entry, heard_s = vehicle.state, vehicle.entry, vehicle.heard_ms / 1000
+        assert state is not None
+        pose = Pose(state.x_m, state.y_m, state.heading_rad)
+        is_on_course = math.dist(errand.course.place_at(heard_s), pose[:2]) <= OFF_COURSE_M
+        if is_on_course or heard_s < errand.course.first * STEP_S:  # or was heard before it was sent
+            return errand.course
+        if math.dist(pose[:2], errand.place) <= 2 * entry.turn_radius_m + OFF_COURSE_M:
+            return self._rest(vehicle)
+        way = way_or_direct(pose, _arrival(pose, errand.place), entry.turn_radius_m, self._keep_out)
+        laid = course(pose, heard_s, vehicle.sailing, entry.turn_radius_m, way, self._keep_out)
+        self._errands[entry.vehicle] = _Errand(errand.place, laid)
+        return laid
 
     def _rest(self, vehicle: KnownVehicle) -> Course:
         """It circles from where it was last, if it has ever been under way."""

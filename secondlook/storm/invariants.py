@@ -211,19 +211,29 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
     for entered in flight.entered:
         what = f"{entered.vehicle} entered zone {entered.zone} of area.keep_out_m"
         yield Violation("vehicles keep out", entered.t_s, entered.vehicle, what)
-    gives_way_from_s = {
-        one.vehicle: _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0
+    gives_way_s = {
+        one.vehicle: (
+            _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0,
+            _out_of_work_s(flight, one.vehicle),
+        )
         for one in flight.run.vehicles
         if one.role.revisits
     }
     for one in flight.closest:
-        # Of two that survey nobody gives way, and who has nowhere to go cannot: that is logged.
+        # Who surveys or goes home gives way to nobody, and who has nowhere to go cannot: that is logged.
         first, second = one.vehicles
-        could = any(one.t_s > gives_way_from_s.get(name, np.inf) for name in one.vehicles)
+        spans_s = [gives_way_s.get(name, (np.inf, 0.0)) for name in one.vehicles]
+        could = any(from_s < one.t_s <= until_s for from_s, until_s in spans_s)
         told = [said for said in witness.logged if "nowhere to go" in said and {first, second} <= set(said.split())]
         if one.closest_m < flight.scenario.mission.separation_m and could and not told:
             what = f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other"
             yield Violation("vehicles keep apart", one.t_s, one.vehicles[0], what)
+
+
+def _out_of_work_s(flight: Flight, name: str) -> float:
+    """When a vehicle first said that it takes on nothing more; infinite if never."""
+    said = flight.said(AgentState, f"agent/{name}/state")
+    return min((one.t_s for one in said if one.message.mode.is_out_of_work), default=np.inf)
 
 
 def _last_s(flight: Flight, name: str, *modes: Mode) -> float:
