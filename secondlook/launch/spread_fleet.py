@@ -88,9 +88,9 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
             strict=False,
             notice=_say_as(ROUTER),
         )
-        _say(ROUTER, f"listens on {endpoint}, and waits for {', '.join(spec.host for spec in hosts)}")
         try:
-            with signals_ask(hub.interrupt):
+            with signals_ask(hub.interrupt):  # before others are told that it is there
+                _say(ROUTER, f"listens on {endpoint}, and waits for {', '.join(spec.host for spec in hosts)}")
                 result = hub.run()
         except Interrupted:
             tell_supervisor(OVER)
