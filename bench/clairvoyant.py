@@ -162,9 +162,8 @@ class Heard:
     def flown(self, measured_m2: float) -> Flown:
         """What the helpers flew."""
         mission = self.clairvoyance.removable()
-        left = mission.risk * self.looks.leaves(mission.grid)
-        legs = legs_flown(self.looks.looks, mission)
-        return Flown(self.looks.removed_m2(mission), mission.left(left).worst30_mean, measured_m2, legs)
+        left, legs = self.looks.left(mission), legs_flown(self.looks.looks, mission)
+        return Flown(mission.gain_m2(left, OBJECTIVES["mean"]), mission.left(left).worst30_mean, measured_m2, legs)
 
 
 def one_seed(scenario: Scenario, names: Sequence[str], seconds: float, objective: str = "mean") -> Row:

@@ -65,9 +65,9 @@ class FlownLooks:
             leaves[rows, columns] *= 1 - p_detect
         return leaves
 
-    def removed_m2(self, mission: Removable) -> float:
-        """The risk that they remove of what the survey leaves, times the area."""
-        return float((mission.risk * (1 - self.leaves(mission.grid))).sum()) * mission.grid.cell_area_m2
+    def left(self, mission: Removable) -> FloatArray:
+        """The residual risk that they leave of what the survey does, grid shape."""
+        return mission.risk * self.leaves(mission.grid)
 
 
 class _Body:

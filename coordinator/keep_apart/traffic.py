@@ -92,11 +92,7 @@ class Traffic:
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
-        pose, start_s = self._here(vehicle, now_s, strip)
-        entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
-        end = run_out.pose_at(run_out.length_m)
-        way = way_or_direct(end, _arrival(end, place), entry.turn_radius_m, self._keep_out)
-        return course(pose, start_s, vehicle.sailing, entry.turn_radius_m, [run_out, *way], self._keep_out)
+        return self._to_place(vehicle, *self._here(vehicle, now_s, strip), place)
 
     def has_room(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> bool:
         """Whether a helper that leaves what it does can go to a place and circle there."""
@@ -189,10 +185,16 @@ class Traffic:
             return errand.course
         if math.dist(pose[:2], errand.place) <= 2 * entry.turn_radius_m + OFF_COURSE_M:
             return self._rest(vehicle)
-        way = way_or_direct(pose, _arrival(pose, errand.place), entry.turn_radius_m, self._keep_out)
-        laid = course(pose, heard_s, vehicle.sailing, entry.turn_radius_m, way, self._keep_out)
+        laid = self._to_place(vehicle, pose, heard_s, errand.place)
         self._errands[entry.vehicle] = _Errand(errand.place, laid)
         return laid
+
+    def _to_place(self, vehicle: KnownVehicle, pose: Pose, start_s: float, place: Point) -> Course:
+        """From a pose at a time to a place, what is left of a run-out first."""
+        radius_m, run_out = vehicle.entry.turn_radius_m, self._run_out(vehicle, pose)
+        end = run_out.pose_at(run_out.length_m)
+        way = way_or_direct(end, _arrival(end, place), radius_m, self._keep_out)
+        return course(pose, start_s, vehicle.sailing, radius_m, [run_out, *way], self._keep_out)
 
     def _rest(self, vehicle: KnownVehicle) -> Course:
         """It circles from where it was last, if it has ever been under way."""

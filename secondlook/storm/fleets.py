@@ -45,7 +45,7 @@ def draw_fleet(number: int) -> Scenario:
         "coordinator": _coordinator(rng),
         **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
-    _part(vehicles, drawn["mission"].get("separation_m", 0.0))
+    _move_apart(vehicles, drawn["mission"].get("separation_m", 0.0))
     if rng.random() < 0.15:  # for less than its survey, perhaps
         vehicles[rng.choice(list(vehicles)[:primaries])]["endurance_s"] = _m(rng.uniform(0.2, 1) * _LONGEST_S)
     scenario = make_scenario(drawn)
@@ -125,7 +125,7 @@ def _start(rng: Random, width_m: float, height_m: float) -> dict[str, float]:
     return {"x_m": _m(rng.uniform(-0.3, 1.3) * width_m), "y_m": _m(-rng.uniform(20, 80)), "heading_deg": 0.0}
 
 
-def _part(vehicles: dict[str, Any], separation_m: float) -> None:
+def _move_apart(vehicles: dict[str, Any], separation_m: float) -> None:
     """Moves those away, farther outside, that would start nearer to one before than vehicles may come."""
     placed: list[tuple[float, float]] = []
     for vehicle in vehicles.values():

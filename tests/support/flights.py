@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 BRIEF = Path(__file__).with_name("brief.yaml")
+TWO_PRIMARIES = Path(__file__).with_name("two-primaries.yaml")
 # The same mission at a walking pace: it goes on for some seconds of wall time, long enough to be cut off.
 SLOW = ("vehicles.primary.speed_mps=0.02", "vehicles.primary.endurance_s=360000", "mission.time_limit_s=100000")
 LONG = tuple(word for one in SLOW for word in ("--set", one))  # 44,600 s of the mission, ten of wall time

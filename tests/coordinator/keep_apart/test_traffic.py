@@ -37,9 +37,9 @@ TOLD: dict[str, Told] = {
 }
 
 
-def at(one: KnownVehicle, mode: Mode, y_m: float, works_on: int = 0) -> KnownVehicle:
+def at(one: KnownVehicle, mode: Mode, y_m: float, works_on: int = 0, x_m: float = 0.0) -> KnownVehicle:
     """The same vehicle, as heard now: on its way northwards."""
-    one.state = AgentState(mode, works_on, 1, 0, 0.0, y_m, NORTH)
+    one.state = AgentState(mode, works_on, 1, 0, x_m, y_m, NORTH)
     return one
 
 
@@ -99,23 +99,16 @@ def test_a_helper_that_took_another_way_is_expected_on_it() -> None:
     traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
     traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
     one.heard_ms = 10_000
-    course = traffic.course(eastwards(at(one, Mode.IDLE, 140), 30.0), None, 12.0)
+    course = traffic.course(at(one, Mode.IDLE, 140, x_m=30.0), None, 12.0)
     assert course is not None
     assert course.at(10.0)[0] == pytest.approx((30, 140, NORTH))
     assert course.place_at(course.arrives_s) == pytest.approx((0, 200), abs=0.5)
     # It came there sooner than any way that is known to lead there: it circles from where it is.
     one.heard_ms = 20_000
-    course = traffic.course(eastwards(at(one, Mode.IDLE, 195), 12.0), None, 22.0)
+    course = traffic.course(at(one, Mode.IDLE, 195, x_m=12.0), None, 22.0)
     assert course is not None
     assert course.at(20.0)[0] == pytest.approx((12, 195, NORTH))
     assert course.arrives_s == 20.0
-
-
-def eastwards(one: KnownVehicle, x_m: float) -> KnownVehicle:
-    """The same vehicle, as heard so far to the east."""
-    assert one.state is not None
-    one.state = replace(one.state, x_m=x_m)
-    return one
 
 
 class TestGroundToKeepOutOf:

@@ -6,8 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-import yaml
-from flights import BRIEF
+from flights import BRIEF, TWO_PRIMARIES
 
 from comms.said.messages import AgentState, MissionOver, Mode, Plan, StripState, Task, TaskAction
 from secondlook.cli import app
@@ -15,25 +14,6 @@ from secondlook.commands.planned_survey import planned_surveys
 from secondlook.scenario.text import Value
 from secondlook.testing import Fleet, assert_all_finished, assert_home_before_empty, assert_kept_apart
 from secondlook.testing.flight import Flight
-
-TWO = """
-name: two
-seed: 3
-area: {polygon_m: [[0, 0], [600, 0], [600, 100], [0, 100]]}
-mission: {deadline_s: 300}
-vehicles:
-  west: &primary
-    role: survey
-    part: 1 of 2
-    start: {x_m: -20, y_m: -20}
-    speed_mps: 8
-    turn_radius_m: 10
-    endurance_s: 80
-    nadir_gap_m: 20
-    range_m: 70
-    sensor: {curve: {range_m: [0, 20, 40, 70], p_detect: [0, 0.5, 0.45, 0.1]}}
-  east: {<<: *primary, part: 2 of 2, start: {x_m: 310, y_m: -20}, endurance_s: 3600, revisits: true}
-"""
 
 
 def flown(folder: Path, **changes: Value) -> Flight:
@@ -88,9 +68,7 @@ class TestAPrimary:
         assert flight.paths["primary"].line.coords[-1] == pytest.approx((150, 130), abs=0.01)
 
     def test_what_it_leaves_another_takes_that_revisits(self, tmp_path: Path) -> None:
-        scenario = tmp_path / "two.yaml"
-        scenario.write_text(json.dumps(yaml.safe_load(TWO)))
-        flight = Fleet(str(scenario), folder=tmp_path / "run").run()
+        flight = Fleet(TWO_PRIMARIES, folder=tmp_path / "run").run()
         assert_home_before_empty(flight, "west")
         assert flight.summary["risk_primary_alone"]["uncovered_share"] > 0.2
         assert flight.summary["risk"]["uncovered_share"] == 0.0

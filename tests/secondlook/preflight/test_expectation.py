@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 import yaml
-from flights import BRIEF
+from flights import BRIEF, TWO_PRIMARIES
 
 from comms.node import Received
 from comms.said.messages import AgentState, Nav
@@ -127,24 +127,6 @@ def two_tracks(**changes: Any) -> MissionExpectation:
     return check_mission(make_scenario(data, [f"{key}={value}" for key, value in changes.items()]))
 
 
-TWO = """
-name: two
-seed: 3
-area: {polygon_m: [[0, 0], [600, 0], [600, 100], [0, 100]]}
-mission: {deadline_s: 300}
-vehicles:
-  west: &primary
-    role: survey
-    part: 1 of 2
-    start: {x_m: -20, y_m: -20}
-    speed_mps: 8
-    turn_radius_m: 10
-    endurance_s: 80
-    nadir_gap_m: 20
-    range_m: 70
-    sensor: {curve: {range_m: [0, 20, 40, 70], p_detect: [0, 0.5, 0.45, 0.1]}}
-  east: {<<: *primary, part: 2 of 2, start: {x_m: 310, y_m: -20}, endurance_s: 3600, revisits: true}
-"""
 WAY_M = 20 + 400 + 20 + 20 * math.pi + 20 + 400
 
 
@@ -208,8 +190,8 @@ class TestBatteries:
         assert len(expected.refusals) == 1
 
     def test_what_another_primary_has_the_time_to_take_is_no_reason_to_stay_ashore(self) -> None:
-        data = yaml.safe_load(TWO)
-        expected = check_mission(make_scenario(data))
+        two = str(TWO_PRIMARIES)
+        expected = check_mission(two)
         assert expected.refusals == ()
         (told,) = expected.warnings
         assert re.fullmatch(
@@ -217,8 +199,8 @@ class TestBatteries:
             "other primaries have the time to take the rest",
             told,
         )
-        assert len(check_mission(make_scenario(data, ["vehicles.east.revisits=false"])).refusals) == 1
-        assert len(check_mission(make_scenario(data, ["mission.deadline_s=110"])).refusals) == 1
+        assert len(check_mission(two, ["vehicles.east.revisits=false"]).refusals) == 1
+        assert len(check_mission(two, ["mission.deadline_s=110"]).refusals) == 1
 
     def test_who_must_be_home_before_the_end_is_reckoned_there(self) -> None:
         expected = check_mission("tellaro", ["vehicles.helper.endurance_s=3000"])
