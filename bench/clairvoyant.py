@@ -21,8 +21,9 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import asdict, dataclass
+from functools import partial
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -39,11 +40,12 @@ from bench.removable import Clairvoyance, Removable
 from comms.node import Received
 from coordinator.cut.ground import OBJECTIVES
 from secondlook.compare.flights import Failure, contenders, fly
+from secondlook.engine.engine import do_all, own_processes
+from secondlook.engine.work_process import Lost
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.worker_pool import worker_pool
 
 ROUNDING = 1e-9
 
@@ -261,14 +263,16 @@ def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
     with (
         signals_interrupt(),
         Progress(*columns, console=console, transient=True, disable=not sys.stderr.isatty()) as progress,
-        worker_pool(min(arguments.jobs, arguments.seeds)) as pool,
+        own_processes(min(arguments.jobs, arguments.seeds)) as engine,
     ):
         task = progress.add_task("", total=arguments.seeds)
         seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
         missions = (scenario.model_copy(update={"seed": seed}) for seed in seeds)
-        terms = allocators, arguments.seconds, arguments.objective
-        for job in as_completed([pool.submit(one_seed, one, *terms) for one in missions]):
-            rows.append(job.result())
+        solve = partial(one_seed, names=allocators, seconds=arguments.seconds, objective=arguments.objective)
+        for mission, row in do_all(solve, missions, engine, count=arguments.seeds):
+            if isinstance(row, Lost):
+                raise RunFailedError(f"seed {mission.seed}: {row.why}")
+            rows.append(row)
             progress.update(task, completed=len(rows))
 
 
@@ -328,4 +332,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    import_module("bench.clairvoyant").main()  # by the name under which other processes find what they are to call

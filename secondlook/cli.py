@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from typing import Annotated
 
@@ -13,6 +13,7 @@ from secondlook.commands.certificates import certificates
 from secondlook.commands.check import check
 from secondlook.commands.compare import compare
 from secondlook.commands.export import export, geojson
+from secondlook.commands.many_missions import DASK, HERE, is_address
 from secondlook.commands.new import new
 from secondlook.commands.node import node_app
 from secondlook.commands.paper import paper
@@ -28,19 +29,20 @@ from secondlook.errors import UserError
 from secondlook.installed_command import WRONG_USE
 
 
-def with_number(arguments: Sequence[str], option: str, left_out: str) -> list[str]:
-    """The arguments with `left_out` as the option's value wherever no number follows the option."""
+def with_value(arguments: Sequence[str], option: str, left_out: str, is_value: Callable[[str], bool]) -> list[str]:
+    """The arguments with `left_out` as the option's value wherever none follows the option."""
     completed = []
     for place, argument in enumerate(arguments):
         following = arguments[place + 1] if place + 1 < len(arguments) else ""
-        if argument == option and not _is_number(following):
+        if argument == option and not is_value(following):
             completed.append(f"{option}={left_out}")
         else:
             completed.append(argument)
     return completed
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether this may be the value of --real-time, which can be left out."""
     try:
         float(text)
     except ValueError:
@@ -84,7 +86,8 @@ app.add_typer(node_app, name="node")
 def main() -> None:
     """Run the command line, and exit: 0 done, 1 failed, 2 wrong use or bad input, 130 Ctrl-C."""
     try:
-        app(with_number(sys.argv[1:], REAL_TIME, "1"))
+        arguments = with_value(sys.argv[1:], REAL_TIME, "1", is_number)
+        app(with_value(arguments, DASK, HERE, is_address))
     except UserError as error:
         sys.stderr.write(f"{error}\n")
         sys.exit(WRONG_USE)

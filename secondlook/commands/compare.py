@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import sys
 from importlib import import_module
 from importlib.util import find_spec
@@ -14,7 +13,7 @@ import typer
 from rich.console import Console
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.commands.many_missions import FAILED, Tell, fly_watched
+from secondlook.commands.many_missions import FAILED, Dask, Jobs, Tell, engine, fly_watched
 from secondlook.compare.flights import Flown, contenders, fly_all
 from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
@@ -42,9 +41,8 @@ def compare(
     first_seed: Annotated[
         int, typer.Option(min=0, max=LARGEST_SEED - MOST_SEEDS, help="The first of them; the others follow.")
     ] = 1,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
-    ] = None,
+    jobs: Jobs = None,
+    dask: Dask = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
@@ -64,16 +62,16 @@ def compare(
     flown: Flown = {}
     numbers = range(first_seed, first_seed + seeds)
     shown = not as_json
-    workers = jobs or os.cpu_count() or 1
 
     def fly(tell: Tell) -> None:
         def progress(flown: Flown) -> None:
             failed = len(failures(flown))
             tell(sum(len(by_seed) for by_seed in flown.values()), f"{failed} failed" if failed else "")
 
-        fly_all(chosen, numbers, workers, flown, progress)
+        fly_all(chosen, numbers, flies, flown, progress)
 
-    failure = fly_watched("compare", "missions", seeds * len(chosen), fly, shown=shown)
+    with engine(jobs, dask) as flies:
+        failure = fly_watched("compare", "missions", seeds * len(chosen), fly, shown=shown)
     stood = standings(flown)
     reacting = verdict(chosen, {one.name: one.against_first for one in stood}, objective)
     title = f"{mission.name}, seeds {numbers[0]} to {numbers[-1]}"

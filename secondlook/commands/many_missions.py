@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections.abc import Callable
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Annotated
 
+import typer
+
+from secondlook.engine.engine import Engine, EngineError, own_processes
 from secondlook.errors import UserError
 from secondlook.launch.signals import signals_interrupt
 from secondlook.progress import shown_progress
@@ -15,6 +22,38 @@ FAILED = 1
 """The exit code where missions were flown, and something was wrong with one of them or with all."""
 Tell = Callable[[int, str], None]
 """Takes how many have been flown, and a remark about them or nothing."""
+
+
+Jobs = Annotated[int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")]
+DASK = "--dask"
+HERE = "here"  # its value where it is left out
+Dask = Annotated[
+    str | None,
+    typer.Option(
+        DASK, metavar="[ADDRESS]", help="Fly on the Dask cluster of this scheduler; alone, on one of this machine."
+    ),
+]
+
+
+def engine(jobs: int | None, dask: str | None) -> AbstractContextManager[Engine]:
+    """What flies missions: processes of this machine, or a Dask cluster. Raises UserError."""
+    jobs = jobs or os.cpu_count() or 1
+    if dask is None:
+        return own_processes(jobs)
+    if find_spec("distributed") is None:
+        raise UserError(f"{DASK} needs distributed, not installed here; the extra secondlook[cluster] has it")
+    if dask != HERE and not is_address(dask):
+        raise UserError(f"{DASK}: {dask} is not allowed; must be a scheduler's address such as tcp://127.0.0.1:8786")
+    # Only who flies on a cluster needs distributed.
+    cluster: AbstractContextManager[Engine] = import_module("secondlook.engine.dask_cluster").dask_cluster(
+        None if dask == HERE else dask, jobs
+    )
+    return cluster
+
+
+def is_address(text: str) -> bool:
+    """Whether this may be the value of --dask, which can be left out."""
+    return re.fullmatch(r"[a-z]+://\S+", text) is not None
 
 
 def fly_watched(command: str, missions: str, total: int, fly: Callable[[Tell], None], *, shown: bool) -> str:
@@ -38,8 +77,8 @@ def fly_watched(command: str, missions: str, total: int, fly: Callable[[Tell], N
                 fly(tell)
         except KeyboardInterrupt:
             return f"interrupted after {flown} of {total} {missions}"
-        except BrokenProcessPool:
-            return f"a process that flew {missions} has died, after {flown} of {total} {missions}"
+        except EngineError as error:
+            return f"{error}, after {flown} of {total} {missions}"
     return ""
 
 

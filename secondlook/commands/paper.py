@@ -12,7 +12,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
+from secondlook.commands.many_missions import FAILED, Dask, Tell, engine, fly_watched, make_folder
 from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.measured import MeasuredMission, measure_all
@@ -28,12 +28,13 @@ def paper(
     out: Annotated[Path | None, typer.Option(help="Folder for the figures, as PNG; none are drawn without.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
     seeds: Annotated[int, typer.Option(min=1, max=1000, help="Runs of the six missions, to tell the spread.")] = 1,
+    dask: Dask = None,
 ) -> None:
     """Fly the paper's three experiments. Prints its tables beside what came of them; needs secondlook[paper]."""
     _require_extra()
     if out is not None:
         make_folder(out)
-    runs = _measure(seeds, shown=not as_json)
+    runs = _measure(seeds, dask, shown=not as_json)
     if as_json:
         typer.echo(json.dumps(entries_of(runs), indent=2))
     else:
@@ -58,17 +59,18 @@ def seed_of(run: int, mission: int) -> int:
     return 1 + run * len(published_missions()) + mission
 
 
-def _measure(runs: int, *, shown: bool) -> list[list[MeasuredMission]]:
+def _measure(runs: int, dask: str | None, *, shown: bool) -> list[list[MeasuredMission]]:
     missions: list[tuple[PublishedMission, int]] = [
         (mission, seed_of(run, index)) for run in range(runs) for index, mission in enumerate(published_missions())
     ]
     measured: list[MeasuredMission] = []
 
     def fly(tell: Tell) -> None:
-        measured.extend(measure_all(missions, lambda done: tell(done, "")))
+        measured.extend(measure_all(missions, flies, lambda done: tell(done, "")))
 
     try:
-        failure = fly_watched("paper", "missions", len(missions), fly, shown=shown)
+        with engine(None, dask) as flies:
+            failure = fly_watched("paper", "missions", len(missions), fly, shown=shown)
     except RunFailedError as error:
         failure = str(error)
     if failure:

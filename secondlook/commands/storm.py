@@ -6,6 +6,8 @@ import json
 import os
 import re
 import sys
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -13,20 +15,29 @@ from typing import Annotated
 import typer
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.commands.many_missions import FAILED, Tell, fly_watched, make_folder
+from secondlook.commands.many_missions import FAILED, Jobs, Tell, fly_watched, make_folder
+from secondlook.engine.work_process import Lost, WorkProcess
 from secondlook.errors import UserError
 from secondlook.files import write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.storm.campaign import Outcomes, agreement, fly_storms, storm_of, times_reached
+from secondlook.storm.campaign import (
+    STORM_LIMIT_S,
+    Outcomes,
+    agreement,
+    fly_storms,
+    storm_of,
+    times_reached,
+    without_end,
+)
 from secondlook.storm.canaries import CANARIES, Find, find_canaries
 from secondlook.storm.fly import Outcome, fly_storm, latest_flight
 from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
+from secondlook.storm.witness import Violation
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.plan import TroublePlan, load_plan
-from secondlook.worker_pool import worker_pool
 
 MOST_STORMS = 1_000_000
 MOST_NAMED = 20  # of what was never tried
@@ -59,9 +70,7 @@ def storm(
     canaries: Annotated[
         bool, typer.Option("--canaries", help="Plant bugs, and fly storms with each until it is found.")
     ] = False,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, max=256, help="Processes; as many as there are cores, if left out.")
-    ] = None,
+    jobs: Jobs = None,
     set_: Annotated[
         list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Override a key of the scenario.")
     ] = None,
@@ -127,8 +136,13 @@ def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroubleP
 
     def fly(tell: Tell) -> None:
         # In a process of its own, as Ctrl-C is to end the search and not to pass for a failure of the mission.
-        with worker_pool(1) as pool:
-            first = next(iter(pool.submit(violations_of, plan, bus).result()), None)
+        with closing(WorkProcess()) as process:
+
+            def violations(tried: TroublePlan) -> Sequence[Violation]:
+                found = process.do(violations_of, tried, bus, limit_s=STORM_LIMIT_S)
+                return [without_end(found.why)] if isinstance(found, Lost) else found
+
+            first = next(iter(violations(plan)), None)
             if first is None:
                 return
 
@@ -137,7 +151,7 @@ def _shrunk(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> TroubleP
                 flown += 1
                 left = smallest
                 tell(flown, f"{len(left.trouble)} faults and {len(left.scenario.vehicles)} vehicles left")
-                return any(is_alike(one, first) for one in pool.submit(violations_of, tried, bus).result())
+                return any(is_alike(one, first) for one in violations(tried))
 
             def found(smaller: TroublePlan) -> None:
                 nonlocal smallest

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from secondlook.engine.engine import Engine, do_all
+from secondlook.engine.work_process import Lost
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
@@ -16,7 +17,6 @@ from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Watch
 from secondlook.scenario import Scenario, ScenarioError, make_scenario
 from secondlook.scenario.plug_ins import ALLOCATOR
-from secondlook.worker_pool import worker_pool
 
 NONE = "none"
 """The allocator without second looks."""
@@ -236,18 +236,23 @@ Flown = dict[str, dict[int, Result | Failure]]
 
 
 def fly_all(
-    contenders: Sequence[Contender], seeds: Sequence[int], jobs: int, flown: Flown, progress: Callable[[Flown], None]
+    contenders: Sequence[Contender],
+    seeds: Sequence[int],
+    engine: Engine,
+    flown: Flown,
+    progress: Callable[[Flown], None],
 ) -> None:
     """Flies them seed by seed, so that after an interrupt, which goes through, all have flown about as many.
 
-    `flown` is filled as missions end, and told to `progress` each time. Raises BrokenProcessPool where a process of its
-    own dies.
+    `flown` is filled as missions end, and told to `progress` each time. Raises EngineError.
     """
-    missions = [(contender, seed) for seed in seeds for contender in contenders]
     flown.update({contender.name: {} for contender in contenders})
-    with worker_pool(min(jobs, len(missions))) as pool:
-        futures = {pool.submit(fly, contender.with_seed(seed)): (contender, seed) for contender, seed in missions}
-        for future in as_completed(futures):
-            contender, seed = futures[future]
-            flown[contender.name][seed] = future.result()
-            progress(flown)
+    missions = ((one.name, one.with_seed(seed)) for seed in seeds for one in contenders)
+    for (name, scenario), result in do_all(_fly_named, missions, engine, count=len(seeds) * len(contenders)):
+        flown[name][scenario.seed] = Failure(scenario.seed, result.why) if isinstance(result, Lost) else result
+        progress(flown)
+
+
+def _fly_named(mission: tuple[str, Scenario]) -> Result | Failure:
+    _, scenario = mission
+    return fly(scenario)

@@ -4,10 +4,8 @@ paper's tables; many missions side by side."""
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,11 +14,13 @@ import numpy as np
 
 from planner.risk import LevelArray, residual_risk
 from planner.types import DetectionCurve, FloatArray
+from secondlook.engine.engine import Engine, do_all
+from secondlook.engine.work_process import Lost
 from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.processes import RunFailedError
 from secondlook.paper.fit import Mixture, fit_mixture
 from secondlook.paper.published import PublishedMission
 from secondlook.scenario import Scenario, load_scenario
-from secondlook.worker_pool import worker_pool
 
 SCENARIO = "paper"
 VEHICLE = "primary"
@@ -163,27 +163,32 @@ class MeasuredMission:
         }
 
 
-def measure(published: PublishedMission, seed: int, scratch: Path) -> MeasuredMission:
-    """Flies one mission and fits its mixture; its files lie in `scratch` for so long. Raises RunFailedError."""
-    with tempfile.TemporaryDirectory(dir=scratch) as folder:
+def measure(published: PublishedMission, seed: int) -> MeasuredMission:
+    """Flies one mission and fits its mixture; its files are gone afterwards. Raises RunFailedError."""
+    with tempfile.TemporaryDirectory(prefix="secondlook-paper-") as folder:
         survey = fly(scenario_of(published, seed), Path(folder))
     return MeasuredMission(published, survey, fit_mixture(survey.risk_seen, published.components))
 
 
 def measure_all(
-    missions: Sequence[tuple[PublishedMission, int]], progress: Callable[[int], None]
+    missions: Sequence[tuple[PublishedMission, int]], engine: Engine, progress: Callable[[int], None]
 ) -> list[MeasuredMission]:
     """Measures each mission with its seed; the results are in the order of the missions.
 
     `progress` is told how many are done. Those with the most components to fit, which take longest, go first. Raises
-    RunFailedError, and BrokenProcessPool where a process of its own dies.
+    RunFailedError and EngineError.
     """
-    workers = min(os.cpu_count() or 1, len(missions))
     longest_first = sorted(range(len(missions)), key=lambda index: -missions[index][0].components)
     measured: dict[int, MeasuredMission] = {}
-    with tempfile.TemporaryDirectory(prefix="secondlook-paper-") as scratch, worker_pool(workers) as pool:
-        jobs = {pool.submit(measure, *missions[index], Path(scratch)): index for index in longest_first}
-        for job in as_completed(jobs):
-            measured[jobs[job]] = job.result()
-            progress(len(measured))
+    pieces = ((index, *missions[index]) for index in longest_first)
+    for (index, published, seed), result in do_all(_measure, pieces, engine, count=len(missions)):
+        if isinstance(result, Lost):
+            raise RunFailedError(f"{published.experiment}, {published.strategy}, seed {seed}: {result.why}")
+        measured[index] = result
+        progress(len(measured))
     return [measured[index] for index in range(len(missions))]
+
+
+def _measure(piece: tuple[int, PublishedMission, int]) -> MeasuredMission:
+    _, published, seed = piece
+    return measure(published, seed)

@@ -6,10 +6,12 @@ import logging
 import math
 from collections import Counter
 from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import cast
 
+from secondlook.engine.engine import do_all, own_processes
+from secondlook.engine.work_process import Lost
 from secondlook.launch.mission import Bus
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import draw_fleet
@@ -18,8 +20,8 @@ from secondlook.storm.sometimes import SOMETIMES
 from secondlook.storm.swarm import draw_storm
 from secondlook.storm.witness import Violation
 from secondlook.testing.plan import TroublePlan
-from secondlook.worker_pool import worker_pool
 
+STORM_LIMIT_S = 900.0  # of the wall clock, flown again and over Zenoh, too
 Outcomes = dict[int, Outcome]
 """By the number of the storm; what has not been flown is not there."""
 
@@ -75,18 +77,26 @@ def fly_storms(
 ) -> None:
     """Flies the storms of these numbers in `jobs` processes. `again`: see `flown_again`; 0 for none.
 
-    `outcomes` is filled as missions end, and each is told to `progress`. Raises BrokenProcessPool where a process of
-    its own dies.
+    `outcomes` is filled as missions end, and each is told to `progress`. In one that is not over after
+    STORM_LIMIT_S, or at which its process dies, something did not hold.
     """
-    with worker_pool(min(jobs, len(numbers))) as pool:
-        futures = {pool.submit(_fly, scenario, number, again): number for number in numbers}
-        for future in as_completed(futures):
-            number = futures.pop(future)
-            outcomes[number] = future.result()
+    with own_processes(min(jobs, len(numbers))) as engine:
+        storms = do_all(partial(_fly, scenario, again), numbers, engine, count=len(numbers), limit_s=STORM_LIMIT_S)
+        for number, flown in storms:
+            outcomes[number] = (
+                Outcome((without_end(flown.why),), digest=None, end_s=0.0, wall_s=0.0)
+                if isinstance(flown, Lost)
+                else flown
+            )
             progress(number, outcomes[number])
 
 
-def _fly(scenario: Scenario | None, number: int, again: int) -> Outcome:
+def without_end(why: str) -> Violation:
+    """Of a storm that was not flown to its end: its process has died or was ended."""
+    return Violation("ends", 0.0, "run", why)
+
+
+def _fly(scenario: Scenario | None, again: int, number: int) -> Outcome:
     quietly()
     plan = storm_of(scenario, number)
     return flown_again(plan, number, fly_storm(plan), again)

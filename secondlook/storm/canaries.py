@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from comms.said.messages import TaskAction, TaskState
@@ -19,10 +19,11 @@ from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
 from planner.fleet_map import VehicleLayer
 from planner.risk import MOST_LEVELS
+from secondlook.engine.engine import do_all, own_processes
+from secondlook.engine.work_process import Lost
 from secondlook.scenario import Scenario
 from secondlook.storm.campaign import quietly, storm_of
 from secondlook.storm.fly import fly_storm
-from secondlook.worker_pool import worker_pool
 from vehicle_agent.agent import Agent
 from vehicle_agent.coverage import CoverageLayer
 from vehicle_agent.revisit import SecondLooks
@@ -160,17 +161,13 @@ def find_canary(name: str, scenario: Scenario | None, numbers: Sequence[int]) ->
 def find_canaries(
     scenario: Scenario | None, numbers: Sequence[int], jobs: int, finds: dict[str, Find], progress: Callable[[], None]
 ) -> None:
-    """Looks for all of CANARIES in `jobs` processes. `finds` is filled by name as they end, and `progress` is told.
-
-    Raises BrokenProcessPool where a process of its own dies.
-    """
-    with worker_pool(min(jobs, len(CANARIES))) as pool:
-        futures = {pool.submit(_find, name, scenario, numbers): name for name in CANARIES}
-        for future in as_completed(futures):
-            finds[futures.pop(future)] = future.result()
+    """Looks for all of CANARIES in `jobs` processes. `finds` is filled by name as they end, and `progress` is told."""
+    with own_processes(min(jobs, len(CANARIES))) as engine:
+        for name, find in do_all(partial(_find, scenario, numbers), CANARIES, engine, count=len(CANARIES)):
+            finds[name] = Find(0) if isinstance(find, Lost) else find
             progress()
 
 
-def _find(name: str, scenario: Scenario | None, numbers: Sequence[int]) -> Find:
+def _find(scenario: Scenario | None, numbers: Sequence[int], name: str) -> Find:
     quietly()
     return find_canary(name, scenario, numbers)

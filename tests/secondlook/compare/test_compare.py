@@ -10,7 +10,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -34,6 +33,7 @@ from secondlook.compare.flights import (
 )
 from secondlook.compare.plot import _lines
 from secondlook.compare.standings import Standing, failures, standings, table
+from secondlook.engine.engine import EngineError
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
@@ -242,7 +242,7 @@ def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch)
 def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
     """Missions by hand in place of flown ones."""
 
-    def fly_all(chosen: object, seeds: object, jobs: int, flown: Flown, progress: Callable[[Flown], None]) -> None:
+    def fly_all(chosen: object, seeds: object, engine: object, flown: Flown, progress: Callable[[Flown], None]) -> None:
         flown.update(FLOWN)
         progress(flown)
 
@@ -289,7 +289,7 @@ class TestCommand:
         self, command: Command, monkeypatch: pytest.MonkeyPatch, objective: str, what: str, better: str
     ) -> None:
         # The other leaves less on 2 of 6 seeds, and is expected to find more on 5.
-        def fly_all(chosen: object, seeds: range, jobs: int, flown: Flown, progress: object) -> None:
+        def fly_all(chosen: object, seeds: range, engine: object, flown: Flown, progress: object) -> None:
             flown["plan"] = {seed: result(seed, 0.4, expected=0.5) for seed in seeds}
             flown["greedy"] = {
                 seed: result(seed, 0.3 if seed <= 2 else 0.5, expected=0.6 if seed <= 5 else 0.4) for seed in seeds
@@ -310,7 +310,7 @@ class TestCommand:
     def test_seeds_are_flown_from_the_first_one(self, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
         told: list[int] = []
 
-        def fly_all(chosen: object, seeds: range, jobs: int, flown: Flown, progress: object) -> None:
+        def fly_all(chosen: object, seeds: range, engine: object, flown: Flown, progress: object) -> None:
             told.extend(seeds)
             flown["none"] = {seed: result(seed, 0.4) for seed in seeds}
 
@@ -322,7 +322,7 @@ class TestCommand:
     def test_a_line_under_the_table_says_whether_reacting_was_worth_it(
         self, command: Command, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        def fly_all(chosen: list[Contender], seeds: range, jobs: int, flown: Flown, progress: object) -> None:
+        def fly_all(chosen: list[Contender], seeds: range, engine: object, flown: Flown, progress: object) -> None:
             ends = {"plan": 0.3, "greedy": 0.2, "blind": 0.4}
             flown.update({one.name: {seed: result(seed, ends[one.name]) for seed in seeds} for one in chosen})
 
@@ -342,9 +342,9 @@ class TestCommand:
         ("raised", "told"),
         [
             (KeyboardInterrupt(), "interrupted after 1 of 2 missions\n"),
-            (BrokenProcessPool(), "a process that flew missions has died, after 1 of 2 missions\n"),
+            (EngineError("the scheduler is gone"), "the scheduler is gone, after 1 of 2 missions\n"),
         ],
-        ids=["interrupted", "died"],
+        ids=["interrupted", "lost"],
     )
     def test_what_was_flown_before_an_end_too_early_is_told(
         self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str

@@ -16,7 +16,7 @@ from flights import BRIEF, Flight, events, flight, has_ended, until
 from comms.said.announcement import ClockMode, RunInfo
 from comms.said.codec import decode
 from comms.said.topics import topic_of
-from secondlook.cli import main, with_number
+from secondlook.cli import is_number, main, with_value
 from secondlook.recorded.mission_files import read_messages
 
 # Half as long again after the primary's end, so that the helper has time for its strips however slow the machine is.
@@ -153,4 +153,4 @@ def test_a_factor_must_be_a_number_that_a_clock_can_run_by(
     ],
 )
 def test_the_factor_may_be_left_out(given: list[str], meant: list[str]) -> None:
-    assert with_number(given, "--real-time", "1") == meant
+    assert with_value(given, "--real-time", "1", is_number) == meant

@@ -6,7 +6,6 @@ import importlib.util
 import io
 import json
 from collections.abc import Callable
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from threadpoolctl import threadpool_limits
 from planner.types import DetectionCurve, FloatArray
 from secondlook import cli
 from secondlook.commands.paper import seed_of
+from secondlook.engine.engine import EngineError, own_processes
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.figures import draw_all
 from secondlook.paper.fit import Mixture, fit_mixture
@@ -97,7 +97,8 @@ def measured() -> list[MeasuredMission]:
     """The paper's six missions, flown side by side."""
     missions = [(mission, seed_of(0, index)) for index, mission in enumerate(published_missions())]
     done: list[int] = []
-    measured = measure_all(missions, done.append)
+    with own_processes(2) as engine:
+        measured = measure_all(missions, engine, done.append)
     assert done == [1, 2, 3, 4, 5, 6]
     return measured
 
@@ -241,7 +242,9 @@ Command = Callable[..., tuple[int | str | None, str, str]]
 def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
     """`secondlook paper`, with missions by hand in place of flown ones."""
 
-    def missions(asked: list[tuple[object, int]], progress: Callable[[int], None]) -> list[MeasuredMission]:
+    def missions(
+        asked: list[tuple[object, int]], engine: object, progress: Callable[[int], None]
+    ) -> list[MeasuredMission]:
         progress(len(asked))
         return [by_hand(name) for _ in range(len(asked) // 6) for name in MISSIONS]
 
@@ -288,9 +291,9 @@ class TestCommand:
         [
             (RunFailedError("primary has failed"), "primary has failed\n"),
             (KeyboardInterrupt(), "interrupted after 0 of 6 missions\n"),
-            (BrokenProcessPool(), "a process that flew missions has died, after 0 of 6 missions\n"),
+            (EngineError("the scheduler is gone"), "the scheduler is gone, after 0 of 6 missions\n"),
         ],
-        ids=["failed", "interrupted", "died"],
+        ids=["failed", "interrupted", "lost"],
     )
     def test_missions_that_fail_are_told_in_one_sentence(
         self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
