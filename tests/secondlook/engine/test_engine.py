@@ -1,3 +1,5 @@
+"""Work is done by processes of its own, one piece after another, and carried in batches by any executor."""
+
 from __future__ import annotations
 
 import multiprocessing
