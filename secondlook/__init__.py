@@ -1,5 +1,6 @@
 """The front door: command line, scenarios, launcher, observer and results. `load` reads a run back,
-`check_mission` tells what a mission is expected to come to."""
+`fly_sweep` flies many and
+`load_sweep` reads their rows, `check_mission` tells what a mission is expected to come to."""
 
 from __future__ import annotations
 
@@ -7,11 +8,13 @@ import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
+    from concurrent.futures import Executor
 
     from secondlook.preflight import MissionExpectation
     from secondlook.recorded import RecordedMission
     from secondlook.scenario import Scenario
+    from secondlook.sweeps.standings import Sweep
 
 
 def load(run: str | os.PathLike[str]) -> RecordedMission:
@@ -27,6 +30,45 @@ def load(run: str | os.PathLike[str]) -> RecordedMission:
     from secondlook.recorded import load_run  # noqa: PLC0415
 
     return load_run(run)
+
+
+def fly_sweep(
+    scenario: str | os.PathLike[str],
+    folder: str | os.PathLike[str],
+    *,
+    seeds: range,
+    vary: Mapping[str, Sequence[object]] | None = None,
+    settings: Sequence[str] = (),
+    executor: Executor | None = None,
+    side_by_side: int | None = None,
+) -> Sweep:
+    """Flies what is missing of a sweep, as `secondlook sweep` does, and reads it back.
+
+    `scenario`: a bundled one's name, or a YAML file. `folder`: new, empty, or of this sweep. `vary`: by key the values
+    that it takes. `settings`: KEY=VALUE each, for all missions. `executor`: anybody's that carries functions to where
+    missions are to be flown, processes of this machine if left out; `side_by_side`: how many it calls at a time, as
+    many as there are cores if left out. Missions that fail are rows that say why. Raises
+    `secondlook.errors.UserError`, in one sentence, for what cannot be flown so.
+    """
+    from secondlook.installed_command import check_rooms  # noqa: PLC0415
+
+    check_rooms()
+    from secondlook.sweeps.fly import fly_sweep as fly_it  # noqa: PLC0415
+
+    return fly_it(os.fspath(scenario), os.fspath(folder), seeds, vary or {}, settings, executor, side_by_side)
+
+
+def load_sweep(folder: str | os.PathLike[str]) -> Sweep:
+    """A sweep as far as it was flown, from its folder; see `secondlook.sweeps.standings.Sweep`.
+
+    Raises `secondlook.errors.UserError` for what is not the folder of a sweep, and as `load` does.
+    """
+    from secondlook.installed_command import check_rooms  # noqa: PLC0415
+
+    check_rooms()
+    from secondlook.sweeps.standings import load_sweep as load_it  # noqa: PLC0415
+
+    return load_it(folder)
 
 
 def check_mission(scenario: str | os.PathLike[str] | Scenario, settings: Sequence[str] = ()) -> MissionExpectation:

@@ -24,6 +24,7 @@ from secondlook.commands.report import report
 from secondlook.commands.run import REAL_TIME, run
 from secondlook.commands.scenarios import scenarios
 from secondlook.commands.storm import storm
+from secondlook.commands.sweep import sweep
 from secondlook.commands.view import view
 from secondlook.errors import UserError
 from secondlook.installed_command import WRONG_USE
@@ -74,7 +75,7 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-_MISSIONS = (run, scenarios, new, check, plan, compare, storm, paper)
+_MISSIONS = (run, scenarios, new, check, plan, compare, sweep, storm, paper)
 _OF_A_RUN = (replay, view, report, geojson, export, picture, video)
 for command in (*_MISSIONS, *_OF_A_RUN, certificates):
     app.command()(command)

@@ -92,14 +92,14 @@ def paired(own: Mapping[int, Result], first: Mapping[int, Result], objective: Ob
     if not values.size:
         return None
     differences = values[:, 0] - values[:, 1]
-    low, high = _interval(differences) if differences.size >= FEWEST_SEEDS else (None, None)
+    low, high = interval_of_mean(differences) if differences.size >= FEWEST_SEEDS else (None, None)
     above, below = int((differences > 0).sum()), int((differences < 0).sum())
     better, worse = (above, below) if objective.more_is_better else (below, above)
     own_mean, first_mean = values.mean(axis=0).tolist()
     return Paired(differences.size, own_mean, first_mean, float(differences.mean()), low, high, better, worse)
 
 
-def _interval(differences: FloatArray) -> tuple[float, float]:
+def interval_of_mean(differences: FloatArray) -> tuple[float, float]:
     """The bootstrap's interval of the mean, by percentiles: the same differences in the same order give the same."""
     chance = np.random.default_rng(0)
     size = (AT_ONCE, differences.size)

@@ -44,16 +44,19 @@ class WorkProcess:
         self._is_closed = False
 
     def do(self, function: Callable[..., T], *arguments: Any, limit_s: float | None = None) -> T | Lost:
-        """What the function gives, or raises; it lies in a module. `limit_s`: wall time after which it is ended."""
+        """What the function gives, or raises; it lies in a module. `limit_s`: wall time after which it is ended, from
+        when it was found there."""
         pipe = self._started()
         if pipe is None:
             return Lost("it was broken off")
         try:
             pipe.send((function, arguments))
-            if not pipe.poll(limit_s):
+            is_done, result = pipe.recv()
+            if is_done is None and not pipe.poll(limit_s):
                 self._end(signal.SIGKILL)
                 return Lost(f"it was not done after {limit_s:g} s")
-            is_done, result = pipe.recv()
+            if is_done is None:
+                is_done, result = pipe.recv()
         except (EOFError, OSError):
             return Lost("it was broken off" if self._is_closed else f"its process {self._end()}")
         if not is_done:
@@ -123,6 +126,7 @@ def main() -> None:
     while True:
         try:
             function, arguments = pickle.loads(work.get())
+            pipe.send((None, None))  # begun
             pipe.send((True, function(*arguments)))
         except Exception as error:
             pipe.send((False, error))

@@ -17,8 +17,10 @@ from secondlook.scenario.model import Scenario
 from secondlook.scenario.text import LARGEST_FILE_BYTES, Document, Value, decode, read, read_value
 
 
-def override(document: Document, settings: Sequence[str], seed: int | None = None) -> Document:
-    """A copy of the document with each `KEY=VALUE` set, in their order, then the seed.
+def override(
+    document: Document, settings: Sequence[str], seed: int | None = None, *, option: str = "--set"
+) -> Document:
+    """A copy of the document with each `KEY=VALUE` set, in their order, then the seed. `option`: by which they came.
 
     A key is a dotted path; mappings on the way that the file leaves out are made. A value is written as in the file.
     A setting that cannot be made is listed in the copy's problems. Whether key and value are allowed is for the
@@ -26,7 +28,7 @@ def override(document: Document, settings: Sequence[str], seed: int | None = Non
     """
     changed = copy.deepcopy(document)
     for setting in settings:
-        place = Place(f"--set {setting}")
+        place = Place(f"{option} {setting}")
         key, equals, text = setting.partition("=")
         path = tuple(key.split("."))
         if not equals or not all(path):
@@ -77,7 +79,10 @@ def _set(document: Document, path: tuple[str, ...], value: Value, place: Place) 
 
 
 def load_scenario(
-    name_or_path: str | os.PathLike[str], overrides: Sequence[str] = (), seed: int | None = None
+    name_or_path: str | os.PathLike[str],
+    overrides: Sequence[str] = (),
+    seed: int | None = None,
+    varied: Sequence[str] = (),
 ) -> Scenario:
     """The scenario of a bundled name, or else of a YAML file.
 
@@ -85,12 +90,14 @@ def load_scenario(
         name_or_path: a bundled name, or a file's path; a path with a folder in it (`./tellaro`) is always a file.
         overrides: `KEY=VALUE` each, KEY a dotted path, VALUE as in the file.
         seed: in place of the scenario's own.
+        varied: further overrides, of which errors tell as of `--vary`.
 
     Raises:
         ScenarioError: there is no such scenario, or it cannot be used; all that is wrong, one sentence a line.
     """
     source = os.fspath(name_or_path)
-    return _validated(override(read(_text(source), source), overrides, seed), Path(source).parent)
+    document = override(read(_text(source), source), overrides, seed)
+    return _validated(override(document, varied, option="--vary") if varied else document, Path(source).parent)
 
 
 def make_scenario(data: dict[str, Value], overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:

@@ -1,0 +1,1 @@
+"""Sweeps: a table of missions, a row each, over seeds and whatever else is varied."""

@@ -1,0 +1,204 @@
+"""The folder of a sweep: its rows as Parquet, readable at any time, and what they were flown with.
+
+Rows are written a file at a time into `rows`, each whole or not at all, and joined into `missions.parquet` when all
+missions are there. A file holds at most what came in FILE_EVERY_S, so that no more is flown again, whatever ends the
+process that writes.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.parquet as pq
+
+from secondlook.engine.code_here import code_here, differing
+from secondlook.errors import UserError
+from secondlook.files import CannotWriteError, whole_file, write_whole
+from secondlook.sweeps.plan import SweepPlan
+from secondlook.sweeps.rows import TEXT, WHOLE, Row, schema_of
+
+MADE_WITH, PLAN, ROWS, MISSIONS = "made_with.json", "sweep.yaml", "rows", "missions.parquet"
+BROKEN_OFF = ".*.part"  # what was left by a process that was killed while it wrote
+FILE_EVERY_S = 10.0  # of the wall clock
+MOST_IN_FILE = 5000
+
+
+@contextmanager
+def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
+    """The folder for a sweep, new, or one of the same sweep that is to go on; nobody else writes to it meanwhile.
+
+    The same is one of the same scenario, settings, code and varied keys; seeds and values may have been fewer. Raises
+    UserError for a folder that holds anything else.
+    """
+    schema = schema_of(plan)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise UserError(f"--out {folder}: {error.strerror}; must be a folder that can be written") from error
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise UserError(f"--out {folder}: another process flies this sweep already") from error
+        for left in (*folder.glob(BROKEN_OFF), *(folder / ROWS).glob(BROKEN_OFF)):
+            left.unlink()
+        if any(folder.iterdir()):
+            _check_same(folder, plan)
+        opened = SweepFolder(folder, schema)
+        opened.tidy()
+        write_whole(folder / MADE_WITH, json.dumps(_made_with(plan), indent=2) + "\n")
+        write_whole(folder / PLAN, plan.to_yaml())
+        yield opened
+    finally:
+        os.close(lock)
+
+
+def _made_with(plan: SweepPlan) -> dict[str, Any]:
+    """What must be the same for rows to be of one sweep, and which seeds and values there are."""
+    scenario = plan.combinations[0].scenario.model_dump(mode="json", exclude_none=True)
+    return {
+        "version": version("secondlook"),
+        "code": code_here(),
+        "scenario": {**scenario, "seed": 0},
+        "vary": {key: list(values) for key, values in plan.vary.items()},
+        "seeds": [plan.seeds[0], plan.seeds[-1]],
+    }
+
+
+def _check_same(folder: Path, plan: SweepPlan) -> None:
+    try:
+        before = json.loads((folder / MADE_WITH).read_text())
+    except FileNotFoundError:
+        raise UserError(
+            f"--out {folder}: holds other files; must be a new or empty folder, or that of a sweep"
+        ) from None
+    except (OSError, ValueError) as error:
+        raise UserError(f"--out {folder}: {MADE_WITH} cannot be read: {error}") from error
+    now = json.loads(json.dumps(_made_with(plan)))
+    if code := differing(before["code"], now["code"]):
+        told = f"other code: {', '.join(code)} {'has' if len(code) == 1 else 'have'} changed"
+    elif before["vary"].keys() != now["vary"].keys():
+        told = f"{', '.join(before['vary']) or 'nothing'} varied"
+    elif gone := [
+        f"{key}={json.dumps(value)}"
+        for key, values in before["vary"].items()
+        for value in values
+        if value not in now["vary"][key]
+    ]:
+        told = f"{gone[0]}, too"
+    elif not (now["seeds"][0] <= before["seeds"][0] and before["seeds"][1] <= now["seeds"][1]):
+        told = f"seeds {before['seeds'][0]} to {before['seeds'][1]}"
+    elif other := _other(before["scenario"], now["scenario"], {tuple(key.split(".")) for key in plan.vary}):
+        told = f"another scenario: {other}"
+    else:
+        return
+    raise UserError(f"--out {folder}: was flown with {told}; must be a new folder, or asked for as before")
+
+
+def _other(before: Any, now: Any, but: set[tuple[str, ...]], path: tuple[str, ...] = ()) -> str:
+    """The first key at which two scenarios differ, and how, apart from what is varied; "" if none does."""
+    if path in but or before == now:
+        return ""
+    if isinstance(before, dict) and isinstance(now, dict):
+        return next(
+            (
+                other
+                for key in sorted(before.keys() | now.keys())
+                if (other := _other(before.get(key), now.get(key), but, (*path, key)))
+            ),
+            "",
+        )
+    return f"{'.'.join(path)} was {json.dumps(before)} and is {json.dumps(now)}"
+
+
+class SweepFolder:
+    """`schema`: of its rows."""
+
+    def __init__(self, folder: Path, schema: pa.Schema) -> None:
+        self.path = folder
+        self._schema = schema
+        self._rows: list[Row] = []
+        self._began_s = time.monotonic()
+        self._next = 1 + max((int(one.stem) for one in self._files()), default=0)
+
+    def done(self) -> set[str]:
+        """The keys of the missions that are there."""
+        files = [*filter(Path.exists, [self.path / MISSIONS]), *self._files()]
+        return {key for file in files for key in _read(file, ["key"])["key"].to_pylist()}
+
+    def add(self, row: Row) -> None:
+        """Takes a row; it is written within some seconds. Raises CannotWriteError."""
+        if not self._rows:
+            self._began_s = time.monotonic()
+        self._rows.append(row)
+        if len(self._rows) >= MOST_IN_FILE or time.monotonic() - self._began_s >= FILE_EVERY_S:
+            self.write()
+
+    def write(self) -> None:
+        """Writes what was added since the last time. Raises CannotWriteError."""
+        if self._rows:
+            rows, self._rows = self._rows, []
+            (self.path / ROWS).mkdir(exist_ok=True)
+            _write(self.path / ROWS / f"{self._next:06}.parquet", pa.Table.from_pylist(rows, self._schema))
+            self._next += 1
+
+    def join(self) -> None:
+        """Writes all rows into one file, sorted by seed and as the plan has them. Raises CannotWriteError."""
+        self.write()
+        if self._files():
+            _write(self.path / MISSIONS, read_rows(self.path, self._schema))
+            self.tidy()
+
+    def tidy(self) -> None:
+        """Takes away what was joined already, in case that was broken off in between."""
+        if (self.path / MISSIONS).exists():
+            joined = _read(self.path / MISSIONS, ["key"])["key"]
+            for file in self._files():
+                if pc.all(pc.is_in(_read(file, ["key"])["key"], joined)).as_py():
+                    file.unlink()
+            if (self.path / ROWS).exists() and not self._files():
+                (self.path / ROWS).rmdir()
+
+    def _files(self) -> list[Path]:
+        return sorted((self.path / ROWS).glob("*.parquet"))
+
+
+def read_rows(folder: Path, schema: pa.Schema | None = None) -> pa.Table:
+    """All rows that are there, joined or not, by seed; with the columns of a schema, or those of the newest."""
+    tables = [_read(file) for file in sorted((folder / ROWS).glob("*.parquet"))]
+    if (folder / MISSIONS).exists():
+        joined = _read(folder / MISSIONS)
+        tables = [joined, *(one.filter(pc.invert(pc.is_in(one["key"], joined["key"]))) for one in tables)]
+    if schema is None:
+        schema = tables[-1].schema if tables else pa.schema({"key": TEXT, "seed": WHOLE})
+    try:
+        table = pa.concat_tables([schema.empty_table(), *tables], promote_options="permissive").select(schema.names)
+    except pa.ArrowException as error:
+        raise UserError(f"{folder}: the values that were varied before are of another kind: {error}") from error
+    return table.sort_by([("seed", "ascending"), ("key", "ascending")])
+
+
+def _read(file: Path, columns: list[str] | None = None) -> pa.Table:
+    try:
+        return pq.read_table(file, columns=columns)
+    except (OSError, pa.ArrowException) as error:
+        raise UserError(f"{file}: cannot be read: {error}; what it held is flown again without it") from error
+
+
+def _write(path: Path, table: pa.Table) -> None:
+    with whole_file(path) as file:
+        try:
+            pq.write_table(table, file, compression="zstd")
+        except OSError as error:  # Arrow's own have no sentence of the system's
+            raise CannotWriteError(path, error) from error

@@ -1,0 +1,214 @@
+"""What a sweep flies: a scenario, with each seed and each combination of what is varied."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import re
+import shlex
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from comms.said.announcement import LARGEST_SEED
+from secondlook.errors import UserError
+from secondlook.fleet.build import build_fleet
+from secondlook.scenario import Scenario, ScenarioError, load_scenario, scenario_hash
+from secondlook.scenario.explain import explain
+from secondlook.scenario.text import LARGEST_FILE_BYTES, Value, decode, dump, read, read_value
+
+MOST_COMBINATIONS = 10_000
+MOST_MISSIONS = 10_000_000
+_RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
+_PLAIN = re.compile(r"[A-Za-z0-9_./:-]+")
+
+
+@dataclass(frozen=True)
+class Combination:
+    """`values`: of what is varied, by key. `scenario`: with them, but for the seed."""
+
+    values: Mapping[str, Value]
+    scenario: Scenario
+
+    @cached_property
+    def hash(self) -> str:
+        """The same for what is the same mission but for the seed, and for nothing else: 12 hexadecimal digits."""
+        return scenario_hash(self.scenario.model_copy(update={"seed": 0}))[:12]
+
+    @property
+    def settings(self) -> list[str]:
+        """KEY=VALUE each, as on the command line."""
+        return [f"{key}={as_text(value)}" for key, value in self.values.items()]
+
+
+@dataclass(frozen=True)
+class SweptMission:
+    """One mission of a sweep. `key`: tells it from all others."""
+
+    key: str
+    combination: Combination
+    seed: int
+
+    @property
+    def scenario(self) -> Scenario:
+        """What is flown."""
+        return self.combination.scenario.model_copy(update={"seed": self.seed})
+
+
+@dataclass(frozen=True)
+class SweepPlan:
+    """`scenario`: a bundled one's name, or a file. `settings`: KEY=VALUE each, for all missions. `vary`: by key the
+    values that it takes, each with each of the others."""
+
+    scenario: str
+    seeds: range
+    settings: tuple[str, ...] = ()
+    vary: Mapping[str, Sequence[Value]] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """The number of missions."""
+        combinations = 1
+        for values in self.vary.values():
+            combinations *= len(values)
+        return combinations * len(self.seeds)
+
+    @cached_property
+    def combinations(self) -> tuple[Combination, ...]:
+        """In order; the last key varies fastest. All are valid, and make a fleet that can be flown.
+
+        Raises UserError for what is not, or is there twice.
+        """
+        if not self.seeds:
+            raise UserError("seeds: are none; must be at least one")
+        if self.count > MOST_MISSIONS or self.count > MOST_COMBINATIONS * len(self.seeds):
+            raise UserError(
+                f"{self.count} missions are not allowed; must be at most {MOST_COMBINATIONS} combinations "
+                f"and {MOST_MISSIONS} missions"
+            )
+        found = dict[str, Combination]()
+        for values in itertools.product(*self.vary.values()):
+            varied = dict(zip(self.vary, values, strict=True))
+            settings = [f"{key}={as_text(value)}" for key, value in varied.items()]
+            scenario = load_scenario(self.scenario, self.settings, self.seeds[0], settings)
+            build_fleet(scenario, record=False)
+            one = Combination(varied, scenario)
+            if one.hash in found:
+                twice = " and ".join(" ".join(other.settings) for other in (found[one.hash], one))
+                raise UserError(f"--vary: {twice} are the same mission, which is not allowed twice")
+            found[one.hash] = one
+        return tuple(found.values())
+
+    def missions(self) -> Iterator[SweptMission]:
+        """Seed by seed, so that a sweep that is broken off has flown about as many of each combination."""
+        for seed in self.seeds:
+            for one in self.combinations:
+                yield SweptMission(f"{one.hash}-{seed}", one, seed)
+
+    def command(self, mission: SweptMission) -> str:
+        """What flies just this one again, with a recording."""
+        words = ["secondlook", "run", self.scenario, "--seed", str(mission.seed)]
+        for setting in (*self.settings, *mission.combination.settings):
+            words += ["--set", setting]
+        return shlex.join(words)
+
+    def to_yaml(self) -> str:
+        """As a file that `load_sweep_plan` reads."""
+        data: dict[str, Value] = {
+            "scenario": self.scenario,
+            "seeds": f"{self.seeds[0]}..{self.seeds[-1]}",
+            "set": list(self.settings),
+            "vary": {key: list(values) for key, values in self.vary.items()},
+        }
+        return dump(data)
+
+
+def as_text(value: Value) -> str:
+    """A value as it is written behind KEY=, and read back as the same."""
+    if isinstance(value, str) and _PLAIN.fullmatch(value) and read_value(value) == value:
+        return value
+    return json.dumps(value, ensure_ascii=False)
+
+
+def seeds_of(text: str, option: str = "--seeds") -> range:
+    """The seeds of A..B, both of which belong to it, or of a single number. Raises UserError."""
+    match = _RANGE.fullmatch(text if ".." in text else f"{text}..{text}")
+    first, last = (int(match[1]), int(match[2])) if match else (1, 0)
+    if not first <= last <= LARGEST_SEED:
+        raise UserError(f"{option}: {text} is not allowed; must be A..B, whole numbers up to {LARGEST_SEED}")
+    return range(first, last + 1)
+
+
+def varied(options: Sequence[str]) -> dict[str, Sequence[Value]]:
+    """What KEY=VALUE,VALUE,... each ask for. Raises UserError."""
+    vary = dict[str, Sequence[Value]]()
+    for option in options:
+        key, _, text = option.partition("=")
+        if not key or not text:
+            raise UserError(f"--vary {option}: is not allowed; must be KEY=VALUE,VALUE,..., as coordinator.rho=0,0.5")
+        if key in vary:
+            raise UserError(f"--vary {option}: {key} is varied already; must be given once with all its values")
+        try:
+            values = read_value(f"[{text}]")
+        except ScenarioError as error:
+            raise UserError(f"--vary {option}: {error.problems[0].text}") from error
+        assert isinstance(values, list), "as it is written"
+        vary[key] = values
+        _check(key, values, f"--vary {option}")
+    return vary
+
+
+def checked(vary: Mapping[str, Sequence[Value]]) -> dict[str, Sequence[Value]]:
+    """What is to be varied, by key; raises UserError for a key without values, or with one twice."""
+    for key, values in vary.items():
+        _check(key, values, f"vary {key}")
+    return {key: list(values) for key, values in vary.items()}
+
+
+def _check(key: str, values: Sequence[Value], place: str) -> None:
+    if key == "seed":
+        raise UserError(f"{place}: seed is not allowed; must be asked for with seeds")
+    if not values:
+        raise UserError(f"{place}: has no value; must have at least one")
+    twice = next((one for index, one in enumerate(values) if one in values[:index]), None)
+    if twice is not None:
+        raise UserError(f"{place}: {as_text(twice)} is not allowed twice")
+
+
+class _PlanFile(BaseModel):
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+    scenario: str
+    seeds: str | int
+    set: list[str] = []
+    vary: dict[str, list[Any]] = {}
+
+
+def load_sweep_plan(path: str | os.PathLike[str]) -> SweepPlan:
+    """The plan that a YAML file holds, with `scenario`, `seeds`, and if wanted `set` and `vary`. A scenario's file is
+    looked for beside it. Raises UserError, a sentence a line, for all that is wrong with it."""
+    source = os.fspath(path)
+    try:
+        with Path(source).open("rb") as file:
+            document = read(decode(file.read(LARGEST_FILE_BYTES + 1), source), source)
+    except OSError as error:
+        raise UserError(f"{source}: cannot be read: {error.strerror}") from error
+    classes: dict[int, type[BaseModel]] = {}
+    problems = document.problems
+    try:
+        told = _PlanFile.model_validate(document.data, context=classes)
+    except ValidationError as error:
+        problems = problems + explain(error.errors(), document.data, document.places, classes)
+    if problems:
+        raise ScenarioError(problems)
+    for key, values in told.vary.items():
+        _check(key, values, f"{document.places[('vary', key)]}: vary.{key}")
+    seeds = seeds_of(str(told.seeds), f"{document.places[('seeds',)]}: seeds")
+    beside = Path(source).parent / told.scenario
+    scenario = str(beside) if beside.suffix and beside.exists() else told.scenario
+    return SweepPlan(scenario, seeds, tuple(told.set), told.vary)

@@ -1,0 +1,313 @@
+"""Rows of a sweep: each mission once, whatever ended the process that flew them; and how they stand."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from collections.abc import Callable
+from concurrent.futures import Executor, Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import swept
+from flights import BRIEF
+
+import secondlook
+from bench.sweep_kills import kill_and_resume
+from secondlook import cli
+from secondlook.engine import engine as engine_module
+from secondlook.engine.engine import Engine, own_processes
+from secondlook.errors import UserError
+from secondlook.files import CannotWriteError
+from secondlook.sweeps import folder as folder_module
+from secondlook.sweeps.fly import fly_missing
+from secondlook.sweeps.folder import read_rows, sweep_folder
+from secondlook.sweeps.plan import SweepPlan
+from secondlook.sweeps.rows import flat, schema_of
+from secondlook.sweeps.standings import load_sweep, short_names, standings
+
+VARY = {"coordinator.allocator": ["plan", "none"]}
+
+
+def plan(seeds: range = range(1, 9), **changes: Any) -> SweepPlan:
+    return SweepPlan(**{"scenario": str(BRIEF), "seeds": seeds, "vary": VARY, **changes})
+
+
+class Here(Executor):
+    """Does the work at once, in this process. `ends_after`: how many batches it does before it is interrupted."""
+
+    def __init__(self, ends_after: int | None = None) -> None:
+        self.ends_after = ends_after
+        self.flown: list[str] = []
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **keywords: Any) -> Future[Any]:
+        if self.ends_after is not None and len(self.flown) >= self.ends_after:
+            raise KeyboardInterrupt
+        self.flown += [one.key for one in arguments[1]]
+        future = Future[Any]()
+        future.set_result(function(*arguments, **keywords))
+        return future
+
+
+def fly(asked: SweepPlan, folder: Path, here: Here | None = None) -> Here:
+    here = here or Here()
+    assert fly_missing(asked, folder, Engine(here, lambda: 1), flies=swept.flown) == 0
+    return here
+
+
+class TestRows:
+    def test_there_is_one_for_each_mission(self, tmp_path: Path) -> None:
+        fly(plan(), tmp_path / "out")
+        table = pq.read_table(tmp_path / "out" / "missions.parquet")
+        assert table["seed"].to_pylist() == sorted([*range(1, 9)] * 2)
+        assert sorted(table["key"].to_pylist()) == sorted(one.key for one in plan().missions())
+        assert table["digest"].to_pylist() == table["key"].to_pylist()
+        none = [row for row in table.to_pylist() if row["coordinator.allocator"] == "none"]
+        assert [row["risk.mean"] for row in none] == pytest.approx([seed / 100 + 0.1 for seed in range(1, 9)])
+        assert not (tmp_path / "out" / "rows").exists()
+
+    def test_what_a_mission_does_not_tell_is_null(self, tmp_path: Path) -> None:
+        fly(plan(), tmp_path)
+        table = pq.read_table(tmp_path / "missions.parquet")
+        assert table["risk.worst30_mean"].null_count == 16
+        assert table["vehicles.primary.r_adpt_m"].to_pylist() == [[60, 70]] * 16
+
+    def test_one_that_fails_and_one_that_hangs_are_rows(self, tmp_path: Path) -> None:
+        with own_processes(2) as engine:
+            failed = fly_missing(plan(vary={}), tmp_path, engine, limit_s=0.5, flies=swept.fails_at_five)
+        assert failed == 2
+        rows = {row["seed"]: row for row in pq.read_table(tmp_path / "missions.parquet").to_pylist()}
+        assert {seed: row["failure"] for seed, row in rows.items() if row["failure"]} == {
+            5: "the battery is empty",
+            6: "it was not done after 0.5 s",
+        }
+        assert rows[6]["risk.mean"] is None
+
+    def test_every_figure_of_a_summary_that_is_no_list_has_a_column(self, tmp_path: Path) -> None:
+        asked = plan(range(3, 4), vary={})
+        with own_processes(1) as engine:
+            fly_missing(asked, tmp_path, engine)
+        (row,) = pq.read_table(tmp_path / "missions.parquet").to_pylist()
+        command = shlex.split(row["command"])
+        again = tmp_path / "again"
+        _command(command[1:], "--bus", "local", "--out", str(again))
+        summary = json.loads((again / "summary.json").read_text())
+        assert summary["digest"] == row["digest"]
+        told = {key: value for key, value in flat(summary).items() if not key.startswith(NOT_IN_ROWS)}
+        assert {key: row[key] for key in told} == told
+
+
+NOT_IN_ROWS = ("scenario", "version", "begun_utc", "bus", "processes", "factor", "time.wall", "time.real", "latency_ms",
+               "separation.closest", "priorities", "dropped")  # fmt: skip
+
+
+def _command(arguments: list[str], *more: str) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("sys.argv", ["secondlook", *arguments, *more])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+    assert ended.value.code == 0
+
+
+@pytest.fixture
+def each_row_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(folder_module, "MOST_IN_FILE", 1)
+    monkeypatch.setattr(engine_module, "MOST_IN_BATCH", 1)
+
+
+class TestResumed:
+    def test_what_is_there_is_not_flown_again(self, tmp_path: Path, each_row_a_file: None) -> None:
+        first, second = Here(ends_after=5), Here()
+        with pytest.raises(KeyboardInterrupt):
+            fly(plan(), tmp_path, first)
+        there = read_rows(tmp_path)["key"].to_pylist()
+        assert len(first.flown) == 5
+        assert 2 <= len(there) <= 5  # what was under way is lost
+        assert {*there} <= {*first.flown}
+        fly(plan(), tmp_path, second)
+        assert not {*there} & {*second.flown}
+        assert sorted([*there, *second.flown]) == sorted(one.key for one in plan().missions())
+        assert fly(plan(), tmp_path).flown == []
+
+    def test_seeds_and_values_may_become_more(self, tmp_path: Path) -> None:
+        fly(plan(), tmp_path)
+        more = fly(plan(range(0, 11), vary={"coordinator.allocator": ["greedy", "plan", "none"]}), tmp_path)
+        assert len(more.flown) == 33 - 16
+        assert len(read_rows(tmp_path)) == 33
+        with pytest.raises(UserError, match="was flown with seeds 0 to 10; must be a new folder, or asked for"):
+            fly(plan(vary={"coordinator.allocator": ["greedy", "plan", "none"]}), tmp_path)
+
+    def test_a_number_may_be_followed_by_one_that_is_not_whole(self, tmp_path: Path) -> None:
+        fly(plan(vary={"vehicles.helper.speed_mps": [1, 2]}), tmp_path)
+        fly(plan(vary={"vehicles.helper.speed_mps": [1, 2, 2.5]}), tmp_path)
+        assert {*read_rows(tmp_path)["vehicles.helper.speed_mps"].to_pylist()} == {1.0, 2.0, 2.5}
+
+    def test_one_broken_off_while_its_rows_were_joined_has_none_twice(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, each_row_a_file: None
+    ) -> None:
+        with monkeypatch.context() as patch:
+            patch.setattr(folder_module.SweepFolder, "tidy", lambda self: None)
+            fly(plan(), tmp_path)
+        assert len([*(tmp_path / "rows").iterdir()]) == 16
+        assert len(load_sweep(tmp_path).table) == 16
+        assert fly(plan(), tmp_path).flown == []
+        assert not (tmp_path / "rows").exists()
+
+    def test_what_a_killed_process_left_is_taken_away(self, tmp_path: Path) -> None:
+        fly(plan(), tmp_path)
+        left = tmp_path / ".missions.parquet.4711.part"
+        left.write_bytes(b"half")
+        fly(plan(), tmp_path)
+        assert not left.exists()
+
+    def test_killed_again_and_again_it_comes_to_the_same_table(self, tmp_path: Path) -> None:
+        assert kill_and_resume(tmp_path, kills=2, seeds=8) == 0
+
+
+class TestRefusedFolder:
+    @pytest.mark.parametrize(
+        ("changes", "told"),
+        [
+            ({"settings": ("mission.rho=0.5",)}, "another scenario: mission.rho was 0.0 and is 0.5"),
+            ({"vary": {"mission.rho": [0, 1]}}, "coordinator.allocator varied"),
+            ({"vary": {}}, "coordinator.allocator varied"),
+            ({"vary": {"coordinator.allocator": ["none"]}}, 'coordinator.allocator="plan", too'),
+            ({"seeds": range(2, 9)}, "seeds 1 to 8"),
+        ],
+    )
+    def test_one_of_another_sweep_says_what_is_other(self, tmp_path: Path, changes: dict[str, Any], told: str) -> None:
+        fly(plan(), tmp_path)
+        with pytest.raises(UserError) as refused:
+            fly(plan(**changes), tmp_path)
+        assert (
+            str(refused.value)
+            == f"--out {tmp_path}: was flown with {told}; must be a new folder, or asked for as before"
+        )
+
+    def test_one_of_other_code_says_what_has_changed(self, tmp_path: Path) -> None:
+        fly(plan(), tmp_path)
+        made_with = json.loads((tmp_path / "made_with.json").read_text())
+        made_with["code"]["planner"] = "0"
+        (tmp_path / "made_with.json").write_text(json.dumps(made_with))
+        with pytest.raises(UserError, match="was flown with other code: planner has changed"):
+            fly(plan(), tmp_path)
+
+    def test_one_that_holds_anything_else(self, tmp_path: Path) -> None:
+        (tmp_path / "notes.txt").write_text("mine")
+        with pytest.raises(UserError, match="holds other files; must be a new or empty folder, or that of a sweep"):
+            fly(plan(), tmp_path)
+        assert [one.name for one in tmp_path.iterdir()] == ["notes.txt"]
+
+    def test_one_that_another_process_writes_to(self, tmp_path: Path) -> None:
+        with sweep_folder(tmp_path, plan()), pytest.raises(UserError, match="another process flies this sweep already"):
+            fly(plan(), tmp_path)
+
+    def test_a_full_disk_is_told_and_nothing_is_half_written(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, each_row_a_file: None
+    ) -> None:
+        def full(table: object, file: Any, **_: object) -> None:
+            file.write(b"PAR1")
+            raise OSError(28, "No space left on device")
+
+        fly(plan(range(1, 3)), tmp_path)
+        with monkeypatch.context() as patch:
+            patch.setattr(pq, "write_table", full)
+            with pytest.raises(CannotWriteError, match="No space left on device"):
+                fly(plan(), tmp_path)
+        assert len(load_sweep(tmp_path).table) == 4
+        assert len(fly(plan(), tmp_path).flown) == 12
+
+
+@pytest.fixture
+def flown(tmp_path: Path) -> Path:
+    fly(plan(), tmp_path)
+    return tmp_path
+
+
+class TestStandings:
+    def test_medians_bands_and_paired_differences(self, flown: Path) -> None:
+        sweep = secondlook.load_sweep(flown)
+        assert (sweep.scenario, sweep.missions, len(sweep.table)) == ("brief", 16, 16)
+        first, none = standings(sweep, ["risk.mean"])
+        assert (first.name, none.name) == ("allocator=plan", "allocator=none")
+        ours, theirs = first.figures["risk.mean"], none.figures["risk.mean"]
+        assert ours is not None
+        assert theirs is not None
+        assert (ours.low, ours.median, ours.high) == pytest.approx(
+            np.percentile(np.arange(1, 9) / 100, [10, 50, 90]).tolist()
+        )
+        assert ours.above_first is None
+        assert (theirs.above_first, theirs.least, theirs.most) == pytest.approx((0.1, 0.1, 0.1))
+        assert (theirs.higher, theirs.lower) == (8, 0)
+
+    def test_a_figure_that_is_no_number_is_refused(self, flown: Path) -> None:
+        for name in ("digest", "risk.median"):
+            with pytest.raises(UserError, match=rf"--figures: {name} is not allowed; must be of seed, "):
+                standings(load_sweep(flown), [name])
+
+    def test_names_are_as_short_as_they_are_told_apart(self) -> None:
+        assert short_names(["mission.rho"]) == ["rho"]
+        assert short_names(["vehicles.a.speed_mps", "vehicles.b.speed_mps", "mission.rho"]) == [
+            "a.speed_mps", "b.speed_mps", "rho",
+        ]  # fmt: skip
+        assert short_names(["seabed", "x.seabed"]) == ["seabed", "x.seabed"]
+
+    def test_what_is_no_sweep_is_refused(self, tmp_path: Path) -> None:
+        with pytest.raises(UserError, match="is not the folder of a sweep"):
+            load_sweep(tmp_path)
+
+    def test_columns_hold_what_is_varied_as_numbers_or_texts(self) -> None:
+        asked = plan(
+            vary={"mission.rho": [0, 0.5], "vehicles.helper.speed_mps": [1, 2], "seabed": [{"kind": "uniform"}]}
+        )
+        kinds = {name: str(schema_of(asked).field(name).type) for name in asked.vary}
+        assert kinds == {"mission.rho": "double", "vehicles.helper.speed_mps": "int64", "seabed": "string"}
+
+
+class TestCommand:
+    def test_it_flies_shows_and_writes_a_page(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        out = tmp_path / "out"
+        asked = ["sweep", str(BRIEF), "--seeds", "1..2", "--vary", "coordinator.allocator=plan,none", "--out", str(out)]
+        _command(asked, "--jobs", "2")
+        told = capsys.readouterr().out
+        assert "brief, 4 of 4 missions" in told
+        assert "allocator=none" in told
+        before = pq.read_table(out / "missions.parquet")
+        _command(asked)
+        assert pq.read_table(out / "missions.parquet").equals(before)
+        _command(["sweep", str(out), "--show", "--figures", "risk.mean,time.mission_s"])
+        page = (out / "sweep.html").read_text()
+        assert page.count("<svg") == 2
+        assert "4 of 4 missions were flown." in page
+        assert "allocator=none" in page
+        _command(["sweep", "--plan", str(out / "sweep.yaml"), "--out", str(tmp_path / "other")])
+        told_before = before.drop_columns(["time.wall_s", "time.real_time_factor"])
+        other = pq.read_table(tmp_path / "other" / "missions.parquet")
+        assert other.drop_columns(["time.wall_s", "time.real_time_factor"]).equals(told_before)
+
+
+class TestFromPython:
+    def test_anybodys_executor_flies_a_sweep(self, tmp_path: Path) -> None:
+        sweep = secondlook.fly_sweep(
+            BRIEF, tmp_path, seeds=range(1, 3), vary={"mission.rho": [0, 1]}, executor=Here(), side_by_side=1
+        )
+        assert sweep.table["ending"].to_pylist() == ["over"] * 4
+        assert sweep.table["mission.rho"].to_pylist() == [0, 1, 0, 1]
+
+    @pytest.mark.parametrize(
+        ("terms", "told"),
+        [
+            ({"seeds": range(0)}, "seeds: are none"),
+            ({"vary": {"mission.rho": [0, 0]}}, "vary mission.rho: 0 is not allowed twice"),
+            ({"vary": {"mission.rho": []}}, "vary mission.rho: has no value"),
+            ({"settings": ["mission.rho"]}, "must be KEY=VALUE"),
+        ],
+    )
+    def test_what_cannot_be_flown_is_refused(self, tmp_path: Path, terms: dict[str, Any], told: str) -> None:
+        with pytest.raises(UserError) as refused:
+            secondlook.fly_sweep(BRIEF, tmp_path / "out", **{"seeds": range(1, 2), **terms})
+        assert told in str(refused.value)
+        assert not (tmp_path / "out").exists()
