@@ -12,6 +12,7 @@ import random
 import subprocess
 import sys
 import tempfile
+from collections import Counter
 from pathlib import Path
 
 import pyarrow as pa
@@ -35,11 +36,11 @@ def main() -> None:
 def kill_and_resume(folder: Path, kills: int, seeds: int) -> int:
     """The exit code: 1 where a table differs. Sweeps are begun until one has been killed so often."""
     undisturbed = _table(folder / "undisturbed", seeds)
-    chance, killed, sweeps, different = random.Random(1), 0, 0, 0
+    chance, killed, sweeps, different, times = random.Random(1), 0, 0, 0, Counter[int]()
     while killed < kills:
         out = folder / f"killed-{sweeps}"
         sweeps += 1
-        done = False
+        done, before = False, killed
         while not done:
             process = _start(out, seeds)
             try:
@@ -49,9 +50,11 @@ def kill_and_resume(folder: Path, kills: int, seeds: int) -> int:
                 process.kill()
                 process.wait()
                 killed += 1
+        times[killed - before] += 1
         table = _read(out)
         different += not table.equals(undisturbed)
     print(f"{killed} kills, {sweeps} sweeps of {len(undisturbed)} missions, {different} with another table")
+    print("killed so often were so many: " + ", ".join(f"{kills}: {count}" for kills, count in sorted(times.items())))
     return 1 if different else 0
 
 

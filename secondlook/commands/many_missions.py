@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import time
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
@@ -15,6 +16,7 @@ import typer
 
 from secondlook.engine.engine import Engine, EngineError, own_processes
 from secondlook.errors import UserError
+from secondlook.files import CannotWriteError
 from secondlook.launch.signals import signals_interrupt
 from secondlook.progress import shown_progress
 
@@ -59,25 +61,33 @@ def is_address(text: str) -> bool:
 def fly_watched(command: str, missions: str, total: int, fly: Callable[[Tell], None], *, shown: bool) -> str:
     """Runs `fly`, which tells how far it is, with its progress on standard error if `shown`.
 
-    `missions` is what they are called. Returns in a sentence what broke it off, Ctrl-C or the end of a process of its
-    own; nothing if it came to its end.
+    `missions` is what they are called. What was there before, as `fly` first tells, does not count for the rate and for
+    what is left. Returns in a sentence what broke it off, Ctrl-C, an engine that is lost or a full disk; nothing if it
+    came to its end.
     """
     flown = 0
+    began: tuple[int, float] | None = None
     with shown_progress(command) if shown else nullcontext() as shown_to:
 
         def tell(done: int, remark: str) -> None:
-            nonlocal flown
+            nonlocal flown, began
             flown = done
+            now_s = time.monotonic()
+            if began is None:
+                began = done, now_s
             if shown_to is not None:
-                told = f"{done} of {total} {missions}"
-                shown_to(done / total, lambda: f"{told}, {remark}" if remark else told)
+                before, began_s = began
+                told = [f"{done} of {total} {missions}"]
+                if done > before and now_s > began_s:
+                    told.append(f"{3600 * (done - before) / (now_s - began_s):.0f} an hour")
+                shown_to((done - before) / max(total - before, 1), lambda: ", ".join([*told, *filter(None, [remark])]))
 
         try:
             with signals_interrupt():
                 fly(tell)
         except KeyboardInterrupt:
             return f"interrupted after {flown} of {total} {missions}"
-        except EngineError as error:
+        except (EngineError, CannotWriteError) as error:
             return f"{error}, after {flown} of {total} {missions}"
     return ""
 

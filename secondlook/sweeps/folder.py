@@ -29,7 +29,7 @@ from secondlook.sweeps.rows import TEXT, WHOLE, Row, schema_of
 
 MADE_WITH, PLAN, ROWS, MISSIONS = "made_with.json", "sweep.yaml", "rows", "missions.parquet"
 BROKEN_OFF = ".*.part"  # what was left by a process that was killed while it wrote
-FILE_EVERY_S = 10.0  # of the wall clock
+FIRST_FILE_S, FILE_EVERY_S = 0.5, 10.0  # of the wall clock; twice as long after each file until then
 MOST_IN_FILE = 5000
 
 
@@ -130,6 +130,7 @@ class SweepFolder:
         self._schema = schema
         self._rows: list[Row] = []
         self._began_s = time.monotonic()
+        self._every_s = FIRST_FILE_S
         self._next = 1 + max((int(one.stem) for one in self._files()), default=0)
 
     def done(self) -> set[str]:
@@ -142,8 +143,9 @@ class SweepFolder:
         if not self._rows:
             self._began_s = time.monotonic()
         self._rows.append(row)
-        if len(self._rows) >= MOST_IN_FILE or time.monotonic() - self._began_s >= FILE_EVERY_S:
+        if len(self._rows) >= MOST_IN_FILE or time.monotonic() - self._began_s >= self._every_s:
             self.write()
+            self._every_s = min(2 * self._every_s, FILE_EVERY_S)
 
     def write(self) -> None:
         """Writes what was added since the last time. Raises CannotWriteError."""
