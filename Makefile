@@ -44,7 +44,8 @@ docs: .venv/.test-ready
 	@$(BIN)/python -m docs.pages
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
 
-# The recorded mission that every node has to say again, anew: after a change that is meant to change what they say.
+# The recorded mission that every node has to say again, and the steps that missions take, anew: after a change that is
+# meant to change what nodes say.
 GOLDEN := tests/secondlook/recorded/golden
 golden: .venv/.run-ready
 	@rm -rf runs/golden
@@ -52,6 +53,7 @@ golden: .venv/.run-ready
 	@mkdir -p $(GOLDEN)
 	@cp runs/golden/scenario.yaml $(GOLDEN)
 	@gzip --best --no-name --stdout runs/golden/messages.mpk >$(GOLDEN)/messages.mpk.gz
+	@$(BIN)/python -m bench --steps
 
 # Three tests at a time, as many wait for a clock or a process. The processes they start, some hundreds, are not to compile
 # each module anew.
