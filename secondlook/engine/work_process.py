@@ -7,6 +7,7 @@ however that ended.
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import queue
@@ -126,6 +127,8 @@ def main() -> None:
     while True:
         try:
             function, arguments = pickle.loads(work.get())
+            if not gc.get_freeze_count():  # what was loaded stays: the collector need not go through it again and again
+                gc.freeze()
             pipe.send((None, None))  # begun
             pipe.send((True, function(*arguments)))
         except Exception as error:
