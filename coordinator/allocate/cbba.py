@@ -148,7 +148,7 @@ class _Routes:
         self._strips = len(strips)
         considered = [strips[place] for place in self._places]
         table = StripTable(considered, helper)
-        to_begin_s, ways = table.shortest_from(np.vstack([[helper.free_at], table.leave.reshape(-1, 3)]))
+        to_begin_s, ways = table.ways.shortest_from(np.vstack([[helper.free_at], table.leave.reshape(-1, 3)]))
         numbers = np.arange(len(considered))
         # From each of these to each strip: the time until it is free again, and from where it then sets out.
         self._takes_s = to_begin_s + table.sonar_on_s[numbers, ways] + table.run_out_s[numbers, ways]

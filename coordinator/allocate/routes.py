@@ -14,13 +14,14 @@ what brings most a second, and of all that come of it the best is taken.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coordinator.allocate.service import StripTable, expected_service, removed_m2
+from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.team import Team
 from planner.types import BoolArray, FloatArray
 
 BEAM = 12
@@ -29,11 +30,6 @@ ALIKE = 4
 """Of so many times as many plans the most promising that differ are carried on."""
 HORIZON_S = 4 * 3600.0
 """How far ahead is planned while nobody can tell when the mission ends."""
-MOST_STRIPS = 64
-"""So many strips are planned with, those that bring most for the time they take."""
-LATER_SHARE = 0.5
-"""Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come, as other
-looks at the same ground."""
 TOLERANCE_M2 = 1e-6
 
 
@@ -107,18 +103,32 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
     """The routes of a team from where and when each helper is free."""
     if not helpers or not strips:
         return Routes(0.0, {one.vehicle: () for one in helpers}, {})
-    team = _Team(strips, helpers, deadline_s)
-    beams = [_Plans.begun(team)]
-    while (plans := beams[-1].grown(team, beam)).count:
-        beams.append(plans)
-    completed = _Plans.joined(beams).to_deadline(team)
-    best = _best(completed.counts_m2(team), [plans.count for plans in beams])
+    team = Team(strips, helpers, deadline_s)
+    completed, sizes = _completed(team, beam)
+    best = _best(completed.counts_m2(team), sizes)
     # Who had left the rest to others takes what those leave.
-    plan = completed.chosen([best])
-    routes = replace(plan, is_done=np.zeros_like(plan.is_done)).to_deadline(team).routes()
+    plan = completed.chosen(np.array([best]))
+    routes = _to_deadline(replace(plan, is_done=np.zeros_like(plan.is_done)), team).routes()
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
     removed_m2, shares = team.flown(routes)
     return Routes(removed_m2, dict(zip((one.vehicle for one in helpers), numbers, strict=True)), shares)
+
+
+def _completed(team: Team, beam: int) -> tuple[_Plans, list[int]]:
+    """The plans of all beams, one beam after the other, each gone on with to the deadline; and how many each has."""
+    completion, plans, sizes = _Completion(team), _Plans.begun(team), list[int]()
+    while plans.count:
+        sizes.append(plans.count)
+        completion.take(plans)
+        plans = completion.grow(plans.count, beam)
+    return completion.ended(), sizes
+
+
+def _to_deadline(plans: _Plans, team: Team) -> _Plans:
+    """Each gone on with to the deadline."""
+    completion = _Completion(team)
+    completion.take(plans)
+    return completion.ended()
 
 
 def _best(counts_m2: FloatArray, sizes: Sequence[int]) -> int:
@@ -131,121 +141,58 @@ def _best(counts_m2: FloatArray, sizes: Sequence[int]) -> int:
     return best
 
 
-class _Team:
-    """What each helper finds at each strip, from its start and from behind each other strip.
-
-    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `way`, `sweep_s`, `home_s`: shape
-    (helpers, nodes, strips): how long it is from there until the sonar is on at a strip, flown the way that is
-    shortest, as a helper's agent does, the node that this is, how long the sonar is on then, and how long it is home
-    after that. `worth_m2`: (helpers, strips). `alone_s`: what a strip takes by itself, and `alone_m2`: what it brings
-    at most, shape (strips,). `later_m2ps`: what a second is worth for which no strip is left.
-    """
-
-    def __init__(self, strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> None:
-        self.helpers = helpers
-        self.strips = _most_promising(strips, helpers)
-        tables = [StripTable(self.strips, one) for one in helpers]
-        count, ways = len(self.strips), max(one.sonar_on_s.shape[1] for one in tables)
-        self.start = count * ways
-        places = np.arange(count)
-        shape = (len(helpers), self.start + 1, count)
-        self.to_begin_s, self.sweep_s, self.home_s = np.full(shape, np.inf), np.ones(shape), np.zeros(shape)
-        self.way = np.zeros(shape, dtype=np.intp)
-        for number, (helper, table) in enumerate(zip(helpers, tables, strict=True)):
-            own = table.sonar_on_s.shape[1]
-            nodes = (places[:, np.newaxis] * ways + np.arange(own)).ravel()
-            poses = np.vstack([table.leave.reshape(-1, 3), [helper.free_at]])
-            rows = np.append(nodes, self.start)
-            self.to_begin_s[number, rows], chosen = table.shortest_from(poses)
-            self.way[number, rows] = places * ways + chosen
-            self.sweep_s[number, rows] = table.sonar_on_s[places, chosen]
-            self.home_s[number, rows] = table.home_s[places, chosen]
-        self.worth_m2 = np.array([one.worth_m2 for one in tables])
-        self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
-        self.lasts_s = np.array([one.lasts_until_s for one in helpers])
-        self.until_s = np.minimum(self.lasts_s, deadline_s)
-        self.deadline_s = deadline_s
-        self.alone_m2 = self.worth_m2.max(axis=0)
-        sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
-        self.alone_s = sweeps_s + self._usual_way_s(count)
-        self.later_m2ps = LATER_SHARE * float((self.alone_m2 / self.alone_s).min())
-        self.by_rate = np.argsort(-self.alone_m2 / self.alone_s, kind="stable")
-        self.rank = np.argsort(self.by_rate, kind="stable")
-
-    def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, dict[int, float]]:
-        """What is removed by the deadline, and by number the share of each strip that is flown by then; `routes`: of
-        each helper, the strips' places."""
-        total_m2, shares = 0.0, {}
-        for one, route in enumerate(routes):
-            at, now_s = self.start, self.helpers[one].free_s
-            for place in route:
-                begins_s, sweep_s = now_s + self.to_begin_s[one, at, place], self.sweep_s[one, at, place]
-                at = self.way[one, at, place]
-                share = min(1.0, max(0.0, float((self.deadline_s - begins_s) / sweep_s)))
-                shares[self.strips[place].strip.number] = share
-                total_m2 += float(self.worth_m2[one, place]) * share
-                now_s = begins_s + sweep_s + self.run_out_s[one]
-        return total_m2, shares
-
-    def _usual_way_s(self, count: int) -> float:
-        """The way to the strip that is nearest, as it mostly is."""
-        nearest_s = self.to_begin_s[:, : self.start].copy()
-        nearest_s[:, np.arange(self.start), np.arange(self.start) // (self.start // count)] = np.inf
-        least_s = np.append(nearest_s.min(axis=(0, 2)), self.to_begin_s[:, self.start].min())
-        return float(np.median(least_s[np.isfinite(least_s)]))
-
-
-def _most_promising(strips: Sequence[OpenStrip], helpers: Sequence[Helper]) -> list[OpenStrip]:
-    """At most `MOST_STRIPS`, by number."""
-
-    def rate(one: OpenStrip) -> float:
-        way_m = min(np.hypot(one.strip.start[0] - h.free_at.x_m, one.strip.start[1] - h.free_at.y_m) for h in helpers)
-        return -one.risk_m2 / (one.strip.length_m + float(way_m))
-
-    most = sorted(strips, key=rate)[:MOST_STRIPS] if len(strips) > MOST_STRIPS else strips
-    return sorted(most, key=lambda one: one.strip.number)
-
-
 @dataclass(frozen=True, eq=False)
 class _Ahead:
     """Who goes on in every plan, `next`, shape (plans,), and by every strip, shape (plans, strips): when the helper is
-    free again, and what is gained by the deadline."""
+    free again, what is gained by the deadline, and whether that is anything."""
 
     next: np.ndarray
     ends_s: FloatArray
     gained_m2: FloatArray
+    gains: BoolArray
+
+    def last(self, count: int) -> _Ahead:
+        """The last plans of these."""
+        return _Ahead(self.next[-count:], self.ends_s[-count:], self.gained_m2[-count:], self.gains[-count:])
 
 
 @dataclass(frozen=True, eq=False)
 class _Plans:
     """Some plans. `nodes`, `free_s`, `is_done`: shape (plans, helpers), where each helper is, when it is free, whether
-    it finds nothing any more or leaves the rest to others; `turn`, `who`: shape (plans, strips), as the how manieth of
-    the plan a strip is served, from 0, and by which helper, -1 where by none; `removed_m2`: shape (plans,)."""
+    it finds nothing any more or leaves the rest to others; `turn`: shape (plans, strips), as the how manieth of the
+    plan a strip is served, from 0, times the number of helpers, and by which helper, -1 where by none; `removed_m2`:
+    shape (plans,)."""
 
     nodes: np.ndarray
     free_s: FloatArray
     is_done: BoolArray
     turn: np.ndarray
-    who: np.ndarray
     removed_m2: FloatArray
 
     @classmethod
-    def begun(cls, team: _Team) -> _Plans:
+    def begun(cls, team: Team) -> _Plans:
         """One plan, in which nobody has begun."""
         helpers, strips = len(team.helpers), len(team.strips)
         free_s = np.array([[one.free_s for one in team.helpers]], dtype=np.float64)
         nodes, by_none = np.full((1, helpers), team.start), np.full((1, strips), -1)
-        return cls(nodes, free_s, np.zeros((1, helpers), dtype=np.bool_), by_none, by_none.copy(), np.zeros(1))
+        return cls(nodes, free_s, np.zeros((1, helpers), dtype=np.bool_), by_none, np.zeros(1))
 
     @classmethod
-    def joined(cls, beams: Sequence[_Plans]) -> _Plans:
-        """The plans of several beams, one after the other."""
-        return cls(*(np.concatenate([getattr(one, field.name) for one in beams]) for field in fields(cls)))
+    def joined(cls, some: Sequence[_Plans]) -> _Plans:
+        """Several of them, one after the other."""
+        return cls(*map(np.concatenate, zip(*(one._arrays for one in some), strict=True)))
 
-    def chosen(self, rows: Sequence[int] | np.ndarray) -> _Plans:
+    def chosen(self, rows: np.ndarray) -> _Plans:
         """Some of these, to be changed by themselves."""
-        places = np.asarray(rows, dtype=np.intp)
-        return _Plans(*(getattr(self, field.name)[places] for field in fields(self)))
+        return _Plans(*[array.take(rows, axis=0) for array in self._arrays])
+
+    def last(self, count: int) -> _Plans:
+        """The last ones of these; changing them changes these."""
+        return _Plans(*[array[-count:] for array in self._arrays])
+
+    @property
+    def _arrays(self) -> tuple[np.ndarray, ...]:
+        return self.nodes, self.free_s, self.is_done, self.turn, self.removed_m2
 
     @property
     def count(self) -> int:
@@ -254,101 +201,185 @@ class _Plans:
 
     def routes(self) -> list[list[int]]:
         """Of each helper of the one plan that this is, the strips it serves, in order."""
-        (turn,), (who,) = self.turn, self.who
-        in_order = np.argsort(turn, kind="stable")
-        return [in_order[who[in_order] == one].tolist() for one in range(self.nodes.shape[1])]
+        routes: list[list[int]] = [[] for _ in range(self.nodes.shape[1])]
+        for turn, place in sorted((turn, place) for place, turn in enumerate(self.turn[0].tolist()) if turn >= 0):
+            routes[turn % len(routes)].append(place)
+        return routes
 
-    def ahead(self, team: _Team, rows: np.ndarray) -> _Ahead:
-        """What some of these plans may go on with; a helper that finds nothing drops out, and the next one goes on."""
-        shape, places = (rows.size, len(team.strips)), np.arange(rows.size)
-        ahead = _Ahead(np.zeros(rows.size, dtype=np.intp), np.zeros(shape), np.zeros(shape))
-        for _ in team.helpers:
-            one = np.where(self.is_done[rows], np.inf, self.free_s[rows]).argmin(axis=1)
-            is_done, at = self.is_done[rows, one], self.nodes[rows, one]
-            begins_s, sweep_s = self.free_s[rows, one][:, np.newaxis] + team.to_begin_s[one, at], team.sweep_s[one, at]
-            ends_s = begins_s + sweep_s
-            share = np.clip((team.deadline_s - begins_s) / sweep_s, 0.0, 1.0)
-            lasts = ends_s + team.home_s[one, at] <= team.lasts_s[one][:, np.newaxis]
-            may = lasts & (self.turn[rows] < 0) & ~is_done[:, np.newaxis]
-            gained_m2 = np.where(may, team.worth_m2[one] * share, 0.0)
-            ahead.next[places], ahead.gained_m2[places] = one, gained_m2
-            ahead.ends_s[places] = ends_s + team.run_out_s[one][:, np.newaxis]
-            idle = (gained_m2.max(axis=1) <= 0.0) & ~is_done
-            if not idle.any():
-                break
-            places, rows = places[idle], rows[idle]
-            self.is_done[rows, one[idle]] = True
+    def ahead(self, team: Team) -> _Ahead:
+        """What these plans may go on with; a helper that finds nothing drops out, and the next one goes on."""
+        rows = np.arange(self.count)
+        one = np.where(self.is_done, np.inf, self.free_s).argmin(axis=1)
+        legs_s = team.legs_s.take(one * team.nodes + self.nodes[rows, one], axis=0)
+        begins_s = legs_s[:, 0]
+        begins_s += self.free_s[rows, one][:, np.newaxis]
+        ends_s = begins_s + legs_s[:, 1]
+        share = np.minimum(np.maximum((team.deadline_s - begins_s) / legs_s[:, 1], 0.0), 1.0)
+        may = ends_s + legs_s[:, 2] <= team.lasts_s.take(one)[:, np.newaxis]
+        may &= self.turn < 0
+        may &= ~self.is_done[rows, one][:, np.newaxis]
+        gained_m2 = team.worth_m2.take(one, axis=0) * share
+        gained_m2[~may] = 0.0
+        ends_s += team.run_out_s.take(one)[:, np.newaxis]
+        ahead = _Ahead(one, ends_s, gained_m2, gained_m2 > 0)
+        self._drop_out(team, ahead)
         return ahead
 
-    def to_deadline(self, team: _Team) -> _Plans:
-        """Each gone on with by what brings most a second, until nothing can be gained any more."""
-        rows = np.arange(self.count)
-        plans = self.chosen(rows)
-        while rows.size:
-            ahead = plans.ahead(team, rows)
-            gains = ahead.gained_m2 > 0
-            now_s = plans.free_s[rows, ahead.next][:, np.newaxis]
-            spent_s = np.where(gains, np.minimum(ahead.ends_s, team.deadline_s) - now_s, 1.0)
-            strips = (ahead.gained_m2 / spent_s).argmax(axis=1)
-            going = np.flatnonzero(gains.any(axis=1))
-            rows = rows[going]
-            plans.serve(team, ahead, rows, going, strips[going])
-        return plans
+    def _drop_out(self, team: Team, ahead: _Ahead) -> None:
+        """Where who goes on finds nothing the next one does."""
+        finds: BoolArray = np.logical_or.reduce(ahead.gains, axis=1)
+        if finds.all():
+            return
+        (idle,) = (~finds).nonzero()
+        self.is_done[idle, ahead.next[idle]] = True
+        idle = idle[~self.is_done[idle].all(axis=1)]
+        if idle.size:
+            others = self.chosen(idle)
+            further = others.ahead(team)
+            self.is_done[idle] = others.is_done
+            ahead.next[idle], ahead.ends_s[idle] = further.next, further.ends_s
+            ahead.gained_m2[idle], ahead.gains[idle] = further.gained_m2, further.gains
 
-    def counts_m2(self, team: _Team) -> FloatArray:
+    def counts_m2(self, team: Team) -> FloatArray:
         """What is removed, and what may be later in the time that is left to those who are done; shape (plans,)."""
         spare_s = np.where(self.is_done, np.maximum(team.until_s - self.free_s, 0.0), 0.0)
         counts_m2: FloatArray = self.removed_m2 + team.later_m2ps * spare_s.sum(axis=1)
         return counts_m2
 
-    def grown(self, team: _Team, beam: int) -> _Plans:
-        """The most promising plans that go on from these by one strip; of those that serve the same strips and leave
-        helpers at the same places one. None where nothing can be gained any more."""
-        ahead = self.ahead(team, np.arange(self.count))
-        has_others = (~self.is_done).sum(axis=1, keepdims=True) > 1
-        goes_on = np.hstack([ahead.gained_m2 > 0, has_others])
-        so_far_m2 = np.hstack([ahead.gained_m2, np.zeros_like(has_others)]) + self.counts_m2(team)[:, np.newaxis]
-        ranks = np.where(goes_on, so_far_m2 + self._still_m2(team, ahead), -np.inf)
-        order = np.argsort(-ranks, axis=None, kind="stable")[: min(int(goes_on.sum()), ALIKE * beam)]
+    def grown(self, team: Team, ahead: _Ahead, beam: int) -> tuple[_Plans, np.ndarray, np.ndarray]:
+        """The most promising plans that go on from these by one strip, and of each from which it does, and by which
+        strip; of those that serve the same strips and leave helpers at the same places one. None where nothing can be
+        gained any more."""
+        ranks = self._still_m2(team, ahead)
+        so_far_m2 = self.counts_m2(team)
+        ranks[:, :-1] += ahead.gained_m2 + so_far_m2[:, np.newaxis]
+        ranks[:, -1] += so_far_m2
+        ranks[:, :-1][~ahead.gains] = -np.inf
+        has_others = self.is_done.sum(axis=1) + 1 < len(team.helpers)
+        ranks[~has_others, -1] = -np.inf
+        goes_on = np.count_nonzero(ahead.gains) + np.count_nonzero(has_others)
+        order = np.negative(ranks, out=ranks).argsort(axis=None, kind="stable")[: min(goes_on, ALIKE * beam)]
         rows, strips = np.divmod(order, ranks.shape[1])
-        plans = self.gone_on(team, ahead, rows, strips)
-        seen = dict[bytes, int]()
-        for row, (nodes, turn, is_done) in enumerate(zip(plans.nodes, plans.turn, plans.is_done, strict=True)):
-            seen.setdefault(nodes.tobytes() + (turn < 0).tobytes() + is_done.tobytes(), row)
-        return plans.chosen(list(seen.values())[:beam])
+        plans = self._gone_on(team, ahead, rows, strips)
+        first = plans.first_that_differ()[:beam]
+        return plans.chosen(first), rows[first], strips[first]
 
-    def gone_on(self, team: _Team, ahead: _Ahead, rows: np.ndarray, strips: np.ndarray) -> _Plans:
+    def first_that_differ(self) -> np.ndarray:
+        """Of those plans that serve the same strips and leave helpers at the same places the first one; in order."""
+        told = np.concatenate([self.nodes, self.turn < 0, self.is_done], axis=1)
+        whole, size = told.tobytes(), told[:1].nbytes
+        seen = dict[bytes, int]()
+        for row in range(self.count):
+            seen.setdefault(whole[row * size : (row + 1) * size], row)
+        return np.array(list(seen.values()), dtype=np.intp)
+
+    def _gone_on(self, team: Team, ahead: _Ahead, rows: np.ndarray, strips: np.ndarray) -> _Plans:
         """Some of these plans, each gone on with by a strip; by none, a number beyond the last one's, where who is next
         leaves the rest to the others."""
-        plans, serves = self.chosen(rows), strips < len(team.strips)
-        plans.is_done[~serves, ahead.next[rows[~serves]]] = True
-        plans.serve(team, ahead, np.flatnonzero(serves), rows[serves], strips[serves])
+        plans, own = self.chosen(rows), np.arange(rows.size)
+        leaves = strips == len(team.strips)
+        if leaves.any():
+            plans.is_done[leaves, ahead.next[rows[leaves]]] = True
+            own = own[~leaves]
+            rows, strips = rows[own], strips[own]
+        plans.serve(team, ahead, own, rows, strips)
         return plans
 
-    def serve(self, team: _Team, ahead: _Ahead, own: np.ndarray, rows: np.ndarray, strips: np.ndarray) -> None:
+    def serve(self, team: Team, ahead: _Ahead, own: np.ndarray, rows: np.ndarray, strips: np.ndarray) -> None:
         """In some of these plans, `own`, who is next serves a strip, as told of in these rows of `ahead`."""
-        one = ahead.next[rows]
+        one = ahead.next.take(rows)
         self.nodes[own, one] = team.way[one, self.nodes[own, one], strips]
         self.free_s[own, one] = ahead.ends_s[rows, strips]
-        self.turn[own, strips] = self.turn[own].max(axis=1) + 1
-        self.who[own, strips] = one
+        before = self.turn.take(own, axis=0).max(axis=1) // len(team.helpers)
+        self.turn[own, strips] = (before + 1) * len(team.helpers) + one
         self.removed_m2[own] += ahead.gained_m2[rows, strips]
 
-    def _still_m2(self, team: _Team, ahead: _Ahead) -> FloatArray:
+    def _still_m2(self, team: Team, ahead: _Ahead) -> FloatArray:
         """What the strips that are left may bring in the time that is left, shape (plans, strips + 1), if a plan goes
         on with each, or without who is next: the best first, by themselves."""
-        one = ahead.next
+        one, plans, strips = ahead.next, self.count, len(team.strips)
         left_s = np.where(self.is_done, 0.0, np.maximum(team.until_s - self.free_s, 0.0))
-        others_s = left_s.sum(axis=1) - left_s[np.arange(len(one)), one]
-        time_s = others_s[:, np.newaxis] + np.maximum(team.until_s[one][:, np.newaxis] - ahead.ends_s, 0.0)
-        there = self.turn[:, team.by_rate] < 0
-        seconds = np.cumsum(there * team.alone_s[team.by_rate], axis=1)
-        worth_m2 = np.cumsum(there * team.alone_m2[team.by_rate], axis=1)
-        before_s = (seconds - there * team.alone_s[team.by_rate])[:, team.rank]
-        counted = before_s <= time_s  # the strip itself is among the best that fill the time: it is not there any more
-        time_s = np.hstack([time_s + np.where(counted, team.alone_s, 0.0), others_s[:, np.newaxis]])
-        seconds = np.hstack([np.zeros((len(one), 1)), seconds, seconds[:, -1:] + HORIZON_S])
-        worth_m2 = np.hstack([np.zeros((len(one), 1)), worth_m2, worth_m2[:, -1:] + HORIZON_S * team.later_m2ps])
-        still_m2 = np.array([np.interp(time_s[row], seconds[row], worth_m2[row]) for row in range(len(one))])
-        still_m2[:, :-1] -= np.where(counted, team.alone_m2, 0.0)
+        others_s = left_s.sum(axis=1) - left_s[np.arange(plans), one]
+        time_s = np.empty((plans, strips + 1))
+        np.subtract(team.until_s.take(one)[:, np.newaxis], ahead.ends_s, out=time_s[:, :-1])
+        np.maximum(time_s[:, :-1], 0.0, out=time_s[:, :-1])
+        time_s[:, :-1] += others_s[:, np.newaxis]
+        time_s[:, -1] = others_s
+        there = self.turn.take(team.by_rate, axis=1) < 0
+        alone_s = there * team.alone_s_by_rate
+        # The time that the best of them take, and what they bring, from none to all, and to what comes behind them.
+        seconds, worth_m2 = np.zeros((2, plans, strips + 2))
+        alone_s.cumsum(axis=1, out=seconds[:, 1:-1])
+        (there * team.alone_m2_by_rate).cumsum(axis=1, out=worth_m2[:, 1:-1])
+        seconds[:, -1] = seconds[:, -2] + HORIZON_S
+        worth_m2[:, -1] = worth_m2[:, -2] + HORIZON_S * team.later_m2ps
+        # The strip itself is among the best that fill the time: it is not there any more.
+        counted = (seconds[:, 1:-1] - alone_s).take(team.rank, axis=1) <= time_s[:, :-1]
+        time_s[:, :-1] += counted * team.alone_s
+        still_m2 = np.array([np.interp(*row) for row in zip(time_s, seconds, worth_m2, strict=True)])
+        still_m2[:, :-1] -= counted * team.alone_m2
         return still_m2
+
+
+class _Completion:
+    """Goes on with plans by what brings most a second, until nothing can be gained any more.
+
+    What may come next is worked out once for that and for the next beam. A plan of that beam which goes on just so
+    stands for the one that it has come from.
+    """
+
+    def __init__(self, team: Team) -> None:
+        self._team = team
+        self._plans = _Plans.begun(team).chosen(np.arange(0))  # those that go on
+        self._numbers = np.arange(0)  # theirs; plans are numbered as they are taken
+        self._count = 0
+        self._ended: list[tuple[np.ndarray, _Plans]] = []
+        self._same: dict[int, int] = {}  # by number that of the plan which stands for it
+
+    def take(self, plans: _Plans) -> None:
+        """Takes plans to go on with."""
+        self._plans = _Plans.joined([self._plans, plans])
+        self._numbers = np.concatenate([self._numbers, np.arange(self._count, self._count + plans.count)])
+        self._count += plans.count
+
+    def grow(self, count: int, beam: int) -> _Plans:
+        """Goes on with all plans by one strip; returns the next beam's, that go on from the last `count` of these."""
+        ahead = self._plans.ahead(self._team)
+        strips, gains = self._best_by_time(ahead)
+        grown, rows, by = self._plans.last(count).grown(self._team, ahead.last(count), beam)
+        rows = rows + (self._plans.count - count)
+        (stands,) = (by == strips.take(rows)).nonzero()
+        stood_for = rows.take(stands)
+        self._same.update(zip(self._numbers[stood_for].tolist(), (self._count + stands).tolist(), strict=True))
+        goes_on = gains.copy()
+        goes_on[stood_for] = False
+        self._go_on(ahead, strips, gains, goes_on)
+        return grown
+
+    def ended(self) -> _Plans:
+        """All plans that it has taken, in order, as they are in the end."""
+        while self._plans.count:
+            ahead = self._plans.ahead(self._team)
+            strips, gains = self._best_by_time(ahead)
+            self._go_on(ahead, strips, gains, gains)
+        numbers = np.concatenate([one for one, _ in self._ended])
+        row_of = np.empty(self._count, dtype=np.intp)
+        row_of[numbers] = np.arange(numbers.size)
+        for number, same in sorted(self._same.items(), reverse=True):
+            row_of[number] = row_of[same]
+        return _Plans.joined([plans for _, plans in self._ended]).chosen(row_of)
+
+    def _best_by_time(self, ahead: _Ahead) -> tuple[np.ndarray, BoolArray]:
+        """Which strip brings most a second in each plan, and whether any brings anything."""
+        now_s = self._plans.free_s[np.arange(self._plans.count), ahead.next][:, np.newaxis]
+        spent_s = np.where(ahead.gains, np.minimum(ahead.ends_s, self._team.deadline_s) - now_s, 1.0)
+        return (ahead.gained_m2 / spent_s).argmax(axis=1), np.logical_or.reduce(ahead.gains, axis=1)
+
+    def _go_on(self, ahead: _Ahead, strips: np.ndarray, gains: BoolArray, goes_on: BoolArray) -> None:
+        """Goes on with some plans by these strips; those end that gain nothing, and the others are not kept."""
+        if not gains.all():
+            (ended,) = (~gains).nonzero()
+            self._ended.append((self._numbers[ended], self._plans.chosen(ended)))
+        (rows,) = goes_on.nonzero()
+        self._plans, self._numbers = self._plans.chosen(rows), self._numbers.take(rows)
+        self._plans.serve(self._team, ahead, np.arange(rows.size), rows, strips.take(rows))

@@ -3,7 +3,7 @@ many from many places at once."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,46 +87,42 @@ def removed_m2(one: OpenStrip, helper: Helper, served: Service, deadline_s: floa
     return helper.p_detect * one.risk_m2 * served.share_by(deadline_s)
 
 
-class StripTable:
-    """What a helper finds at each of some strips, flown in each of some ways; of a strip that has fewer the last is
-    repeated. All arrays have shape (strips, ways), poses a third axis of 3.
+class StripWays:
+    """How helpers fly some strips that fly alike, each in several ways; of a strip that has fewer the last is repeated.
+    All arrays have shape (strips, ways), poses a third axis of 3.
 
     `entry`, `leave`: the poses in which a way is begun, before its run-in, and left, behind its run-out. `sonar_on_s`:
-    from when its sonar goes on until all is seen; `run_out_s`: from then until it is free. `home_s`: see
-    `Helper.home_s`. `worth_m2`: what the strip's sweep removes, shape (strips,); 0 for one that the helper is not to be
-    offered.
+    from when the sonar goes on until all is seen; `run_out_s`: from then until the helper is free.
     """
 
     def __init__(self, strips: Sequence[OpenStrip], helper: Helper) -> None:
         ways = [sweeps(one.strip, helper) for one in strips]
         most = max(map(len, ways), default=1)
-        filled = [(*way, *[way[-1]] * (most - len(way))) for way in ways]
+        filled = [way + way[-1:] * (most - len(way)) for way in ways]
         shape = (len(strips), most)
-        self.helper = helper
+        self._helper = helper
         self.entry = np.array([one.entry for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
         self.leave = np.array([one.leave for way in filled for one in way], dtype=np.float64).reshape(*shape, 3)
         length_m = np.array([one.length_m for way in filled for one in way], dtype=np.float64).reshape(shape)
-        self.home_s = helper.home_s(self.leave.reshape(-1, 3)).reshape(shape)
         self.sonar_on_s: FloatArray = (length_m - 2 * helper.run_in_m) / helper.speed_mps
         if not helper.sailing.is_in_still_water:
             on_s = [_sonar_on_s(one, helper) for way in filled for one in way]
             self.sonar_on_s = np.array(on_s, dtype=np.float64).reshape(shape)
         self.run_out_s = helper.run_in_s(self.leave)
-        risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
-        self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 
     def to_begin_s(self, poses: FloatArray) -> FloatArray:
         """How long it is from poses, shape (n, 3), until the sonar goes on, shape (n, strips, ways)."""
-        way_m = way_lengths_m(poses, self.entry.reshape(-1, 3), self.helper.turn_radius_m, self.helper.keep_out)
+        helper = self._helper
+        way_m = way_lengths_m(poses, self.entry.reshape(-1, 3), helper.turn_radius_m, helper.keep_out)
         way_m = way_m.reshape(len(poses), *self.sonar_on_s.shape)
-        sailing = self.helper.sailing
+        sailing = helper.sailing
         if sailing.is_in_still_water:
-            return (way_m + self.helper.run_in_m) / self.helper.speed_mps
+            return (way_m + helper.run_in_m) / helper.speed_mps
         # By the bearing of the entry and the flow half-way there: what turns make of it is told when it is offered.
         east_m, north_m = (self.entry[:, :, axis] - poses[:, axis, np.newaxis, np.newaxis] for axis in (0, 1))
         x_m, y_m = self.entry[:, :, 0] - east_m / 2, self.entry[:, :, 1] - north_m / 2
         way_s = way_m / sailing.made_good_mps(np.arctan2(east_m, north_m), x_m, y_m)
-        to_begin_s: FloatArray = way_s + self.helper.run_in_s(self.entry)
+        to_begin_s: FloatArray = way_s + helper.run_in_s(self.entry)
         return to_begin_s
 
     def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -134,8 +130,28 @@ class StripTable:
         the sonar goes on, and which way that is, both of shape (n, strips)."""
         to_begin_s = self.to_begin_s(poses)
         # To the microsecond: of equals the first.
-        ways = np.round(to_begin_s + self.sonar_on_s, 6).argmin(axis=2)
+        ways = (to_begin_s + self.sonar_on_s).round(6).argmin(axis=2)
         return np.take_along_axis(to_begin_s, ways[:, :, np.newaxis], axis=2)[:, :, 0], ways
+
+
+class StripTable:
+    """What a helper finds at each of some strips, flown in each of some `ways`, whose arrays are here, too.
+
+    `home_s`: see `Helper.home_s`, shape (strips, ways). `worth_m2`: what the strip's sweep removes, shape (strips,); 0
+    for one that the helper is not to be offered.
+    """
+
+    def __init__(self, strips: Sequence[OpenStrip], helper: Helper, ways: StripWays | None = None) -> None:
+        self.ways = StripWays(strips, helper) if ways is None else ways
+        self.helper = helper
+        self.leave, self.sonar_on_s, self.run_out_s = self.ways.leave, self.ways.sonar_on_s, self.ways.run_out_s
+        self.home_s = helper.home_s(self.leave.reshape(-1, 3)).reshape(self.sonar_on_s.shape)
+        risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
+        self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
+
+    def to_begin_s(self, poses: FloatArray) -> FloatArray:
+        """See `StripWays.to_begin_s`."""
+        return self.ways.to_begin_s(poses)
 
     def removed_m2(self, begins_s: FloatArray, deadline_s: float) -> FloatArray:
         """What services remove by the deadline that begin at these times, shape (n, strips, ways); nothing where the
@@ -147,9 +163,24 @@ class StripTable:
     def best_from(self, pose: Pose, free_s: float, deadline_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Of each strip, served from a pose at a time by the way that is shortest: what that removes, when it ends,
         shape (strips,), and the pose in which it is left, shape (strips, 3)."""
-        (to_begin_s,), (way,) = self.shortest_from(np.array([pose], dtype=np.float64))
+        (to_begin_s,), (way,) = self.ways.shortest_from(np.array([pose], dtype=np.float64))
         strips = np.arange(to_begin_s.size)
         begins_s, sonar_on_s = free_s + to_begin_s, self.sonar_on_s[strips, way]
         ends_s = begins_s + sonar_on_s + self.run_out_s[strips, way]
         removed_m2 = self.removed_m2(begins_s[:, np.newaxis], deadline_s)
         return removed_m2[strips, way], ends_s, self.leave[strips, way]
+
+
+def tables_of(strips: Sequence[OpenStrip], helpers: Iterable[Helper]) -> list[StripTable]:
+    """What each helper finds; the ways of those that fly alike are worked out once."""
+    ways = dict[Hashable, StripWays]()
+    tables = []
+    for one in helpers:
+        alike = (
+            (one.speed_mps, one.turn_radius_m, one.run_in_m, one.swath_m, one.beside_m, one.lead_m),
+            (one.keep_out, one.sailing),
+        )
+        if alike not in ways:
+            ways[alike] = StripWays(strips, one)
+        tables.append(StripTable(strips, one, ways[alike]))
+    return tables

@@ -84,12 +84,12 @@ class Cutter:
         leave it."""
         stay = _counted(left, opened, self._kept.least_m2)
         best, before_m2, kept = [one.window for one in stay], left.left_m2(), self._kept
-        after, rest_m2 = self._flown(left, stay, flown)
+        after, rest_m2 = as_it_is = self._flown(left, stay, flown)
         most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
         for way in self._ways:
             windows = way.windows(left, time_m)
             anew = _counted(left, windows if self._room is None else self._room.flyable(self._block, windows))
-            after_anew, rest_m2 = self._flown(left, anew, flown)
+            after_anew, rest_m2 = as_it_is if anew == stay else self._flown(left, anew, flown)
             gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
             if gained_m2 > most_m2 or not best:
                 most_m2, best, after, self._kept = gained_m2, [one.window for one in anew], after_anew, way

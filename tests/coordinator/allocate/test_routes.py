@@ -14,10 +14,11 @@ from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
 from coordinator import allocate
-from coordinator.allocate.routes import BEAM, HORIZON_S, MOST_STRIPS, Routes, RoutesAllocator, plan_routes
+from coordinator.allocate.routes import BEAM, HORIZON_S, Routes, RoutesAllocator, plan_routes
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
+from coordinator.allocate.team import MOST_STRIPS
 
 PLAN = RoutesAllocator()
 NEAR, FAR = open_strip(strip(2, y_m=100)), open_strip(strip(1, y_m=600))
@@ -238,7 +239,7 @@ class TestAgainstAllOrders:
     def test_one_or_two_helpers_do_as_well_as_can_be_with_a_wide_beam(self, told: Situation) -> None:
         helpers, until_s = told.helpers[:2], min(told.deadline_s, HORIZON_S)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(allocate.routes, "LATER_SHARE", 0.0)
+            patch.setattr(allocate.team, "LATER_SHARE", 0.0)
             found = plan_routes(told.strips, helpers, until_s, 200)
         assert found.removed_m2 == pytest.approx(most_m2(told.strips, helpers, until_s), rel=0.001)
 
@@ -252,7 +253,7 @@ class TestAgainstAllOrders:
         ]
         best_m2 = most_m2(told.strips, helpers, until_s)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(allocate.routes, "LATER_SHARE", 0.0)
+            patch.setattr(allocate.team, "LATER_SHARE", 0.0)
             found = routes(told.strips, helpers, until_s)
         assert 0.95 * best_m2 <= found.removed_m2 <= best_m2 + 1e-6
 
@@ -261,7 +262,7 @@ class TestAgainstAllOrders:
     def test_they_do_no_worse_than_who_is_free_first_taking_what_brings_most_a_second(self, told: Situation) -> None:
         until_s = min(told.deadline_s, HORIZON_S)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(allocate.routes, "LATER_SHARE", 0.0)
+            patch.setattr(allocate.team, "LATER_SHARE", 0.0)
             found = routes(told.strips, told.helpers, until_s)
         assert found.removed_m2 >= by_rate_m2(told, until_s) - 1e-6
 
