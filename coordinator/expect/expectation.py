@@ -15,7 +15,7 @@ import numpy as np
 from coordinator.cut.window import Window
 from coordinator.expect.hotspots import Hotspots
 from coordinator.expect.seabed import Seabed
-from coordinator.expect.tracks import expected_tracks
+from coordinator.expect.tracks import ExpectedTracks
 from coordinator.fleet import KnownFleet
 from planner.risk import HIGHEST_P_DETECT, MOST_LEVELS, NATS_PER_LEVEL, LevelArray
 from planner.types import BoolArray, FloatArray
@@ -42,6 +42,7 @@ class ExpectedMap:
         self._inside = inside
         self._p_detect = p_detect
         self._seabed = Seabed(fleet.map.grid)
+        self._tracks = ExpectedTracks(fleet.map.grid)
 
     def learn(self, window: Window, helper: str, before: LevelArray, typical: float) -> None:
         """Learns what second looks find from a pass over a window. `before`: what the helper's layer told there
@@ -57,7 +58,7 @@ class ExpectedMap:
         """What is expected by all that was heard. Ground ahead of the survey is told of once every primary that
         surveys has said its plan."""
         fleet, rho = self._fleet, self._fleet.map.rho
-        tracks = expected_tracks(fleet.map.grid, fleet.primaries)
+        tracks = self._tracks.of(fleet.primaries)
         primaries, helpers, largest = self._nats_so_far()
         share, helpers_share = self._seabed.shares(primaries, tracks.flown)
         nats = primaries + helpers + share * tracks.ahead

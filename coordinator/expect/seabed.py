@@ -31,6 +31,7 @@ class Seabed:
         self._cells = max(0, round(ABOUT_M / grid.cell_m))
         self._found: FloatArray = np.zeros(grid.shape)
         self._told: FloatArray = np.zeros(grid.shape)
+        self._learnt_about: tuple[FloatArray, FloatArray] | None = None  # the means about each cell of both, if known
 
     def learn(self, window: Window, p_detect: FloatArray, typical: float) -> None:
         """Learns from a pass of a helper over a window's cells: the P_d that it found at each, shape of the window, 0
@@ -38,6 +39,7 @@ class Seabed:
         seen = p_detect > 0
         self._found[window.cells][seen] += p_detect[seen]
         self._told[window.cells][seen] += typical
+        self._learnt_about = None
 
     def shares(self, found_nats: FloatArray, expected_nats: FloatArray) -> tuple[FloatArray, FloatArray]:
         """What part of the P_d expected of a look is expected to be found, grid shape: of a primary's by its P(y), and
@@ -53,8 +55,10 @@ class Seabed:
         told = float((self._told * by_tracks).sum())
         doubt = DOUBT_OF_HELPERS * self._found.size
         of_helpers = (float(self._found.sum()) + doubt) / (told + doubt)
-        found_about += self._about(self._found) / of_helpers
-        told_about += self._about(self._told)
+        if self._learnt_about is None:
+            self._learnt_about = self._about(self._found), self._about(self._told)
+        found_about += self._learnt_about[0] / of_helpers
+        told_about += self._learnt_about[1]
         share = np.clip((found_about + DOUBT) / (told_about + DOUBT), LEAST_SHARE, 1 / LEAST_SHARE)
         return share, np.minimum(of_helpers * share, MOST_OF_TOLD)
 
@@ -67,10 +71,26 @@ class Seabed:
 
 def sliding_mean(values: FloatArray, beside: int, axis: int) -> FloatArray:
     """The mean over up to `beside` places before and behind each along an axis."""
-    size = values.shape[axis]
-    total = np.zeros((size + 1, values.shape[1 - axis]))
-    np.cumsum(values if axis == 0 else values.T, axis=0, out=total[1:])
-    places = np.arange(size)
-    first, end = np.maximum(places - beside, 0), np.minimum(places + beside + 1, size)
-    mean: FloatArray = (total[end] - total[first]) / (end - first)[:, np.newaxis]
-    return mean if axis == 0 else mean.T
+    total = _running_sums(values, axis)
+    mean = np.empty_like(values)
+    sums, total = (mean, total) if axis == 0 else (mean.T, total.T)
+    size = len(sums)
+    reach = min(beside, size)
+    sums[: size - reach], sums[size - reach :] = total[reach + 1 :], total[size]
+    sums[reach + 1 :] -= total[1 : size - reach]
+    places = np.arange(size, dtype=np.float64)
+    sums /= (np.minimum(places + beside + 1, size) - np.maximum(places - beside, 0))[:, np.newaxis]
+    return mean
+
+
+def _running_sums(values: FloatArray, axis: int) -> FloatArray:
+    """Sums along an axis from its beginning to before each place, and to its end."""
+    rows, columns = values.shape
+    if axis == 1:
+        total = np.zeros((rows, columns + 1))
+        total[:, 1:] = values.cumsum(axis=1)
+        return total
+    total = np.zeros((rows + 1, columns))
+    for row in range(rows):  # faster than a sum column by column
+        np.add(total[row], values[row], out=total[row + 1])
+    return total

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -30,39 +32,114 @@ class Tracks:
     largest_ahead: FloatArray
 
 
-def expected_tracks(grid: GridSpec, primaries: Mapping[str, KnownVehicle]) -> Tracks:
-    """Of all primaries together; one that is given up flies no more tracks. One that has not measured P(y) yet is
-    expected to see as others with the same kind of sonar do, and before anybody has, alike up to the range that
-    its tracks are spaced for."""
-    arrays = np.zeros((3, *grid.shape))
-    found = Tracks(*arrays)
-    for vehicle in primaries.values():
-        if vehicle.plan is None:
-            continue
-        curve = curve_of(vehicle, primaries.values())
-        lead_m = footprint_of(vehicle.entry.sonar).lead_m
-        places_known = len(vehicle.plan.tracks) - vehicle.plan.tentative
-        settled, tentative = (found.ahead, found.largest_ahead), np.zeros((2, *grid.shape))
-        for number, track in enumerate(vehicle.plan.tracks):
-            passed_m = _passed_m(track, vehicle, lead_m)
-            window, along_m, nats = _beside(grid, track, curve)
-            has_passed = along_m <= passed_m
-            found.flown[window] += np.where(has_passed, nats, 0.0)
-            if vehicle.finished_ms is None:
-                to_come = np.where(has_passed, 0.0, nats)
-                total, largest = settled if number < places_known else tentative
-                total[window] += to_come
-                np.maximum(largest[window], to_come, out=largest[window])
-        if tentative[0].any():
-            total, largest = (_wherever_laid(grid, vehicle.plan, nats) for nats in tentative)
-            np.add(found.ahead, total, out=found.ahead)
-            np.maximum(found.largest_ahead, largest, out=found.largest_ahead)
-    return found
+_Ends = tuple[float, float, float, float]
+_Track = tuple[_Ends, bytes]
+"""From where to where a track runs, and its curve's points: what it makes of a grid follows from these alone."""
+_Nats = tuple[FloatArray, FloatArray]
+Value = TypeVar("Value")
 
 
-def _wherever_laid(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:
-    """-ln(1 - P_d) on average over where tracks may come to lie that are not settled yet: anywhere up to half of what
-    tracks are apart to either side, all together."""
+class _Kept(Generic[Value]):
+    """What was worked out by keys from which it follows; kept as long as it is asked for in each round."""
+
+    def __init__(self) -> None:
+        self._now, self._before = dict[Hashable, Value](), dict[Hashable, Value]()
+
+    def begin_round(self) -> None:
+        """What is not asked for until the next one is forgotten."""
+        self._now, self._before = {}, self._now
+
+    def value(self, key: Hashable, made: Callable[[], Value]) -> Value:
+        """That of a key, made where it is not kept."""
+        if key not in self._now:
+            self._now[key] = self._before[key] if key in self._before else made()
+        return self._now[key]
+
+
+class ExpectedTracks:
+    """What tracks of primaries are expected to make of a grid, which is worked out where a track or a curve is another
+    than when it was asked before."""
+
+    def __init__(self, grid: GridSpec) -> None:
+        self._grid = grid
+        self._beside = _Kept[_Beside]()
+        self._laid = _Kept[_Nats | None]()
+
+    def of(self, primaries: Mapping[str, KnownVehicle]) -> Tracks:
+        """Of all primaries together; one that is given up flies no more tracks. One that has not measured P(y) yet is
+        expected to see as others with the same kind of sonar do, and before anybody has, alike up to the range that
+        its tracks are spaced for."""
+        arrays = np.zeros((3, *self._grid.shape))
+        found = Tracks(*arrays)
+        self._beside.begin_round()
+        self._laid.begin_round()
+        for vehicle in primaries.values():
+            if vehicle.plan is not None:
+                self._add(found, vehicle, vehicle.plan, curve_of(vehicle, primaries.values()))
+        return found
+
+    def _add(self, found: Tracks, vehicle: KnownVehicle, plan: Plan, curve: DetectionCurve) -> None:
+        """Adds one primary's."""
+        points, lead_m = curve.range_m.tobytes() + curve.p_detect.tobytes(), footprint_of(vehicle.entry.sonar).lead_m
+        tracks: list[_Track] = [(_ends(track), points) for track in plan.tracks]
+        beside = [self._beside.value(one, partial(_beside, self._grid, one[0], curve)) for one in tracks]
+        passed_m = [_passed_m(track, vehicle, lead_m) for track in plan.tracks]
+        for one, its_m in zip(beside, passed_m, strict=True):
+            seen = one.flown(its_m)
+            if seen is not None:
+                found.flown[one.window] += seen
+        if vehicle.finished_ms is not None:
+            return
+        known = len(tracks) - plan.tentative
+        _add_ahead((found.ahead, found.largest_ahead), beside[:known], passed_m[:known])
+        key = tuple(tracks), plan.tentative, tuple(passed_m[known:])
+        laid = self._laid.value(key, partial(self._wherever_laid, plan, beside[known:], passed_m[known:]))
+        if laid is not None:
+            np.add(found.ahead, laid[0], out=found.ahead)
+            np.maximum(found.largest_ahead, laid[1], out=found.largest_ahead)
+
+    def _wherever_laid(self, plan: Plan, beside: Sequence[_Beside], passed_m: Sequence[float]) -> _Nats | None:
+        """Summed, and the largest single look, on average over where tracks may come to lie that are not settled yet:
+        anywhere up to half of what tracks are apart to either side, all together. None where there are none."""
+        total, largest = np.zeros((2, *self._grid.shape))
+        _add_ahead((total, largest), beside, passed_m)
+        return (_shifted(self._grid, plan, total), _shifted(self._grid, plan, largest)) if total.any() else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Beside:
+    """What one track makes of a window of the grid: -ln(1 - P_d) of a look at each cell, and how far along the track
+    each lies."""
+
+    window: tuple[slice, slice]
+    along_m: FloatArray
+    nats: FloatArray
+
+    def flown(self, passed_m: float) -> FloatArray | None:
+        """What of it is seen where so much of the track is passed; None for nothing."""
+        if np.isinf(passed_m):
+            return self.nats if passed_m > 0 else None
+        return np.where(self.along_m <= passed_m, self.nats, 0.0)
+
+    def ahead(self, passed_m: float) -> FloatArray | None:
+        """What of it is still to be seen then; None for nothing."""
+        if np.isinf(passed_m):
+            return None if passed_m > 0 else self.nats
+        return np.where(self.along_m <= passed_m, 0.0, self.nats)
+
+
+def _add_ahead(to: _Nats, beside: Iterable[_Beside], passed_m: Iterable[float]) -> None:
+    """What is still to be seen of some tracks, to a sum and to the largest single look."""
+    total, largest = to
+    for one, its_m in zip(beside, passed_m, strict=True):
+        nats = one.ahead(its_m)
+        if nats is not None:
+            total[one.window] += nats
+            np.maximum(largest[one.window], nats, out=largest[one.window])
+
+
+def _shifted(grid: GridSpec, plan: Plan, nats: FloatArray) -> FloatArray:
+    """The mean over where tracks may lie, see `ExpectedTracks`."""
     starts, ends = (
         np.array(grid.frame.to_sweep(*np.array(places).T))
         for places in (
@@ -97,21 +174,24 @@ def _passed_m(track: PlannedTrack, vehicle: KnownVehicle, lead_m: float) -> floa
     state = vehicle.state
     if state is None or state.mode is not Mode.SURVEY or state.works_on != track.number:
         return -np.inf
-    _, along_m = _frame(track).to_sweep(state.x_m, state.y_m)
+    _, along_m = _frame(_ends(track)).to_sweep(state.x_m, state.y_m)
     return float(along_m) + lead_m
 
 
-def _frame(track: PlannedTrack) -> SweepFrame:
-    heading_rad = np.arctan2(track.end_x_m - track.start_x_m, track.end_y_m - track.start_y_m)
-    return SweepFrame(track.start_x_m, track.start_y_m, float(heading_rad))
+def _frame(ends: _Ends) -> SweepFrame:
+    start_x_m, start_y_m, end_x_m, end_y_m = ends
+    return SweepFrame(start_x_m, start_y_m, float(np.arctan2(end_x_m - start_x_m, end_y_m - start_y_m)))
 
 
-def _beside(
-    grid: GridSpec, track: PlannedTrack, curve: DetectionCurve
-) -> tuple[tuple[slice, slice], FloatArray, FloatArray]:
-    """The window of the grid beside a track, how far along the track its cells lie, and -ln(1 - P_d) there."""
-    frame = _frame(track)
-    length_m = float(np.hypot(track.end_x_m - track.start_x_m, track.end_y_m - track.start_y_m))
+def _ends(track: PlannedTrack) -> _Ends:
+    return track.start_x_m, track.start_y_m, track.end_x_m, track.end_y_m
+
+
+def _beside(grid: GridSpec, ends: _Ends, curve: DetectionCurve) -> _Beside:
+    """What a track makes of the window of the grid beside it."""
+    start_x_m, start_y_m, end_x_m, end_y_m = ends
+    frame = _frame(ends)
+    length_m = float(np.hypot(end_x_m - start_x_m, end_y_m - start_y_m))
     reach_m = float(curve.range_m[-1]) + EDGE_TOLERANCE_M
     ends_m = (-EDGE_TOLERANCE_M, length_m + EDGE_TOLERANCE_M)
     corners = grid.frame.to_sweep(*frame.to_mission(np.array([-reach_m, reach_m] * 2), np.repeat(ends_m, 2)))
@@ -122,4 +202,4 @@ def _beside(
     centres = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
     across_m, along_m = frame.to_sweep(*centres)
     nats = -np.log1p(-curve.at(np.abs(across_m)))
-    return (rows, columns), along_m, np.where((along_m >= ends_m[0]) & (along_m <= ends_m[1]), nats, 0.0)
+    return _Beside((rows, columns), along_m, np.where((along_m >= ends_m[0]) & (along_m <= ends_m[1]), nats, 0.0))

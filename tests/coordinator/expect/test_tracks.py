@@ -11,7 +11,7 @@ from by_hand import PRIMARY, vehicle
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
-from coordinator.expect.tracks import Tracks, expected_tracks
+from coordinator.expect.tracks import ExpectedTracks, Tracks
 from coordinator.vehicles import KnownVehicle
 from planner.footprints import footprint_of
 from planner.types import DetectionCurve, FloatArray, GridSpec, SweepFrame
@@ -38,7 +38,7 @@ def primary(
 
 
 def expected(*primaries: KnownVehicle) -> Tracks:
-    return expected_tracks(GRID, {f"{number}": one for number, one in enumerate(primaries)})
+    return ExpectedTracks(GRID).of({f"{number}": one for number, one in enumerate(primaries)})
 
 
 def at(y_m: float, mode: Mode = Mode.SURVEY, works_on: int = 1) -> AgentState:
@@ -99,7 +99,7 @@ class TestPlannedTracks:
         frame = SweepFrame(1000, -500, math.radians(heading_deg))
         (x0_m, x1_m), (y0_m, y1_m) = frame.to_mission(np.array([201.0, 201.0]), np.array([0.0, 400.0]))
         track = PlannedTrack(1, 201, float(x0_m), float(y0_m), float(x1_m), float(y1_m), False)
-        turned = expected_tracks(replace(GRID, frame=frame), {PRIMARY: primary(track, curves={1: LINEAR})})
+        turned = ExpectedTracks(replace(GRID, frame=frame)).of({PRIMARY: primary(track, curves={1: LINEAR})})
         plain = expected(primary(replace(UP, start_x_m=201, end_x_m=201), curves={1: LINEAR}))
         assert turned.ahead == pytest.approx(plain.ahead, abs=1e-9)
 
