@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from coordinator.cut.ground import Ground
 from coordinator.cut.room import Room
-from coordinator.cut.strips import Counted, Cut, CuttingRules, cells_wide, cut_windows
+from coordinator.cut.strips import Counted, Cut, Cutting, CuttingRules, cells_wide
 from coordinator.cut.window import Window
 from planner.types import GridSpec
 
@@ -111,7 +111,7 @@ class Cutter:
         left, found = ground.copy(), list[Cut]()
         for window in windows:
             cells = window.cells
-            worth = left.worth(cells)
+            worth = left.worth_of(cells)
             counts_m2 = float(worth.sum())
             removed_m2 = float((left.risk[cells] * left.look[cells]).sum()) * self._cell_area_m2
             foreseen = float(worth[left.is_seen[cells]].sum()) < counts_m2 / 2
@@ -127,7 +127,7 @@ def _counted(
     out, and not flown."""
     left, found = ground.copy(), list[Counted]()
     for window in windows:
-        counts_m2 = float(left.worth(window.cells).sum())
+        counts_m2 = float(left.worth_of(window.cells).sum())
         if least_m2 is None or counts_m2 > least_m2(window):
             found.append(Counted(window, counts_m2))
             left.fly(window)
@@ -149,28 +149,30 @@ class OneHeading:
         spare; none without time."""
         if time_m <= 0:
             return []
-        found = self._at(ground, self.price)
+        fresh = Cutting(self._grid, ground, self._rules, across=self._across)
+        left, found = self._cut(fresh, self.price)
         for _ in range(MOST_STEPS):
             if self.metres(found) < time_m:
                 if self.price <= self._least_price:
                     break
                 self.price = max(self._least_price, self.price / STEP)
-                found = self._at(ground, self.price)
+                left, found = self._cut(fresh, self.price)
             else:
-                dearer = self._at(ground, self.price * STEP)
+                left_dearer, dearer = self._cut(fresh, self.price * STEP)
                 if self.metres(dearer) < time_m:
                     break
-                self.price, found = self.price * STEP, dearer
-        price, left = self.price, ground.copy()
-        for window in found:
-            left.fly(window)
+                self.price, left, found = self.price * STEP, left_dearer, dearer
+        price = self.price
         while self.metres(found) < self._enough_m(time_m, found) and price > self._least_price:
             price = max(self._least_price, price / STEP**2)
-            new = self._at(left, price)
-            for window in new:
-                left.fly(window)
-            found = [*found, *new]
+            found = [*found, *left.cut(price)]
         return found
+
+    @staticmethod
+    def _cut(fresh: Cutting, price: float) -> tuple[Cutting, list[Window]]:
+        """What is cut of ground at a price, and the ground as that leaves it."""
+        left = fresh.copy()
+        return left, left.cut(price)
 
     def least_m2(self, window: Window) -> float:
         """What a strip there has to count to be worth flying whatever time there is."""
@@ -178,9 +180,6 @@ class OneHeading:
 
     def _enough_m(self, time_m: float, found: Sequence[Window]) -> float:
         return time_m + SPARE_STRIPS * self.metres(found) / max(1, len(found))
-
-    def _at(self, ground: Ground, price: float) -> list[Window]:
-        return cut_windows(self._grid, ground, self._rules, price, across=self._across)
 
     def metres(self, windows: Sequence[Window]) -> float:
         """What is flown for some windows, the ways to them included."""

@@ -11,6 +11,7 @@ from coordinator.cut.window import Window
 from planner.types import BoolArray, FloatArray
 
 WORST = 0.3  # share of the area
+CELLS_AT_ONCE = 16_384  # that are worked on, so that they stay in the processor's cache
 
 
 @dataclass(frozen=True)
@@ -74,7 +75,8 @@ class Ground:
     def fly(self, window: Window, share: float = 1.0) -> None:
         """A look along a window is flown, or counts as if it were; `share`: as far as that, taken alike over all of
         it."""
-        self.risk[window.cells] *= 1.0 - share * self.look[window.cells]
+        cells = window.cells
+        self.risk[cells] *= 1.0 - share * self.look[cells]
 
     def left_m2(self) -> float:
         """What is left of the objective (residual risk times m2): the worst 30 % as they are now, not by the
@@ -93,14 +95,27 @@ class Ground:
         risk = self.risk[self.risk > 0]
         return float(np.quantile(risk, 1.0 - WORST)) if risk.size else 0.0
 
-    def worth(self, cells: tuple[slice, slice] = np.s_[:, :]) -> FloatArray:
-        """What a look at each of some cells counts in the objective (residual risk times m2)."""
+    def worth(self) -> FloatArray:
+        """What a look at each cell counts in the objective (residual risk times m2)."""
+        worth = np.empty_like(self.risk)
+        rows = max(1, CELLS_AT_ONCE // self.risk.shape[1])
+        for first in range(0, len(worth), rows):
+            some = np.s_[first : first + rows, :]
+            worth[some] = self.worth_of(some)
+        return worth
+
+    def worth_of(self, cells: tuple[slice, slice]) -> FloatArray:
+        """The same of some cells."""
         risk, look = self.risk[cells], self.look[cells]
-        worth = self.objective.mean * risk * look
+        worth = self.objective.mean * risk
+        worth *= look
         if self.objective.worst:
-            above = np.maximum(risk - self.threshold, 0.0) - np.maximum(risk * (1.0 - look) - self.threshold, 0.0)
-            worth = worth + self.objective.worst / WORST * above
-        return self.weights[cells] * worth
+            above = np.maximum(risk - self.threshold, 0.0)
+            above -= np.maximum(risk * (1.0 - look) - self.threshold, 0.0)
+            above *= self.objective.worst / WORST
+            worth += above
+        worth *= self.weights[cells]
+        return worth
 
 
 def _sums(values: FloatArray, block: int) -> FloatArray:

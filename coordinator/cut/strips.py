@@ -9,10 +9,11 @@ if they had been flown, and the search goes on with what is left.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from itertools import pairwise
 
-from coordinator.cut.bands import TOLERANCE, side_by_side
+from coordinator.cut.bands import TOLERANCE, Bands
 from coordinator.cut.ground import Ground
 from coordinator.cut.window import Window
 from planner.types import GridSpec, Point, Strip
@@ -57,37 +58,51 @@ class Cut(Counted):
     why: str = ""
 
 
-def cut_windows(
-    grid: GridSpec, ground: Ground, rules: CuttingRules, price: float, *, across: bool = False
-) -> list[Window]:
-    """The windows worth flying at a price for each metre flown, those first that lie side by side; all along the
-    tracks, or all across them. One that lies on another is worth a look when that has been flown."""
-    left, found = ground.copy(), list[Window]()
-    as_cut = left.turned if across else left
-    for _ in range(MOST_PASSES):
-        new = _side_by_side(grid, as_cut, rules, price)
-        if not new:
-            break
-        for window in new:
-            as_cut.fly(window)
-        found += new
-    return [one.turned for one in found] if across else found
+class Cutting:
+    """Ground as windows are cut of it and flown, all along the tracks, or all across them."""
 
+    def __init__(self, grid: GridSpec, ground: Ground, rules: CuttingRules, *, across: bool = False) -> None:
+        self._cell_m, self._rules, self._across = grid.cell_m, rules, across
+        left = ground.copy()
+        self._ground = left.turned if across else left  # as it lies when strips run up the rows
+        width = min(self._ground.risk.shape[1], cells_wide(grid, rules.swath_m))
+        self._worth = self._ground.worth()
+        self._bands = Bands(self._worth, width)
 
-def _side_by_side(grid: GridSpec, ground: Ground, rules: CuttingRules, price: float) -> list[Window]:
-    """Windows up the rows that pay for themselves."""
-    width = min(ground.risk.shape[1], cells_wide(grid, rules.swath_m))
-    worth, cell_m = ground.worth(), grid.cell_m
-    row_cost, fixed_cost = price * cell_m, price * rules.overhead_m
-    shortest = max(1, round(rules.min_strip_m / cell_m))
-    longest = max(shortest, round(rules.max_strip_m / cell_m))
-    found = []
-    for band in side_by_side(worth, width, row_cost, fixed_cost):
-        for begin, end in _pieces(band.first_row, band.end_row, shortest, longest):
-            piece = replace(band, first_row=begin, end_row=end)
-            if float(worth[piece.cells].sum()) > (piece.rows * row_cost + fixed_cost) * (1 + TOLERANCE):
-                found.append(piece)
-    return found
+    def copy(self) -> Cutting:
+        """One that may be cut by itself."""
+        new = copy(self)
+        new._ground, new._bands = self._ground.copy(), self._bands.copy()
+        return new
+
+    def cut(self, price: float) -> list[Window]:
+        """Cuts the windows worth flying at a price for each metre flown, those first that lie side by side; one that
+        lies on another is worth a look when that has been flown. The ground is left as they leave it."""
+        found = list[Window]()
+        for _ in range(MOST_PASSES):
+            new = self._side_by_side(price)
+            if not new:
+                break
+            for window in new:
+                self._ground.fly(window)
+            self._worth = self._ground.worth()
+            self._bands.change(self._worth, new)
+            found += new
+        return [one.turned for one in found] if self._across else found
+
+    def _side_by_side(self, price: float) -> list[Window]:
+        """Windows up the rows that pay for themselves."""
+        row_cost, fixed_cost = price * self._cell_m, price * self._rules.overhead_m
+        shortest = max(1, round(self._rules.min_strip_m / self._cell_m))
+        longest = max(shortest, round(self._rules.max_strip_m / self._cell_m))
+        found = []
+        for band in self._bands.side_by_side(row_cost, fixed_cost):
+            for begin, end in _pieces(band.first_row, band.end_row, shortest, longest):
+                piece = Window(begin, end, band.first_column, band.end_column)
+                counts_m2 = float(self._worth[piece.cells].sum())
+                if counts_m2 > (piece.rows * row_cost + fixed_cost) * (1 + TOLERANCE):
+                    found.append(piece)
+        return found
 
 
 def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:

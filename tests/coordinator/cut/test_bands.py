@@ -10,8 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from coordinator.cut.bands import MOST_ADDED, side_by_side
+from coordinator.cut.bands import MOST_ADDED, Bands
 from coordinator.cut.window import Window
+from planner.types import FloatArray
+
+
+def side_by_side(worth: FloatArray, width: int, row_cost: float, fixed_cost: float) -> list[Window]:
+    return Bands(worth, width).side_by_side(row_cost, fixed_cost)
 
 
 class TestByHand:
@@ -51,6 +56,18 @@ class TestByHand:
         worth = np.zeros((4, 60))
         worth[1:3, 20 : 20 + width] = 1.0
         assert side_by_side(worth, width, width - 0.5, 0.5) == [Window(1, 3, 20, 20 + width)]
+
+    @pytest.mark.parametrize("width", [1, 3, MOST_ADDED + 1])
+    def test_after_a_change_all_is_found_as_if_it_had_always_been_so(self, width: int) -> None:
+        rng = np.random.default_rng(3)
+        worth = rng.random((6, 40))
+        bands = Bands(worth, width)
+        for number, row_cost in enumerate([0.4, 0.4, 0.4, 0.6, 0.6]):
+            assert bands.side_by_side(width * row_cost, 0.1) == side_by_side(worth, width, width * row_cost, 0.1)
+            changed = Window(number, number + 2, 7 * number, 7 * number + 3)
+            worth = worth.copy()
+            worth[changed.cells] *= 2 * rng.random()
+            bands.change(worth, [changed])
 
 
 @given(

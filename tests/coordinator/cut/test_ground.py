@@ -51,7 +51,7 @@ class TestWorth:
     def test_it_may_be_asked_of_some_cells(self) -> None:
         one = ground(np.arange(12.0).reshape(3, 4) / 12, objective="both", threshold=0.4)
         cells = Window(1, 3, 1, 2).cells
-        assert one.worth(cells) == pytest.approx(one.worth()[cells])
+        assert one.worth_of(cells) == pytest.approx(one.worth()[cells])
 
 
 class TestLeft:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.strips import Cut, CuttingRules, cut_windows, strip_of
+from coordinator.cut.strips import Cut, Cutting, CuttingRules, strip_of
 from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
@@ -44,7 +44,7 @@ def ground(risk: FloatArray, grid: GridSpec = GRID, look: float = LOOK, objectiv
 
 def cut(risk: FloatArray, rules: CuttingRules = RULES, price: float = PRICE, look: float = LOOK) -> list[Window]:
     """Where a first look is worth its price."""
-    return list(dict.fromkeys(cut_windows(GRID, ground(risk, look=look), rules, price)))
+    return list(dict.fromkeys(Cutting(GRID, ground(risk, look=look), rules).cut(price)))
 
 
 class TestByHand:
@@ -104,16 +104,16 @@ class TestByHand:
     def test_ground_that_counts_more_comes_first(self) -> None:
         told = ground(hot(np.s_[10:40, 2:12], risk=0.8) + hot(np.s_[10:40, 25:35], risk=0.5))
         told.weights[:, 20:] *= 2.0
-        assert list(dict.fromkeys(one.first_column for one in cut_windows(GRID, told, RULES, PRICE))) == [25, 2]
+        assert list(dict.fromkeys(one.first_column for one in Cutting(GRID, told, RULES).cut(PRICE))) == [25, 2]
 
     def test_where_a_look_takes_more_comes_first(self) -> None:
         told = ground(hot(np.s_[10:40, 2:12], np.s_[10:40, 25:35]))
         told.look[:, :20] = 0.5
-        assert list(dict.fromkeys(one.first_column for one in cut_windows(GRID, told, RULES, PRICE))) == [25, 2]
+        assert list(dict.fromkeys(one.first_column for one in Cutting(GRID, told, RULES).cut(PRICE))) == [25, 2]
 
     def test_for_the_worst_only_what_is_above_the_threshold_is_cut(self) -> None:
         told = ground(hot(np.s_[:, 2:12], risk=0.4) + hot(np.s_[:, 25:35], risk=0.9), objective="worst30")
-        assert cut_windows(GRID, told, RULES, PRICE) == [Window(0, 60, 25, 35)]
+        assert Cutting(GRID, told, RULES).cut(PRICE) == [Window(0, 60, 25, 35)]
 
     def test_nothing_hot_gives_nothing(self) -> None:
         assert cut(np.zeros(GRID.shape)) == []
@@ -126,16 +126,16 @@ class TestByHand:
     def test_a_place_is_cut_again_where_it_is_worth_another_look_after_that(self) -> None:
         # A poor look takes 20 m2 a metre, then 12 and 7.2; strips of 150 m cost 190 m at 9 m2, which is 11.4 a metre.
         told = ground(hot(np.s_[10:40, 10:20]), look=0.4)
-        assert cut_windows(GRID, told, RULES, 9.0) == [Window(10, 40, 10, 20)] * 2
+        assert Cutting(GRID, told, RULES).cut(9.0) == [Window(10, 40, 10, 20)] * 2
 
     def test_the_swath_is_never_wider_than_the_sensor_sees(self) -> None:
         grid = GridSpec(EAST, 3.4, 40, 60)
-        windows = cut_windows(grid, ground(np.ones(grid.shape), grid), RULES, PRICE)
+        windows = Cutting(grid, ground(np.ones(grid.shape), grid), RULES).cut(PRICE)
         assert {one.columns_wide for one in windows} == {14}  # 47.6 m; 15 would be 51 m
 
     def test_an_area_narrower_than_the_swath_is_cut_as_it_is(self) -> None:
         grid = GridSpec(EAST, 5, 6, 60)
-        assert cut_windows(grid, ground(np.ones(grid.shape), grid), RULES, PRICE) == [Window(0, 60, 0, 6)]
+        assert Cutting(grid, ground(np.ones(grid.shape), grid), RULES).cut(PRICE) == [Window(0, 60, 0, 6)]
 
 
 class TestOverlap:
@@ -184,7 +184,7 @@ def test_windows_lie_on_the_grid_are_as_long_as_allowed_lie_apart_and_pay_for_th
     told = ground(risk, SMALL, look, objective)
     worth = told.worth()
     found: list[Window] = []
-    for window in cut_windows(SMALL, told, rules, price):
+    for window in Cutting(SMALL, told, rules).cut(price):
         assert 0 <= window.first_row < window.end_row <= SMALL.rows
         assert 0 <= window.first_column < window.end_column <= SMALL.columns
         assert window.columns_wide == round(rules.swath_m / SMALL.cell_m)
@@ -193,6 +193,25 @@ def test_windows_lie_on_the_grid_are_as_long_as_allowed_lie_apart_and_pay_for_th
             assert worth[window.cells].sum() > price * (window.rows * SMALL.cell_m + rules.overhead_m)
         found.append(window)
     assert (told.risk == risk).all()  # the ground that is asked of is left as it is
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    risk=risks,
+    rules=rules_of_all_kinds,
+    prices=st.lists(st.sampled_from([0.2, 0.5, 1.0, 3.0]), min_size=1, max_size=4),
+    across=st.booleans(),
+)
+def test_what_is_cut_further_is_cut_as_of_the_ground_as_it_was_left(
+    risk: FloatArray, rules: CuttingRules, prices: list[float], across: bool
+) -> None:
+    left, cutting = ground(risk, SMALL), Cutting(SMALL, ground(risk, SMALL), rules, across=across)
+    for price in prices:
+        found = Cutting(SMALL, left, rules, across=across).cut(price)
+        assert cutting.copy().cut(price) == found
+        assert cutting.cut(price) == found
+        for window in found:
+            left.fly(window)
 
 
 class TestStripOf:
@@ -232,7 +251,7 @@ def test_across_the_tracks_they_are_cut_as_along_them_on_the_map_turned(
 ) -> None:
     told = ground(risk, SMALL)
     turned = GridSpec(SMALL.frame, SMALL.cell_m, SMALL.rows, SMALL.columns)
-    across = cut_windows(SMALL, told, rules, price, across=True)
-    assert [one.turned for one in across] == cut_windows(turned, ground(risk.T.copy(), turned), rules, price)
+    across = Cutting(SMALL, told, rules, across=True).cut(price)
+    assert [one.turned for one in across] == Cutting(turned, ground(risk.T.copy(), turned), rules).cut(price)
     assert all(one.across for one in across)
     assert (told.risk == risk).all()
