@@ -128,4 +128,5 @@ class Ledger:
     def in_state(self, *states: StripState) -> list[StripRecord]:
         """Records in one of these states, by number."""
         numbers = [number for state in states for number in self._by_state[state]]
-        return [self._records[number] for number in sorted(numbers)]
+        numbers.sort()
+        return [self._records[number] for number in numbers]

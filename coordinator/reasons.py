@@ -61,7 +61,7 @@ class Reasons:
         """Places of some of a cut's cells, and what each weighs: its risk."""
         window, grid = cut.window, self._grid
         rows, columns = (
-            np.unique(np.linspace(first, end - 1, MOST_CELLS).round().astype(int))
+            np.array(list(dict.fromkeys(np.linspace(first, end - 1, MOST_CELLS).round().astype(int).tolist())))
             for first, end in ((window.first_row, window.end_row), (window.first_column, window.end_column))
         )
         x_m, y_m = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])

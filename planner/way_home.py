@@ -24,6 +24,9 @@ ARRIVALS = 16
 """Headings of arrival that are compared where a way home leads round ground to keep out of, beside the direct one."""
 DETOUR = 3.0
 """A way past zones is never so many times as long as is expected of it, circles that its turns add included."""
+MOST_RADII = 8.0
+"""By less than so many turn radii a way home in open water is longer than the beeline: a whole turn, and from its
+circle."""
 _FULL_TURN_RAD = 2 * math.pi
 _ROUNDING_RAD = 1e-7
 
@@ -69,12 +72,13 @@ class WayHome:
         return times_s
 
     def is_well_within(self, pose: Pose, time_s: float) -> bool:
-        """Whether it takes so much less than a time, by what is known without looking for the way past the zones, that
-        nobody need look for it. Without zones False: looking takes no longer."""
+        """Whether it takes so much less than a time, by what is known without looking for the way, that nobody need
+        look for it."""
+        slowest_mps = self.sailing.slowest_mps
         if not self.keep_out:
-            return False
+            return (math.dist(pose[:2], self.home) + MOST_RADII * self.turn_radius_m) / slowest_mps < time_s
         about_s = float(self.times_s(np.array([pose], dtype=np.float64))[0])
-        circle_s = _FULL_TURN_RAD * self.turn_radius_m / self.sailing.slowest_mps
+        circle_s = _FULL_TURN_RAD * self.turn_radius_m / slowest_mps
         return DETOUR * (about_s + DETOUR * circle_s) < time_s
 
     def passes_within(self, pose: Pose, passes: Sequence[Pass], time_s: float) -> int:

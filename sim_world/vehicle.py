@@ -133,9 +133,10 @@ class SimulatedVehicle:
         """When `pop_event` has something next, None for never."""
         to_come_ms = self._to_come[0][0] if self._to_come else None
         empty_ms = self.config.endurance_ms
-        if empty_ms is not None:  # who leaves home too late gets nowhere
-            empty_ms = None if self._is_home or self._emptied_ms is not None else max(empty_ms, self._begun_ms)
-        return min((at_ms for at_ms in (to_come_ms, empty_ms) if at_ms is not None), default=None)
+        if empty_ms is None or self._is_home or self._emptied_ms is not None:
+            return to_come_ms
+        empty_ms = max(empty_ms, self._begun_ms)  # who leaves home too late gets nowhere
+        return empty_ms if to_come_ms is None else min(to_come_ms, empty_ms)
 
     def pop_event(self) -> Event:
         """The next event, once its time has come.

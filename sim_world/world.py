@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from operator import itemgetter
-
 from comms.node import Publication, Received, Step
 from comms.said.messages import Maneuver, ManeuverStatus, MissionOver
 from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE, TRUTH_TARGETS
@@ -131,14 +129,16 @@ class World:
         if self._next_nav_ms <= now_ms:
             publish += self._navigation(now_ms)
         while True:
-            # Of several events at one time min takes the first body's: bodies are in the order of their ids.
-            due = [(at_ms, body) for body in self._bodies.values() if (at_ms := body.next_event_ms) is not None]
-            if not due:
+            first_ms, first = None, None
+            for body in self._bodies.values():  # of several events at one time that of the first by id
+                at_ms = body.next_event_ms
+                if at_ms is not None and (first_ms is None or at_ms < first_ms):
+                    first_ms, first = at_ms, body
+            if first_ms is None or first is None:
                 return publish, self._next_nav_ms
-            at_ms, body = min(due, key=itemgetter(0))
-            if at_ms > now_ms:
-                return publish, min(at_ms, self._next_nav_ms)
-            publish += body.next_event(at_ms)
+            if first_ms > now_ms:
+                return publish, min(first_ms, self._next_nav_ms)
+            publish += first.next_event(first_ms)
 
     def _navigation(self, now_ms: int) -> list[Publication]:
         self._next_nav_ms = (now_ms // NAV_PERIOD_MS + 1) * NAV_PERIOD_MS

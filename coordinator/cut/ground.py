@@ -121,6 +121,12 @@ class Ground:
 def _sums(values: FloatArray, block: int) -> FloatArray:
     """Sums over blocks of cells."""
     rows, columns = (-(-size // block) for size in values.shape)
-    padded = np.pad(values, [(0, rows * block - values.shape[0]), (0, columns * block - values.shape[1])])
-    sums: FloatArray = padded.reshape(rows, block, columns, block).sum(axis=(1, 3))
+    padded = np.zeros((rows * block, columns * block))
+    padded[: values.shape[0], : values.shape[1]] = values
+    sums: FloatArray = np.zeros((rows, columns))
+    for row in range(block):  # far faster than a sum over two axes of four
+        of_row = padded[row::block, ::block].copy()
+        for column in range(1, block):
+            of_row += padded[row::block, column::block]
+        sums += of_row
     return sums

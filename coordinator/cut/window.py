@@ -66,15 +66,20 @@ class Window:
 
     def shared(self, other: Window) -> int:
         """Number of cells that lie in both."""
+        if self.end_column <= other.first_column or other.end_column <= self.first_column:
+            return 0  # soon told, as most pairs lie apart
+        if self.end_row <= other.first_row or other.end_row <= self.first_row:
+            return 0
         rows = min(self.end_row, other.end_row) - max(self.first_row, other.first_row)
         columns = min(self.end_column, other.end_column) - max(self.first_column, other.first_column)
-        return max(rows, 0) * max(columns, 0)
+        return rows * columns
 
     def overlap(self, other: Window) -> float:
         """Shared cells as a share of the cells of both together."""
         shared = self.shared(other)
-        return shared / (self.size + other.size - shared)
+        return shared / (self.size + other.size - shared) if shared else 0.0
 
     def is_at_one_of(self, others: Iterable[Window]) -> bool:
         """Whether three quarters of it lie in one of these."""
-        return any(self.shared(other) >= SAME_PLACE * self.size for other in others)
+        least = SAME_PLACE * self.size
+        return any(self.shared(other) >= least for other in others)

@@ -58,7 +58,10 @@ def test_what_is_well_within_a_time_takes_no_longer(
     assert not (home.is_well_within(pose, time_s) and home.from_pose(pose)[0] > time_s)
     assert home.is_well_within(pose, 100_000.0)
     assert not home.is_well_within(pose, home.from_pose(pose)[0])
-    assert not replace(home, keep_out=NOWHERE).is_well_within(pose, 100_000.0)
+    in_open_water = replace(home, keep_out=NOWHERE)
+    assert not (in_open_water.is_well_within(pose, time_s) and in_open_water.from_pose(pose)[0] > time_s)
+    assert in_open_water.is_well_within(pose, 100_000.0)
+    assert not in_open_water.is_well_within(pose, in_open_water.from_pose(pose)[0])
 
 
 @given(st.floats(-200, 200), st.floats(-200, 200), st.floats(0, 6.28))
