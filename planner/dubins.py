@@ -179,9 +179,13 @@ def _turning_circles(
 
 
 def _turns(angles_rad: FloatArray) -> FloatArray:
-    """As `_turn`, for arrays."""
-    wrapped = angles_rad % _FULL_TURN_RAD
-    wrapped[_FULL_TURN_RAD - wrapped < _ANGLE_TOLERANCE_RAD] = 0.0
+    """As `_turn`, for arrays; within two full turns either way this is the same to the last bit, and faster."""
+    turns = angles_rad / _FULL_TURN_RAD
+    np.floor(turns, out=turns)
+    turns *= _FULL_TURN_RAD
+    wrapped = np.subtract(angles_rad, turns, out=turns)
+    np.maximum(wrapped, 0.0, out=wrapped)  # just short of a full turn its share of one may have been rounded up
+    np.putmask(wrapped, _FULL_TURN_RAD - wrapped < _ANGLE_TOLERANCE_RAD, 0.0)
     return wrapped
 
 

@@ -30,7 +30,7 @@ ALIKE = 4
 """Of so many times as many plans the most promising that differ are carried on."""
 HORIZON_S = 4 * 3600.0
 """How far ahead is planned while nobody can tell when the mission ends."""
-TOLERANCE_M2 = 1e-6
+TOLERANCE_M2, LEAST_S = 1e-6, 1e-9
 
 
 @dataclass(frozen=True)
@@ -210,16 +210,20 @@ class _Plans:
         """What these plans may go on with; a helper that finds nothing drops out, and the next one goes on."""
         rows = np.arange(self.count)
         one = np.where(self.is_done, np.inf, self.free_s).argmin(axis=1)
-        legs_s = team.legs_s.take(one * team.nodes + self.nodes[rows, one], axis=0)
-        begins_s = legs_s[:, 0]
+        at = one * team.nodes + self.nodes[rows, one]
+        begins_s = team.to_begin_s.take(at, axis=0)
         begins_s += self.free_s[rows, one][:, np.newaxis]
-        ends_s = begins_s + legs_s[:, 1]
-        share = np.minimum(np.maximum((team.deadline_s - begins_s) / legs_s[:, 1], 0.0), 1.0)
-        may = ends_s + legs_s[:, 2] <= team.lasts_s.take(one)[:, np.newaxis]
+        sweep_s = team.sweep_s.take(at, axis=0)
+        ends_s = begins_s + sweep_s
+        gained_m2 = np.subtract(team.deadline_s, begins_s, out=begins_s)
+        gained_m2 /= sweep_s
+        gained_m2.clip(0.0, 1.0, out=gained_m2)
+        gained_m2 *= team.worth_m2.take(one, axis=0)
+        home_s = team.home_s.take(at, axis=0)
+        home_s += ends_s
+        may = home_s <= np.where(self.is_done[rows, one], -np.inf, team.lasts_s.take(one))[:, np.newaxis]
         may &= self.turn < 0
-        may &= ~self.is_done[rows, one][:, np.newaxis]
-        gained_m2 = team.worth_m2.take(one, axis=0) * share
-        gained_m2[~may] = 0.0
+        np.putmask(gained_m2, ~may, 0.0)
         ends_s += team.run_out_s.take(one)[:, np.newaxis]
         ahead = _Ahead(one, ends_s, gained_m2, gained_m2 > 0)
         self._drop_out(team, ahead)
@@ -254,23 +258,26 @@ class _Plans:
         so_far_m2 = self.counts_m2(team)
         ranks[:, :-1] += ahead.gained_m2 + so_far_m2[:, np.newaxis]
         ranks[:, -1] += so_far_m2
-        ranks[:, :-1][~ahead.gains] = -np.inf
+        np.copyto(ranks[:, :-1], -np.inf, where=~ahead.gains)
         has_others = self.is_done.sum(axis=1) + 1 < len(team.helpers)
         ranks[~has_others, -1] = -np.inf
         goes_on = np.count_nonzero(ahead.gains) + np.count_nonzero(has_others)
         order = np.negative(ranks, out=ranks).argsort(axis=None, kind="stable")[: min(goes_on, ALIKE * beam)]
         rows, strips = np.divmod(order, ranks.shape[1])
         plans = self._gone_on(team, ahead, rows, strips)
-        first = plans.first_that_differ()[:beam]
+        first = plans.first_that_differ(beam)
         return plans.chosen(first), rows[first], strips[first]
 
-    def first_that_differ(self) -> np.ndarray:
-        """Of those plans that serve the same strips and leave helpers at the same places the first one; in order."""
+    def first_that_differ(self, most: int) -> np.ndarray:
+        """Of those plans that serve the same strips and leave helpers at the same places the first one; in order, no
+        more than `most`."""
         told = np.concatenate([self.nodes, self.turn < 0, self.is_done], axis=1)
         whole, size = told.tobytes(), told[:1].nbytes
         seen = dict[bytes, int]()
         for row in range(self.count):
             seen.setdefault(whole[row * size : (row + 1) * size], row)
+            if len(seen) == most:
+                break
         return np.array(list(seen.values()), dtype=np.intp)
 
     def _gone_on(self, team: Team, ahead: _Ahead, rows: np.ndarray, strips: np.ndarray) -> _Plans:
@@ -372,7 +379,9 @@ class _Completion:
     def _best_by_time(self, ahead: _Ahead) -> tuple[np.ndarray, BoolArray]:
         """Which strip brings most a second in each plan, and whether any brings anything."""
         now_s = self._plans.free_s[np.arange(self._plans.count), ahead.next][:, np.newaxis]
-        spent_s = np.where(ahead.gains, np.minimum(ahead.ends_s, self._team.deadline_s) - now_s, 1.0)
+        spent_s = np.minimum(ahead.ends_s, self._team.deadline_s)
+        spent_s -= now_s
+        np.maximum(spent_s, LEAST_S, out=spent_s)  # where something is gained it is more
         return (ahead.gained_m2 / spent_s).argmax(axis=1), np.logical_or.reduce(ahead.gains, axis=1)
 
     def _go_on(self, ahead: _Ahead, strips: np.ndarray, gains: BoolArray, goes_on: BoolArray) -> None:

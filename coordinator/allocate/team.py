@@ -23,13 +23,13 @@ looks at the same ground."""
 class Team:
     """What helpers find.
 
-    A node is a strip flown one way; the last node is a helper's start. `legs_s`: shape (helpers * nodes, 3, strips):
-    how long it is from each node of each helper until the sonar is on at a strip, flown the way that is shortest, as a
-    helper's agent does, how long the sonar is on then, and how long it is home after that; `way`, shape (helpers,
-    nodes, strips): the node that this is. `worth_m2`: (helpers, strips). `alone_s`: what a strip takes by itself, and
-    `alone_m2`: what it brings at most, shape (strips,); `by_rate`: the strips' places in order of what they so bring a
-    second, the most first, `rank`: of each its place in that order. `later_m2ps`: what a second is worth for which no
-    strip is left.
+    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `sweep_s`, `home_s`: shape
+    (helpers * nodes, strips): how long it is from each node of each helper until the sonar is on at a strip, flown the
+    way that is shortest, as a helper's agent does, how long the sonar is on then, and how long it is home after that;
+    `way`, shape (helpers, nodes, strips): the node that this is. `worth_m2`: (helpers, strips). `alone_s`: what a strip
+    takes by itself, and `alone_m2`: what it brings at most, shape (strips,); `by_rate`: the strips' places in order of
+    what they so bring a second, the most first, `rank`: of each its place in that order. `later_m2ps`: what a second is
+    worth for which no strip is left.
     """
 
     def __init__(self, strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> None:
@@ -39,22 +39,25 @@ class Team:
         count, ways = len(self.strips), max(one.sonar_on_s.shape[1] for one in tables)
         self.start, self.nodes = count * ways, count * ways + 1
         places = np.arange(count)
-        legs_s = np.empty((len(helpers), self.nodes, 3, count))
-        legs_s[:] = np.array([[np.inf], [1.0], [0.0]])  # at nodes that a helper does not have
-        self.way = np.zeros((len(helpers), self.nodes, count), dtype=np.intp)
+        # At nodes that a helper does not have:
+        shape = (len(helpers), self.nodes, count)
+        to_begin_s, sweep_s, home_s = np.full(shape, np.inf), np.ones(shape), np.zeros(shape)
+        self.way = np.zeros(shape, dtype=np.intp)
         for some in _alike(tables):
             table = tables[some[0]]
             own = table.sonar_on_s.shape[1]
             nodes = (places[:, np.newaxis] * ways + np.arange(own)).ravel()
             starts = [helpers[number].free_at for number in some]
-            to_begin_s, chosen = table.ways.shortest_from(np.concatenate([table.leave.reshape(-1, 3), starts]))
+            its_s, chosen = table.ways.shortest_from(np.concatenate([table.leave.reshape(-1, 3), starts]))
             for place, number in enumerate(some, start=nodes.size):
                 for rows, poses in ((nodes, slice(nodes.size)), (self.start, place)):
                     self.way[number, rows] = places * ways + chosen[poses]
-                    legs_s[number, rows, 0] = to_begin_s[poses]
-                    legs_s[number, rows, 1] = table.sonar_on_s[places, chosen[poses]]
-                    legs_s[number, rows, 2] = tables[number].home_s[places, chosen[poses]]
-        self.legs_s: FloatArray = legs_s.reshape(-1, 3, count)
+                    to_begin_s[number, rows] = its_s[poses]
+                    sweep_s[number, rows] = table.sonar_on_s[places, chosen[poses]]
+                    home_s[number, rows] = tables[number].home_s[places, chosen[poses]]
+        self.to_begin_s: FloatArray = to_begin_s.reshape(-1, count)
+        self.sweep_s: FloatArray = sweep_s.reshape(-1, count)
+        self.home_s: FloatArray = home_s.reshape(-1, count)
         self.worth_m2 = np.array([one.worth_m2 for one in tables])
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
         self.lasts_s = np.array([one.lasts_until_s for one in helpers])
@@ -62,7 +65,7 @@ class Team:
         self.deadline_s = deadline_s
         self.alone_m2 = self.worth_m2.max(axis=0)
         sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
-        self.alone_s = sweeps_s + self._usual_way_s(legs_s[:, :, 0])
+        self.alone_s = sweeps_s + self._usual_way_s(to_begin_s)
         rates = self.alone_m2 / self.alone_s
         self.later_m2ps = LATER_SHARE * float(rates.min())
         self.by_rate = np.argsort(-rates, kind="stable")
@@ -76,8 +79,8 @@ class Team:
         for one, route in enumerate(routes):
             at, now_s = self.start, self.helpers[one].free_s
             for place in route:
-                to_begin_s, sweep_s, _ = self.legs_s[one * self.nodes + at, :, place]
-                begins_s = now_s + to_begin_s
+                row = one * self.nodes + at
+                begins_s, sweep_s = now_s + self.to_begin_s[row, place], self.sweep_s[row, place]
                 at = self.way[one, at, place]
                 share = min(1.0, max(0.0, float((self.deadline_s - begins_s) / sweep_s)))
                 shares[self.strips[place].strip.number] = share
