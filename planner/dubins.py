@@ -57,7 +57,8 @@ class DubinsPath:
         left_m = max(distance_m, 0.0)
         pose = self.start
         for turn, length_m in zip(self.turns, self.lengths_m, strict=True):
-            pose = _advance(pose, turn / self.turn_radius_m, min(left_m, length_m))
+            stretch_m = min(left_m, length_m)
+            pose = along_arc(pose, stretch_m, turn / self.turn_radius_m * stretch_m)
             left_m -= length_m
             if left_m <= 0:
                 break
@@ -89,8 +90,28 @@ class DubinsPath:
     @cached_property
     def _stretch_starts(self) -> tuple[Pose, Pose, Pose]:
         """The pose in which each stretch begins, headings not wrapped."""
-        second = _advance(self.start, self.turns[0] / self.turn_radius_m, self.lengths_m[0])
-        return self.start, second, _advance(second, self.turns[1] / self.turn_radius_m, self.lengths_m[1])
+        (first_m, second_m, _), (first, second, _), radius_m = self.lengths_m, self.turns, self.turn_radius_m
+        begin = along_arc(self.start, first_m, first / radius_m * first_m)
+        return self.start, begin, along_arc(begin, second_m, second / radius_m * second_m)
+
+
+def along_arc(start: Pose, length_m: float, turned_rad: float) -> Pose:
+    """The pose after a way of a length on which the heading turns evenly, by `turned_rad` to starboard; 0 for straight
+    ahead. The heading is not wrapped."""
+    half_rad = turned_rad / 2
+    chord_m = length_m if half_rad == 0 else length_m * math.sin(half_rad) / half_rad
+    chord_heading_rad = start.heading_rad + half_rad
+    return Pose(
+        start.x_m + chord_m * math.sin(chord_heading_rad),
+        start.y_m + chord_m * math.cos(chord_heading_rad),
+        start.heading_rad + turned_rad,
+    )
+
+
+def compass_rad(angle_rad: float) -> float:
+    """An angle as a heading in [0, 2 pi)."""
+    heading_rad = angle_rad % (2 * math.pi)
+    return 0.0 if heading_rad == 2 * math.pi else heading_rad  # the remainder of a tiny negative angle is a full turn
 
 
 def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
@@ -236,15 +257,3 @@ def _compass(heading_rad: FloatArray) -> FloatArray:
     """Headings wrapped to [0, 2 pi); the remainder of a tiny negative angle rounds to a full turn."""
     wrapped = heading_rad % _FULL_TURN_RAD
     return np.where(wrapped == _FULL_TURN_RAD, 0.0, wrapped)
-
-
-def _advance(pose: Pose, curvature: float, length_m: float) -> Pose:
-    """The pose after a stretch of constant curvature (1/m, to starboard), the heading not wrapped."""
-    half_rad = curvature * length_m / 2
-    chord_m = length_m if half_rad == 0 else length_m * math.sin(half_rad) / half_rad
-    chord_heading_rad = pose.heading_rad + half_rad
-    return Pose(
-        pose.x_m + chord_m * math.sin(chord_heading_rad),
-        pose.y_m + chord_m * math.cos(chord_heading_rad),
-        pose.heading_rad + 2 * half_rad,
-    )

@@ -8,10 +8,9 @@ import math
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
 
 from planner.currents import Current, made_good_mps
-from planner.dubins import Pose
+from planner.dubins import Pose, along_arc, compass_rad
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
 from planner.ways import Way, shortest_way
@@ -28,49 +27,31 @@ class NoWayError(Exception):
     """A manoeuvre that cannot be sailed without entering ground to keep out of; `str()` says why."""
 
 
-class Leg(Protocol):
-    """A piece of a path."""
-
-    @property
-    def length_m(self) -> float:
-        """Length, >= 0; infinity for a circle without end."""
-
-    def pose_at(self, distance_m: float) -> Pose:
-        """The pose at a distance from the leg's start, 0 to its length."""
-
-
 @dataclass(frozen=True, slots=True)
-class Straight:
-    """A straight leg."""
+class Arc:
+    """A leg of one curvature in 1/m, to starboard where that is above 0; 0 for a straight one. `length_m`: infinity for
+    a circle without end."""
 
     start: Pose
     length_m: float
+    curvature: float = 0.0
 
     def pose_at(self, distance_m: float) -> Pose:
         """The pose at a distance from the start."""
-        x_m, y_m, heading_rad = self.start
-        return Pose(x_m + distance_m * math.sin(heading_rad), y_m + distance_m * math.cos(heading_rad), heading_rad)
+        pose = along_arc(self.start, distance_m, distance_m * self.curvature)
+        return pose._replace(heading_rad=compass_rad(pose.heading_rad))
 
 
-@dataclass(frozen=True, slots=True)
-class Loiter:
-    """A circle without end, to starboard where `side` is 1, to port where it is -1."""
-
-    start: Pose
-    radius_m: float
-    side: int = 1
-    length_m: float = math.inf
-
-    def pose_at(self, distance_m: float) -> Pose:
-        """The pose at a distance from the start."""
-        x_m, y_m, heading_rad = self.start
-        turned = heading_rad + self.side * distance_m / self.radius_m
-        beside_m = self.side * self.radius_m
-        return Pose(
-            x_m + beside_m * (math.cos(heading_rad) - math.cos(turned)),
-            y_m + beside_m * (math.sin(turned) - math.sin(heading_rad)),
-            compass_rad(turned),
-        )
+def arcs_of(way: Way) -> list[Arc]:
+    """The turns and straights of a way."""
+    arcs: list[Arc] = []
+    for path in way:
+        start = path.start
+        for turn, length_m in zip(path.turns, path.lengths_m, strict=True):
+            if length_m > 0.0:
+                arcs.append(Arc(start, length_m, turn / path.turn_radius_m))
+                start = arcs[-1].pose_at(length_m)
+    return arcs
 
 
 class Path:
@@ -80,7 +61,7 @@ class Path:
     arrives on them.
     """
 
-    def __init__(self, start_ms: int, speed_mps: float, legs: list[Leg], held_m: list[tuple[float, float]]) -> None:
+    def __init__(self, start_ms: int, speed_mps: float, legs: list[Arc], held_m: list[tuple[float, float]]) -> None:
         self.start_ms = start_ms
         self.speed_mps = speed_mps
         self._legs = legs
@@ -97,8 +78,33 @@ class Path:
 
     def pose_after(self, distance_m: float) -> Pose:
         """The pose at a distance from the start."""
-        number = bisect_right(self._starts_m, distance_m) - 1
+        number = self._leg_at(distance_m)
         return self._legs[number].pose_at(distance_m - self._starts_m[number])
+
+    def curvature_at(self, time_ms: int) -> float:
+        """That of the leg the vehicle is on; where it comes from one to the next, of the next."""
+        return self._legs[self._leg_at(self.distance_at(time_ms) + ROUNDING_M)].curvature
+
+    def cut(self, from_m: float, to_m: float) -> list[Arc]:
+        """The path from one distance to another."""
+        arcs: list[Arc] = []
+        for start_m, leg in zip(self._starts_m, self._legs, strict=True):
+            begin_m, end_m = max(from_m, start_m), min(to_m, start_m + leg.length_m)
+            if begin_m < end_m:
+                arcs.append(Arc(leg.pose_at(begin_m - start_m), end_m - begin_m, leg.curvature))
+        return arcs
+
+    def steady_until_ms(self, from_ms: int, most_ms: int) -> int:
+        """Until when, at most until a time after `from_ms`, the vehicle is where it would be if it went on as it does
+        at `from_ms`, at one speed and one rate of turn."""
+        number = self._leg_at(self.distance_at(from_ms) + ROUNDING_M)
+        for start_m, leg in zip(self._starts_m[number + 1 :], self._legs[number + 1 :], strict=True):
+            if leg.curvature != self._legs[number].curvature:
+                return min(most_ms, max(self.time_ms(start_m), from_ms + 1))
+        return most_ms
+
+    def _leg_at(self, distance_m: float) -> int:
+        return bisect_right(self._starts_m, distance_m) - 1
 
     @property
     def circles_from_m(self) -> float:
@@ -116,21 +122,12 @@ class Path:
         return max(left, default=0.0)
 
 
-@dataclass(frozen=True, slots=True)
-class Onward:
-    """What is left of an earlier path, or some of it, sailed on."""
-
-    path: Path
-    from_m: float
-    length_m: float
-
-    def pose_at(self, distance_m: float) -> Pose:
-        """The pose at a distance from where it is taken up."""
-        return self.path.pose_after(self.from_m + distance_m)
-
-
 STEP_OF_RADIUS = 0.1
 """A vehicle that is carried by a current turns by no more a step."""
+OFF_M = 1.0
+"""So far a vehicle may be from where its course leads by what it has told, before it tells another one,"""
+OFTEN_MS = 1_000
+"""but for this alone not sooner."""
 
 
 class CarriedPath(Path):
@@ -141,7 +138,7 @@ class CarriedPath(Path):
         self,
         start_ms: int,
         speed_mps: float,
-        legs: list[Leg],
+        legs: list[Arc],
         held_m: list[tuple[float, float]],
         current: Current,
         step_m: float,
@@ -168,6 +165,23 @@ class CarriedPath(Path):
         share = distance_m / self._step_m - step
         time_s = self._times_s[step] + share * (self._times_s[step + 1] - self._times_s[step])
         return self.start_ms + math.ceil(time_s * 1000.0 - ROUNDING_MS)
+
+    def steady_until_ms(self, from_ms: int, most_ms: int) -> int:
+        """The same, but for OFF_M that the vehicle may be ahead or behind."""
+        most_ms = super().steady_until_ms(from_ms, most_ms)
+        from_s, from_m = (from_ms - self.start_ms) / 1000.0, self.distance_at(from_ms)
+        speed_mps = self.made_good_mps(from_m, from_s)
+        near_ms = from_ms + OFTEN_MS
+        for step in itertools.count(int(from_m / self._step_m) + 1):
+            while len(self._times_s) <= step:
+                self._go_on()
+            time_s = self._times_s[step]
+            if self.start_ms + time_s * 1000.0 >= most_ms:
+                return most_ms
+            if abs(self._step_m * step - from_m - speed_mps * (time_s - from_s)) > OFF_M:
+                break
+            near_ms = max(near_ms, self.start_ms + math.floor(time_s * 1000.0))
+        return min(near_ms, most_ms)
 
     def made_good_mps(self, distance_m: float, time_s: float) -> float:
         """The speed over the ground at a distance from the start, so long after it."""
@@ -235,6 +249,15 @@ class Motion:
             return self._path.made_good_mps(self._path.distance_at(time_ms), (time_ms - self._path.start_ms) / 1000.0)
         return 0.0 if self._path is None else self._speed_mps
 
+    def turn_radps(self, time_ms: int) -> float:
+        """How fast it turns over the ground, to starboard if above 0."""
+        return 0.0 if self._path is None else self._path.curvature_at(time_ms) * self.speed_mps(time_ms)
+
+    def steady_until_ms(self, from_ms: int, most_ms: int) -> int:
+        """Until when, at most until a time after `from_ms`, it is where it would be if it went on as it does at
+        `from_ms`; in a current within OFF_M."""
+        return most_ms if self._path is None else self._path.steady_until_ms(from_ms, most_ms)
+
     def stop(self, now_ms: int) -> None:
         """Lies where it is, until the next manoeuvre."""
         self._start, self._path = self.pose_at(now_ms), None
@@ -273,7 +296,7 @@ class Motion:
             end = Pose(*point, bearing if heading_rad is None else heading_rad)
             way = self._way(pose, end)
             if way is not None and (not loiters or self._circling(end) is not None):
-                legs.extend(way)
+                legs.extend(arcs_of(way))
                 arrival_m = sum(leg.length_m for leg in legs)
                 return self._sail(legs, held_m, now_ms).time_ms(arrival_m)
         raise NoWayError("no way there, to circle there, stays out of ground to keep out of")
@@ -297,13 +320,13 @@ class Motion:
         run_in = Pose(
             start[0] - run_in_m * math.sin(heading_rad), start[1] - run_in_m * math.cos(heading_rad), heading_rad
         )
-        whole = Straight(run_in, length_m + 2 * run_in_m)
+        whole = Arc(run_in, length_m + 2 * run_in_m)
         if not self._nearest.is_room(run_in, whole.pose_at(whole.length_m), self._turn_radius_m):
             raise NoWayError("the track, with its runs and turns, enters ground to keep out of")
         for legs, held_m, pose in self._departures(now_ms):
             way = self._way(pose, run_in)
             if way is not None:
-                legs.extend(way)
+                legs.extend(arcs_of(way))
                 start_m = sum(leg.length_m for leg in legs) + run_in_m
                 legs.append(whole)
                 held_m.append((start_m + length_m, start_m + length_m + run_in_m))
@@ -320,7 +343,7 @@ class Motion:
         side = self._keep_out.circling(pose, self._turn_radius_m)
         return self._nearest.circling(pose, self._turn_radius_m) if side is None else side
 
-    def _departures(self, now_ms: int) -> Iterator[tuple[list[Leg], list[tuple[float, float]], Pose]]:
+    def _departures(self, now_ms: int) -> Iterator[tuple[list[Arc], list[tuple[float, float]], Pose]]:
         """What has to be sailed before a new manoeuvre, as legs and held stretches, and the pose it starts from.
 
         Where there is ground to keep out of: beside the least that has to be, ever more of the way under way.
@@ -330,18 +353,17 @@ class Motion:
         if held_m == 0.0:
             yield [], [], pose
         else:
-            run_out = Straight(pose, held_m)
+            run_out = Arc(pose, held_m)
             yield [run_out], [(0.0, held_m)], run_out.pose_at(held_m)
         if self._keep_out and self._path is not None:
             path, here_m = self._path, self._path.distance_at(now_ms)
             for further_m in _further(here_m + held_m, path.circles_from_m, self._turn_radius_m):
-                length_m = further_m - here_m
                 held = [(0.0, held_m)] if held_m else []
-                yield [Onward(path, here_m, length_m)], held, path.pose_after(further_m)
+                yield path.cut(here_m, further_m), held, path.pose_after(further_m)
 
-    def _sail(self, legs: list[Leg], held_m: list[tuple[float, float]], now_ms: int) -> Path:
+    def _sail(self, legs: list[Arc], held_m: list[tuple[float, float]], now_ms: int) -> Path:
         last = legs[-1].pose_at(legs[-1].length_m) if legs else self.pose_at(now_ms)
-        legs = [*legs, Loiter(last, self._turn_radius_m, self._circling(last) or 1)]
+        legs = [*legs, Arc(last, math.inf, (self._circling(last) or 1) / self._turn_radius_m)]
         if self._current is None:
             self._path = Path(now_ms, self._speed_mps, legs, held_m)
         else:
@@ -362,9 +384,3 @@ def _further(from_m: float, circles_from_m: float, turn_radius_m: float) -> list
 def bearing_rad(start: Point, end: Point) -> float:
     """Compass bearing of one point from another, [0, 2 pi)."""
     return compass_rad(math.atan2(end[0] - start[0], end[1] - start[1]))
-
-
-def compass_rad(angle_rad: float) -> float:
-    """An angle as a heading in [0, 2 pi)."""
-    heading_rad = angle_rad % (2 * math.pi)
-    return 0.0 if heading_rad == 2 * math.pi else heading_rad  # the remainder of a tiny negative angle is a full turn

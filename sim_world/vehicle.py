@@ -14,9 +14,11 @@ from planner.keep_out import NOWHERE, KeepOut
 from planner.types import Point
 from planner.way_home import THERE_M
 from sim_world.config import FARTHEST_M, VehicleConfig
-from sim_world.motion import FollowedTrack, Motion, NoWayError, bearing_rad
+from sim_world.motion import OFF_M, FollowedTrack, Motion, NoWayError, bearing_rad
 from sim_world.steadiness import STILL_WATER, Stream
 
+HEARTBEAT_MS = 10_000
+"""Whenever so much time has passed a course is told again, as one may have been lost: by all at once."""
 TRACK_ROUNDING_M = 0.02
 """Two ends in whole centimetres make a track up to 1.5 cm too long; no bin is added for that."""
 
@@ -81,15 +83,22 @@ class SimulatedVehicle:
         return self.config.position_drift_mps * now_ms / 1000
 
     def nav(self, now_ms: int) -> Nav:
-        """Where it believes it is."""
-        pose = self._motion.pose_at(now_ms)
-        return Nav(*pose, self._motion.speed_mps(now_ms), self.config.altitude_m, self.sigma_at(now_ms))
+        """The course it believes in."""
+        motion, config = self._motion, self.config
+        pose, speed_mps, turn_radps = motion.pose_at(now_ms), motion.speed_mps(now_ms), motion.turn_radps(now_ms)
+        return Nav(*pose, speed_mps, config.altitude_m, self.sigma_at(now_ms), turn_radps)
 
     def truth(self, now_ms: int) -> TruthPose:
-        """Where it is."""
-        x_m, y_m, heading_rad = self._motion.pose_at(now_ms)
-        east_m, north_m = self.offset_at(now_ms)
-        return TruthPose(x_m + east_m, y_m + north_m, heading_rad)
+        """Its course."""
+        nav, (east_m, north_m) = self.nav(now_ms), self.offset_at(now_ms)
+        return TruthPose(nav.x_m + east_m, nav.y_m + north_m, nav.heading_rad, nav.speed_mps, nav.turn_radps)
+
+    def steady_until_ms(self, from_ms: int) -> int:
+        """Until when what it tells of its course at a time is true within OFF_M; at most until the next heartbeat."""
+        heartbeat_ms = (from_ms // HEARTBEAT_MS + 1) * HEARTBEAT_MS
+        drift_mps = self.config.position_drift_mps
+        off_ms = from_ms + round(OFF_M / drift_mps * 1000) if drift_mps > 0.0 else heartbeat_ms
+        return self._motion.steady_until_ms(from_ms, min(heartbeat_ms, off_ms))
 
     def command(self, maneuver: Maneuver, now_ms: int) -> ManeuverStatus:
         """Begins a manoeuvre, or refuses it and goes on with what it does.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 from comms.node import Publication, Received, Step
-from comms.said.messages import Maneuver, ManeuverStatus, MissionOver
+from comms.said.messages import Maneuver, ManeuverState, ManeuverStatus, MissionOver
 from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE, TRUTH_TARGETS
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
@@ -32,6 +34,7 @@ class Body:
         )
         self._told: tuple[Maneuver, int] | None = None
         self._said: ManeuverStatus | None = None
+        self._course_due_ms = 0
         self._truth_differs = config.position_error_m > 0.0 or config.position_drift_mps > 0.0
         self._nav_key = NAV.key(vehicle=config.vehicle)
         self._status_key = MANEUVER_STATUS.key(vehicle=config.vehicle)
@@ -39,8 +42,11 @@ class Body:
         self._truth_look_key = TRUTH_LOOK.key(vehicle=config.vehicle)
         self._truth_pose_key = TRUTH_POSE.key(vehicle=config.vehicle)
 
-    def navigation(self, now_ms: int) -> list[Publication]:
-        """Where the vehicle believes it is and, where that differs, where it is."""
+    def course(self, now_ms: int) -> list[Publication]:
+        """The course that the vehicle believes in and, where that differs, the true one; nothing before it is due."""
+        if now_ms < self._course_due_ms:
+            return []
+        self._course_due_ms = self._vehicle.steady_until_ms(now_ms)
         publish = [Publication(self._nav_key, self._vehicle.nav(now_ms))]
         if self._truth_differs:
             publish.append(Publication(self._truth_pose_key, self._vehicle.truth(now_ms)))
@@ -50,20 +56,28 @@ class Body:
         """Begins or refuses a manoeuvre; of one that is asked for again, by the same incarnation of the agent, it says
         how far it got."""
         if (maneuver, incarnation) != self._told:
-            self._told = maneuver, incarnation
+            self._told, self._course_due_ms = (maneuver, incarnation), now_ms
             self._said = self._vehicle.command(maneuver, now_ms)
         assert self._said is not None
         return Publication(self._status_key, self._said)
 
     @property
     def next_event_ms(self) -> int | None:
-        """When the vehicle has something to say next besides its navigation, None for never."""
+        """When the vehicle has something to say next besides its course, None for never."""
         return self._vehicle.next_event_ms
+
+    @property
+    def next_ms(self) -> int:
+        """When it has anything to say next."""
+        event_ms = self._vehicle.next_event_ms
+        return self._course_due_ms if event_ms is None else min(event_ms, self._course_due_ms)
 
     def next_event(self, time_ms: int) -> list[Publication]:
         """What it has to say at that time."""
         event = self._vehicle.pop_event()
         if isinstance(event, ManeuverStatus):
+            if event.state is not ManeuverState.ON_TRACK:  # it may lie now
+                self._course_due_ms = time_ms
             if self._told is not None and event.number == self._told[0].number:
                 self._said = event
             return [Publication(self._status_key, event)]
@@ -75,14 +89,11 @@ class Body:
         return publish
 
 
-NAV_PERIOD_MS = 1000
-
-
 class World:
     """The node of the simulated sea, for all its vehicles (`comms.node.Node`).
 
-    Reads manoeuvres and the mission's end. Publishes the targets once; for each vehicle its navigation at every whole
-    second, a word on each manoeuvre, and a look for each stretch of track, the moment it is passed.
+    Reads manoeuvres and the mission's end. Publishes the targets once; for each vehicle its course when that changes
+    and at each heartbeat, a word on each manoeuvre, and a look for each stretch of track, the moment it is passed.
     """
 
     def __init__(self, config: WorldConfig) -> None:
@@ -91,7 +102,6 @@ class World:
         current = make_current(config.current, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)
         self._bodies = {one.vehicle: Body(one, config, seabed, current, self._targets) for one in by_id}
-        self._next_nav_ms = 0
         self._over = False
 
     def start(self, now_ms: int) -> Step:
@@ -124,22 +134,14 @@ class World:
     def _due(self, now_ms: int) -> tuple[list[Publication], int | None]:
         """What there is to say by now, and when there is more."""
         publish: list[Publication] = []
-        if not self._bodies:
-            return publish, None
-        if self._next_nav_ms <= now_ms:
-            publish += self._navigation(now_ms)
-        while True:
-            first_ms, first = None, None
-            for body in self._bodies.values():  # of several events at one time that of the first by id
-                at_ms = body.next_event_ms
-                if at_ms is not None and (first_ms is None or at_ms < first_ms):
-                    first_ms, first = at_ms, body
-            if first_ms is None or first is None:
-                return publish, self._next_nav_ms
-            if first_ms > now_ms:
-                return publish, min(first_ms, self._next_nav_ms)
-            publish += first.next_event(first_ms)
-
-    def _navigation(self, now_ms: int) -> list[Publication]:
-        self._next_nav_ms = (now_ms // NAV_PERIOD_MS + 1) * NAV_PERIOD_MS
-        return [one for body in self._bodies.values() for one in body.navigation(now_ms)]
+        while due := [
+            (at_ms, body)
+            for body in self._bodies.values()
+            if (at_ms := body.next_event_ms) is not None and at_ms <= now_ms
+        ]:
+            # Of several events at one time min takes the first body's: bodies are in the order of their ids.
+            at_ms, body = min(due, key=itemgetter(0))
+            publish += body.next_event(at_ms)
+        for body in self._bodies.values():
+            publish += body.course(now_ms)
+        return publish, min((body.next_ms for body in self._bodies.values()), default=None)

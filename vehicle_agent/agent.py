@@ -25,6 +25,7 @@ from comms.said.topics import CONTACT, MANEUVER, STATE
 from planner.dubins import Pose
 from planner.footprints.footprint import Footprint
 from planner.keep_out import NOWHERE, KeepOut
+from planner.reckoning import Course
 from planner.region import Region
 from planner.sweep import pass_over, shifted
 from planner.types import Point, Strip, SweepFrame, Track
@@ -55,7 +56,7 @@ class Agent:
         self.mode = Mode.IDLE
         self.works_on = 0
         self.expected_end_ms = 0
-        self.nav: Nav | None = None
+        self.course: Course | None = None
         self.coverage: CoverageLayer | None = None
         self.region: Region
         self.keep_out: KeepOut = NOWHERE
@@ -83,7 +84,7 @@ class Agent:
         message = received.message
         self._now_ms = now_ms
         if isinstance(message, Nav):
-            self._hear_nav(message, now_ms)
+            self._hear_nav(message, received.header.sent_ms, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
             self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
             self.region = Region(message.outline, message.hole_outlines, message.keep_out_outlines)
@@ -165,18 +166,19 @@ class Agent:
 
     def go_to(self, place: Point) -> None:
         """Commands the vehicle to a place, to wait there."""
-        here = (self.nav.x_m, self.nav.y_m) if self.nav else place
-        self._command(ManeuverKind.GOTO, here, place, 0.0)
+        pose = self.pose
+        self._command(ManeuverKind.GOTO, place if pose is None else pose[:2], place, 0.0)
 
     def hold(self) -> None:
         """Commands the vehicle to stay where it is."""
-        here = (self.nav.x_m, self.nav.y_m) if self.nav else (0.0, 0.0)  # a hold needs no place
+        pose = self.pose
+        here = (0.0, 0.0) if pose is None else pose[:2]  # a hold needs no place
         self._command(ManeuverKind.HOLD, here, here, 0.0)
 
     @property
     def pose(self) -> Pose | None:
-        """Where the vehicle is; None before it has said so."""
-        return None if self.nav is None else Pose(self.nav.x_m, self.nav.y_m, self.nav.heading_rad)
+        """Where the vehicle is by what it said last of its course; None before it has said so."""
+        return None if self.course is None else self.course.pose_at(self._now_ms)
 
     def turn_home(self, now_ms: int) -> None:
         """Leaves what it does, and commands the vehicle home."""
@@ -188,7 +190,7 @@ class Agent:
         self.expected_end_ms, begin = 0, homing.way.home
         if pose is not None:
             way_s, heading_rad = homing.way.from_pose(pose)
-            if way_s == 0.0 and self.maneuver is None and self.nav is not None and self.nav.speed_mps == 0.0:
+            if way_s == 0.0 and self.maneuver is None and self.course is not None and self.course.speed_mps == 0.0:
                 self._rest(Mode.HOME, now_ms)  # it has never left
                 return
             self.expected_end_ms = now_ms + round(way_s * 1000)
@@ -209,7 +211,8 @@ class Agent:
 
     def report_state(self, now_ms: int) -> None:
         """Publishes the state alone, once the vehicle has said where it is."""
-        if self.nav is None:
+        pose = self.pose
+        if pose is None:
             return
         assert self.coverage is not None
         message = AgentState(
@@ -217,9 +220,9 @@ class Agent:
             works_on=self.works_on,
             battery=self.battery(now_ms),
             expected_end_ms=self.expected_end_ms,
-            x_m=self.nav.x_m,
-            y_m=self.nav.y_m,
-            heading_rad=self.nav.heading_rad,
+            x_m=pose.x_m,
+            y_m=pose.y_m,
+            heading_rad=pose.heading_rad,
             tiles_told=self.coverage.told(),
             hotspots_told=self.hotspots_told(),
         )
@@ -229,9 +232,11 @@ class Agent:
         """Share of the endurance that is left."""
         return self.endurance.left(now_ms)
 
-    def _hear_nav(self, nav: Nav, now_ms: int) -> None:
-        first = self.nav is None
-        self.nav = nav
+    def _hear_nav(self, nav: Nav, sent_ms: int, now_ms: int) -> None:
+        first = self.course is None
+        if self.course is not None and sent_ms < self.course.begun_ms:  # it comes late, a newer one holds
+            return
+        self.course = Course.of(nav, sent_ms)
         if first and self.coverage is not None and not self._over:
             self.report_state(now_ms)
 

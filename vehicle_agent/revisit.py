@@ -107,7 +107,8 @@ class SecondLooks:
         if self.strip is not None:
             self._tell(strip.number, TaskState.REFUSED, 0, f"at work on strip {self.strip.number}")
             return
-        if agent.nav is None:
+        pose = agent.pose
+        if pose is None:
             self._tell(strip.number, TaskState.REFUSED, 0, "no position yet")
             return
         if not _makes_sense(strip):
@@ -124,15 +125,14 @@ class SecondLooks:
         if agent.endurance.left(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
             return
-        assert agent.pose is not None
         radius_m, keep_out = config.turn_radius_m, agent.keep_out.nearer()
         ways = sweeps_by(agent.footprint, strip, radius_m, config.run_in_m, keep_out)
         try:
-            sweep, way_m = shortest_sweep(ways, agent.pose, radius_m, keep_out)
+            sweep, way_m = shortest_sweep(ways, pose, radius_m, keep_out)
         except NoSweepError:
             self._tell(strip.number, TaskState.REFUSED, 0, NO_ROOM)
             return
-        ends_ms = now_ms + self._takes_ms(sweep, agent.pose, way_m)
+        ends_ms = now_ms + self._takes_ms(sweep, pose, way_m)
         free_ms = ends_ms + agent.endurance.run_out_ms(sweep.passes[-1], config.run_in_m)
         if not agent.endurance.lasts_from(sweep.leave, free_ms, MARGIN_MS):
             self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)

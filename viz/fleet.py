@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 
 import numpy as np
@@ -11,7 +11,9 @@ import rerun as rr
 from comms.node import Received
 from comms.said.announcement import RosterVehicle, RunInfo
 from comms.said.messages import AgentState, Contact, Mode, Nav, Plan, TaskState, TaskStatus
+from planner.dubins import Pose
 from planner.footprints import footprint_of
+from planner.reckoning import Course, Trace
 from viz import palette, paths
 from viz.canvas import Canvas, Column
 from viz.shapes import FLOWN_Z_M, PLAN_Z_M, POINT_Z_M, VEHICLE_Z_M, Extent, body_quaternions, glyph
@@ -31,6 +33,7 @@ class Fleet:
         self._colours = palette.vehicle_colours(run.vehicles)
         self._glyph_m = GLYPH_SHARE * max(extent.width_m, extent.height_m)
         self._trail_points = 0.9 if len(run.vehicles) <= MANY else 0.45
+        self._traces: dict[str, Trace] = {}
         self._poses: dict[str, Column] = {}
         self._trails: dict[str, Trail] = {}
         self._modes: dict[str, Mode] = {}
@@ -42,10 +45,24 @@ class Fleet:
     def on_nav(self, received: Received, nav: Nav) -> None:
         """Moves the vehicle, and draws its track on."""
         vehicle, time_ms = received.vehicle, received.header.sent_ms
-        if vehicle not in self._poses:
+        if vehicle not in self._traces:
             self._introduce(vehicle)
-        self._poses[vehicle].add(time_ms, (nav.x_m, nav.y_m, nav.heading_rad))
-        self._trails[vehicle].add(time_ms, nav.x_m, nav.y_m)
+        self._move(vehicle, self._traces[vehicle].hear(Course.of(nav, time_ms)))
+
+    def advance(self, time_ms: int) -> None:
+        """Moves every vehicle on along its course."""
+        for vehicle, trace in self._traces.items():
+            self._move(vehicle, trace.until(time_ms))
+
+    def finish(self, time_ms: int) -> None:
+        """The same to the end."""
+        for vehicle, trace in self._traces.items():
+            self._move(vehicle, trace.end(time_ms))
+
+    def _move(self, vehicle: str, places: Iterable[tuple[int, Pose]]) -> None:
+        for time_ms, pose in places:
+            self._poses[vehicle].add(time_ms, pose)
+            self._trails[vehicle].add(time_ms, pose.x_m, pose.y_m)
 
     def on_plan(self, received: Received, plan: Plan) -> None:
         """Replaces the vehicle's planned tracks."""
@@ -121,6 +138,7 @@ class Fleet:
         self._canvas.put_static(
             flown, rr.LineStrips3D.from_fields(colors=[colour], radii=rr.Radius.ui_points(self._trail_points))
         )
+        self._traces[vehicle] = Trace(all_along=True)
         self._poses[vehicle] = self._canvas.column(here, _poses)
         self._trails[vehicle] = Trail(self._canvas.column(flown, _segments))
 
@@ -148,7 +166,7 @@ class Trail:
             self._last = (time_ms, x_m, y_m)
 
 
-def _poses(rows: Sequence[tuple[float, float, float]]) -> rr.ComponentColumnList:
+def _poses(rows: Sequence[Pose]) -> rr.ComponentColumnList:
     x_m, y_m, heading_rad = np.array(rows).T
     places = np.column_stack([x_m, y_m, np.full(len(rows), VEHICLE_Z_M)])
     return rr.Transform3D.columns(translation=places, quaternion=body_quaternions(heading_rad))

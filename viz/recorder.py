@@ -86,7 +86,8 @@ class _Mission:
         self._second_looks = SecondLooks(canvas, extent)
         self._books = StripBooks()
         self._time_ms = -1
-        fleet, curves, truth = Fleet(canvas, run, extent), Curves(canvas, run, config.thresholds), Truth(canvas)
+        self._fleet, self._truth = fleet, truth = Fleet(canvas, run, extent), Truth(canvas)
+        curves = Curves(canvas, run, config.thresholds)
         self._draw: dict[type[Message], tuple[Callable[[Received, Any], None], ...]] = {
             CoverageTile: (self._map.on_tile,),
             Nav: (fleet.on_nav,),
@@ -112,6 +113,8 @@ class _Mission:
 
     def _advance(self, time_ms: int) -> None:
         self._time_ms = time_ms
+        self._fleet.advance(time_ms)
+        self._truth.advance(time_ms)
         self._map.advance(time_ms)
         self._second_looks.advance(time_ms)
         self._table.advance(time_ms)
@@ -119,6 +122,8 @@ class _Mission:
         self._canvas.advance()
 
     def finish(self) -> None:
+        self._fleet.finish(self._time_ms)
+        self._truth.finish(self._time_ms)
         self._map.finish()
         self._second_looks.finish()
         self._table.finish()

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 import rerun as rr
 
 from comms.node import Received
 from comms.said.messages import TruthLook, TruthPose, TruthTargets
+from planner.dubins import Pose
+from planner.reckoning import Course, Trace
 from planner.types import FloatArray
 from viz import palette, paths
 from viz.canvas import Canvas, Column
@@ -22,6 +26,7 @@ class Truth:
         self._canvas = canvas
         self._targets: FloatArray = np.zeros((0, 3))
         self._detected: set[int] = set()
+        self._traces: dict[str, Trace] = {}
         self._poses: dict[str, Column] = {}
 
     def on_targets(self, received: Received, truth: TruthTargets) -> None:
@@ -40,12 +45,27 @@ class Truth:
     def on_pose(self, received: Received, pose: TruthPose) -> None:
         """Notes where the vehicle truly is."""
         vehicle = received.vehicle
-        if vehicle not in self._poses:
+        if vehicle not in self._traces:
             path = f"{paths.TRUTH_FLEET}/{vehicle}"
             look = rr.Points3D.from_fields(colors=[palette.TRUE_POSE], radii=rr.Radius.ui_points(3.0))
             self._canvas.put_static(path, look)
+            self._traces[vehicle] = Trace(all_along=True)
             self._poses[vehicle] = self._canvas.column(path, lambda rows: rr.Points3D.columns(positions=rows))
-        self._poses[vehicle].add(received.header.sent_ms, (pose.x_m, pose.y_m, POINT_Z_M))
+        self._move(vehicle, self._traces[vehicle].hear(Course.of(pose, received.header.sent_ms)))
+
+    def advance(self, time_ms: int) -> None:
+        """Moves every true position on."""
+        for vehicle, trace in self._traces.items():
+            self._move(vehicle, trace.until(time_ms))
+
+    def finish(self, time_ms: int) -> None:
+        """The same to the end."""
+        for vehicle, trace in self._traces.items():
+            self._move(vehicle, trace.end(time_ms))
+
+    def _move(self, vehicle: str, places: Iterable[tuple[int, Pose]]) -> None:
+        for time_ms, pose in places:
+            self._poses[vehicle].add(time_ms, (pose.x_m, pose.y_m, POINT_Z_M))
 
     def _put_targets(self, received: Received, path: str, places: FloatArray, colour: palette.Colour) -> None:
         points = rr.Points3D(places, colors=[colour], radii=rr.Radius.ui_points(TARGET_POINTS))

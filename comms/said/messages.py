@@ -25,6 +25,7 @@ from comms.said.wire import (
     ProbabilityCurve,
     ProbabilityLook,
     Radians,
+    RadiansPerSecond,
     SquareMetres,
     Text,
     YesNo,
@@ -37,7 +38,9 @@ MOST_TRACKS = 2000
 
 @dataclass(frozen=True, slots=True)
 class Nav:
-    """Where a vehicle believes it is."""
+    """A vehicle's course over the ground: where it believes it is, and how it goes on from there: straight ahead, or
+    along a circle where `turn_radps` is not 0, to starboard if above 0. It holds until the next one; readers reckon
+    (`planner.reckoning`). Said when the course changes, and every 10 s at the latest, as one may be lost."""
 
     x_m: Metres
     y_m: Metres
@@ -45,6 +48,7 @@ class Nav:
     speed_mps: MetresPerSecond
     altitude_m: Metres
     position_sigma_m: Metres
+    turn_radps: RadiansPerSecond = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -394,11 +398,13 @@ class TruthLook:
 
 @dataclass(frozen=True, slots=True)
 class TruthPose:
-    """Where a vehicle truly is, beside where it believes it is."""
+    """A vehicle's true course, beside that which it believes in; see `Nav`."""
 
     x_m: Metres
     y_m: Metres
     heading_rad: Radians
+    speed_mps: MetresPerSecond = 0.0
+    turn_radps: RadiansPerSecond = 0.0
 
 
 Message = (

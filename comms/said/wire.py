@@ -384,6 +384,7 @@ def shortened(text: str) -> str:
 
 Metres = Annotated[float, Scaled("m", 100, -1e7, 1e7)]
 Radians = Annotated[float, Scaled("rad", 1_000_000, -7.0, 7.0)]
+RadiansPerSecond = Annotated[float, Scaled("rad/s", 1_000_000, -1e4, 1e4)]
 MetresPerSecond = Annotated[float, Scaled("m/s", 1000, 0.0, 100.0)]
 Probability = Annotated[float, Scaled("(probability)", 10_000, 0.0, 1.0)]
 SquareMetres = Annotated[float, Scaled("m2", 10, 0.0, 1e9)]

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from comms.node import Received
-from comms.said.messages import Nav, TruthPose
+from planner.types import Point
+from secondlook.recorded.whereabouts import Place
+
+LEGS_KEPT = 40
+"""Of a vehicle, for those whose places up to the same time come later."""
 
 
 @dataclass(frozen=True)
@@ -22,54 +26,49 @@ class Closest:
 
 
 class _Leg(NamedTuple):
-    """A vehicle's way from one position told to the next, taken to be straight."""
+    """A vehicle's way from one place to the next."""
 
     from_s: float
     to_s: float
-    start: tuple[float, float]
-    end: tuple[float, float]
+    start: Point
+    end: Point
 
-    def at(self, time_s: float) -> tuple[float, float]:
+    def at(self, time_s: float) -> Point:
         share = (time_s - self.from_s) / (self.to_s - self.from_s) if self.to_s > self.from_s else 1.0
         return tuple(a + share * (b - a) for a, b in zip(self.start, self.end, strict=True))  # type: ignore[return-value]
 
 
 class ClosestApproaches:
-    """Take the messages in order; ask at any time.
+    """Take the places of each vehicle in order; ask at any time.
 
-    True positions count where they are told, else those that vehicles believe in. A vehicle counts from when it is
-    first under way, and not while it rests at home. Vehicles that are told of at different times are compared where
-    their last stretches overlap. `speeds_mps`: the most that each vehicle does; a pair is not looked at again before it
-    can be nearer than it was.
+    A vehicle counts from when it is first under way, and not while it rests at home. `speeds_mps`: the most that each
+    vehicle does; a pair is not looked at again before it can be nearer than it was.
     """
 
     def __init__(self, speeds_mps: Mapping[str, float]) -> None:
         self._speeds_mps = speeds_mps
-        self._legs: dict[str, _Leg] = {}
-        self._told_true: set[str] = set()
+        self._legs: dict[str, deque[_Leg]] = {}
         self._under_way: set[str] = set()
         self._closest: dict[tuple[str, str], Closest] = {}
         self._due_s: dict[tuple[str, str], float] = {}
 
-    def hear(self, received: Received) -> None:
-        """Folds one message in."""
-        message, name = received.message, received.vehicle
-        if isinstance(message, TruthPose):
-            self._told_true.add(name)
-        elif not isinstance(message, Nav):
-            return
-        elif message.speed_mps > 0:
+    def hear(self, place: Place) -> None:
+        """Folds one place in."""
+        name = place.vehicle
+        if place.moves:
             self._under_way.add(name)
-        if name not in self._under_way or (isinstance(message, Nav) and name in self._told_true):
+        if name not in self._under_way or not place.counts:
             return
-        now_s, place = received.t_s, (message.x_m, message.y_m)
-        before = self._legs.get(name)
-        self._legs[name] = leg = _Leg(before.to_s if before else now_s, now_s, before.end if before else place, place)
-        for other, its in self._legs.items():
-            if other != name:
-                pair = (name, other) if name < other else (other, name)
-                if self._due_s.get(pair, 0.0) <= now_s:
-                    self._compare(pair, leg, its)
+        legs = self._legs.setdefault(name, deque(maxlen=LEGS_KEPT))
+        from_s, start = (legs[-1].to_s, legs[-1].end) if legs else (place.t_s, place.at)
+        leg = _Leg(from_s, place.t_s, start, place.at)
+        legs.append(leg)
+        for other, others in self._legs.items():
+            pair = (name, other) if name < other else (other, name)
+            if other == name or self._due_s.get(pair, 0.0) > leg.to_s:
+                continue
+            for its in [its for its in others if its.to_s >= leg.from_s]:
+                self._compare(pair, leg, its)
 
     def rest(self, name: str) -> None:
         """A vehicle has come home: nobody can come too close to it there."""

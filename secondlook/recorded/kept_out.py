@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import shapely
 
-from comms.node import Received
-from comms.said.messages import Nav, TruthPose
 from planner.types import Point
+from secondlook.recorded.whereabouts import Place
 
 
 @dataclass(frozen=True)
@@ -22,36 +21,27 @@ class Entered:
 
 
 class Entries:
-    """Take the messages in order; ask at any time.
-
-    True positions count where they are told, else those that vehicles believe in. From one to the next a vehicle is
-    taken to go straight.
-    """
+    """Take the places of each vehicle in order; ask at any time."""
 
     def __init__(self, zones: Sequence[Sequence[Point]]) -> None:
         self._zones = [shapely.Polygon(zone) for zone in zones]
         shapely.prepare(self._zones)
-        self._places: dict[str, Point] = {}
-        self._told_true: set[str] = set()
+        self._places: dict[str, Place] = {}
         self._found: dict[tuple[str, int], Entered] = {}
 
-    def hear(self, received: Received) -> None:
-        """Folds one message in."""
-        message, name = received.message, received.vehicle
-        if not self._zones or not isinstance(message, Nav | TruthPose):
+    def hear(self, place: Place) -> None:
+        """Folds one place in."""
+        if not self._zones or not place.counts:
             return
-        if isinstance(message, TruthPose) and name not in self._told_true:
-            self._told_true.add(name)
-            self._places.pop(name, None)
-        if isinstance(message, Nav) and name in self._told_true:
-            return
-        place = (message.x_m, message.y_m)
-        way = shapely.LineString([self._places.get(name, place), place])
-        at = shapely.Point(place)
+        name = place.vehicle
+        before = self._places.get(name, place)
+        if before.is_true is not place.is_true:  # from where it believed to be no way leads to where it is
+            before = place
+        way, at = shapely.LineString([before.at, place.at]), shapely.Point(place.at)
         self._places[name] = place
         for number, zone in enumerate(self._zones, start=1):
             if (name, number) not in self._found and (zone.intersects(at) or zone.intersects(way)):
-                self._found[name, number] = Entered(name, number, received.t_s)
+                self._found[name, number] = Entered(name, number, place.t_s)
 
     def found(self) -> list[Entered]:
         """Each vehicle and zone once, in the order of time."""

@@ -33,10 +33,11 @@ from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
-from planner.types import BoolArray, FloatArray
+from planner.types import BoolArray, FloatArray, Point
 from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.recorded.kept_out import Entries
 from secondlook.recorded.vehicles import Ending
+from secondlook.recorded.whereabouts import Place, Whereabouts
 from vehicle_agent.agent import makes_sense
 
 RISK_AT_FACTORS = (1.0, 1.05)
@@ -54,7 +55,7 @@ class VehicleFigures:
     ended_ms: int = 0
     looked_m: float = 0.0
     plan: Plan | None = None
-    last_nav: Nav | None = None
+    last_at: Point | None = None
     finished_ms: int | None = None
     surveyed: VehicleLayer | None = None
     mode: Mode | None = None
@@ -99,6 +100,7 @@ class Metrics:
     targets: TruthTargets | None = None
     detected: set[int] = field(default_factory=set)
     risk_at: list[dict[str, float]] = field(default_factory=list)
+    whereabouts: Whereabouts = field(default_factory=Whereabouts)
     approaches: ClosestApproaches = field(default_factory=lambda: ClosestApproaches({}))
     entries: Entries = field(default_factory=lambda: Entries(()))
     misfits: int = 0
@@ -111,16 +113,11 @@ class Metrics:
         if received.header.sent_ms > self.now_ms:
             self._pass_time(received.header.sent_ms)
         vehicle = self.vehicles.get(received.vehicle)
-        if isinstance(message, Nav):  # most are
+        if isinstance(message, Nav | TruthPose):
             if vehicle is not None:
-                self._hear_nav(vehicle, message)
-                self.approaches.hear(received)
-                self.entries.hear(received)
+                self._hear_places(self.whereabouts.hear(received))
         elif isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
-        elif isinstance(message, TruthPose) and vehicle is not None:
-            self.approaches.hear(received)
-            self.entries.hear(received)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
             if makes_sense(message):
                 vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
@@ -207,7 +204,9 @@ class Metrics:
         return self.map.risk[rows, columns], missed
 
     def close(self) -> None:
-        """The mission has ended: times that were not reached have the risk of its end."""
+        """The mission has ended: vehicles were where their last courses led until now, and times that were not reached
+        have the risk of its end."""
+        self._hear_places(self.whereabouts.end(self.now_ms))
         primary_ms = self.primary_ms()
         if primary_ms is not None:
             for factor in RISK_AT_FACTORS[len(self.risk_at) :]:
@@ -259,10 +258,15 @@ class Metrics:
         if risk is not None:
             self.risk_at.append({"t_s": at_ms / 1000, "mean": risk.mean, "worst30_mean": risk.worst30_mean})
 
-    def _hear_nav(self, vehicle: VehicleFigures, nav: Nav) -> None:
-        if vehicle.last_nav is not None:
-            vehicle.path_m += math.hypot(nav.x_m - vehicle.last_nav.x_m, nav.y_m - vehicle.last_nav.y_m)
-        vehicle.last_nav = nav
+    def _hear_places(self, places: list[Place]) -> None:
+        for place in places:
+            if not place.is_true:
+                vehicle = self.vehicles[place.vehicle]
+                if vehicle.last_at is not None:
+                    vehicle.path_m += math.dist(vehicle.last_at, place.at)
+                vehicle.last_at = place.at
+            self.approaches.hear(place)
+            self.entries.hear(place)
 
     def _hear_state(self, vehicle: VehicleFigures, state: AgentState, sent_ms: int) -> None:
         vehicle.ended_ms = sent_ms

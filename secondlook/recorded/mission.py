@@ -169,6 +169,7 @@ class Mission(ABC):
         figures = Metrics()
         for one in self.received():
             figures.hear(one)
+        figures.close()
         return figures
 
     @cached_property
@@ -184,7 +185,7 @@ class Mission(ABC):
     @cached_property
     def paths(self) -> dict[str, PathRecord]:
         """Where each vehicle has been."""
-        return paths(self.said(Nav))
+        return paths(self.said(Nav), self.end_s)
 
     @cached_property
     def strips(self) -> list[StripRecord]:

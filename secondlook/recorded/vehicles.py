@@ -11,6 +11,8 @@ import shapely
 
 from comms.node import Received
 from comms.said.messages import AgentState, Mode, Nav, Plan
+from planner.dubins import Pose
+from planner.reckoning import Course, Trace
 from planner.types import FloatArray
 
 
@@ -152,10 +154,17 @@ class PathRecord:
         return float(self.line.length)
 
 
-def paths(positions: Iterable[Received[Nav]]) -> dict[str, PathRecord]:
-    """The path of each vehicle that told where it is."""
-    rows: dict[str, list[tuple[float, float, float, float]]] = {}
-    for one in positions:
-        nav = one.message
-        rows.setdefault(one.vehicle, []).append((one.t_s, nav.x_m, nav.y_m, nav.heading_rad))
-    return {vehicle: PathRecord(vehicle, *np.array(found).T) for vehicle, found in rows.items()}
+def paths(courses: Iterable[Received[Nav]], end_s: float) -> dict[str, PathRecord]:
+    """The path of each vehicle that told its course, until `end_s`: where it told that, and each second of such a
+    course."""
+    rows: dict[str, list[tuple[int, Pose]]] = {}
+    traces: dict[str, Trace] = {}
+    for one in courses:
+        trace = traces.setdefault(one.vehicle, Trace(all_along=True))
+        rows.setdefault(one.vehicle, []).extend(trace.hear(Course.of(one.message, one.header.sent_ms)))
+    for vehicle, trace in traces.items():
+        rows[vehicle] += trace.end(round(end_s * 1000))
+    return {
+        vehicle: PathRecord(vehicle, *np.array([(at_ms / 1000, *pose) for at_ms, pose in found]).T)
+        for vehicle, found in rows.items()
+    }

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.dubins import Pose
-from sim_world.motion import Motion, bearing_rad, compass_rad
+from planner.dubins import Pose, compass_rad
+from sim_world.motion import Motion, bearing_rad
 
 NORTH = Pose(0.0, 0.0, 0.0)
 QUARTER_M = 20.0 * math.pi / 2
