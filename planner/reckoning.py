@@ -11,6 +11,8 @@ BELIEVED_MS = 30_000
 """For so long a vehicle is taken to go on as it told last, and then to lie; who is that long silent is lost."""
 STEP_MS = 1_000
 """Between two places of a course on which nothing was told."""
+LATE_MS = 250
+"""So much later than after STEP_MS those may tell their position who do so as often as that."""
 
 
 class Told(Protocol):
@@ -90,12 +92,14 @@ class Trace:
         return [*places, (course.begun_ms, course.start)]
 
     def until(self, now_ms: int) -> list[tuple[int, Pose]]:
-        """The places up to now, but for those so new that what is told next may soon tell better."""
+        """The places before now; the first on a course LATE_MS later, as another may be told about then."""
         course = self._course
         if course is None or course.speed_mps == 0.0 or (course.is_straight and not self._all_along):
             return []
-        last_ms = min(now_ms - STEP_MS // 2, course.begun_ms + BELIEVED_MS)
-        places = [(at_ms, course.pose_at(at_ms)) for at_ms in range(self._next_ms, last_ms + 1, STEP_MS)]
+        if now_ms < course.begun_ms + STEP_MS + LATE_MS:
+            return []
+        end_ms = min(now_ms, course.begun_ms + BELIEVED_MS + 1)
+        places = [(at_ms, course.pose_at(at_ms)) for at_ms in range(self._next_ms, end_ms, STEP_MS)]
         self._next_ms += STEP_MS * len(places)
         return places
 

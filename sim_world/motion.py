@@ -176,11 +176,11 @@ class CarriedPath(Path):
             while len(self._times_s) <= step:
                 self._go_on()
             time_s = self._times_s[step]
-            if self.start_ms + time_s * 1000.0 >= most_ms:
-                return most_ms
             if abs(self._step_m * step - from_m - speed_mps * (time_s - from_s)) > OFF_M:
                 break
             near_ms = max(near_ms, self.start_ms + math.floor(time_s * 1000.0))
+            if near_ms >= most_ms:
+                break
         return min(near_ms, most_ms)
 
     def made_good_mps(self, distance_m: float, time_s: float) -> float:
@@ -239,12 +239,17 @@ class Motion:
         self._current = current
         self._path: Path | None = None
 
+    @property
+    def lies(self) -> bool:
+        """Whether it does: before the first manoeuvre, and where it was stopped."""
+        return self._path is None
+
     def pose_at(self, time_ms: int) -> Pose:
         """The pose at a time not before the last manoeuvre's start."""
         return self._start if self._path is None else self._path.pose_at(time_ms)
 
     def speed_mps(self, time_ms: int) -> float:
-        """The speed over the ground: 0 before the first manoeuvre, and where it lies still."""
+        """The speed over the ground: 0 where it lies."""
         if isinstance(self._path, CarriedPath):
             return self._path.made_good_mps(self._path.distance_at(time_ms), (time_ms - self._path.start_ms) / 1000.0)
         return 0.0 if self._path is None else self._speed_mps

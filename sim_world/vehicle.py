@@ -93,6 +93,11 @@ class SimulatedVehicle:
         nav, (east_m, north_m) = self.nav(now_ms), self.offset_at(now_ms)
         return TruthPose(nav.x_m + east_m, nav.y_m + north_m, nav.heading_rad, nav.speed_mps, nav.turn_radps)
 
+    @property
+    def lies(self) -> bool:
+        """Whether it has not been told to go anywhere yet, or has come home, or its battery is empty."""
+        return self._motion.lies
+
     def steady_until_ms(self, from_ms: int) -> int:
         """Until when what it tells of its course at a time is true within OFF_M; at most until the next heartbeat."""
         heartbeat_ms = (from_ms // HEARTBEAT_MS + 1) * HEARTBEAT_MS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from operator import itemgetter
 
 from comms.node import Publication, Received, Step
-from comms.said.messages import Maneuver, ManeuverState, ManeuverStatus, MissionOver
+from comms.said.messages import Maneuver, ManeuverStatus, MissionOver
 from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE, TRUTH_TARGETS
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
@@ -76,7 +76,7 @@ class Body:
         """What it has to say at that time."""
         event = self._vehicle.pop_event()
         if isinstance(event, ManeuverStatus):
-            if event.state is not ManeuverState.ON_TRACK:  # it may lie now
+            if self._vehicle.lies:
                 self._course_due_ms = time_ms
             if self._told is not None and event.number == self._told[0].number:
                 self._said = event

@@ -37,7 +37,7 @@ log = logging.getLogger("secondlook.agent")
 
 REPORT_EVERY_MS = 10_000
 REPORTS_A_TILE = 2  # with every so many reports a tile goes out that has not changed, as it may have been lost
-FARTHEST_M = 1e6  # a look farther away is none: what follows from its places would not fit the wire's metres
+FARTHEST_M = 1e6  # a look or a vehicle farther away is none: what follows from it would not fit the wire's metres
 FARTHEST_RANGE_M = 1e4
 STRAIGHT_IN_M = 100.0  # behind home lies the start of the way there, which tells the heading of arrival
 
@@ -234,7 +234,8 @@ class Agent:
 
     def _hear_nav(self, nav: Nav, sent_ms: int, now_ms: int) -> None:
         first = self.course is None
-        if self.course is not None and sent_ms < self.course.begun_ms:  # it comes late, a newer one holds
+        is_late = self.course is not None and sent_ms < self.course.begun_ms  # a newer one holds
+        if is_late or max(abs(nav.x_m), abs(nav.y_m)) > FARTHEST_M:
             return
         self.course = Course.of(nav, sent_ms)
         if first and self.coverage is not None and not self._over:

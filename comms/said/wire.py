@@ -280,9 +280,8 @@ class Many:
 
 
 class Record:
-    """A frozen dataclass as a positional array of its fields. The last ones, if they have defaults, may be missing: one
-    written before there were such fields reads as if it had the defaults. Of a class with `LEFT_OUT` so many of the
-    last ones are not written where all of them have their defaults."""
+    """A frozen dataclass as a positional array of its fields. The last ones may be missing if they have defaults, which
+    then hold. Of a class with `LEFT_OUT` so many of the last ones are not written where all have their defaults."""
 
     def __init__(self, cls: type[Any]) -> None:
         hints = get_type_hints(cls, include_extras=True)

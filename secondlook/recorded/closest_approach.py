@@ -49,6 +49,7 @@ class ClosestApproaches:
         self._speeds_mps = speeds_mps
         self._legs: dict[str, deque[_Leg]] = {}
         self._under_way: set[str] = set()
+        self._told_true: set[str] = set()
         self._closest: dict[tuple[str, str], Closest] = {}
         self._due_s: dict[tuple[str, str], float] = {}
 
@@ -60,6 +61,9 @@ class ClosestApproaches:
         if name not in self._under_way or not place.counts:
             return
         legs = self._legs.setdefault(name, deque(maxlen=LEGS_KEPT))
+        if place.is_true and name not in self._told_true:  # where it believed to be it was not
+            self._told_true.add(name)
+            legs.clear()
         from_s, start = (legs[-1].to_s, legs[-1].end) if legs else (place.t_s, place.at)
         leg = _Leg(from_s, place.t_s, start, place.at)
         legs.append(leg)

@@ -57,7 +57,7 @@ def test_what_is_opened_without_unpacking_is_what_the_payload_holds(topic: Topic
         ("veh/alpha/nav", b"\xc1", "malformed", "from world: malformed: veh/alpha/nav: not a list"),
         ("veh/alpha/nav", sealed([b"\xc1"]), "malformed", "malformed: veh/alpha/nav: "),
         ("veh/alpha/nav", GOOD[:-1] + b"\x07", "malformed", "veh/alpha/nav: the checksum does not fit"),
-        ("veh/alpha/nav", encode(Header("world", 0, 0, 0), state()), "malformed", "Nav needs a list of 6 fields"),
+        ("veh/alpha/nav", encode(Header("world", 0, 0, 0), state()), "malformed", "Nav needs a list of 7 fields"),
         ("veh/alpha/nav", b"\x00" * (NAV.max_bytes + 1), "too long", "too long: veh/alpha/nav: 201 bytes"),
         ("veh/alpha/nav", encode(Header("beta", 0, 0, 0), nav()), "wrong sender", "says it is from beta"),
         ("agent/beta/state", encode(Header("alpha", 0, 0, 0), state()), "wrong sender", "from beta: wrong sender"),

@@ -133,12 +133,16 @@ def test_at_the_start_it_tells_the_targets_and_where_the_vehicles_wait() -> None
     ]
 
 
-def test_navigation_comes_at_every_whole_second() -> None:
-    sea = Sea(NOISY).until(5_500).order("a", NORTH_400).until(60_000)
-    for vehicle in ("a", "b"):
-        assert [at_ms for at_ms, _ in sea.said(Nav, vehicle)] == list(range(0, 60_001, 1000))
-    # 10 s after the order: 20 m on.
-    assert dict(sea.said(Nav))[15_000] == Nav(0.0, -81.0, 0.0, 2.0, 10.0, 0.0)
+def test_a_course_comes_when_it_changes_and_every_10_s() -> None:
+    sea = Sea(NOISY).until(5_500).order("a", NORTH_400).until(300_000)
+    every_10_s = list(range(0, 300_001, 10_000))
+    assert [at_ms for at_ms, _ in sea.said(Nav, "b")] == every_10_s
+    # 100 m to the track, 400 m of it and 50 m of run-out, straight ahead; then a circle of 20 m radius.
+    assert [at_ms for at_ms, _ in sea.said(Nav, "a")] == sorted([*every_10_s, 5_500, 280_500])
+    told = dict(sea.said(Nav))
+    assert told[5_500] == Nav(0.0, -100.0, 0.0, 2.0, 10.0, 0.0)
+    assert told[20_000] == Nav(0.0, -71.0, 0.0, 2.0, 10.0, 0.0)
+    assert told[280_500] == Nav(0.0, 450.0, 0.0, 2.0, 10.0, 0.0, 0.1)
 
 
 def test_a_400_m_track_is_20_looks_at_hand_computed_times() -> None:
@@ -151,7 +155,7 @@ def test_a_400_m_track_is_20_looks_at_hand_computed_times() -> None:
     assert [at_ms for at_ms, _ in sea.said(Look)] == [60_000 + 10_000 * n for n in range(20)]
     assert [(look.number, look.first_along_m) for look in sea.looks()] == [(n + 1, 20.0 * n) for n in range(20)]
     last = [type(one.message) for at_ms, one in sea.published if at_ms == 250_000]
-    assert last == [Nav, Look, ManeuverStatus]
+    assert last == [Look, ManeuverStatus, Nav]
 
 
 def test_a_quiet_look_holds_the_curve() -> None:
@@ -233,10 +237,10 @@ def test_a_goto_arrives_with_the_bearing_from_start_to_end() -> None:
     sea = Sea(QUIET).order("a", go_to(1, (0.0, 0.0), (0.0, -10.0))).until(0)
     sea.order("a", go_to(2, (200.0, 100.0), (40.0, 100.0))).until(1_000_000)
     ends_ms = sea.statuses()[-1][2]
-    nav = dict(sea.said(Nav))[(ends_ms // 1000 + 1) * 1000]
+    nav = dict(sea.said(Nav))[ends_ms]
     assert isinstance(nav, Nav)
-    assert math.dist((nav.x_m, nav.y_m), (40.0, 100.0)) < 2.0
-    assert abs(nav.heading_rad - 1.5 * math.pi) < 0.11
+    assert math.dist((nav.x_m, nav.y_m), (40.0, 100.0)) < 0.002
+    assert nav.heading_rad == pytest.approx(1.5 * math.pi, abs=1e-4)
 
 
 @pytest.mark.parametrize(
@@ -265,7 +269,7 @@ def test_what_cannot_be_sailed_is_refused_and_the_old_manoeuvre_goes_on(order: M
 def test_an_order_to_nobody_here_changes_nothing() -> None:
     sea = Sea(QUIET).order("external", NORTH_400)
     assert [one for _, one in sea.published if isinstance(one.message, ManeuverStatus)] == []
-    assert sea.wake_ms == 1000
+    assert sea.wake_ms == 10_000
 
 
 def test_a_track_that_begins_under_the_keel_is_on_track_at_once() -> None:
@@ -289,13 +293,13 @@ def test_a_world_without_vehicles_tells_the_targets_and_sleeps() -> None:
     assert sea.order("a", NORTH_400).wake_ms is None
 
 
-def test_a_late_wake_up_loses_no_look_and_repeats_no_navigation() -> None:
+def test_a_late_wake_up_loses_no_look_and_repeats_no_course() -> None:
     sea = Sea(QUIET).order("a", NORTH_400).until(55_000)
     said = len(sea.published)
     sea.now_ms = 85_400
     sea._take(sea.world.on_wake(85_400))
-    assert [type(one.message) for _, one in sea.published[said:]] == [Nav, Look, Look, Look]
-    assert sea.wake_ms == 86_000
+    assert [type(one.message) for _, one in sea.published[said:]] == [Look, Look, Look, Nav]
+    assert sea.wake_ms == 90_000
 
 
 def test_an_order_that_meets_what_is_due_finds_it_said_first() -> None:
@@ -304,7 +308,7 @@ def test_an_order_that_meets_what_is_due_finds_it_said_first() -> None:
     said = len(sea.published)
     sea.order("a", replace(NORTH_400, number=NORTH_400.number + 1))
     kinds = [type(one.message) for _, one in sea.published[said:]]
-    assert kinds == [Nav, Look, ManeuverStatus, ManeuverStatus]
+    assert kinds == [Look, ManeuverStatus, Nav, ManeuverStatus, Nav]
     assert [one[1] for one in sea.statuses()[-2:]] == [ManeuverState.DONE, ManeuverState.ACCEPTED]
 
 
@@ -313,7 +317,8 @@ def test_events_at_one_time_come_in_the_order_of_the_vehicles() -> None:
     sea = Sea(replace(QUIET, vehicles=(A, twin)))
     sea.order("a", NORTH_400).order("0", follow(7, (300.0, 0.0), (300.0, 400.0))).until(300_000)
     at_the_end = [one.key for at_ms, one in sea.published if at_ms == 250_000]
-    assert at_the_end[2:] == ["veh/0/look", "veh/0/maneuver_status", "veh/a/look", "veh/a/maneuver_status"]
+    events = ["veh/0/look", "veh/0/maneuver_status", "veh/a/look", "veh/a/maneuver_status"]
+    assert at_the_end == [*events, "veh/0/nav", "veh/a/nav"]
 
 
 def test_the_seabed_weakens_a_look() -> None:

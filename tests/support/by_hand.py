@@ -64,8 +64,8 @@ def run_info(
 
 
 def nav(x_m: float = 0.0, y_m: float = 0.0, heading_rad: float = 0.0) -> Nav:
-    """Where a vehicle believes it is."""
-    return Nav(x_m, y_m, heading_rad, SPEED_MPS, 15, 0)
+    """Where a vehicle believes it is; nobody reckons that it goes on from there."""
+    return Nav(x_m, y_m, heading_rad, 0, 15, 0)
 
 
 def flat(p_detect: float, near_m: float, far_m: float) -> P_Detect:

@@ -115,7 +115,7 @@ def test_round_ground_to_keep_out_of_it_is_farther_home_and_who_is_refused_asks_
     node = OneNode(SurveyAgent(config), Role.SURVEY)
     node.hear("run", replace(run_info(300, 200), keep_out=(zone,), keep_out_margin_m=2.0))
     # By the beeline it lasts for 100 s home, round two corners of the zone for 2 * hypot(100, 100) + 100 m or so.
-    node.hear(f"veh/{PRIMARY}/nav", Nav(200, 0, 1.5 * math.pi, 2, 15, 0))
+    node.hear(f"veh/{PRIMARY}/nav", Nav(200, 0, 1.5 * math.pi, 0, 15, 0))
     node.wait_until(10_000)
     state = node.all(AgentState)[-1]
     assert state.mode is Mode.RETURNING

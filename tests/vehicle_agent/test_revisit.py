@@ -18,6 +18,7 @@ from comms.said.messages import (
     ManeuverState,
     MissionOver,
     Mode,
+    Nav,
     Task,
     TaskAction,
     TaskState,
@@ -58,6 +59,36 @@ def answer(agent: OneNode, task: Task) -> TaskStatus:
 
 def give_back(strip: int = STRIP.strip) -> Task:
     return replace(STRIP, action=TaskAction.GIVE_BACK, strip=strip)
+
+
+class TestWhereItIs:
+    def test_is_reckoned_from_its_course_at_each_report(self) -> None:
+        agent = revisit(at_m=None)
+        # Along a circle of 10 m radius to starboard, a quarter of it each 10 s.
+        turn = math.pi / 20
+        agent.hear(f"veh/{HELPER}/nav", Nav(100, 0, 0, 10 * turn, 5, 0, turn), at_ms=10_000, sent_ms=10_000)
+        agent.wait_until(20_001)  # it reports each 10 s since it knows of the run
+        state = agent.last(AgentState)
+        assert (state.x_m, state.y_m) == pytest.approx((110, 10), abs=0.02)
+        assert state.heading_rad == pytest.approx(math.pi / 2, abs=1e-3)
+
+    def test_of_two_courses_the_one_that_was_sent_later_holds(self) -> None:
+        agent = revisit(at_m=None)
+        agent.hear(f"veh/{HELPER}/nav", Nav(100, 0, 0, 0, 5, 0), at_ms=5_000)
+        agent.hear(f"veh/{HELPER}/nav", Nav(300, 0, 0, 0, 5, 0), at_ms=6_000, sent_ms=4_000)
+        agent.wait_until(10_001)
+        assert agent.last(AgentState).x_m == 100
+
+    def test_without_a_word_it_goes_on_for_30_s(self) -> None:
+        agent = revisit(at_m=None)
+        agent.hear(f"veh/{HELPER}/nav", Nav(100, 0, 0, 2, 5, 0), at_ms=1, sent_ms=1)
+        agent.wait_until(90_001)
+        places = [state.y_m for state in agent.all(AgentState)]
+        assert places == pytest.approx([0, 20, 40, 60, 60, 60, 60, 60, 60, 60], abs=0.01)
+
+    def test_nowhere_is_no_place(self) -> None:
+        agent = revisit(at_m=(2e6, 0))
+        assert answer(agent, STRIP).reason == "no position yet"
 
 
 class TestStandingAside:

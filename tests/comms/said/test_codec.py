@@ -38,7 +38,7 @@ from planner.tiles import TILE_CELLS
 from secondlook.testing.checks.any_mail import any_message, kind_of
 
 HEADER = Header("alpha", 0, 3, 4500)
-NAV = Nav(1.0, -2.5, 0.5, 1.5, 15.0, 0.0)
+NAV = Nav(1.0, -2.5, 0.5, 1.5, 15.0, 0.0, -0.25)
 by_type = pytest.mark.parametrize("message_type", MESSAGE_TYPES, ids=lambda one: one.__name__)
 
 # What MessagePack can say: also deep nesting, extension types, huge and special numbers, text that is no UTF-8.
@@ -184,9 +184,9 @@ def test_a_field_that_does_not_fit_is_named_also_where_the_last_are_missing(wron
 def test_a_payload_is_a_positional_array_behind_schema_version_and_checksum() -> None:
     payload = encode(HEADER, NAV)
     assert msgpack.unpackb(payload) == [
-        SCHEMA_VERSION, zlib.crc32(payload[7:]), "alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0],
+        SCHEMA_VERSION, zlib.crc32(payload[7:]), "alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0, -250_000],
     ]  # fmt: skip
-    assert payload[7:] == msgpack.packb(["alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0]])[1:]
+    assert payload[7:] == msgpack.packb(["alpha", 0, 3, 4500, [100, -250, 500_000, 1500, 1500, 0, -250_000]])[1:]
 
 
 @by_type

@@ -13,19 +13,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
+from comms.node import Received
 from comms.said.messages import Nav, TaskState, TaskStatus, TruthPose
 from coordinator.allocate.allocators import ALLOCATORS
 from secondlook.errors import UserError
 from secondlook.launch.run_display import closing_table
-from secondlook.recorded.closest_approach import ClosestApproaches
+from secondlook.recorded.closest_approach import Closest, ClosestApproaches
+from secondlook.recorded.whereabouts import Whereabouts
 from secondlook.testing import Fleet, assert_kept_apart, assert_no_strip_lost
 
 HARD = [("five-helpers", name) for name in ALLOCATORS if name != "none"]  # the fleet that is most in its own way
 OTHERS = [("tellaro", "plan"), ("two-helpers", "nearest"), ("patchy", "auction"), ("headland", "plan")]
 
 
-def nav(name: str, t_s: float, x_m: float, y_m: float, speed_mps: float = 2.0) -> object:
-    """Where a vehicle says it is."""
+def nav(name: str, t_s: float, x_m: float, y_m: float, speed_mps: float = 2.0) -> Received:
+    """Where a vehicle says it is, as one that says it each second."""
     return received(f"veh/{name}/nav", Nav(x_m, y_m, 0, speed_mps, 5, 0), sent_ms=round(t_s * 1000))
 
 
@@ -85,29 +87,49 @@ class TestMissions:
         )
 
 
+def closest(*said: Received, until_s: float = 0.0, speed_mps: float = 20.0) -> Closest | None:
+    """What becomes of what a and b say, in the order of time; None where they were not under way at one time."""
+    figure, whereabouts = ClosestApproaches({"a": speed_mps, "b": speed_mps}), Whereabouts()
+    told = [place for one in said for place in whereabouts.hear(one)]
+    for place in [*told, *whereabouts.end(round(until_s * 1000))]:
+        figure.hear(place)
+    return figure.found()[0] if figure.found() else None
+
+
 class TestTheFigure:
     def test_between_two_positions(self) -> None:
-        figure = ClosestApproaches({"a": 20, "b": 20})
-        for one in [nav("a", 0, -10, 3), nav("b", 0, 10, 0), nav("a", 1, 10, 3), nav("b", 1, -10, 0)]:
-            figure.hear(one)  # type: ignore[arg-type]
-        (found,) = figure.found()
+        found = closest(nav("a", 0, -10, 3), nav("b", 0, 10, 0), nav("a", 1, 10, 3), nav("b", 1, -10, 0))
+        assert found is not None
         assert found.vehicles == ("a", "b")
         assert found.closest_m == pytest.approx(3)
         assert found.t_s == pytest.approx(0.5)
 
     def test_a_vehicle_counts_once_it_is_under_way(self) -> None:
-        figure = ClosestApproaches({"a": 2, "b": 2})
-        for one in [nav("a", 0, 0, 0), nav("b", 0, 1, 0, 0), nav("a", 1, 2, 0), nav("b", 1, 1, 0, 0)]:
-            figure.hear(one)  # type: ignore[arg-type]
-        assert figure.found() == []
+        assert closest(nav("a", 0, 0, 0), nav("b", 0, 1, 0, 0), nav("a", 1, 2, 0), nav("b", 1, 1, 0, 0)) is None
 
     def test_true_positions_count(self) -> None:
-        figure = ClosestApproaches({"a": 2, "b": 2})
+        said = []
         for t_s in (0, 1):
-            figure.hear(nav("a", t_s, 0, 0))  # type: ignore[arg-type]
-            figure.hear(received("world/truth/pose/a", TruthPose(7, 0, 0), sender="world", sent_ms=t_s * 1000))
-            figure.hear(nav("b", t_s, 0, 0))  # type: ignore[arg-type]
-        assert figure.found()[0].closest_m == pytest.approx(7)
+            truth = received("world/truth/pose/a", TruthPose(7, 0, 0), sender="world", sent_ms=t_s * 1000)
+            said += [nav("a", t_s, 0, 0), truth, nav("b", t_s, 0, 0)]
+        found = closest(*said)
+        assert found is not None
+        assert found.closest_m == pytest.approx(7)
+
+    def test_along_courses_of_which_nothing_is_told_in_between(self) -> None:
+        # a sails north along x = 0 for 20 s; b circles about (20, 20), 12 m from there, once in 20 s, from its north
+        # side on; they are nearest when b is on the west side, after 15 s to starboard, and a is 30 m on its way.
+        turn = math.tau / 20
+        straight = received("veh/a/nav", Nav(0, 0, 0, 2, 5, 0), sent_ms=0)
+        circle = received("veh/b/nav", Nav(20, 32, math.pi / 2, 12 * turn, 5, 0, turn), sent_ms=0)
+        ahead = received("veh/a/nav", Nav(0, 40, 0, 2, 5, 0), sent_ms=20_000)
+        t_s = np.linspace(0, 20, 20_001)
+        apart_m = np.hypot(20 + 12 * np.sin(turn * t_s), 20 + 12 * np.cos(turn * t_s) - 2 * t_s)
+        for said in ([straight, circle, ahead], [circle, straight, ahead], [straight, circle]):
+            found = closest(*said, until_s=20.0)
+            assert found is not None
+            assert found.closest_m == pytest.approx(apart_m.min(), abs=0.2)
+            assert found.t_s == pytest.approx(t_s[apart_m.argmin()], abs=0.5)
 
     @given(st.lists(st.tuples(*[st.floats(-1, 1)] * 4), min_size=20, max_size=60))
     def test_it_is_the_least_although_not_every_pair_is_looked_at(
@@ -115,11 +137,12 @@ class TestTheFigure:
     ) -> None:
         """Two vehicles that wander by up to sqrt(2) m a second, against a search in small steps."""
         ways = np.round(np.cumsum(np.array(turns), axis=0) + np.array([0, 0, 15, 15]), 2)
-        figure = ClosestApproaches({"a": 1.43, "b": 1.43})
+        said = []
         for t_s, (ax, ay, bx, by) in enumerate(ways.tolist()):
-            figure.hear(nav("a", t_s, ax, ay))  # type: ignore[arg-type]
-            figure.hear(nav("b", t_s, bx, by))  # type: ignore[arg-type]
+            said += [nav("a", t_s, ax, ay), nav("b", t_s, bx, by)]
+        found = closest(*said, speed_mps=1.43)
+        assert found is not None
         apart = ways[:, :2] - ways[:, 2:]
         share = np.linspace(0, 1, 101)[:, np.newaxis, np.newaxis]
         apart_m = np.hypot(*np.moveaxis(apart[:-1] * (1 - share) + apart[1:] * share, -1, 0))
-        assert figure.found()[0].closest_m == pytest.approx(apart_m.min(), abs=0.02)
+        assert found.closest_m == pytest.approx(apart_m.min(), abs=0.02)
