@@ -15,6 +15,8 @@ from flights import BRIEF, TWO_PRIMARIES
 
 from comms.node import Received
 from comms.said.messages import AgentState, Nav
+from planner.dubins import Pose
+from planner.reckoning import Course, Trace
 from secondlook import check_mission
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
@@ -35,19 +37,25 @@ class Flown:
 
     summary: dict[str, Any] = field(default_factory=dict)
     ways: dict[str, tuple[float, float]] = field(default_factory=dict)
-    _last: dict[str, Nav] = field(default_factory=dict)
+    _traces: dict[str, Trace] = field(default_factory=dict)
+    _last: dict[str, Pose] = field(default_factory=dict)
     _way_m: dict[str, float] = field(default_factory=dict)
 
     def watch(self, said: Received) -> None:
         """Told each message."""
         message, vehicle = said.message, said.vehicle
         if isinstance(message, Nav):
-            before = self._last.get(vehicle, message)
-            further_m = math.hypot(message.x_m - before.x_m, message.y_m - before.y_m)
-            self._way_m[vehicle] = self._way_m.get(vehicle, 0.0) + further_m
-            self._last[vehicle] = message
-        elif isinstance(message, AgentState) and message.mode.has_ended:
+            trace = self._traces.setdefault(vehicle, Trace())
+            self._go(vehicle, trace.hear(Course.of(message, said.header.sent_ms)))
+        elif isinstance(message, AgentState) and message.mode.has_ended and vehicle not in self.ways:
+            self._go(vehicle, self._traces[vehicle].end(said.header.sent_ms))
             self.ways.setdefault(vehicle, (said.t_s, self._way_m.get(vehicle, 0.0)))
+
+    def _go(self, vehicle: str, places: list[tuple[int, Pose]]) -> None:
+        for _, pose in places:
+            further_m = math.dist(pose[:2], self._last.get(vehicle, pose)[:2])
+            self._way_m[vehicle] = self._way_m.get(vehicle, 0.0) + further_m
+            self._last[vehicle] = pose
 
 
 def fly(scenario: Scenario, folder: Path) -> Flown:
