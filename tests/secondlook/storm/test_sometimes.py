@@ -161,6 +161,7 @@ ROWS = {
     "a message is damaged on its way": ("a message is malformed", "a damaged message is dropped"),
     "a primary vanishes, or stands still": ("a primary is not waited for any more",),
     "a primary is cut off while it finishes": ("a task: tell_again", "a hotspot is said again"),
+    "a vehicle's course is lost": ("a message is lost",),
     "an agent's answer or a tile is lost": ("a helper's word that it is done is lost", "a tile is said again"),
     "a node is killed and goes on by its memory": ("a primary goes on by its memory",),
     "the coordinator is killed and started anew": ("a strip of a coordinator that is gone is given back",),
