@@ -18,6 +18,7 @@ from planner.ways import Way, shortest_way
 ROUNDING_MS = 1e-6
 """A time is not rounded up to the next millisecond for as little as this."""
 ROUNDING_M = 1e-6
+"""Nor is a turn one that is no longer."""
 CIRCLE_PARTS = 8
 """At so many places of a circle a vehicle looks for a way off it."""
 MOST_DEPARTURES = 60
@@ -48,7 +49,7 @@ def arcs_of(way: Way) -> list[Arc]:
     for path in way:
         start = path.start
         for turn, length_m in zip(path.turns, path.lengths_m, strict=True):
-            if length_m > 0.0:
+            if length_m > ROUNDING_M:
                 arcs.append(Arc(start, length_m, turn / path.turn_radius_m))
                 start = arcs[-1].pose_at(length_m)
     return arcs
@@ -254,9 +255,9 @@ class Motion:
             return self._path.made_good_mps(self._path.distance_at(time_ms), (time_ms - self._path.start_ms) / 1000.0)
         return 0.0 if self._path is None else self._speed_mps
 
-    def turn_radps(self, time_ms: int) -> float:
-        """How fast it turns over the ground, to starboard if above 0."""
-        return 0.0 if self._path is None else self._path.curvature_at(time_ms) * self.speed_mps(time_ms)
+    def curvature_at(self, time_ms: int) -> float:
+        """That of its way over the ground in 1/m, to starboard if above 0; 0 where it lies."""
+        return 0.0 if self._path is None else self._path.curvature_at(time_ms)
 
     def steady_until_ms(self, from_ms: int, most_ms: int) -> int:
         """Until when, at most until a time after `from_ms`, it is where it would be if it went on as it does at

@@ -85,8 +85,9 @@ class SimulatedVehicle:
     def nav(self, now_ms: int) -> Nav:
         """The course it believes in."""
         motion, config = self._motion, self.config
-        pose, speed_mps, turn_radps = motion.pose_at(now_ms), motion.speed_mps(now_ms), motion.turn_radps(now_ms)
-        return Nav(*pose, speed_mps, config.altitude_m, self.sigma_at(now_ms), turn_radps)
+        speed_mps, curvature = motion.speed_mps(now_ms), motion.curvature_at(now_ms)
+        pose, sigma_m = motion.pose_at(now_ms), self.sigma_at(now_ms)
+        return Nav(*pose, speed_mps, config.altitude_m, sigma_m, turn_radps=curvature * speed_mps)
 
     def truth(self, now_ms: int) -> TruthPose:
         """Its course."""

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from planner.types import Point
 from secondlook.recorded.whereabouts import Place
 
+START_S = 1.0
 LEGS_KEPT = 40
 """Of a vehicle, for those whose places up to the same time come later."""
 
@@ -41,14 +42,16 @@ class _Leg(NamedTuple):
 class ClosestApproaches:
     """Take the places of each vehicle in order; ask at any time.
 
-    A vehicle counts from when it is first under way, and not while it rests at home. `speeds_mps`: the most that each
-    vehicle does; a pair is not looked at again before it can be nearer than it was.
+    A vehicle counts from when it is first under way, one that lay before from START_S later, as it did not choose where
+    it lay; and not while it rests at home. `speeds_mps`: the most that each vehicle does; a pair is not looked at again
+    before it can be nearer than it was.
     """
 
     def __init__(self, speeds_mps: Mapping[str, float]) -> None:
         self._speeds_mps = speeds_mps
         self._legs: dict[str, deque[_Leg]] = {}
-        self._under_way: set[str] = set()
+        self._counts_from_s: dict[str, float] = {}
+        self._lay: set[str] = set()
         self._told_true: set[str] = set()
         self._closest: dict[tuple[str, str], Closest] = {}
         self._due_s: dict[tuple[str, str], float] = {}
@@ -56,9 +59,12 @@ class ClosestApproaches:
     def hear(self, place: Place) -> None:
         """Folds one place in."""
         name = place.vehicle
-        if place.moves:
-            self._under_way.add(name)
-        if name not in self._under_way or not place.counts:
+        if name not in self._counts_from_s:
+            if not place.moves:
+                self._lay.add(name)
+                return
+            self._counts_from_s[name] = place.t_s + (START_S if name in self._lay else 0.0)
+        if not place.counts:
             return
         legs = self._legs.setdefault(name, deque(maxlen=LEGS_KEPT))
         if place.is_true and name not in self._told_true:  # where it believed to be it was not
@@ -77,14 +83,15 @@ class ClosestApproaches:
     def rest(self, name: str) -> None:
         """A vehicle has come home: nobody can come too close to it there."""
         self._legs.pop(name, None)
-        self._under_way.discard(name)
+        self._counts_from_s.pop(name, None)
 
     def found(self) -> list[Closest]:
         """Of each pair of vehicles that were under way at one time, the nearest first."""
         return sorted(self._closest.values(), key=lambda one: (one.closest_m, one.vehicles))
 
     def _compare(self, pair: tuple[str, str], one: _Leg, other: _Leg) -> None:
-        from_s, to_s = max(one.from_s, other.from_s), min(one.to_s, other.to_s)
+        from_s = max(one.from_s, other.from_s, *(self._counts_from_s[name] for name in pair))
+        to_s = min(one.to_s, other.to_s)
         if from_s > to_s:
             return
         begin, end = ([b - a for a, b in zip(one.at(t_s), other.at(t_s), strict=True)] for t_s in (from_s, to_s))

@@ -138,7 +138,7 @@ class TestRunUntil:
             fleet.run_until(lambda heard: False, timeout_s=12)
         said = str(caught.value).splitlines()
         assert said[0] == f"the condition did not come to hold by {began_s + 12:g} s; heard last:"
-        assert said[-1].startswith("  agent/primary/contact/2 from primary at 16.851 s: Contact(x_m=")
+        assert said[-1].startswith("  agent/helper/contact/2 from helper at 20.200 s: Contact(x_m=")
         assert fleet.heard.now_s <= began_s + 12
         assert fleet.now_s == began_s
 
