@@ -123,6 +123,8 @@ class Path:
         return max(left, default=0.0)
 
 
+FAR_STEP, LONGEST_STEP_S = 1e-3, 30.0
+"""A step straight ahead may be so much of the way so far, and take so long in still water."""
 STEP_OF_RADIUS = 0.1
 """A vehicle that is carried by a current turns by no more a step."""
 OFF_M = 1.0
@@ -147,7 +149,7 @@ class CarriedPath(Path):
         super().__init__(start_ms, speed_mps, legs, held_m)
         self._current = current
         self._step_m = step_m
-        self._times_s = [0.0]
+        self._along_m, self._times_s = [0.0], [0.0]  # at each step
 
     def distance_at(self, time_ms: int) -> float:
         """How far along the path the vehicle is."""
@@ -156,14 +158,14 @@ class CarriedPath(Path):
             self._go_on()
         step = bisect_right(self._times_s, time_s) - 1
         since_s, took_s = time_s - self._times_s[step], self._times_s[step + 1] - self._times_s[step]
-        return self._step_m * (step + since_s / took_s)
+        return self._along_m[step] + since_s / took_s * (self._along_m[step + 1] - self._along_m[step])
 
     def time_ms(self, distance_m: float) -> int:
         """When the vehicle has come so far, rounded up to the millisecond."""
-        step = int(distance_m / self._step_m)
-        while len(self._times_s) < step + 2:
+        while self._along_m[-1] <= distance_m:
             self._go_on()
-        share = distance_m / self._step_m - step
+        step = bisect_right(self._along_m, distance_m) - 1
+        share = (distance_m - self._along_m[step]) / (self._along_m[step + 1] - self._along_m[step])
         time_s = self._times_s[step] + share * (self._times_s[step + 1] - self._times_s[step])
         return self.start_ms + math.ceil(time_s * 1000.0 - ROUNDING_MS)
 
@@ -173,11 +175,11 @@ class CarriedPath(Path):
         from_s, from_m = (from_ms - self.start_ms) / 1000.0, self.distance_at(from_ms)
         speed_mps = self.made_good_mps(from_m, from_s)
         near_ms = from_ms + OFTEN_MS
-        for step in itertools.count(int(from_m / self._step_m) + 1):
+        for step in itertools.count(bisect_right(self._along_m, from_m)):
             while len(self._times_s) <= step:
                 self._go_on()
             time_s = self._times_s[step]
-            if abs(self._step_m * step - from_m - speed_mps * (time_s - from_s)) > OFF_M:
+            if abs(self._along_m[step] - from_m - speed_mps * (time_s - from_s)) > OFF_M:
                 break
             near_ms = max(near_ms, self.start_ms + math.floor(time_s * 1000.0))
             if near_ms >= most_ms:
@@ -192,9 +194,20 @@ class CarriedPath(Path):
 
     def _go_on(self) -> None:
         """A step more, at the speed in its middle."""
-        distance_m, time_s = self._step_m * (len(self._times_s) - 1), self._times_s[-1]
-        half_s = self._step_m / 2 / self.made_good_mps(distance_m, time_s)
-        self._times_s.append(time_s + self._step_m / self.made_good_mps(distance_m + self._step_m / 2, time_s + half_s))
+        distance_m, time_s = self._along_m[-1], self._times_s[-1]
+        step_m = max(self._step_m, self._far_step_m(distance_m))
+        half_s = step_m / 2 / self.made_good_mps(distance_m, time_s)
+        self._along_m.append(distance_m + step_m)
+        self._times_s.append(time_s + step_m / self.made_good_mps(distance_m + step_m / 2, time_s + half_s))
+
+    def _far_step_m(self, distance_m: float) -> float:
+        """Straight ahead steps become longer with the way before them, so that one of a thousand kilometres is summed
+        up as well; they end where the straight does."""
+        number = self._leg_at(distance_m + ROUNDING_M)
+        left_m = self._starts_m[number] + self._legs[number].length_m - distance_m
+        return (
+            0.0 if self._legs[number].curvature else min(FAR_STEP * distance_m, LONGEST_STEP_S * self.speed_mps, left_m)
+        )
 
 
 @dataclass(frozen=True)

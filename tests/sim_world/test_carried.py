@@ -15,7 +15,7 @@ from planner.dubins import Pose, shortest_path
 from planner.keep_out import KeepOut
 from planner.ways import shortest_way
 from sim_world.config import CurrentConfig
-from sim_world.motion import Motion, NoWayError
+from sim_world.motion import CarriedPath, Motion, NoWayError
 from tests.sim_world.test_world import QUIET, A, Sea, follow
 
 EAST, WEST = math.pi / 2, 1.5 * math.pi
@@ -59,6 +59,24 @@ def test_a_way_with_turns_takes_what_is_reckoned() -> None:
     way = shortest_path(Pose(0, 0, EAST), Pose(200, 300, WEST), SWIMMER.turn_radius_m)
     reckoned_s = Sailing(2.5, 1.5, EAST).path_s(way) + 400 / 1.0
     assert told.statuses()[0][2] / 1000 == pytest.approx(reckoned_s, rel=2e-3)
+
+
+def test_a_way_of_a_thousand_kilometres_is_summed_up_in_no_time_and_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked, made_good_mps = [], CarriedPath.made_good_mps
+
+    def counted(path: CarriedPath, distance_m: float, time_s: float) -> float:
+        asked.append(distance_m)
+        return made_good_mps(path, distance_m, time_s)
+
+    monkeypatch.setattr(CarriedPath, "made_good_mps", counted)
+    told = sea().order("a", follow(1, (0.0, 0.0), (900_000.0, 0.0), run_in_m=0.0))
+    assert told.statuses()[0][2] == pytest.approx(900_000 / 4.0 * 1000, abs=1)
+    assert len(asked) < 50_000
+    # And back again: the turn lies far ahead, and is summed up as any.
+    told = sea().order("a", follow(1, (900_000.0, 300.0), (899_000.0, 300.0), run_in_m=0.0))
+    way = shortest_path(Pose(0, 0, EAST), Pose(900_000, 300, WEST), SWIMMER.turn_radius_m)
+    reckoned_s = Sailing(2.5, 1.5, EAST).path_s(way) + 1000 / 1.0
+    assert told.statuses()[0][2] / 1000 == pytest.approx(reckoned_s, rel=1e-5)
 
 
 def test_a_tide_that_turns_gives_back_what_it_takes() -> None:
