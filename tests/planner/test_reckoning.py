@@ -18,7 +18,8 @@ TURN = math.pi / 10
 RADIUS_M = 2.0 / TURN
 
 poses = st.builds(Pose, st.floats(-1e4, 1e4), st.floats(-1e4, 1e4), st.floats(0.0, 6.28))
-courses = st.builds(Course, st.integers(0, 10**7), poses, st.floats(0.0, 5.0), st.floats(-2.0, 2.0))
+turns = st.integers(-2_000_000, 2_000_000).map(lambda steps: steps / 1e6)  # as they come from the wire
+courses = st.builds(Course, st.integers(0, 10**7), poses, st.floats(0.0, 5.0), turns)
 times_ms = st.integers(0, BELIEVED_MS)
 
 

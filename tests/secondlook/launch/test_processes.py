@@ -194,7 +194,8 @@ def run_fleet(
         (
             "recorder",
             150,
-            r"nothing heard for 3 s at .*: no acknowledgement from recorder|recorder has fallen silent .*",
+            # It is waited for in mid-mission, or at the end where all that it has not taken is less than may wait.
+            r"nothing heard for 3 s at .*: no (acknowledgement|last word) from recorder|recorder has fallen silent .*",
         ),
         # Late enough for the hub to have given signs of life in mid-mission.
         ("world", 4000, r"world has fallen silent, last heard at [1-9]\d*\.\d{3} s of the mission"),
