@@ -61,12 +61,12 @@ class Briefing:
         """The same of one that is not open yet."""
         return OpenStrip(strip, cut.counts_m2 / self._p_detect)
 
-    def time_m(self, now_ms: int) -> float:
+    def time_m(self, situation: Situation) -> float:
         """The metres that helpers have time, and battery, to fly until the mission ends; infinite while nobody can tell
         of either."""
-        deadline_s, helpers = self.expected_deadline_s(), self.helpers(now_ms)
+        deadline_s, helpers = situation.deadline_s, situation.helpers
         if not helpers:  # some may still come
-            left_s = max(0.0, deadline_s - now_ms / 1000)
+            left_s = max(0.0, deadline_s - situation.now_s)
             return sum(left_s * one.entry.speed_mps for one in self._vehicles.values() if one.entry.role.revisits)
         return sum(max(0.0, min(deadline_s, one.lasts_until_s) - one.free_s) * one.speed_mps for one in helpers)
 

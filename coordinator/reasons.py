@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -22,42 +23,45 @@ Value = TypeVar("Value", bound=Hashable)
 
 
 class Reasons:
-    """Reads the plans and curves of the `primaries` as they are when it is asked."""
+    """Why strips lie where they do, by the plans and curves of the `primaries` as they are now. `risk`: residual risk
+    expected to be left, shape of the grid."""
 
-    def __init__(self, grid: GridSpec, primaries: Mapping[str, KnownVehicle]) -> None:
+    def __init__(self, grid: GridSpec, primaries: Mapping[str, KnownVehicle], risk: FloatArray) -> None:
         self._grid = grid
         self._primaries = primaries
+        self._risk = risk
+        self._known = [
+            (name, track) for name, one in primaries.items() for track in (one.plan.tracks if one.plan else ())
+        ]
 
-    def why(self, cut: Cut, risk: FloatArray) -> str:
+    def why(self, cut: Cut) -> str:
         """What makes a cut's place worth a second look: "seen badly by track 3: nadir gap", or of one that is foreseen
-        "expected beside tracks 5 and 6: range's end". `risk`: residual risk expected to be left, shape of the grid.
+        "expected beside tracks 5 and 6: range's end".
 
         Where P(y) is below half of its best, nearer than that or farther, is the nadir gap and the range's end.
         """
-        known = [
-            (name, one, track)
-            for name, one in self._primaries.items()
-            for track in (one.plan.tracks if one.plan else ())
-        ]
-        beside = known if cut.foreseen else [one for one in known if one[2].flown] or known
+        beside = self._known if cut.foreseen else [one for one in self._known if one[1].flown] or self._known
         if not beside:
             return "expected to be badly seen" if cut.foreseen else "badly seen"
-        x_m, y_m, weights = self._sampled(cut, risk)
-        apart_m, is_beyond = _apart(x_m, y_m, [track for _, _, track in beside])
+        x_m, y_m, weights = self._sampled(cut)
+        apart_m, is_beyond = _apart(x_m, y_m, [track for _, track in beside])
         nearest = apart_m.argmin(axis=0)
         places = np.arange(nearest.size)
         apart_m, is_beyond = apart_m[nearest, places], is_beyond[nearest, places]
-        curves = {name: curve_of(one, self._primaries.values()) for name, one in self._primaries.items()}
         causes = np.full(nearest.size, BEST, dtype=object)
-        for at in np.unique(nearest):
+        for at in set(nearest.tolist()):
             here = nearest == at
-            causes[here] = _causes(apart_m[here], curves[beside[at][0]])
+            causes[here] = _causes(apart_m[here].tolist(), self._curves[beside[at][0]])
         causes[is_beyond] = BEYOND
         tracks = [beside[at] for at in _named(nearest.tolist(), weights)[:MOST_TRACKS]]
         by = "expected beside" if cut.foreseen else "seen badly by"
         return f"{by} {self._in_words(tracks)}: {_listed(_named(causes.tolist(), weights))}"
 
-    def _sampled(self, cut: Cut, risk: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    @cached_property
+    def _curves(self) -> dict[str, DetectionCurve]:
+        return {name: curve_of(one, self._primaries.values()) for name, one in self._primaries.items()}
+
+    def _sampled(self, cut: Cut) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Places of some of a cut's cells, and what each weighs: its risk."""
         window, grid = cut.window, self._grid
         rows, columns = (
@@ -65,15 +69,17 @@ class Reasons:
             for first, end in ((window.first_row, window.end_row), (window.first_column, window.end_column))
         )
         x_m, y_m = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
-        weights = risk[np.ix_(rows, columns)].ravel()
+        weights = self._risk[np.ix_(rows, columns)].ravel()
         return x_m.ravel(), y_m.ravel(), weights if weights.any() else np.ones_like(weights)
 
-    def _in_words(self, beside: Sequence[tuple[str, KnownVehicle, PlannedTrack]]) -> str:
+    def _in_words(self, beside: Sequence[tuple[str, PlannedTrack]]) -> str:
         """Their numbers; of several primaries with whose they are."""
         if len(self._primaries) == 1:
-            numbers = sorted(track.number for _, _, track in beside)
+            numbers = sorted(track.number for _, track in beside)
             return f"track{'s' if len(numbers) > 1 else ''} {_listed([str(one) for one in numbers])}"
-        return _listed([f"{name}'s track {number}" for name, number in sorted((n, t.number) for n, _, t in beside)])
+        return _listed(
+            [f"{name}'s track {number}" for name, number in sorted((name, track.number) for name, track in beside)]
+        )
 
 
 def _apart(x_m: FloatArray, y_m: FloatArray, tracks: Sequence[PlannedTrack]) -> tuple[FloatArray, BoolArray]:
@@ -88,11 +94,11 @@ def _apart(x_m: FloatArray, y_m: FloatArray, tracks: Sequence[PlannedTrack]) -> 
     return np.hypot(across, over), over > 0
 
 
-def _causes(apart_m: FloatArray, curve: DetectionCurve) -> list[str]:
+def _causes(apart_m: Sequence[float], curve: DetectionCurve) -> list[str]:
     best = int(curve.p_detect.argmax())
     is_low = 2 * curve.p_detect < curve.p_detect[best]
-    near_m = curve.range_m[:best][is_low[:best]].max(initial=-1.0)
-    far_m = curve.range_m[best:][is_low[best:]].min(initial=curve.range_m[-1])
+    near_m = float(curve.range_m[:best][is_low[:best]].max(initial=-1.0))
+    far_m = float(curve.range_m[best:][is_low[best:]].min(initial=curve.range_m[-1]))
     return [NADIR_GAP if one <= near_m else RANGE_END if one >= far_m else BEST for one in apart_m]
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from comms.node import Received
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import Hotspot, StripState
 from coordinator.allocate.routes import HORIZON_S, plan_routes
+from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.cutter import Cutter, Flown
@@ -60,13 +60,12 @@ class StripCutting:
         self._expected = expected
         self._briefing = briefing
         self._fleet = fleet
-        self._reasons = Reasons(fleet.map.grid, fleet.primaries)
         self._strips = strips
 
-    def _flown(self, now_ms: int) -> Flown:
+    def _flown(self, situation: Situation) -> Flown:
         """What helpers fly of strips by the best routes to the deadline; all of it where nobody is there yet."""
-        helpers, grid = self._briefing.helpers(now_ms), self._fleet.map.grid
-        deadline_s = min(self._briefing.expected_deadline_s(), now_ms / 1000 + HORIZON_S)
+        helpers, grid = situation.helpers, self._fleet.map.grid
+        deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
 
         def flown(cuts: Sequence[Counted]) -> Mapping[int, float]:
             if not helpers:
@@ -85,7 +84,7 @@ class StripCutting:
         """Cuts anew, and opens, revises and withdraws strips by that; `again`: also a second one on a place that is
         worth two looks, else that is cut when the first is under way."""
         expected, ledger = self._expected.now(), self._strips.ledger
-        why = partial(self._reasons.why, risk=expected.risk)
+        why = Reasons(self._fleet.map.grid, self._fleet.primaries, expected.risk).why
         ground = Ground(
             risk=expected.risk,
             look=expected.look,
@@ -97,7 +96,8 @@ class StripCutting:
         claimed = [record.window for record in ledger.in_state(*WITH_A_VEHICLE)]
         unmatched = ledger.in_state(StripState.OPEN)
         opened = [record.window for record in unmatched]
-        time_m, flown = self._briefing.time_m(now_ms), self._flown(now_ms)
+        situation = self._briefing.situation(now_ms)
+        time_m, flown = self._briefing.time_m(situation), self._flown(situation)
         for cut in self._cutter.cut(ground, time_m, claimed, opened, flown, again=again):
             alike = (record for record in unmatched if record.window.across == cut.window.across)
             same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)

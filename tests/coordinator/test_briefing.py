@@ -33,6 +33,9 @@ class Known:
         state = AgentState(mode, works_on, battery, end_ms, 122.5, 0, 0)
         self.fleet.vehicles[name].hear_state(Header(name, 0, 1, 50_000), state, 50_000)
 
+    def time_m(self, now_ms: int) -> float:
+        return self.briefing.time_m(self.briefing.situation(now_ms))
+
     def survey_ends(self, end_ms: int) -> None:
         """The primary is on its only track."""
         plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 400, False),), (), (), "")
@@ -49,24 +52,24 @@ class TestTheTimeLeft:
 
     def test_helpers_have_time_for_so_many_metres(self) -> None:
         known = Known()
-        assert known.briefing.time_m(50_000) == math.inf
+        assert known.time_m(50_000) == math.inf
         known.heard(HELPER, Mode.IDLE)
-        assert known.briefing.time_m(50_000) == pytest.approx((14_400 - 10) * 2)  # what its battery lasts, less 10 s
+        assert known.time_m(50_000) == pytest.approx((14_400 - 10) * 2)  # what its battery lasts, less 10 s
         known.survey_ends(1_000_000)
-        assert known.briefing.time_m(50_000) == pytest.approx((1050 - 50) * 2)
-        assert known.briefing.time_m(1_050_000) == known.briefing.time_m(2_000_000) == 0
+        assert known.time_m(50_000) == pytest.approx((1050 - 50) * 2)
+        assert known.time_m(1_050_000) == known.time_m(2_000_000) == 0
 
     def test_the_battery_ends_it(self) -> None:
         known = Known()
         known.survey_ends(1_000_000)
         known.heard(HELPER, Mode.IDLE, battery=0.01)  # 144 s from 50 s on
-        assert known.briefing.time_m(150_000) == pytest.approx((194 - 10 - 150) * 2)
+        assert known.time_m(150_000) == pytest.approx((194 - 10 - 150) * 2)
 
     def test_while_no_helper_was_heard_some_may_still_come(self) -> None:
         known = Known()
         known.survey_ends(1_000_000)
         assert known.briefing.helpers(50_000) == ()
-        assert known.briefing.time_m(50_000) == pytest.approx((1050 - 50) * 2)
+        assert known.time_m(50_000) == pytest.approx((1050 - 50) * 2)
 
 
 def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:

@@ -35,7 +35,7 @@ def lane(first_m: float, end_m: float, *, foreseen: bool = True, rows: tuple[int
 
 
 def why(cut: Cut, *primaries: KnownVehicle, risk: np.ndarray = FLAT) -> str:
-    return Reasons(GRID, {one.entry.vehicle: one for one in primaries}).why(cut, risk)
+    return Reasons(GRID, {one.entry.vehicle: one for one in primaries}, risk).why(cut)
 
 
 def test_near_below_a_track_is_the_nadir_gap() -> None:

@@ -118,3 +118,10 @@ class TestWorstFrom:
         assert one.worst_from() == pytest.approx(0.4 + 0.3 * 0.6)  # between the seventh and the eighth of ten: 6.3 up
         one.fly(Window(0, 1, 0, 3))
         assert one.worst_from() == pytest.approx(0.4 + 0.3 * 0.1)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3, 4, 10, 11, 97])
+def test_from_which_risk_on_it_is_of_the_worst_is_a_quantile(size: int) -> None:
+    risk = np.random.default_rng(size).uniform(0.01, 1.0, (1, size))
+    assert ground(risk).worst_from() == np.quantile(risk, 0.7)
+    assert ground(np.zeros((1, size))).worst_from() == 0.0
