@@ -64,10 +64,8 @@ class Reasons:
     def _sampled(self, cut: Cut) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Places of some of a cut's cells, and what each weighs: its risk."""
         window, grid = cut.window, self._grid
-        rows, columns = (
-            np.array(list(dict.fromkeys(np.linspace(first, end - 1, MOST_CELLS).round().astype(int).tolist())))
-            for first, end in ((window.first_row, window.end_row), (window.first_column, window.end_column))
-        )
+        rows = _evenly(window.first_row, window.end_row)
+        columns = _evenly(window.first_column, window.end_column)
         x_m, y_m = grid.frame.to_mission(grid.across_m[columns][np.newaxis, :], grid.along_m[rows][:, np.newaxis])
         weights = self._risk[np.ix_(rows, columns)].ravel()
         return x_m.ravel(), y_m.ravel(), weights if weights.any() else np.ones_like(weights)
@@ -80,6 +78,12 @@ class Reasons:
         return _listed(
             [f"{name}'s track {number}" for name, number in sorted((name, track.number) for name, track in beside)]
         )
+
+
+def _evenly(first: int, end: int) -> list[int]:
+    """Some of the numbers from the first one to before the end, evenly spread, both ends among them."""
+    step = (end - 1 - first) / (MOST_CELLS - 1)
+    return list(dict.fromkeys(round(place * step + first) for place in range(MOST_CELLS)))
 
 
 def _apart(x_m: FloatArray, y_m: FloatArray, tracks: Sequence[PlannedTrack]) -> tuple[FloatArray, BoolArray]:

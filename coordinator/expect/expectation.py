@@ -79,9 +79,11 @@ class ExpectedMap:
 
     def _nats_so_far(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """-ln(1 - P_d) of all looks so far: summed over those of primaries and of helpers, and the largest of all."""
-        primaries, helpers, largest = np.zeros((3, *self._fleet.map.grid.shape))
+        shape = self._fleet.map.grid.shape
+        primaries, helpers, nats = np.zeros((3, *shape))
+        largest_levels = np.zeros(shape, dtype=np.uint8)
         for name, layer in self._fleet.map.layers.items():
             sums = primaries if name in self._fleet.primaries else helpers
-            sums += NATS_PER_LEVEL * layer.sum_levels
-            np.maximum(largest, NATS_PER_LEVEL * layer.largest_levels, out=largest)
-        return primaries, helpers, largest
+            sums += np.multiply(layer.sum_levels, NATS_PER_LEVEL, out=nats)
+            np.maximum(largest_levels, layer.largest_levels, out=largest_levels)
+        return primaries, helpers, np.multiply(largest_levels, NATS_PER_LEVEL, out=nats)
