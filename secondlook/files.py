@@ -55,6 +55,17 @@ def write_whole(path: Path, content: str) -> None:
 
 
 @contextmanager
+def passing_folder() -> Iterator[Path]:
+    """A folder that is gone afterwards. Raises UserError where none can be made, as the disk is full for one."""
+    try:
+        made = tempfile.TemporaryDirectory(prefix="secondlook-")
+    except OSError as error:
+        raise UserError(f"a passing file cannot be made: {error.strerror}") from error
+    with made as name:
+        yield Path(name)
+
+
+@contextmanager
 def room_kept(folder: Path) -> Iterator[None]:
     """Within it a file without a name takes up room in a folder, as far as there is any: what is written afterwards,
     such as a summary which says that the disk was full, finds that free. Raises CannotWriteError."""

@@ -27,7 +27,7 @@ def test_no_strip_is_lost_where_every_fifth_message_is(make_fleet: Callable[...,
     fleet = make_fleet("tellaro", overrides={"coordinator.allocator": LongestFirst}, fault_seed=fault_seed)
     fleet.drop("**", probability=0.2)
     flight = fleet.run()
-    assert flight.summary["dropped"]["lost by a fault"] > 1000
+    assert flight.summary["dropped"]["lost by a fault"] > 500
     assert_no_strip_lost(flight)
     assert_one_strip_at_a_time(flight)
     assert_never_assigned_to_lost(flight)

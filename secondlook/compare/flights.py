@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from secondlook.engine.engine import Engine, do_all
 from secondlook.engine.work_process import Lost
 from secondlook.errors import UserError
+from secondlook.files import passing_folder
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.recorded.metrics import Metrics
@@ -190,8 +189,8 @@ def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
     """Flies a mission; its files lie in a folder that is gone afterwards. `watch`: see `RunOptions`."""
     notes = _Notes()
     try:
-        with tempfile.TemporaryDirectory(prefix="secondlook-compare-") as folder:
-            options = RunOptions(Path(folder), bus="local", record=False, progress=notes.take, watch=watch)
+        with passing_folder() as folder:
+            options = RunOptions(folder, bus="local", record=False, progress=notes.take, watch=watch)
             summary = run_mission(scenario, options)
     except (RunFailedError, UserError, OSError) as error:  # of the last two one where the disk is full
         return Failure(scenario.seed, str(error))

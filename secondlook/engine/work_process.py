@@ -11,17 +11,21 @@ import gc
 import os
 import pickle
 import queue
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+PASSING = "secondlook-work-"
 ENDED = 1  # the exit code of one whose pipe has ended
 ENDS_WITHIN_S = 5.0  # of the wall clock, when its pipe has broken
 
@@ -34,13 +38,15 @@ class Lost:
 
 
 class WorkProcess:
-    """It is started with the first piece of work, and anew after one at which it has died or was ended.
+    """It is started with the first piece of work, and anew after one at which it has died or was ended. Its passing
+    files lie in a folder that goes with it.
 
     One thread gives it work; `close` may come from any.
     """
 
     def __init__(self) -> None:
         self._here: tuple[subprocess.Popen[bytes], Connection] | None = None
+        self._passing: tempfile.TemporaryDirectory[str] | None = None
         self._starting = threading.Lock()
         self._is_closed = False
 
@@ -73,6 +79,7 @@ class WorkProcess:
                 process, _ = self._here  # the pipe is closed by who waits at it, or with this
                 process.kill()
                 process.wait()
+                self._clear()
 
     def __del__(self) -> None:
         self.close()  # of one that belonged to a thread, when that has ended
@@ -93,10 +100,24 @@ class WorkProcess:
                         stdout=sys.__stderr__,
                         pass_fds=[theirs.fileno()],
                         start_new_session=True,
+                        env={**os.environ, **self._made_passing()},
                     )
                 self._here = process, pipe
                 pipe.send(sys.path)
             return self._here[1]
+
+    def _made_passing(self) -> dict[str, str]:
+        """The environment's entry for a folder for passing files; none where it cannot be made: who needs it tells."""
+        try:
+            self._passing = tempfile.TemporaryDirectory(prefix=PASSING, ignore_cleanup_errors=True)
+        except OSError:
+            return {}
+        return {"TMPDIR": self._passing.name}
+
+    def _clear(self) -> None:
+        if self._passing is not None:
+            self._passing.cleanup()
+            self._passing = None
 
     def _end(self, by: int | None = None) -> str:
         """Forgets it, ended by a signal, or as its pipe has broken; tells in words how it ended."""
@@ -112,6 +133,7 @@ class WorkProcess:
         except subprocess.TimeoutExpired:
             process.kill()
             code = process.wait()
+        self._clear()
         return f"died of {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
 
@@ -141,6 +163,9 @@ def _receive(pipe: Connection, work: queue.SimpleQueue[bytes]) -> None:
         try:
             work.put(pipe.recv_bytes())
         except (EOFError, OSError):
+            passing = Path(tempfile.gettempdir())
+            if passing.name.startswith(PASSING):  # who started it may have been killed, and takes nothing away
+                shutil.rmtree(passing, ignore_errors=True)
             os._exit(ENDED)
 
 

@@ -4,7 +4,6 @@ paper's tables; many missions side by side."""
 from __future__ import annotations
 
 import json
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from planner.risk import LevelArray, residual_risk
 from planner.types import DetectionCurve, FloatArray
 from secondlook.engine.engine import Engine, do_all
 from secondlook.engine.work_process import Lost
+from secondlook.files import passing_folder
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.fit import Mixture, fit_mixture
@@ -165,8 +165,8 @@ class MeasuredMission:
 
 def measure(published: PublishedMission, seed: int) -> MeasuredMission:
     """Flies one mission and fits its mixture; its files are gone afterwards. Raises RunFailedError."""
-    with tempfile.TemporaryDirectory(prefix="secondlook-paper-") as folder:
-        survey = fly(scenario_of(published, seed), Path(folder))
+    with passing_folder() as folder:
+        survey = fly(scenario_of(published, seed), folder)
     return MeasuredMission(published, survey, fit_mixture(survey.risk_seen, published.components))
 
 

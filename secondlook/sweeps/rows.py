@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 
 from comms.said.topics import TOPICS
 from secondlook.errors import UserError
+from secondlook.files import passing_folder
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
 from secondlook.scenario.text import Value
@@ -118,8 +117,8 @@ def fly(mission: SweptMission) -> dict[str, Any]:
     """The figures of a mission, by column; its files lie in a folder that is gone afterwards. Of one that failed there
     is the sentence that says why."""
     try:
-        with tempfile.TemporaryDirectory(prefix="secondlook-sweep-") as folder:
-            summary = run_mission(mission.scenario, RunOptions(Path(folder), bus="local", record=False))
+        with passing_folder() as folder:
+            summary = run_mission(mission.scenario, RunOptions(folder, bus="local", record=False))
     except (RunFailedError, UserError, OSError) as error:  # of the last two one where the disk is full
         return {"failure": str(error)}
     return flat(summary)

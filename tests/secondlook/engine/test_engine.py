@@ -97,13 +97,17 @@ class TestWorkProcess:
         )
         paths = os.pathsep.join([str(Path(work.__file__).parent), *sys.path])
         starter = subprocess.Popen(
-            [sys.executable, "-c", program], stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": paths}
+            [sys.executable, "-c", program],
+            stdout=subprocess.PIPE,
+            env={**os.environ, "PYTHONPATH": paths, "TMPDIR": str(tmp_path)},
         )
         with starter:
             assert starter.stdout is not None
             child = int(starter.stdout.readline())
+            assert len(list(tmp_path.iterdir())) == 1
             starter.kill()
         assert until(lambda: not Path(f"/proc/{child}").exists())
+        assert list(tmp_path.iterdir()) == []
 
 
 def all_of(engine: Engine, function: Callable[[int], int], numbers: range = NUMBERS, **terms: Any) -> dict[int, Any]:
