@@ -16,6 +16,8 @@ from secondlook.engine.code_here import code_here, differing
 from secondlook.engine.engine import Engine, EngineError, OtherCodeError
 from secondlook.errors import UserError
 
+UNWATCHED = {"distributed.worker.profile.enabled": False, "distributed.admin.system-monitor.interval": "5s"}
+"""Of a cluster of our own: what looks at its workers some hundred times a second takes a seventh of a processor."""
 PATIENCE_S = 30.0  # until a scheduler answers and has a worker, and until one that was started anew is there again
 
 
@@ -32,11 +34,13 @@ def dask_cluster(address: str | None, jobs: int) -> Iterator[Engine]:
     with ExitStack() as stack:
         at = address
         if at is None:
+            dask.config.set(UNWATCHED)
             cluster = distributed.LocalCluster(
                 n_workers=jobs,
                 threads_per_worker=1,
                 host="127.0.0.1",
                 dashboard_address=None,
+                memory_limit=0,
                 silence_logs=logging.CRITICAL,
             )
             at = stack.enter_context(cluster).scheduler_address
