@@ -201,9 +201,12 @@ class CoordinatorWitness:
         self._check_risk(received.vehicle, now_ms)
 
     def _hear_answer(self, received: Received, status: TaskStatus, now_ms: int) -> None:
-        """Whoever has said last that it is at the strip that it was offered has it."""
+        """Whoever has said last that it is at the strip that it was offered has it; a state may have said since that it
+        is not."""
         vehicle = received.vehicle
         before = self._answers.get((vehicle, status.strip), _NONE_YET)
+        if vehicle in self._states:
+            before = max(before, order_of(self._states[vehicle][0]))
         if order_of(received.header) <= before:
             self.noted.add(LATE_ANSWER)
             return
