@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import re
 import sys
 from collections.abc import Sequence
 from contextlib import closing
@@ -36,12 +35,12 @@ from secondlook.storm.fly import Outcome, fly_storm, latest_flight
 from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
 from secondlook.storm.witness import Violation
+from secondlook.sweeps.plan import seed_range
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.plan import TroublePlan, load_plan
 
 MOST_STORMS = 1_000_000
 MOST_NAMED = 20  # of what was never tried
-_RANGE = re.compile(r"([0-9]{1,10})\.\.([0-9]{1,10})")
 
 
 def storm(
@@ -103,11 +102,10 @@ def storm(
 
 
 def _range_of(seeds: str) -> range:
-    match = _RANGE.fullmatch(seeds)
-    first, last = (int(match[1]), int(match[2])) if match else (1, 0)
-    if not first <= last <= LARGEST_SEED or last - first >= MOST_STORMS:
+    numbers = seed_range(seeds)
+    if not 0 < len(numbers) <= MOST_STORMS:
         raise UserError(f"--seeds: {seeds} is not allowed; must be A..B, at most {MOST_STORMS} whole numbers")
-    return range(first, last + 1)
+    return numbers
 
 
 def _fly_one(plan: TroublePlan, folder: Path, bus: Bus, flights: int) -> None:

@@ -14,7 +14,8 @@ from secondlook.errors import UserError
 from secondlook.sweeps.fly import LIMIT_S, fly_missing
 from secondlook.sweeps.page import write_page
 from secondlook.sweeps.plan import SweepPlan, load_sweep_plan, seeds_of, varied
-from secondlook.sweeps.standings import SHOWN, load_sweep, standings, table_of
+from secondlook.sweeps.rows import schema_of
+from secondlook.sweeps.standings import SHOWN, check_figures, load_sweep, standings, table_of
 
 WIDEST = 500  # characters
 MOST_TOLD = 5  # failures
@@ -46,12 +47,14 @@ def sweep(
     figures: Annotated[str, typer.Option(metavar="NAME,NAME,...", help="Which columns are told.")] = ",".join(SHOWN),
 ) -> None:
     """Fly a scenario with many seeds and settings into a table; the same command goes on where it was broken off."""
+    names = [name.strip() for name in figures.split(",")]
     if show:
-        _show(out or Path(scenario or ""), figures)
+        _show(out or Path(scenario or ""), names)
         return
     if out is None:
         raise UserError("--out: is needed; must be a folder for the rows")
     asked = _plan(scenario, seeds, vary, set_, plan)
+    check_figures(schema_of(asked), names)  # all that is asked for, before anything is made
     missions = asked.count
     failed = 0
 
@@ -66,9 +69,8 @@ def sweep(
         with engine(jobs, dask) as flies:
             fly_missing(asked, out, flies, progress, limit_s=limit_s)
 
-    assert asked.combinations, "checked before anything is made"
     failure = fly_watched("sweep", "missions", missions, fly, shown=True)
-    _show(out, figures, page=False)
+    _show(out, names, page=False)
     typer.echo(f"Files: {out}; how it stands: secondlook sweep {out} --show")
     if failure:
         sys.stderr.write(f"{failure}; the same command goes on\n")
@@ -90,8 +92,7 @@ def _plan(
     return load_sweep_plan(plan)
 
 
-def _show(folder: Path, figures: str, *, page: bool = True) -> None:
-    names = [name.strip() for name in figures.split(",")]
+def _show(folder: Path, names: list[str], *, page: bool = True) -> None:
     flown = load_sweep(folder)
     stood = standings(flown, names)
     told = table_of(flown, stood, names)

@@ -9,8 +9,7 @@ from typing import Any
 from secondlook.engine.engine import Engine, do_all
 from secondlook.engine.work_process import Lost
 from secondlook.errors import UserError
-from secondlook.files import passing_folder
-from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.mission import run_in_passing
 from secondlook.launch.processes import RunFailedError
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Watch
@@ -189,10 +188,8 @@ def fly(scenario: Scenario, watch: Watch | None = None) -> Result | Failure:
     """Flies a mission; its files lie in a folder that is gone afterwards. `watch`: see `RunOptions`."""
     notes = _Notes()
     try:
-        with passing_folder() as folder:
-            options = RunOptions(folder, bus="local", record=False, progress=notes.take, watch=watch)
-            summary = run_mission(scenario, options)
-    except (RunFailedError, UserError, OSError) as error:  # of the last two one where the disk is full
+        summary = run_in_passing(scenario, progress=notes.take, watch=watch)
+    except RunFailedError as error:
         return Failure(scenario.seed, str(error))
     primary_s, mission_s = summary["time"]["primary_s"], summary["time"]["mission_s"]
     if primary_s is None or summary["risk"] is None:

@@ -28,9 +28,8 @@ R = TypeVar("R")
 BATCH_S = 3.0  # of the wall clock
 MOST_IN_BATCH = 1000
 UNDER_WAY = 2  # batches a slot: one that is done, and one that waits for its end
-LEAST_LEFT = (
-    4  # batches a slot into which what is left is divided at least, so that all slots end at about the same time
-)
+LEAST_LEFT = 4
+"""Batches a slot at least, of what is left: so that all slots end at about the same time."""
 MOST_LOST = 3  # times that a batch is, before the engine is given up
 SHORTEST_S = 1e-6
 

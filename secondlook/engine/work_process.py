@@ -26,9 +26,8 @@ from typing import Any, TypeVar
 
 T = TypeVar("T")
 PASSING = "secondlook-work-"
-TRIMMED = (
-    "MALLOC_TRIM_THRESHOLD_"  # set by Dask for its workers; giving memory back at once makes missions a third slower
-)
+TRIMMED = "MALLOC_TRIM_THRESHOLD_"
+"""Dask sets it for its workers; with memory given back at once missions take a third longer."""
 ENDED = 1  # the exit code of one whose pipe has ended
 ENDS_WITHIN_S = 5.0  # of the wall clock, when its pipe has broken
 

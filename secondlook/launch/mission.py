@@ -23,7 +23,7 @@ from comms.said.announcement import Role
 from comms.said.routing import Routing
 from comms.session import PATIENCE_S
 from secondlook.errors import UserError
-from secondlook.files import CannotWriteError, room_kept, write_whole
+from secondlook.files import CannotWriteError, passing_folder, room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
@@ -122,6 +122,19 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     if failure is not None:
         raise RunFailedError(failure)
     return summary
+
+
+def run_in_passing(
+    scenario: Scenario, *, progress: Progress | None = None, watch: Watch | None = None
+) -> dict[str, Any]:
+    """The same on the local bus without recording, its files in a folder that is gone afterwards. Raises RunFailedError
+    for all that keeps it from ending well, a full disk for one."""
+    try:
+        with passing_folder() as folder:
+            options = RunOptions(folder, bus="local", record=False, progress=progress, watch=watch)
+            return run_mission(scenario, options)
+    except (UserError, OSError) as error:
+        raise RunFailedError(str(error)) from error
 
 
 def warn_of(summary: Mapping[str, Any]) -> None:

@@ -54,11 +54,15 @@ def _written(value: Value) -> str:
     return value if isinstance(value, str) else f"{value:.1f}".removesuffix(".0")
 
 
+def round_step(rough: float) -> float:
+    """The next of 1, 2 or 5 times a power of ten that is at least `rough` (> 0)."""
+    power = 10.0 ** math.floor(math.log10(rough))
+    return next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough)
+
+
 def ticks(highest: float, about: int) -> list[float]:
     """From 0 to at most `highest` (> 0), about so many, at 1, 2 or 5 times a power of ten."""
-    rough = highest / max(1, about)
-    power = 10.0 ** math.floor(math.log10(rough))
-    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough)
+    step = round_step(highest / max(1, about))
     return [index * step for index in range(math.floor(highest / step + 1e-9) + 1)]
 
 

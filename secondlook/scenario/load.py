@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import copy
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from pydantic import BaseModel, ValidationError
 
+from secondlook.errors import UserError
 from secondlook.scenario import bundled
 from secondlook.scenario.degrees import in_metres
 from secondlook.scenario.errors import KeyPath, Place, Problem, ScenarioError, dotted, shown
 from secondlook.scenario.explain import explain, nearest
 from secondlook.scenario.model import Scenario
 from secondlook.scenario.text import LARGEST_FILE_BYTES, Document, Value, decode, read, read_value
+
+M = TypeVar("M", bound=BaseModel)
 
 
 def override(
@@ -103,6 +107,31 @@ def load_scenario(
 def make_scenario(data: dict[str, Value], overrides: Sequence[str] = (), seed: int | None = None) -> Scenario:
     """The scenario that plain data says, as a file's content would; overrides, seed and errors as `load_scenario`."""
     return _validated(override(Document(data, {(): Place("scenario")}), overrides, seed), Path())
+
+
+def load_model(
+    path: str | os.PathLike[str], model: type[M], tags: Iterable[str] = ()
+) -> tuple[M, Mapping[KeyPath, Place]]:
+    """What another YAML file than a scenario's says, by the model that checks it, and where each of its values stands.
+
+    `tags`: see `explain`. Raises UserError where the file cannot be read, and ScenarioError, a sentence a line, for all
+    that is wrong with it.
+    """
+    source = os.fspath(path)
+    try:
+        with Path(source).open("rb") as file:
+            document = read(decode(file.read(LARGEST_FILE_BYTES + 1), source), source)
+    except OSError as error:
+        raise UserError(f"{source}: cannot be read: {error.strerror}") from error
+    classes: dict[int, type[BaseModel]] = {}
+    problems = document.problems
+    try:
+        found = model.model_validate(document.data, context=classes)
+    except ValidationError as error:
+        problems = problems + explain(error.errors(), document.data, document.places, classes, tags=tags)
+    if problems:
+        raise ScenarioError(problems)
+    return found, document.places
 
 
 def bundled_scenarios() -> list[tuple[str, str]]:

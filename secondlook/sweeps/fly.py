@@ -13,7 +13,7 @@ from secondlook.engine.engine import Engine, do_all, own_processes
 from secondlook.engine.work_process import Lost
 from secondlook.sweeps.folder import sweep_folder
 from secondlook.sweeps.plan import SweepPlan, SweptMission, checked
-from secondlook.sweeps.rows import fly, row_of, schema_of
+from secondlook.sweeps.rows import fly, row_of
 from secondlook.sweeps.standings import Sweep, load_sweep
 
 LIMIT_S = 600.0
@@ -39,14 +39,14 @@ def fly_missing(
     """
     failed = 0
     with sweep_folder(folder, plan) as rows:
-        schema, there = schema_of(plan), rows.done()
+        there = rows.done()
         missing = (one for one in plan.missions() if one.key not in there)
-        done = sum(one.key in there for one in plan.missions())
+        done = len(there)  # all of this plan, which has become no smaller
         progress(done, failed)
         try:
             for mission, figures in do_all(flies, missing, engine, count=plan.count - done, limit_s=limit_s):
                 told = {"failure": figures.why} if isinstance(figures, Lost) else figures
-                rows.add(row_of(plan, mission, told, schema))
+                rows.add(row_of(plan, mission, told, rows.schema))
                 failed += told.get("failure") is not None
                 done += 1
                 progress(done, failed)

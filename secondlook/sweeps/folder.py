@@ -127,7 +127,7 @@ class SweepFolder:
 
     def __init__(self, folder: Path, schema: pa.Schema) -> None:
         self.path = folder
-        self._schema = schema
+        self.schema = schema
         self._rows: list[Row] = []
         self._began_s = time.monotonic()
         self._every_s = FIRST_FILE_S
@@ -152,14 +152,14 @@ class SweepFolder:
         if self._rows:
             rows, self._rows = self._rows, []
             (self.path / ROWS).mkdir(exist_ok=True)
-            _write(self.path / ROWS / f"{self._next:06}.parquet", pa.Table.from_pylist(rows, self._schema))
+            _write(self.path / ROWS / f"{self._next:06}.parquet", pa.Table.from_pylist(rows, self.schema))
             self._next += 1
 
     def join(self) -> None:
         """Writes all rows into one file, sorted by seed and as the plan has them. Raises CannotWriteError."""
         self.write()
         if self._files():
-            _write(self.path / MISSIONS, read_rows(self.path, self._schema))
+            _write(self.path / MISSIONS, read_rows(self.path, self.schema))
             self.tidy()
 
     def tidy(self) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from importlib.resources import files
 from pathlib import Path
 
 import jinja2
-import numpy as np
 import pyarrow.compute as pc
 
 from secondlook.files import write_whole
-from secondlook.report.drawing import Element, drawing, element, markup
+from secondlook.report.drawing import Element, drawing, element, markup, round_step
 from secondlook.sweeps.standings import Spread, Standing, Sweep, above, band
 
 PAGE = "sweep.html"
@@ -81,8 +81,6 @@ def _row(name: str, spread: Spread, y: float, x: Callable[[float], float]) -> It
 
 def _marks(low: float, high: float) -> list[float]:
     """Round values about evenly from below the least to above the most."""
-    rough = max((high - low) / TICKS, abs(high) * 1e-9, 1e-12)
-    power = 10.0 ** np.floor(np.log10(rough))
-    step = next(factor * power for factor in (1, 2, 5, 10) if factor * power >= rough)
-    first, last = int(np.floor(low / step)), int(np.ceil(high / step))
+    step = round_step(max((high - low) / TICKS, abs(high) * 1e-9, 1e-12))
+    first, last = math.floor(low / step), math.ceil(high / step)
     return [round(place * step, 12) for place in range(first, max(last, first + 1) + 1)]

@@ -13,14 +13,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict
 
 from comms.said.announcement import LARGEST_SEED
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.scenario import Scenario, ScenarioError, load_scenario, scenario_hash
-from secondlook.scenario.explain import explain
-from secondlook.scenario.text import LARGEST_FILE_BYTES, Value, decode, dump, read, read_value
+from secondlook.scenario.load import load_model
+from secondlook.scenario.text import Value, dump, read_value
 
 MOST_COMBINATIONS = 10_000
 MOST_MISSIONS = 10_000_000
@@ -135,13 +135,19 @@ def as_text(value: Value) -> str:
     return json.dumps(value, ensure_ascii=False)
 
 
+def seed_range(text: str) -> range:
+    """The seeds of A..B, both of which belong to it; none where that is no range of seeds."""
+    match = _RANGE.fullmatch(text)
+    first, last = (int(match[1]), int(match[2])) if match else (1, 0)
+    return range(first, last + 1) if last <= LARGEST_SEED else range(0)
+
+
 def seeds_of(text: str, option: str = "--seeds") -> range:
     """The seeds of A..B, both of which belong to it, or of a single number. Raises UserError."""
-    match = _RANGE.fullmatch(text if ".." in text else f"{text}..{text}")
-    first, last = (int(match[1]), int(match[2])) if match else (1, 0)
-    if not first <= last <= LARGEST_SEED:
+    seeds = seed_range(text if ".." in text else f"{text}..{text}")
+    if not seeds:
         raise UserError(f"{option}: {text} is not allowed; must be A..B, whole numbers up to {LARGEST_SEED}")
-    return range(first, last + 1)
+    return seeds
 
 
 def varied(options: Sequence[str]) -> dict[str, Sequence[Value]]:
@@ -192,23 +198,10 @@ class _PlanFile(BaseModel):
 def load_sweep_plan(path: str | os.PathLike[str]) -> SweepPlan:
     """The plan that a YAML file holds, with `scenario`, `seeds`, and if wanted `set` and `vary`. A scenario's file is
     looked for beside it. Raises UserError, a sentence a line, for all that is wrong with it."""
-    source = os.fspath(path)
-    try:
-        with Path(source).open("rb") as file:
-            document = read(decode(file.read(LARGEST_FILE_BYTES + 1), source), source)
-    except OSError as error:
-        raise UserError(f"{source}: cannot be read: {error.strerror}") from error
-    classes: dict[int, type[BaseModel]] = {}
-    problems = document.problems
-    try:
-        told = _PlanFile.model_validate(document.data, context=classes)
-    except ValidationError as error:
-        problems = problems + explain(error.errors(), document.data, document.places, classes)
-    if problems:
-        raise ScenarioError(problems)
+    told, places = load_model(path, _PlanFile)
     for key, values in told.vary.items():
-        _check(key, values, f"{document.places[('vary', key)]}: vary.{key}")
-    seeds = seeds_of(str(told.seeds), f"{document.places[('seeds',)]}: seeds")
-    beside = Path(source).parent / told.scenario
+        _check(key, values, f"{places[('vary', key)]}: vary.{key}")
+    seeds = seeds_of(str(told.seeds), f"{places[('seeds',)]}: seeds")
+    beside = Path(path).parent / told.scenario
     scenario = str(beside) if beside.suffix and beside.exists() else told.scenario
     return SweepPlan(scenario, seeds, tuple(told.set), told.vary)

@@ -8,9 +8,7 @@ from typing import Any
 import pyarrow as pa
 
 from comms.said.topics import TOPICS
-from secondlook.errors import UserError
-from secondlook.files import passing_folder
-from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.launch.mission import run_in_passing
 from secondlook.launch.processes import RunFailedError
 from secondlook.scenario.text import Value
 from secondlook.sweeps.plan import SweepPlan, SweptMission, as_text
@@ -117,11 +115,9 @@ def fly(mission: SweptMission) -> dict[str, Any]:
     """The figures of a mission, by column; its files lie in a folder that is gone afterwards. Of one that failed there
     is the sentence that says why."""
     try:
-        with passing_folder() as folder:
-            summary = run_mission(mission.scenario, RunOptions(folder, bus="local", record=False))
-    except (RunFailedError, UserError, OSError) as error:  # of the last two one where the disk is full
+        return flat(run_in_passing(mission.scenario))
+    except RunFailedError as error:
         return {"failure": str(error)}
-    return flat(summary)
 
 
 def flat(summary: Mapping[str, Any], above: str = "") -> dict[str, Any]:

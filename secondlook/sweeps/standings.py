@@ -18,6 +18,7 @@ from rich.table import Table
 from planner.types import FloatArray
 from secondlook.compare.paired import FEWEST_SEEDS, interval_of_mean
 from secondlook.errors import UserError
+from secondlook.scenario.explain import nearest
 from secondlook.scenario.text import Value
 from secondlook.sweeps.folder import MADE_WITH, read_rows
 from secondlook.sweeps.plan import as_text
@@ -79,11 +80,7 @@ class Standing:
 def standings(sweep: Sweep, figures: Sequence[str] = SHOWN) -> list[Standing]:
     """Those that have flown, in the order of the values asked for. Raises UserError for a figure that is no number of
     the table."""
-    table = sweep.table
-    for name in figures:
-        if name not in table.schema.names or not _is_number(table.schema.field(name).type):
-            numbers = [field.name for field in table.schema if _is_number(field.type)]
-            raise UserError(f"--figures: {name} is not allowed; must be of {', '.join(numbers)}")
+    check_figures(sweep.table.schema, figures)
     names = short_names(list(sweep.vary))
     found, first = list[Standing](), dict[str, dict[int, float]]()
     for values, rows in _groups(sweep):
@@ -110,6 +107,15 @@ def _groups(sweep: Sweep) -> list[tuple[tuple[str, ...], pa.Table]]:
     order = [{_text(value): place for place, value in enumerate(sweep.vary[key])} for key in keys]
     ordered = sorted(rows, key=lambda one: [places.get(text, -1) for places, text in zip(order, one, strict=True)])
     return [(one, sweep.table.take(rows[one])) for one in ordered]
+
+
+def check_figures(schema: pa.Schema, figures: Sequence[str]) -> None:
+    """Raises UserError for a figure that is no number of a table with these columns."""
+    numbers = [field.name for field in schema if _is_number(field.type)]
+    for name in figures:
+        if name not in numbers:
+            such_as = nearest(name, numbers) or SHOWN[0]
+            raise UserError(f"--figures: {name} is not allowed; must be a column of numbers, such as {such_as}")
 
 
 def short_names(keys: Sequence[str]) -> list[str]:

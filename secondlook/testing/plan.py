@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
-from secondlook.scenario.errors import ScenarioError
-from secondlook.scenario.explain import explain
-from secondlook.scenario.text import LARGEST_FILE_BYTES, Value, decode, dump, read
+from secondlook.scenario.load import load_model
+from secondlook.scenario.text import Value, dump
 from secondlook.scenario.values import Mapping, Share, refused
 from secondlook.testing.trouble import Trouble
 
@@ -157,20 +155,7 @@ class TroublePlan(Mapping):
 
 def load_plan(path: str | os.PathLike[str]) -> TroublePlan:
     """The plan that a YAML file holds; raises ScenarioError, a sentence a line, for all that is wrong with it."""
-    source = os.fspath(path)
-    try:
-        with Path(source).open("rb") as file:
-            document = read(decode(file.read(LARGEST_FILE_BYTES + 1), source), source)
-    except OSError as error:
-        raise UserError(f"{source}: cannot be read: {error.strerror}") from error
-    classes: dict[int, type[BaseModel]] = {}
-    problems = document.problems
-    try:
-        plan = TroublePlan.model_validate(document.data, context=classes)
-    except ValidationError as error:
-        problems = problems + explain(error.errors(), document.data, document.places, classes, tags=KINDS)
-    if problems:
-        raise ScenarioError(problems)
+    plan, _ = load_model(path, TroublePlan, tags=KINDS)
     return plan
 
 

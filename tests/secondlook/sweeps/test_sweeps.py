@@ -245,7 +245,7 @@ class TestStandings:
 
     def test_a_figure_that_is_no_number_is_refused(self, flown: Path) -> None:
         for name in ("digest", "risk.median"):
-            with pytest.raises(UserError, match=rf"--figures: {name} is not allowed; must be of seed, "):
+            with pytest.raises(UserError, match=rf"--figures: {name} is not allowed; must be a column of numbers"):
                 standings(load_sweep(flown), [name])
 
     def test_names_are_as_short_as_they_are_told_apart(self) -> None:
