@@ -4,8 +4,8 @@ vehicles on their courses come too close to each other."""
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from planner.currents import FlowGrid, Sailing
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import Sweep, shifted
-from planner.types import FloatArray, Point
+from planner.types import FloatArray
 from planner.ways import way_or_direct
 
 STEP_S = 2.0
@@ -31,35 +31,39 @@ ON_TRACK_M = 2.0
 @dataclass(frozen=True, eq=False)
 class Course:
     """`poses[k]`, shape (n, 3), is where the vehicle is `first + k` steps after the mission's start: x_m, y_m,
-    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle."""
+    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle. `poses_at`: the same at
+    any times in s, shape (n,), between the steps exactly; before `start_s` as then."""
 
+    start_s: float
     first: int
     poses: FloatArray
     arrives_s: float
+    poses_at: Callable[[FloatArray], FloatArray]
+    _asked: dict[float, Pose] = field(default_factory=dict)
+    """What was asked for last, as many courses are laid against one at one time."""
 
     @property
     def end(self) -> int:
         """The first step that it does not tell of any more."""
         return self.first + len(self.poses)
 
-    def at(self, time_s: float) -> tuple[Pose, float]:
-        """Where the vehicle is at the first step from a time on, and that step's time; before its first step and after
-        its last as then."""
-        step = min(max(math.ceil(time_s / STEP_S), self.first), self.end - 1)
-        return Pose(*self.poses[step - self.first].tolist()), step * STEP_S
-
-    def place_at(self, time_s: float) -> Point:
-        """Where the vehicle is, between two steps as if it went straight; before its first and after its last as
-        then."""
-        x_m, y_m = (
-            float(np.interp(time_s / STEP_S - self.first, range(len(self.poses)), self.poses[:, k])) for k in (0, 1)
-        )
-        return x_m, y_m
+    def at(self, time_s: float) -> Pose:
+        """Where the vehicle is; before its start and after its last step as then."""
+        if time_s not in self._asked:
+            self._asked.clear()
+            self._asked[time_s] = Pose(*self.poses_at(np.array([min(time_s, (self.end - 1) * STEP_S)]))[0].tolist())
+        return self._asked[time_s]
 
     def later(self, steps: int) -> Course:
         """The same, so many steps later; until then the vehicle is where it begins."""
-        waiting = np.repeat(self.poses[:1], steps, axis=0)
-        return Course(self.first, np.concatenate([waiting, self.poses]), self.arrives_s + steps * STEP_S)
+        waiting, late_s = np.repeat(self.poses[:1], steps, axis=0), steps * STEP_S
+        return replace(
+            self,
+            poses=np.concatenate([waiting, self.poses]),
+            arrives_s=self.arrives_s + late_s,
+            poses_at=lambda times_s: self.poses_at(times_s - late_s),
+            _asked={},
+        )
 
 
 def course(
@@ -77,25 +81,33 @@ def course(
     knots_s, knots_m = sailing.knots(() if still else paths)
     sails_s = sum(path.length_m for path in paths) / speed_mps if still else float(knots_s[-1])
     lasts_s = min(sails_s + AHEAD_S, LONGEST_S)
-    times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
-    way_m: FloatArray = speed_mps * (times_s - start_s)
-    if not still:
-        way_m = np.interp(times_s - start_s, knots_s, knots_m) + np.maximum(way_m - speed_mps * sails_s, 0.0)
-    parts, done, done_m, pose = [], 0, 0.0, start
-    for path in paths:
-        to = int(np.searchsorted(way_m, done_m + path.length_m))
-        parts.append(path.poses_at(way_m[done:to] - done_m))
-        pose, done, done_m = path.pose_at(path.length_m), to, done_m + path.length_m
-    side = keep_out.circling(pose, turn_radius_m) or 1
-    circle = DubinsPath(pose, turn_radius_m, (side, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
-    parts.append(circle.poses_at(way_m[done:] - done_m))
-    return Course(first, np.concatenate(parts), start_s + (done_m / speed_mps if still else sails_s))
+    end = paths[-1].pose_at(paths[-1].length_m) if paths else start
+    side = keep_out.circling(end, turn_radius_m) or 1
+    circle = DubinsPath(end, turn_radius_m, (side, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
+
+    def poses_at(times_s: FloatArray) -> FloatArray:
+        way_m: FloatArray = speed_mps * (times_s - start_s)
+        if not still:
+            way_m = np.interp(times_s - start_s, knots_s, knots_m) + np.maximum(way_m - speed_mps * sails_s, 0.0)
+        parts, done, done_m = [], 0, 0.0
+        for path in paths:
+            to = int(np.searchsorted(way_m, done_m + path.length_m))
+            if to > done:
+                parts.append(path.poses_at(way_m[done:to] - done_m))
+            done, done_m = to, done_m + path.length_m
+        return np.concatenate([*parts, circle.poses_at(way_m[done:] - done_m)])
+
+    poses = poses_at(STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64))
+    return Course(start_s, first, poses, start_s + sails_s, poses_at)
 
 
 def lying_still(pose: Pose, from_s: float) -> Course:
     """The course of a vehicle that has not been under way yet."""
-    first = math.ceil(from_s / STEP_S)
-    return Course(first, np.tile(np.array(pose, dtype=np.float64), (math.ceil(AHEAD_S / STEP_S), 1)), from_s)
+
+    def poses_at(times_s: FloatArray) -> FloatArray:
+        return np.tile(np.array(pose, dtype=np.float64), (len(times_s), 1))
+
+    return Course(from_s, math.ceil(from_s / STEP_S), poses_at(np.zeros(math.ceil(AHEAD_S / STEP_S))), from_s, poses_at)
 
 
 def survey_course(
@@ -176,6 +188,8 @@ def survey_run_out_left_m(entry: RosterVehicle, plan: Plan | None, pose: Pose) -
 
 NO_NEARER_M = 1.0
 """Vehicles that begin too close may part; they come no nearer by more than this."""
+SOON_S = 10.0
+"""So long courses are known well enough for those that part to come as near as to `soon_m`."""
 
 
 @dataclass(frozen=True)
@@ -186,18 +200,26 @@ class Approach:
     time_s: float
 
 
-def too_close(one: Course, other: Course, least_m: float, from_s: float, until_s: float) -> Approach | None:
+def too_close(
+    one: Course, other: Course, least_m: float, from_s: float, until_s: float, soon_m: float = math.inf
+) -> Approach | None:
     """The first time at which two vehicles come nearer to each other than `least_m`, and how near; None for never.
 
     Between two steps both are assumed to go straight, which in a turn of 6 m at 2 m/s is wrong by 0.3 m. Vehicles that
-    are nearer at the beginning are too close only if they come nearer still, or again after they were apart.
+    are nearer at the beginning are too close only if they come nearer still, at once than `soon_m`, or again after they
+    were apart.
     """
-    first = max(one.first, other.first, int(from_s / STEP_S))
+    first = max(one.first, other.first, int(from_s / STEP_S) + 1)
     last = min(one.end, other.end, int(until_s / STEP_S) + 2)
-    if last - first < 2:
+    if last - first < 1:
         return None
-    apart = (
-        one.poses[first - one.first : last - one.first, :2] - other.poses[first - other.first : last - other.first, :2]
+    (x_m, y_m), (its_x_m, its_y_m) = one.at(from_s)[:2], other.at(from_s)[:2]
+    apart = np.empty((1 + last - first, 2))
+    apart[0] = x_m - its_x_m, y_m - its_y_m
+    np.subtract(
+        one.poses[first - one.first : last - one.first, :2],
+        other.poses[first - other.first : last - other.first, :2],
+        out=apart[1:],
     )
     nearest_m = _nearest_m(apart)
     near = nearest_m < least_m
@@ -206,11 +228,13 @@ def too_close(one: Course, other: Course, least_m: float, from_s: float, until_s
     begin_m = float(np.hypot(*apart[0]))
     if begin_m < least_m:
         parting = near.size if near.all() else int(near.argmin())
-        near[:parting] = nearest_m[:parting] < begin_m - NO_NEARER_M
+        soon = min(parting, 1 + int(SOON_S / STEP_S))
+        near[:soon] = nearest_m[:soon] < min(begin_m - NO_NEARER_M, soon_m)
+        near[soon:parting] = nearest_m[soon:parting] < begin_m - NO_NEARER_M
         if not near.any():
             return None
     step = int(near.argmax())
-    return Approach(float(nearest_m[step:][near[step:]].min()), (first + step) * STEP_S)
+    return Approach(float(nearest_m[step:][near[step:]].min()), (first + step - 1) * STEP_S if step else from_s)
 
 
 def _nearest_m(apart: FloatArray) -> FloatArray:

@@ -27,6 +27,8 @@ OFFER_MARGIN_M = 16.0
 """A way that is offered, or to stand aside, keeps so much farther off: courses are known to a few metres."""
 MARGIN_M = 11.0
 """A helper gives way where it would come nearer than the separation and this."""
+SOON_MARGIN_M = 4.0
+"""Vehicles that are nearer already when one sets out, as where they begin side by side, may come so near at once."""
 DELAYS_S = (0.0, 10.0, 20.0, 30.0)
 """An offer that is clear so much later waits; else another is asked for."""
 RESTS_S = 20.0
@@ -78,6 +80,7 @@ class RightOfWay:
 
     def __init__(self, separation_m: float, is_inside: Callable[[Point], bool], keep_out: KeepOut = NOWHERE) -> None:
         self.separation_m = separation_m
+        self._soon_m = separation_m + SOON_MARGIN_M
         self.check_s = 0.0
         """When to check next."""
         self._is_inside = is_inside
@@ -91,7 +94,7 @@ class RightOfWay:
 
     def departures(self, fleet: Sequence[Underway], now_s: float) -> Departures:
         """To judge the offers of one moment."""
-        return Departures(self.separation_m + OFFER_MARGIN_M, self._traffic, fleet, now_s)
+        return Departures(self.separation_m, self._traffic, fleet, now_s)
 
     def offered(self, name: str, number: int, departures: Departures) -> None:
         """A helper is sent to a strip."""
@@ -158,7 +161,7 @@ class RightOfWay:
         until_s = now_s + (CLEAR_AHEAD_S if one.strip is None else GIVES_BACK_S)
         if begins and one.strip is not None:
             until_s = max(until_s, mine.arrives_s + RESTS_S)
-        return too_close(mine, its, self.separation_m + MARGIN_M, now_s, until_s)
+        return too_close(mine, its, self.separation_m + MARGIN_M, now_s, until_s, self._soon_m)
 
     def _next_check_s(self, one: Underway, other: Underway, now_s: float) -> float:
         """Until when one cannot come near enough to the other, whatever both do, to be told anything."""
@@ -205,7 +208,7 @@ class RightOfWay:
 
     def _place_aside(self, one: Underway, courses: list[Course], now_s: float) -> Point | None:
         """The nearest place in the area at which it can wait; None where there is none."""
-        here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)[0]
+        here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)
         for for_s in (2 * CLEAR_AHEAD_S, STANDS_ASIDE_S):
             for share, number in product((2.0, 3.5, 5.0), range(BEARINGS)):
                 bearing_rad = here.heading_rad + 2 * math.pi * number / BEARINGS
@@ -221,7 +224,7 @@ class RightOfWay:
         self, course: Course, others: list[Course], now_s: float, for_s: float, margin_m: float = MARGIN_M
     ) -> bool:
         least_m = self.separation_m + margin_m
-        return all(too_close(course, other, least_m, now_s, now_s + for_s) is None for other in others)
+        return all(too_close(course, other, least_m, now_s, now_s + for_s, self._soon_m) is None for other in others)
 
     def _complain(self, one: Underway, other: Underway, approach: Approach) -> None:
         if (one.name, other.name) not in self._complained_of:
@@ -239,13 +242,13 @@ class Departures:
     free helpers that keep another from setting out, and its course.
     """
 
-    def __init__(self, least_m: float, traffic: Traffic, fleet: Sequence[Underway], now_s: float) -> None:
+    def __init__(self, separation_m: float, traffic: Traffic, fleet: Sequence[Underway], now_s: float) -> None:
         self.fleet = fleet
         self.now_s = now_s
         self.ways: dict[tuple[str, int], tuple[Strip, Course, Sweep]] = {}
         self.sweeps_s: dict[tuple[str, int], float] = {}
         self.in_the_way: list[tuple[str, Course]] = []
-        self._least_m = least_m
+        self._least_m, self._soon_m = separation_m + OFFER_MARGIN_M, separation_m + SOON_MARGIN_M
         self._traffic = traffic
         self._agreed: dict[str, Course] = {}
 
@@ -272,11 +275,9 @@ class Departures:
         free, busy = self._others(name)
         for delay_s in DELAYS_S:
             later = course.later(round(delay_s / STEP_S)) if delay_s else course
-            if any(too_close(later, its, self._least_m, now_s, until_s + delay_s) for its in busy):
+            if any(self._meet(later, its, until_s + delay_s) for its in busy):
                 continue
-            blocking = [
-                who for who, its in free.items() if too_close(later, its, self._least_m, now_s, now_s + STANDS_ASIDE_S)
-            ]
+            blocking = [who for who, its in free.items() if self._meet(later, its, now_s + STANDS_ASIDE_S)]
             self.in_the_way += [(who, course) for who in blocking]
             if blocking:
                 return DELAYS_S[1]
@@ -284,6 +285,9 @@ class Departures:
                 self._agreed[name] = course
             return delay_s
         return math.inf
+
+    def _meet(self, one: Course, other: Course, until_s: float) -> bool:
+        return too_close(one, other, self._least_m, self.now_s, until_s, self._soon_m) is not None
 
     def _others(self, name: str) -> tuple[dict[str, Course], list[Course]]:
         """The courses of the other vehicles: of those that can stand aside, by name, and of those that cannot."""

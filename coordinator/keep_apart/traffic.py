@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 from comms.said.messages import AgentState, Mode
 from coordinator.keep_apart.courses import (
-    STEP_S,
     Course,
     course,
     lying_still,
@@ -83,22 +82,22 @@ class Traffic:
 
     def to_strip(self, vehicle: KnownVehicle, strip: Strip | None, other: Strip, now_s: float) -> tuple[Course, Sweep]:
         """The course of a helper that leaves what it does and sets out to another strip now, and how it sweeps it."""
-        pose, start_s = self._here(vehicle, now_s, strip)
+        pose = self._here(vehicle, now_s, strip)
         entry, run_out_m = vehicle.entry, self._run_out_m(vehicle, pose)
         sweep = self._sweep_from(pose, vehicle, other)
         radius_m, keep_out = entry.turn_radius_m, self._keep_out
-        laid = sweep_course(pose, start_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
+        laid = sweep_course(pose, now_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
         return laid, sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
-        return self._to_place(vehicle, *self._here(vehicle, now_s, strip), place)
+        return self._to_place(vehicle, self._here(vehicle, now_s, strip), now_s, place)
 
     def has_room(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> bool:
         """Whether a helper that leaves what it does can go to a place and circle there."""
         if not self._keep_out:
             return True
-        pose, radius_m = self._here(vehicle, now_s, strip)[0], vehicle.entry.turn_radius_m
+        pose, radius_m = self._here(vehicle, now_s, strip), vehicle.entry.turn_radius_m
         run_out = self._run_out(vehicle, pose)
         end = run_out.pose_at(run_out.length_m)
         there = _arrival(end, place)
@@ -107,9 +106,9 @@ class Traffic:
 
     def holding(self, vehicle: KnownVehicle, strip: Strip | None, now_s: float) -> Course:
         """The course of a helper that leaves what it does and circles where it is."""
-        pose, start_s = self._here(vehicle, now_s, strip)
+        pose = self._here(vehicle, now_s, strip)
         entry, run_out = vehicle.entry, self._run_out(vehicle, pose)
-        return course(pose, start_s, vehicle.sailing, entry.turn_radius_m, [run_out], self._keep_out)
+        return course(pose, now_s, vehicle.sailing, entry.turn_radius_m, [run_out], self._keep_out)
 
     def offered(self, name: str, strip: Strip, laid: Course, sweep: Sweep) -> None:
         """A helper was sent to a strip."""
@@ -120,11 +119,12 @@ class Traffic:
         """A helper was told to wait at a place."""
         self._errands[vehicle.entry.vehicle] = _Errand(place, self.aside(vehicle, strip, place, now_s))
 
-    def _here(self, vehicle: KnownVehicle, now_s: float, strip: Strip | None = None) -> tuple[Pose, float]:
+    def _here(self, vehicle: KnownVehicle, now_s: float, strip: Strip | None) -> Pose:
+        """Where a vehicle is that is told something now."""
         state = vehicle.state
         assert state is not None
         laid = self.course(vehicle, strip, now_s)
-        return (Pose(state.x_m, state.y_m, state.heading_rad), now_s) if laid is None else laid.at(now_s)
+        return Pose(state.x_m, state.y_m, state.heading_rad) if laid is None else laid.at(now_s)
 
     def _survey(self, vehicle: KnownVehicle, now_s: float) -> Course:
         state, plan, name = vehicle.state, vehicle.plan, vehicle.entry.vehicle
@@ -180,8 +180,8 @@ class Traffic:
         state, entry, heard_s = vehicle.state, vehicle.entry, vehicle.heard_ms / 1000
         assert state is not None
         pose = Pose(state.x_m, state.y_m, state.heading_rad)
-        is_on_course = math.dist(errand.course.place_at(heard_s), pose[:2]) <= OFF_COURSE_M
-        if is_on_course or heard_s < errand.course.first * STEP_S:  # or was heard before it was sent
+        is_on_course = math.dist(errand.course.at(heard_s)[:2], pose[:2]) <= OFF_COURSE_M
+        if is_on_course or heard_s < errand.course.start_s:  # or was heard before it was sent
             return errand.course
         if math.dist(pose[:2], errand.place) <= 2 * entry.turn_radius_m + OFF_COURSE_M:
             return self._rest(vehicle)

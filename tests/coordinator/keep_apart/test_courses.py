@@ -34,9 +34,9 @@ def ahead(x_m: float, y_m: float, heading_rad: float, speed_mps: float, length_m
 class TestCourses:
     def test_it_is_where_its_speed_takes_it_and_then_circles(self) -> None:
         laid = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 100, 10)])
-        pose, at_s = laid.at(25)
-        assert at_s == 26
-        assert pose == pytest.approx((42, 0, EAST))  # 21 s at 2 m/s
+        assert laid.at(25) == pytest.approx((40, 0, EAST))  # 20 s at 2 m/s
+        assert laid.at(0) == (0, 0, EAST)
+        assert laid.later(2).at(25) == pytest.approx((32, 0, EAST))
         assert laid.arrives_s == 55
         later = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 55]
         assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
@@ -47,16 +47,15 @@ class TestCourses:
         laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep)
         served = expected_service(OpenStrip(one, 1), free)
         assert laid.arrives_s == pytest.approx(served.free_s)
-        there, at_s = laid.at(served.free_s)
-        assert math.dist(there[:2], served.free_at[:2]) <= free.speed_mps * (at_s - served.free_s) + 1e-6
+        assert laid.at(served.free_s) == pytest.approx(served.free_at, abs=1e-6)
 
     def test_a_run_out_is_sailed_before_the_way_to_the_next_strip(self) -> None:
         free = helper(heading_rad=EAST)
         sweep, _ = shortest_sweep(sweeps(strip(1, 300, 100), free), free.pose, free.turn_radius_m)
         at_once = sweep_course(free.pose, 0, Sailing(2), 6, sweep)
         later = sweep_course(free.pose, 0, Sailing(2), 6, sweep, run_out_m=20)
-        assert later.at(10)[0] == pytest.approx((20, 0, EAST))
-        assert at_once.at(10)[0].y_m > 1
+        assert later.at(10) == pytest.approx((20, 0, EAST))
+        assert at_once.at(10).y_m > 1
         assert later.arrives_s == pytest.approx(at_once.arrives_s, abs=2)
 
     def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
@@ -65,7 +64,7 @@ class TestCourses:
         laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep)
         crosses_s = laid.arrives_s - 60
         assert crosses_s > 1800
-        meets = laid.at(crosses_s)[0]
+        meets = laid.at(crosses_s)
         crossing = ahead(meets.x_m - 2 * crosses_s, meets.y_m, EAST, 2, 2 * crosses_s + 200)
         found = too_close(laid, crossing, 10, 0, crosses_s + 100)
         assert found is not None
@@ -76,7 +75,7 @@ class TestCourses:
         tracks = (PlannedTrack(1, 0, 0, 0, 0, 400, False), PlannedTrack(2, 100, 100, 400, 100, 0, False))
         state = AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0)
         laid = survey_course(entry, state, Plan(1, tracks, (), (), ""), 0)
-        assert laid.at(100)[0][:2] == pytest.approx((0, 400))
+        assert laid.at(100)[:2] == pytest.approx((0, 400))
         on_second = laid.poses[np.abs(laid.poses[:, 2] - SOUTH) < 1e-6]
         assert on_second[:, 0] == pytest.approx(100)
         assert on_second[:, 1].min() < 10
@@ -110,7 +109,7 @@ class TestCourses:
         track = PlannedTrack(1, 0, 0, 0, 0, 400, False)
         state = AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0)
         laid = survey_course(entry, state, Plan(1, (track,), (), (), ""), 0)
-        assert laid.at(100)[0][:2] == pytest.approx((0, 370))
+        assert laid.at(100)[:2] == pytest.approx((0, 370))
 
     def test_a_run_out_is_sailed_to_its_end(self) -> None:
         entry = vehicle("primary", Role.SURVEY)
@@ -147,6 +146,15 @@ class TestTooClose:
         found = too_close(ahead(0, -25, NORTH, 5), ahead(-25, 0, EAST, 5), 1, 0, 60)
         assert found is not None
         assert found.distance_m == pytest.approx(0, abs=1e-6)
+
+    def test_before_the_first_whole_step(self) -> None:
+        # Told at 0.5 s, it overtakes the other at 1.9 s, 5 m beside it; from the first sample on it draws away.
+        start = Pose(0, 0, NORTH)
+        told = course(start, 0.5, Sailing(9), 10, [straight(start, 2000, 10)])
+        found = too_close(told, ahead(5, 9, NORTH, 2), 8, 0.5, 60)
+        assert found is not None
+        assert found.distance_m == pytest.approx(5)
+        assert found.time_s == 0.5
 
     def test_one_that_passes_later(self) -> None:
         assert too_close(ahead(0, -100, NORTH, 2), ahead(-400, 0, EAST, 2), 20, 0, 600) is None

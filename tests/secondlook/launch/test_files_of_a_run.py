@@ -145,7 +145,7 @@ COMPARE = ("compare", str(BRIEF), "--allocators", "none", "--seeds", "1", "--job
         (5_000, ("picture", "RUN", "--out", "OUT/a.png"), 2, "OUT/a.png", []),
         (5_000, ("video", "RUN", "--seconds", "1", "--frames", "2", "--out", "OUT/a.webp"), 2, "OUT/a.webp", []),
         (5_000, ("geojson", "RUN", "--out", "OUT/a.json"), 2, "--out OUT/a.json", []),
-        (60_000, ("export", "RUN", "--out", "OUT"), 2, "OUT/mission.geojson", []),
+        (50_000, ("export", "RUN", "--out", "OUT"), 2, "OUT/mission.geojson", []),
         (1_000, ("storm", "--seed", "1", "--out", "OUT"), 2, "OUT/plan.yaml", []),
         (1_000, (*COMPARE, "OUT"), 1, r"none, seed 1: /.+/scenario\.yaml", []),
         (70_000, (*COMPARE, "OUT"), 2, "--out OUT/risk.png", ["compare.json"]),

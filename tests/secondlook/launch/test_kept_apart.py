@@ -78,12 +78,12 @@ class TestMissions:
 
     def test_each_pair_that_does_is_a_warning_in_the_log(self, tmp_path: Path) -> None:
         # Nobody can keep apart who is not where it believes to be.
-        beside = ("mission.separation_m=60", "vehicles.helper.position_error_m=30")
+        beside = ("mission.separation_m=80", "vehicles.helper.position_error_m=30")
         flight = Fleet(BRIEF, folder=tmp_path, overrides=beside).run()
         (pair,) = flight.summary["separation"]["closest"]
         assert (flight.folder / "logs" / "launcher.txt").read_text() == (
             f"secondlook.mission: helper and primary came within {pair['closest_m']:.1f} m of each other at "
-            f"{pair['t_s']:.0f} s, less than the 60 m of mission.separation_m\n"
+            f"{pair['t_s']:.0f} s, less than the 80 m of mission.separation_m\n"
         )
 
 

@@ -312,8 +312,8 @@ class TestStripsOfferedWithin:
 
     def test_a_strip_that_waits_for_a_helper_that_is_free(self, tmp_path: Path) -> None:
         idle = fly(tmp_path, BRIEF, overrides={"coordinator.allocator": NoAllocator})
-        opened = strips(idle, 1)[0]
-        said = rf"strip 1 waits since {at(opened)} and was not offered by \d+\.\d+ s"
+        opened = strips(idle, 2)[0]
+        said = rf"strip 2 waits since {at(opened)} and was not offered by \d+\.\d+ s"
         with pytest.raises(AssertionError, match=rf"^strips wait for a helper that is free:\n  {said}"):
             assert_strips_offered_within(idle, 20)
         assert_strips_offered_within(idle, 1000)
