@@ -7,7 +7,7 @@ from enum import Enum, auto
 
 
 class Item(Enum):
-    """What can be on the agenda."""
+    """What can be on the agenda; CUT and ASSIGN are of a sector each."""
 
     CUT = auto()
     ASSIGN = auto()
@@ -17,27 +17,31 @@ class Item(Enum):
 
 
 class Agenda:
-    """Holds each item once, with its deadline. Times are milliseconds since the mission's start."""
+    """Holds each item once, by sector, with its deadline. Times are milliseconds since the mission's start."""
 
     def __init__(self) -> None:
-        self._deadlines_ms: dict[Item, int] = {}
+        self._deadlines_ms: dict[tuple[Item, int], int] = {}
 
-    def add(self, item: Item, deadline_ms: int) -> None:
+    def add(self, item: Item, deadline_ms: int, sector: int = 0) -> None:
         """An item is to be done at a time at the latest: of two deadlines the earlier counts. One that is now, or past,
         is met with the next wake-up."""
-        self._deadlines_ms[item] = min(deadline_ms, self._deadlines_ms.get(item, deadline_ms))
+        key = item, sector
+        self._deadlines_ms[key] = min(deadline_ms, self._deadlines_ms.get(key, deadline_ms))
 
-    def strike(self, item: Item, now_ms: int) -> bool:
-        """Strikes an item off if it is due, whatever was to come of it later; returns whether it was."""
-        deadline_ms = self._deadlines_ms.get(item)
-        if deadline_ms is None or deadline_ms > now_ms:
-            return False
-        del self._deadlines_ms[item]
-        return True
+    def strike(self, item: Item, now_ms: int) -> list[int]:
+        """Strikes an item off where it is due, whatever was to come of it later; returns of which sectors it was."""
+        due = [sector for (one, sector), due_ms in self._deadlines_ms.items() if one is item and due_ms <= now_ms]
+        for sector in due:
+            del self._deadlines_ms[item, sector]
+        return sorted(due)
 
     def deadline_ms(self, item: Item) -> int | None:
-        """When an item is to be done; None where it is not on the agenda."""
-        return self._deadlines_ms.get(item)
+        """When an item is to be done, of any sector; None where it is not on the agenda."""
+        return min((due_ms for (one, _), due_ms in self._deadlines_ms.items() if one is item), default=None)
+
+    def sectors(self, item: Item) -> list[int]:
+        """Of which sectors an item is on the agenda."""
+        return [sector for one, sector in self._deadlines_ms if one is item]
 
     def next_wake_ms(self, now_ms: int, others_ms: Iterable[int]) -> int | None:
         """The earliest deadline, of the agenda and of these others, in the future; None where there is none."""

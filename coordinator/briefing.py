@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from comms.said.messages import StripState
@@ -10,7 +11,8 @@ from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Counted
 from coordinator.fleet import KnownFleet
-from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
+from coordinator.ledger import Ledger, StripRecord
+from coordinator.sectors import Sector
 from coordinator.vehicles import KnownVehicle, way_home_of
 from planner.dubins import Pose
 from planner.footprints import footprint_of
@@ -29,21 +31,17 @@ class Briefing:
         self._vehicles = fleet.vehicles
         self._primaries = fleet.primaries
 
-    def situation(self, now_ms: int) -> Situation:
-        """What is decided on now."""
-        helpers = self.helpers(now_ms)
+    def situation(self, now_ms: int, sector: Sector) -> Situation:
+        """What is decided on now in a sector: of its open strips, and for who is in its team, by name."""
+        records = [one for one in self._ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
+        found = (self._helper(self._vehicles[name], records, now_ms) for name in sorted(sector.team))
         return Situation(
             now_s=now_ms / 1000,
             deadline_s=self.expected_deadline_s(),
-            strips=tuple(self.open_strip(record) for record in self._ledger.in_state(StripState.OPEN)),
-            helpers=helpers,
+            strips=tuple(self.open_strip(record) for record in records),
+            helpers=tuple(helper for helper in found if helper is not None),
             switch_margin=self._config.switch_margin,
         )
-
-    def helpers(self, now_ms: int) -> tuple[Helper, ...]:
-        """Those that can be given something, by name."""
-        found = (self._helper(vehicle, now_ms) for _, vehicle in sorted(self._vehicles.items()))
-        return tuple(helper for helper in found if helper is not None)
 
     def expected_deadline_s(self) -> float:
         """When the mission is expected to be over at the latest; infinite while nobody can tell."""
@@ -61,40 +59,40 @@ class Briefing:
         """The same of one that is not open yet."""
         return OpenStrip(strip, cut.counts_m2 / self._p_detect)
 
-    def time_m(self, situation: Situation) -> float:
-        """The metres that helpers have time, and battery, to fly until the mission ends; infinite while nobody can tell
-        of either."""
+    def time_m(self, situation: Situation, sector: Sector) -> float:
+        """The metres that its helpers have time, and battery, to fly in a sector until the mission ends; infinite while
+        nobody can tell of either."""
         deadline_s, helpers = situation.deadline_s, situation.helpers
         if not helpers:  # some may still come
             left_s = max(0.0, deadline_s - situation.now_s)
-            return sum(left_s * one.entry.speed_mps for one in self._vehicles.values() if one.entry.role.revisits)
+            return sum(left_s * self._vehicles[name].entry.speed_mps for name in sorted(sector.team))
         return sum(max(0.0, min(deadline_s, one.lasts_until_s) - one.free_s) * one.speed_mps for one in helpers)
 
-    def _helper(self, vehicle: KnownVehicle, now_ms: int) -> Helper | None:
-        """A helper as an allocator sees it; None where it is lost or can be given nothing."""
+    def _helper(self, vehicle: KnownVehicle, open_strips: Sequence[StripRecord], now_ms: int) -> Helper | None:
+        """A helper as an allocator sees it; None where it is lost or can be given nothing. `open_strips`: those that it
+        may be offered."""
         state, entry = vehicle.state, vehicle.entry
         stays_away = vehicle.is_finished and not vehicle.is_idle  # or on its way home
         if not entry.role.revisits or vehicle.lost or state is None or stays_away or not vehicle.is_trusted:
             return None
-        records = [one for one in self._ledger.in_state(*WITH_A_VEHICLE) if one.vehicle == entry.vehicle]
-        if not records and not vehicle.is_idle:
+        record = self._ledger.strip_of(entry.vehicle)
+        if record is None and not vehicle.is_idle:
             return None
         pose = Pose(state.x_m, state.y_m, state.heading_rad)
         free_at, free_ms = pose, now_ms
-        if records:
-            expected = vehicle.offers[records[0].strip.number].service
+        if record is not None:
+            expected = vehicle.offers[record.strip.number].service
             ends_ms = round(expected.free_s * 1000)
-            if state.works_on == records[0].strip.number and state.expected_end_ms > 0:
+            if state.works_on == record.strip.number and state.expected_end_ms > 0:
                 ends_ms = state.expected_end_ms
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
-        open_strips = self._ledger.in_state(StripState.OPEN)
         sees = footprint_of(entry.sonar)
         helper = Helper(
             vehicle=entry.vehicle,
             pose=pose,
             free_at=free_at,
             free_s=free_ms / 1000,
-            task=self.open_strip(records[0]) if records else None,
+            task=None if record is None else self.open_strip(record),
             speed_mps=entry.speed_mps,
             turn_radius_m=entry.turn_radius_m,
             run_in_m=entry.run_in_m,
@@ -104,7 +102,7 @@ class Briefing:
             way_home=way_home_of(entry, vehicle.keep_out, vehicle.flows),
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
-            sweeping=bool(records) and records[0].state is StripState.UNDER_WAY,
+            sweeping=record is not None and record.state is StripState.UNDER_WAY,
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
             keep_out=vehicle.keep_out,
         )

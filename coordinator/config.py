@@ -35,6 +35,7 @@ class CoordinatorConfig:
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
     `switch_margin`: share by which the fleet's plan must get better for a helper to be turned round.
+    `helpers_a_team`: so many share a sector of the area; fewer than twice as many share all of it.
     `across`: whether strips may run across the tracks, too.
     `priorities`: ground whose residual risk counts more, or less.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens.
@@ -47,6 +48,7 @@ class CoordinatorConfig:
     max_strip_m: float
     worth_risk: float
     switch_margin: float
+    helpers_a_team: int = 3
     deadline_s: float = math.inf
     separation_m: float = 0.0
     objective: Literal["mean", "worst30", "both", "targets"] = "both"

@@ -53,8 +53,8 @@ class Dispatch:
             if now_ms >= self._right_of_way.check_s * 1000:
                 self._agenda.add(Item.KEEP_APART, now_ms)
 
-    def assign(self, situation: Situation, now_ms: int) -> None:
-        """Makes the allocator's offers; those that must wait it is asked for again."""
+    def assign(self, situation: Situation, sector: int, now_ms: int) -> None:
+        """Makes the allocator's offers in a sector; those that must wait it is asked for again."""
         if not situation.strips or not situation.helpers:
             return
         right = self._right_of_way
@@ -69,7 +69,7 @@ class Dispatch:
                 right.offered(name, number, departures)
         self._offer(offers, situation, now_ms)
         if math.isfinite(again_s):
-            self._agenda.add(Item.ASSIGN, now_ms + round(again_s * 1000))
+            self._agenda.add(Item.ASSIGN, now_ms + round(again_s * 1000), sector)
         self._instruct(right.make_room(departures, self._under_way()))
 
     def keep_apart(self, now_ms: int) -> None:

@@ -18,6 +18,7 @@ from coordinator.cut.room import Room
 from coordinator.cut.strips import Cut, cells_wide
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
+from coordinator.sectors import Sector
 from coordinator.strip_cutting import StripCutting
 from coordinator.strip_life import StripLife
 from planner.footprints import footprint_of
@@ -122,12 +123,15 @@ def _lanes(inside: BoolArray, first: int, end: int, width: int) -> list[Window]:
 
 
 class Beforehand:
-    """Plans routes once, to the deadline and for what is expected when every primary has said its first plan, and keeps
-    to them."""
+    """Plans routes of the whole area, one `sector`, once, to the deadline and for what is expected when every primary
+    has said its first plan, and keeps to them."""
 
-    def __init__(self, cutting: StripCutting, briefing: Briefing, fleet: KnownFleet, strips: StripLife) -> None:
+    def __init__(
+        self, cutting: StripCutting, sector: Sector, briefing: Briefing, fleet: KnownFleet, strips: StripLife
+    ) -> None:
         self.routes = FixedRoutes()
         self._cutting = cutting
+        self._sector = sector
         self._briefing = briefing
         self._fleet = fleet
         self._strips = strips
@@ -139,7 +143,7 @@ class Beforehand:
         if self.routes.routes or waits or not math.isfinite(self._briefing.expected_deadline_s()):
             return
         self._cutting.cut(now_ms, again=True)
-        situation = self._briefing.situation(now_ms)
+        situation = self._briefing.situation(now_ms, self._sector)
         routes = plan_routes(situation.strips, situation.helpers, situation.deadline_s, BEAM)
         self.routes.routes = {name: list(numbers) for name, numbers in routes.strips.items()}
         planned = {number for numbers in routes.strips.values() for number in numbers}

@@ -10,6 +10,7 @@ from coordinator.agenda import Agenda, Item
 from coordinator.config import CoordinatorConfig
 from coordinator.fleet import KnownFleet
 from coordinator.outbox import Outbox
+from coordinator.sectors import Sectors
 from coordinator.strip_life import StripLife
 from coordinator.vehicles import KnownVehicle
 
@@ -24,13 +25,20 @@ class MissionEnd:
     that, None until then."""
 
     def __init__(
-        self, config: CoordinatorConfig, fleet: KnownFleet, strips: StripLife, agenda: Agenda, outbox: Outbox
+        self,
+        config: CoordinatorConfig,
+        fleet: KnownFleet,
+        strips: StripLife,
+        sectors: Sectors,
+        agenda: Agenda,
+        outbox: Outbox,
     ) -> None:
         self.over: MissionOver | None = None
         self._over_ms = 0
         self._config = config
         self._fleet = fleet
         self._strips = strips
+        self._sectors = sectors
         self._agenda = agenda
         self._outbox = outbox
 
@@ -63,7 +71,7 @@ class MissionEnd:
         if not lacking:
             if due_ms is not None:
                 self._agenda.strike(Item.ASK_AGAIN, due_ms)
-                self._agenda.add(Item.CUT, now_ms)
+                self._sectors.cut_by(now_ms)
         elif due_ms is None:
             self._agenda.add(Item.ASK_AGAIN, now_ms + ASK_AFTER_MS)
         elif self._agenda.strike(Item.ASK_AGAIN, now_ms):
@@ -74,10 +82,10 @@ class MissionEnd:
 
     def _cut_is_left(self, now_ms: int) -> bool:
         """Whether there is news that was not cut by; if so that is done at once."""
-        is_left = self._agenda.deadline_ms(Item.CUT) is not None
-        if is_left:
-            self._agenda.add(Item.CUT, now_ms)
-        return is_left
+        left = self._agenda.sectors(Item.CUT)
+        for sector in left:
+            self._agenda.add(Item.CUT, now_ms, sector)
+        return bool(left)
 
     def say_again(self, now_ms: int) -> None:
         """Says again that the mission is over, where a vehicle has not answered, or something of it has not arrived:

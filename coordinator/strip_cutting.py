@@ -4,25 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from comms.node import Received
 from comms.said.announcement import RosterVehicle
-from comms.said.messages import Hotspot, StripState
+from comms.said.messages import StripState
 from coordinator.allocate.routes import HORIZON_S, plan_routes
 from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
-from coordinator.config import CoordinatorConfig, weights_over
+from coordinator.config import CoordinatorConfig
 from coordinator.cut.cutter import Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.room import Room
-from coordinator.cut.strips import Counted, CuttingRules
-from coordinator.expect.expectation import ExpectedMap
+from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE
 from coordinator.reasons import Reasons
+from coordinator.sectors import Sector
 from coordinator.strip_life import StripLife
 from planner.footprints import footprint_of
-from planner.types import BoolArray
+from planner.types import FloatArray
 
 COMPARED_BEAM = 6  # of the routes by which strips are compared: half as wide as that of those to be flown
 LEAST_WORTH = 1e-3  # of a cell in m2 for its area: what is worth less is worth nothing
@@ -30,15 +30,18 @@ SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newl
 
 
 class StripCutting:
-    """Cuts when that is on the agenda, strips that suit the `narrowest` of the fleet's helpers. `inside`: the area's
-    cells, shape of the map's grid."""
+    """Cuts a sector when that is on the agenda, strips that suit the `narrowest` of the fleet's helpers. `weights`:
+    what a cell's risk counts, shape of the map's grid.
+
+    What is cut has windows of the sector; what is in the ledger has those of the fleet's map.
+    """
 
     def __init__(
         self,
         narrowest: RosterVehicle,
         config: CoordinatorConfig,
-        inside: BoolArray,
-        expected: ExpectedMap,
+        weights: FloatArray,
+        sector: Sector,
         briefing: Briefing,
         fleet: KnownFleet,
         strips: StripLife,
@@ -51,20 +54,22 @@ class StripCutting:
             max_strip_m=config.max_strip_m,
         )
         self._objective = OBJECTIVES[config.objective]
-        area_m2 = fleet.map.grid.cell_area_m2
+        grid = sector.expected.grid
+        area_m2 = grid.cell_area_m2
         least_worth = self._objective.mean * config.worth_risk * narrowest.p_detect * area_m2
         least_worth = max(least_worth, LEAST_WORTH * area_m2)
-        room = Room(fleet.map.grid, narrowest, fleet.keep_out, config.min_strip_m) if fleet.keep_out else None
-        self._cutter = Cutter(fleet.map.grid, rules, least_worth, across=config.across, room=room)
-        self._weights = weights_over(fleet.map.grid, inside, config.priorities) * area_m2
-        self._expected = expected
+        room = Room(grid, narrowest, fleet.keep_out, config.min_strip_m) if fleet.keep_out else None
+        self._cutter = Cutter(grid, rules, least_worth, across=config.across, room=room)
+        self._weights = weights[sector.window.cells] * area_m2
+        self._sector = sector
+        self._grid = grid
         self._briefing = briefing
         self._fleet = fleet
         self._strips = strips
 
     def _flown(self, situation: Situation) -> Flown:
         """What helpers fly of strips by the best routes to the deadline; all of it where nobody is there yet."""
-        helpers, grid = situation.helpers, self._fleet.map.grid
+        helpers, grid = situation.helpers, self._grid
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
 
         def flown(cuts: Sequence[Counted]) -> Mapping[int, float]:
@@ -75,16 +80,16 @@ class StripCutting:
 
         return flown
 
-    def hear_hotspot(self, received: Received, message: Hotspot) -> bool:
-        """Hears a hotspot's newest word; returns whether it was news."""
-        revision = received.header.incarnation, message.revision
-        return self._expected.hotspots.hear((received.vehicle, received.number), revision, message)
-
     def cut(self, now_ms: int, *, again: bool = False) -> None:
         """Cuts anew, and opens, revises and withdraws strips by that; `again`: also a second one on a place that is
         worth two looks, else that is cut when the first is under way."""
-        expected, ledger = self._expected.now(), self._strips.ledger
-        why = Reasons(self._fleet.map.grid, self._fleet.primaries, expected.risk).why
+        sector, ledger = self._sector, self._strips.ledger
+        expected, place = sector.expected.now(), sector.window
+        reasons = Reasons(self._grid, self._fleet.primaries, expected.risk)
+
+        def why(cut: Cut) -> str:
+            return reasons.why(replace(cut, window=cut.window.within(place)))
+
         ground = Ground(
             risk=expected.risk,
             look=expected.look,
@@ -93,12 +98,15 @@ class StripCutting:
             objective=self._objective,
             threshold=self._cutter.threshold,
         )
-        claimed = [record.window for record in ledger.in_state(*WITH_A_VEHICLE)]
-        unmatched = ledger.in_state(StripState.OPEN)
-        opened = [record.window for record in unmatched]
-        situation = self._briefing.situation(now_ms)
-        time_m, flown = self._briefing.time_m(situation), self._flown(situation)
-        for cut in self._cutter.cut(ground, time_m, claimed, opened, flown, again=again):
+        claimed = [one.window.within(place) for one in ledger.in_state(*WITH_A_VEHICLE) if one.window.shared(place)]
+        unmatched = [one for one in ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
+        opened = [record.window.within(place) for record in unmatched]
+        situation = self._briefing.situation(now_ms, sector)
+        time_m, flown = self._briefing.time_m(situation, sector), self._flown(situation)
+        cuts = self._cutter.cut(ground, time_m, claimed, opened, flown, again=again)
+        sector.price, sector.is_worth, sector.present = self._cutter.price, bool(cuts), len(situation.helpers)
+        for found in cuts:
+            cut = replace(found, window=found.window.moved(place.first_row, place.first_column))
             alike = (record for record in unmatched if record.window.across == cut.window.across)
             same = max(alike, key=lambda record: record.window.overlap(cut.window), default=None)
             if same is not None and same.window.overlap(cut.window) >= SAME_STRIP:

@@ -12,13 +12,12 @@ from dataclasses import replace
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, StripState, TaskAction, TaskState, TaskStatus
 from comms.strip_books import LEFT
-from coordinator.agenda import Agenda, Item
 from coordinator.allocate.service import Service
 from coordinator.cut.strips import Cut
-from coordinator.expect.expectation import ExpectedMap
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
 from coordinator.outbox import NO_STRIP, Outbox
+from coordinator.sectors import Sectors
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.risk import MOST_LEVELS
 from planner.types import BoolArray, Strip
@@ -33,7 +32,8 @@ LATE_MS = 60_000  # and so much more
 class StripLife:
     """Writes the `ledger`, and says each change of it; nobody else does.
 
-    `inside`: the area's cells, shape of the grid. `expected`: learns from strips that are done.
+    `inside`: the area's cells, shape of the grid. `sectors`: where strips lie; what is expected there learns from those
+    that are done.
     """
 
     def __init__(
@@ -41,15 +41,13 @@ class StripLife:
         ledger: Ledger,
         fleet: KnownFleet,
         inside: BoolArray,
-        expected: ExpectedMap,
-        agenda: Agenda,
+        sectors: Sectors,
         outbox: Outbox,
     ) -> None:
         self.ledger = ledger
         self._fleet = fleet
         self._inside = inside
-        self._expected = expected
-        self._agenda = agenda
+        self._sectors = sectors
         self._outbox = outbox
 
     def open(self, cut: Cut, now_ms: int, why: str) -> None:
@@ -117,9 +115,12 @@ class StripLife:
         record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
         if record is None or record.vehicle != name or record.state not in WITH_A_VEHICLE:
             if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
-                self._agenda.add(Item.CUT, now_ms)
+                self._sectors.cut_by(now_ms, None if record is None else [record.window])
             return
-        self._agenda.add(Item.ASSIGN if status.state is TaskState.REFUSED else Item.CUT, now_ms)
+        if status.state is TaskState.REFUSED:
+            self._sectors.assign_by(now_ms, record.window)
+        else:
+            self._sectors.cut_by(now_ms, [record.window])
         match status.state:
             case TaskState.REFUSED:
                 vehicle.note_refusal(status.strip)
@@ -141,12 +142,12 @@ class StripLife:
             for record in self.ledger.in_state(*WITH_A_VEHICLE):
                 if record.vehicle == name:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
-                    self._agenda.add(Item.CUT, now_ms)
+                    self._sectors.cut_by(now_ms, [record.window])
         for record in self.ledger.in_state(StripState.OFFERED):
             if now_ms - record.since_ms >= ANSWER_WITHIN_MS:
                 self._fleet.vehicles[record.vehicle].note_silence()
                 self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
-                self._agenda.add(Item.ASSIGN, now_ms)
+                self._sectors.assign_by(now_ms, record.window)
         for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
             vehicle, offer = self._of(record)
             if now_ms >= offer.due_ms:
@@ -154,7 +155,7 @@ class StripLife:
                 self.ask_back(record.strip, vehicle)
                 vehicle.note_failure(record.window)
                 self._move(record, StripState.OPEN, now_ms, late)
-                self._agenda.add(Item.CUT, now_ms)
+                self._sectors.cut_by(now_ms, [record.window])
 
     def deadlines_ms(self) -> Iterator[int]:
         """When an answer, or a service, is overdue."""
@@ -195,7 +196,7 @@ class StripLife:
             if record.strip != offer.strip:
                 self.ledger.revise(record, offer.strip, offer.cut)
                 self._outbox.add_strip(record)
-                self._agenda.add(Item.CUT, now_ms)
+                self._sectors.cut_by(now_ms, [record.window])
             vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + LATE_MS))
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
         if record.vehicle != name or record.state not in WITH_A_VEHICLE:
@@ -218,7 +219,7 @@ class StripLife:
             if other.state is not StripState.OFFERED and vehicle.has_told_since(header, other.strip.number):
                 return False
             self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
-            self._agenda.add(Item.ASSIGN, now_ms)
+            self._sectors.assign_by(now_ms, other.window)
         return True
 
     def _hear_no_work(self, vehicle: KnownVehicle, header: Header, now_ms: int) -> None:
@@ -232,14 +233,14 @@ class StripLife:
                 else:
                     vehicle.note_failure()
                     self._move(record, StripState.OPEN, now_ms, f"{name} has no work, its word on it was lost")
-                self._agenda.add(Item.CUT, now_ms)
+                self._sectors.cut_by(now_ms, [record.window])
 
     def _hear_done(self, record: StripRecord, vehicle: KnownVehicle, now_ms: int) -> None:
         """What is left of a strip that its vehicle says is done is cut anew."""
         name, share = vehicle.entry.vehicle, self._seen_share(record)
         if share >= COVERED_SHARE:
             vehicle.failures = 0
-            self._expected.learn(record.window, name, self._of(record)[1].levels_before, vehicle.entry.p_detect)
+            self._sectors.learn(record.window, name, self._of(record)[1].levels_before, vehicle.entry.p_detect)
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
         else:
             vehicle.note_failure(record.window)

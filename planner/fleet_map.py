@@ -22,6 +22,7 @@ from planner.types import BoolArray, FloatArray, GridSpec
 
 PARTS = 16  # of a level: half of one is less than a thousandth of the residual risk
 MOST_STARTS = 8  # that are told apart, of each tile
+EVERYWHERE = (slice(None), slice(None))
 CLOSED = 2**31  # a version above all that are told: nothing newer is taken
 
 Place = tuple[int, int]
@@ -187,12 +188,12 @@ class FleetMap:
             seen |= layer.sum_levels > 0
         return seen
 
-    def settled_by(self, vehicles: Iterable[str]) -> BoolArray:
-        """Cells that one of these vehicles has declared settled."""
-        settled = np.zeros(self.grid.shape, dtype=np.bool_)
+    def settled_by(self, vehicles: Iterable[str], window: tuple[slice, slice] = EVERYWHERE) -> BoolArray:
+        """Cells of a window that one of these vehicles has declared settled."""
+        settled: BoolArray = np.zeros(self._unseen[window].shape, dtype=np.bool_)
         for vehicle in vehicles:
             if vehicle in self.layers:
-                settled |= self.layers[vehicle].settled
+                settled |= self.layers[vehicle].settled[window]
         return settled
 
     def told_by(self, vehicles: Iterable[str]) -> BoolArray:
@@ -209,8 +210,7 @@ class FleetMap:
 
     def risk_of_layers(self, layers: Iterable[VehicleLayer]) -> tuple[FloatArray, BoolArray]:
         """The same from these layers, of this map or as they once were."""
-        everywhere = (slice(None), slice(None))
-        risk, sums = self._joined(everywhere, list(layers))
+        risk, sums = self._joined(EVERYWHERE, list(layers))
         return risk, sums > 0
 
     def levels_within(

@@ -68,6 +68,14 @@ class GridSpec:
         """Area of one cell."""
         return self.cell_m * self.cell_m
 
+    def part(self, first_row: int, end_row: int, first_column: int, end_column: int) -> GridSpec:
+        """The grid of some of its rows and columns; the same one where these are all."""
+        if (first_row, end_row, first_column, end_column) == (0, self.rows, 0, self.columns):
+            return self
+        x_m, y_m = self.frame.to_mission(first_column * self.cell_m, first_row * self.cell_m)
+        frame = SweepFrame(float(x_m), float(y_m), self.frame.heading_rad)
+        return GridSpec(frame, self.cell_m, end_column - first_column, end_row - first_row)
+
     @cached_property
     def across_m(self) -> FloatArray:
         """Centres of the columns, sweep frame, shape (columns,)."""

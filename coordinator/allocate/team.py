@@ -13,7 +13,7 @@ from coordinator.allocate.service import StripTable, StripWays, tables_of
 from coordinator.allocate.situation import Helper, OpenStrip
 from planner.types import FloatArray
 
-MOST_STRIPS = 64
+MOST_STRIPS = 32
 """So many strips are planned with, those that bring most for the time they take."""
 LATER_SHARE = 0.5
 """Of what a second brings at the strip that is worth least: so much it is taken to bring at strips to come, as other

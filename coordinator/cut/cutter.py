@@ -47,6 +47,11 @@ class Cutter:
         self.threshold = 0.0
         """Residual risk from which on a cell will be of the worst, see `Ground`."""
 
+    @property
+    def price(self) -> float:
+        """Of a metre flown, at which strips were cut last."""
+        return self._kept.price
+
     def cut(
         self,
         ground: Ground,

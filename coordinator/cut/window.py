@@ -44,6 +44,22 @@ class Window:
         """Number of cells."""
         return self.rows * self.columns_wide
 
+    def holds(self, row: int, column: int) -> bool:
+        """Whether a cell lies in it."""
+        return self.first_row <= row < self.end_row and self.first_column <= column < self.end_column
+
+    def moved(self, rows: int, columns: int) -> Window:
+        """The same so many rows and columns farther."""
+        first_row, first_column = self.first_row + rows, self.first_column + columns
+        return Window(first_row, self.end_row + rows, first_column, self.end_column + columns, self.across)
+
+    def within(self, other: Window) -> Window:
+        """What of it lies in another with which it shares cells, as that counts its rows and columns."""
+        first_row, first_column = max(self.first_row, other.first_row), max(self.first_column, other.first_column)
+        end_row, end_column = min(self.end_row, other.end_row), min(self.end_column, other.end_column)
+        part = Window(first_row, end_row, first_column, end_column, self.across)
+        return part.moved(-other.first_row, -other.first_column)
+
     @property
     def turned(self) -> Window:
         """The same on the grid with rows and columns exchanged."""

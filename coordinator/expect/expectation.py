@@ -33,26 +33,30 @@ class Expectation:
 
 
 class ExpectedMap:
-    """Made anew from what the fleet has said whenever it is asked. `inside`: the area's cells, shape of the grid;
-    `p_detect`: what a helper's look is told to have."""
+    """Made anew from what the fleet has said whenever it is asked. `place`: of which part of the fleet's map it is, for
+    which `grid` and all arrays are; `inside`: the area's cells there; `p_detect`: what a helper's look is told to
+    have."""
 
-    def __init__(self, fleet: KnownFleet, inside: BoolArray, p_detect: float) -> None:
-        self.hotspots = Hotspots(fleet.map.grid, inside)
+    def __init__(self, fleet: KnownFleet, place: Window, inside: BoolArray, p_detect: float) -> None:
+        self.grid = fleet.map.grid.part(place.first_row, place.end_row, place.first_column, place.end_column)
+        self.hotspots = Hotspots(self.grid, inside)
         self._fleet = fleet
+        self._place = place
         self._inside = inside
         self._p_detect = p_detect
-        self._seabed = Seabed(fleet.map.grid)
-        self._tracks = ExpectedTracks(fleet.map.grid)
+        self._seabed = Seabed(self.grid)
+        self._tracks = ExpectedTracks(self.grid)
 
     def learn(self, window: Window, helper: str, before: LevelArray, typical: float) -> None:
-        """Learns what second looks find from a pass over a window. `before`: what the helper's layer told there
-        before it, the sum over its looks; `typical`: its P_d as the run tells it."""
+        """Learns what second looks find from a pass over a window of the fleet's map that lies in this part of it.
+        `before`: what the helper's layer told there before it, the sum over its looks; `typical`: its P_d as the run
+        tells it."""
         gained = self._fleet.levels(helper, window).astype(np.float64) - before
         layer = self._fleet.map.layers.get(helper)
         if layer is not None:  # where the sum is full the best look is all that is known
             full = layer.sum_levels[window.cells] == MOST_LEVELS
             gained = np.where(full, np.maximum(gained, layer.largest_levels[window.cells]), gained)
-        self._seabed.learn(window, -np.expm1(-NATS_PER_LEVEL * np.maximum(gained, 0.0)), typical)
+        self._seabed.learn(window.within(self._place), -np.expm1(-NATS_PER_LEVEL * np.maximum(gained, 0.0)), typical)
 
     def now(self) -> Expectation:
         """What is expected by all that was heard. Ground ahead of the survey is told of once every primary that
@@ -65,7 +69,7 @@ class ExpectedMap:
         largest = np.maximum(largest, share * tracks.largest_ahead)
         look_nats = -np.log1p(-np.minimum(self._p_detect * helpers_share, HIGHEST_P_DETECT))
         more = np.maximum(look_nats - largest, 0.0) if rho > 0 else 0.0  # what it adds to the largest single look
-        settled = fleet.map.settled_by(fleet.primaries)
+        settled = fleet.map.settled_by(fleet.primaries, self._place.cells)
         hot, told_risk = self.hotspots.drawn()
         has_tiles = settled | (primaries + helpers > 0)
         risk = np.where(hot & ~has_tiles, told_risk, np.exp(-(largest * rho + nats * (1 - rho))))
@@ -79,11 +83,11 @@ class ExpectedMap:
 
     def _nats_so_far(self) -> tuple[FloatArray, FloatArray, FloatArray]:
         """-ln(1 - P_d) of all looks so far: summed over those of primaries and of helpers, and the largest of all."""
-        shape = self._fleet.map.grid.shape
+        shape, cells = self.grid.shape, self._place.cells
         primaries, helpers, nats = np.zeros((3, *shape))
         largest_levels = np.zeros(shape, dtype=np.uint8)
         for name, layer in self._fleet.map.layers.items():
             sums = primaries if name in self._fleet.primaries else helpers
-            sums += np.multiply(layer.sum_levels, NATS_PER_LEVEL, out=nats)
-            np.maximum(largest_levels, layer.largest_levels, out=largest_levels)
+            sums += np.multiply(layer.sum_levels[cells], NATS_PER_LEVEL, out=nats)
+            np.maximum(largest_levels, layer.largest_levels[cells], out=largest_levels)
         return primaries, helpers, np.multiply(largest_levels, NATS_PER_LEVEL, out=nats)

@@ -287,6 +287,7 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         across=scenario.coordinator.across,
         worth_risk=scenario.coordinator.worth_risk,
         switch_margin=scenario.coordinator.switch_margin,
+        helpers_a_team=scenario.coordinator.helpers_a_team,
         strips=scenario.coordinator.strips,
         objective=scenario.coordinator.objective,
         separation_m=scenario.mission.separation_m,

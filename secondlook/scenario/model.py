@@ -31,6 +31,7 @@ from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, 
 
 DEADLINE_FACTOR = 1.05
 MOST_TOLD = 5  # of what is missing
+MOST_VEHICLES = 1024
 Extent = Annotated[float, Field(ge=0.1, le=1000)]
 PartOf = Annotated[float, Field(ge=0, lt=1)]
 Headings = Annotated[tuple[Heading, Heading], BeforeValidator(check_pair), Field(strict=False)]
@@ -165,6 +166,9 @@ class Coordinator(Mapping):
     `both`, seven tenths the mean and three tenths the worst, or the share of `targets` expected to be missed. Helpers
     do the same for the last as for the mean, for a cell's risk is the chance that a target there is missed;
     `area.priorities` then tell where targets lie thicker. What differs is by what `secondlook compare` judges."""
+    helpers_a_team: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = 3
+    """So many helpers share a sector of the area; fewer than twice as many share all of it. What is decided in one
+    sector rests on what lies in it and on its team; who is free joins another team where it is needed more."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
     """A helper is turned round for a plan that is better by at least this share."""
 
@@ -197,7 +201,7 @@ class Scenario(Mapping):
     """How the water flows; left out, not at all."""
     targets: Targets = Targets()
     """What there is to find."""
-    vehicles: Annotated[dict[VehicleId, Vehicle], Field(max_length=64)]
+    vehicles: Annotated[dict[VehicleId, Vehicle], Field(max_length=MOST_VEHICLES)]
     """An entry for each vehicle, under its id (a-z, 0-9, `_` and `-`); at least one surveys."""
     coordinator: Coordinator = Coordinator()
     """How strips are cut and given out."""

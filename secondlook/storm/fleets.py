@@ -45,6 +45,8 @@ def draw_fleet(number: int) -> Scenario:
         "coordinator": _coordinator(rng),
         **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
+    if helpers > 1:
+        drawn["coordinator"]["helpers_a_team"] = 1 + number % 3
     _move_apart(vehicles, drawn["mission"].get("separation_m", 0.0))
     if rng.random() < 0.15:  # for less than its survey, perhaps
         vehicles[rng.choice(list(vehicles)[:primaries])]["endurance_s"] = _m(rng.uniform(0.2, 1) * _LONGEST_S)

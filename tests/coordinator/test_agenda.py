@@ -24,11 +24,11 @@ class TestDeadlines:
 
     def test_what_is_not_on_it_has_none(self, agenda: Agenda) -> None:
         assert agenda.deadline_ms(Item.SAY_OVER) is None
-        assert not agenda.strike(Item.SAY_OVER, 1_000_000)
+        assert agenda.strike(Item.SAY_OVER, 1_000_000) == []
 
     @pytest.mark.parametrize(("now_ms", "due"), [(0, False), (19_999, False), (20_000, True), (30_000, True)])
     def test_an_item_is_struck_off_from_its_deadline_on(self, agenda: Agenda, now_ms: int, due: bool) -> None:
-        assert agenda.strike(Item.ASSIGN, now_ms) is due
+        assert agenda.strike(Item.ASSIGN, now_ms) == ([0] if due else [])
         assert agenda.deadline_ms(Item.ASSIGN) == (None if due else 20_000)
         assert agenda.deadline_ms(Item.CUT) == 60_000
 
@@ -37,6 +37,18 @@ class TestDeadlines:
         assert not agenda.strike(Item.ASSIGN, 20_000)
         agenda.add(Item.ASSIGN, 80_000)
         assert agenda.deadline_ms(Item.ASSIGN) == 80_000
+
+
+class TestSectors:
+    def test_each_has_deadlines_of_its_own(self, agenda: Agenda) -> None:
+        agenda.add(Item.CUT, 50_000, 2)
+        agenda.add(Item.CUT, 40_000, 1)
+        agenda.add(Item.CUT, 90_000, 1)
+        assert agenda.deadline_ms(Item.CUT) == 40_000
+        assert sorted(agenda.sectors(Item.CUT)) == [0, 1, 2]
+        assert agenda.strike(Item.CUT, 50_000) == [1, 2]
+        assert agenda.sectors(Item.CUT) == [0]
+        assert agenda.next_wake_ms(0, []) == 20_000
 
 
 class TestWakeUp:

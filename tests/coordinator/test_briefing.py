@@ -6,10 +6,12 @@ import math
 
 import pytest
 from by_hand import HELPER, PRIMARY, run_info
+from sectors_by_hand import sector, whole
 
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.simple import GreedyAllocator
+from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Cut
@@ -27,6 +29,7 @@ class Known:
         self.fleet = KnownFleet(run_info(400, 400), CONFIG.lost_after_ms, 0)
         self.ledger = Ledger()
         self.briefing = Briefing(CONFIG, self.ledger, self.fleet, 0.7)
+        self.sector = whole(self.fleet)
 
     def heard(self, name: str, mode: Mode, works_on: int = 0, end_ms: int = 0, battery: float = 1.0) -> None:
         """A vehicle's state, sent at 50 s."""
@@ -34,7 +37,10 @@ class Known:
         self.fleet.vehicles[name].hear_state(Header(name, 0, 1, 50_000), state, 50_000)
 
     def time_m(self, now_ms: int) -> float:
-        return self.briefing.time_m(self.briefing.situation(now_ms))
+        return self.briefing.time_m(self.situation(now_ms), self.sector)
+
+    def situation(self, now_ms: int) -> Situation:
+        return self.briefing.situation(now_ms, self.sector)
 
     def survey_ends(self, end_ms: int) -> None:
         """The primary is on its only track."""
@@ -68,7 +74,7 @@ class TestTheTimeLeft:
     def test_while_no_helper_was_heard_some_may_still_come(self) -> None:
         known = Known()
         known.survey_ends(1_000_000)
-        assert known.briefing.helpers(50_000) == ()
+        assert known.situation(50_000).helpers == ()
         assert known.time_m(50_000) == pytest.approx((1050 - 50) * 2)
 
 
@@ -77,11 +83,24 @@ def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     known.heard(HELPER, Mode.IDLE)
     cut = Cut(Window(10, 70, 20, 30), counts_m2=4200.0, removable_m2=2100.0)
     known.ledger.open(cut.strip(known.fleet.map.grid, 1), cut, 0, "badly seen")
-    told = known.briefing.situation(60_000)
+    told = known.situation(60_000)
     (one,) = told.strips
     assert one.strip.number == 1
     assert one.risk_m2 == pytest.approx(4200 / 0.7)
     (helper,) = told.helpers
     assert (helper.vehicle, helper.free_s, helper.task, helper.refused) == (HELPER, 60, None, frozenset())
     known.fleet.vehicles[HELPER].refused.add(1)
-    assert known.briefing.helpers(60_000)[0].refused == {1}
+    assert known.situation(60_000).helpers[0].refused == {1}
+
+
+def test_a_sector_is_told_of_its_own_strips_and_helpers_alone() -> None:
+    known = Known()
+    known.heard(HELPER, Mode.IDLE)
+    for number, first_row in enumerate((0, 40), 1):
+        cut = Cut(Window(first_row, first_row + 30, 20, 30), counts_m2=4200.0, removable_m2=2100.0)
+        known.ledger.open(cut.strip(known.fleet.map.grid, number), cut, 0, "badly seen")
+    south, north = (sector(known.fleet, Window(first, first + 40, 0, 81)) for first in (0, 40))
+    north.team.add(HELPER)
+    told = [known.briefing.situation(60_000, one) for one in (south, north)]
+    assert [[one.strip.number for one in each.strips] for each in told] == [[1], [2]]
+    assert [[one.vehicle for one in each.helpers] for each in told] == [[], [HELPER]]

@@ -40,7 +40,7 @@ class Told:
 
     def __post_init__(self) -> None:
         self.fleet = KnownFleet(run_info(400, 400, vehicles=self.vehicles, rho=self.rho), LOST_MS, 0)
-        self.expected = ExpectedMap(self.fleet, self.inside, 0.7)
+        self.expected = ExpectedMap(self.fleet, EVERYWHERE, self.inside, 0.7)
 
     def plan(self, *tracks: PlannedTrack, name: str = PRIMARY) -> None:
         """A plan, and what its tracks have seen: half, as far as the area goes."""

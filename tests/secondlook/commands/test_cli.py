@@ -223,7 +223,7 @@ def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
     assert (code, err) == (0, "")
     names = [line.split()[0] for line in out.splitlines()]
     trials = ["five-helpers", "forward-looking", "headland", "paper", "patchy", "tellaro", "two-helpers", "wide"]
-    assert names == sorted([*trials, "clear", "harbour", "ripples", "turns"])
+    assert names == sorted([*trials, "armada", "clear", "harbour", "ripples", "turns"])
 
 
 def test_live_without_a_display_is_told_before_anything_flies(

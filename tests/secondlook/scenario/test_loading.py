@@ -57,6 +57,7 @@ def test_the_start_is_kept_in_utc_as_a_text(tmp_path: Path, said: str, kept: str
 
 def test_bundled_scenarios_are_named_like_their_files_and_described() -> None:
     assert BUNDLED == [
+        "armada",
         "clear",
         "five-helpers",
         "forward-looking",
