@@ -113,7 +113,8 @@ class Coordinator:
             self._briefing = briefing = Briefing(config, ledger, fleet, p_detect)
             weights = weights_over(run.grid.spec, inside, config.priorities)
             self._cutting = [
-                StripCutting(narrowest, config, weights, one, briefing, fleet, strips) for one in sectors.all
+                StripCutting(narrowest, config, weights, one, len(sectors.all), briefing, fleet, strips)
+                for one in sectors.all
             ]
             if config.strips == "beforehand":
                 self._fixed = Beforehand(self._cutting[0], sectors.all[0], briefing, fleet, strips)

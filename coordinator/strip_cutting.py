@@ -26,12 +26,14 @@ from planner.types import FloatArray
 
 COMPARED_BEAM = 6  # of the routes by which strips are compared: half as wide as that of those to be flown
 LEAST_WORTH = 1e-3  # of a cell in m2 for its area: what is worth less is worth nothing
+MOST_BETWEEN = 4
 SAME_STRIP = 0.25  # shared area, as a share of both together, from which a newly cut strip is an open one revised
 
 
 class StripCutting:
     """Cuts a sector when that is on the agenda, strips that suit the `narrowest` of the fleet's helpers. `weights`:
-    what a cell's risk counts, shape of the map's grid.
+    what a cell's risk counts, shape of the map's grid. `sectors`: how many there are; of so many cuts, at most
+    MOST_BETWEEN, one tries the other heading, as all share the coordinator's time.
 
     What is cut has windows of the sector; what is in the ledger has those of the fleet's map.
     """
@@ -42,6 +44,7 @@ class StripCutting:
         config: CoordinatorConfig,
         weights: FloatArray,
         sector: Sector,
+        sectors: int,
         briefing: Briefing,
         fleet: KnownFleet,
         strips: StripLife,
@@ -59,7 +62,9 @@ class StripCutting:
         least_worth = self._objective.mean * config.worth_risk * narrowest.p_detect * area_m2
         least_worth = max(least_worth, LEAST_WORTH * area_m2)
         room = Room(grid, narrowest, fleet.keep_out, config.min_strip_m) if fleet.keep_out else None
-        self._cutter = Cutter(grid, rules, least_worth, across=config.across, room=room)
+        self._cutter = Cutter(
+            grid, rules, least_worth, across=config.across, room=room, turns_each=min(sectors, MOST_BETWEEN)
+        )
         self._weights = weights[sector.window.cells] * area_m2
         self._sector = sector
         self._grid = grid

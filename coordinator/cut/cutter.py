@@ -31,10 +31,18 @@ class Cutter:
     """Remembers prices and heading, which hardly change from one cut to the next. `least_worth`: what a cell has to
     count for a look to be worth flying there whatever time there is, as a mean over a swath (residual risk times
     m2). `across`: whether strips may run across the tracks, too. `room`: cuts them so
-    that they can be flown where there is ground to keep out of."""
+    that they can be flown where there is ground to keep out of. `turns_each`: of so many cuts one tries the other
+    heading."""
 
     def __init__(
-        self, grid: GridSpec, rules: CuttingRules, least_worth: float, *, across: bool = False, room: Room | None = None
+        self,
+        grid: GridSpec,
+        rules: CuttingRules,
+        least_worth: float,
+        *,
+        across: bool = False,
+        room: Room | None = None,
+        turns_each: int = 1,
     ) -> None:
         self._room = room
         self._cell_area_m2, self._shape = grid.cell_area_m2, grid.shape
@@ -44,6 +52,8 @@ class Cutter:
         headings = (False, True) if across else (False,)
         self._ways = [OneHeading(blocks, rules, least_price, across=way) for way in headings]
         self._kept = self._ways[0]
+        self._turns_each = turns_each
+        self._searches = 0
         self.threshold = 0.0
         """Residual risk from which on a cell will be of the worst, see `Ground`."""
 
@@ -91,7 +101,9 @@ class Cutter:
         best, before_m2, kept = [one.window for one in stay], left.left_m2(), self._kept
         after, rest_m2 = as_it_is = self._flown(left, stay, flown)
         most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
-        for way in self._ways:
+        turns = not best or self._searches % self._turns_each == 0
+        self._searches += 1
+        for way in self._ways if turns else (self._kept,):
             windows = way.windows(left, time_m)
             anew = _counted(left, windows if self._room is None else self._room.flyable(self._block, windows))
             after_anew, rest_m2 = as_it_is if anew == stay else self._flown(left, anew, flown)

@@ -20,6 +20,7 @@ from sim_world.steadiness import make_current
 from vehicle_agent.config import SurveyRevisitConfig
 
 OR_ANYWAY = "or flown with --anyway"
+MOST_NAMED = 8  # vehicles, of each of which the battery is told
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class MissionExpectation:
     @property
     def sentences(self) -> list[str]:
         """What is expected, for people."""
-        left = ", ".join(f"{name} {share:.0%}" for name, share in self.battery_left.items())
+        left = _batteries(self.battery_left)
         over = (
             f", the mission is over after {in_seconds(self.latest_s)} at the latest"
             if self.latest_s > self.survey_s
@@ -102,6 +103,18 @@ class MissionExpectation:
         for name, why in self.idle.items():
             by_reason.setdefault(why, []).append(name)
         return [*(f"{', '.join(names)}: can do nothing: {why}" for why, names in by_reason.items()), *self.remarks]
+
+
+def _batteries(left: Mapping[str, float]) -> str:
+    """What is left of each battery; of a large fleet those that are alike together."""
+    if len(left) <= MOST_NAMED:
+        return ", ".join(f"{name} {share:.0%}" for name, share in left.items())
+    alike: dict[str, list[str]] = {}
+    for name, share in sorted(left.items(), key=lambda one: one[1]):
+        alike.setdefault(f"{share:.0%}", []).append(name)
+    return ", ".join(
+        f"{names[0] if len(names) == 1 else f'{len(names)} vehicles'} {share}" for share, names in alike.items()
+    )
 
 
 def expected_mission(scenario: Scenario) -> MissionExpectation:

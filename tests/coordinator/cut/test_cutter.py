@@ -234,6 +234,15 @@ class TestHeading:
         assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.015, even))) == opened
         assert not cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.03, even))[0].window.across
 
+    def test_the_other_heading_may_be_tried_in_some_of_the_cuts_alone(self) -> None:
+        cutter, told = Cutter(GRID, RULES, LEAST, across=True, turns_each=3), self.ALL_HOT
+        along, across = best_in(2 * STRIP_M), best_in(2 * STRIP_M, across=True)
+        opened = windows(cutter.cut(told, 2 * STRIP_M, (), (), along))
+        for tried in (False, False, True):
+            opened = windows(cutter.cut(told, 2 * STRIP_M, (), opened, across))
+            assert opened
+            assert {one.across for one in opened} == {tried}
+
 
 class TestClaimed:
     def test_what_is_with_a_vehicle_counts_as_flown(self) -> None:

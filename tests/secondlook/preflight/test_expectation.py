@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from secondlook import check_mission
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
-from secondlook.preflight import MissionExpectation
+from secondlook.preflight import MissionExpectation, expected_mission
 from secondlook.scenario import Scenario, load_scenario, make_scenario
 from secondlook.scenario.bundled import scenario_names
 from secondlook.scenario.text import Value
@@ -291,3 +291,9 @@ def test_a_limit_cuts_what_is_told(tmp_path: Path) -> None:
 def test_a_spacing_planner_of_the_users_that_fails_is_told() -> None:
     with pytest.raises(UserError, match="stubborn_spacing:Stubborn has failed to lay tracks: RuntimeError: not today"):
         check_mission("tellaro", ["vehicles.primary.spacing=stubborn_spacing:Stubborn"])
+
+
+def test_of_a_large_fleet_batteries_that_are_alike_are_told_together() -> None:
+    few = expected_mission(load_scenario(str(BRIEF)))
+    few = replace(few, battery_left={f"v{number}": 0.75 if number == 3 else 0.5 for number in range(9)})
+    assert few.sentences[-1].endswith("; battery left then: 8 vehicles 50%, v3 75%")
