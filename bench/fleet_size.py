@@ -66,7 +66,7 @@ def fleet_of(shares: int, cell_m: float) -> Scenario:
             "name": f"shares-{shares}",
             "area": {"polygon_m": corners, "track_heading_deg": 0, "cell_m": cell_m},
             "mission": {"time_limit_s": 60_000},
-            "seabed": {"kind": "patchy", "ripple_fields": 2 * shares, "vegetation_patches": 10 * shares},
+            "seabed": {"kind": "patchy", "ripple_fields": 2 * shares, "vegetation_patches": 4 * shares},
             "vehicles": vehicles,
         }
     )
@@ -101,7 +101,7 @@ def flown(scenario: Scenario, seconds: float) -> dict[str, Any]:
                     setattr(owner, name, function)
     by_part: dict[str, float] = {}
     for part, spent_s in account.seconds.items():
-        told = TOLD.get(part.split(",")[0], "bus, figures and files")
+        told = TOLD.get(part.split(",")[0], "bus and files")
         by_part[told] = by_part.get(told, 0.0) + spent_s
     hours = len(scenario.vehicles) * seconds / 3600
     return {
@@ -132,10 +132,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         math.log(most["all_a_vehicle_hour_s"] / least["all_a_vehicle_hour_s"])
         / math.log(most["vehicles"] / least["vehicles"])
         if len(found) > 1
-        else math.nan
+        else None
     )
     if options.json:
-        print(json.dumps({"fleets": found, "power": round(power, 2)}, indent=2))
+        print(json.dumps({"fleets": found, "power": power}, indent=2))
         return
     parts = sorted({part for one in found for part in one["a_vehicle_hour_s"]})
     table = Table("vehicles", "cells", "strips", "messages", *parts, "all", caption="CPU seconds a vehicle-hour")
@@ -143,8 +143,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         told = [one["a_vehicle_hour_s"].get(part, 0.0) for part in parts]
         numbers = [one["vehicles"], one["cells"], one["strips"], one["messages"]]
         table.add_row(*map(str, numbers), *(f"{one:.2f}" for one in told), f"{one['all_a_vehicle_hour_s']:.2f}")
-    Console().print(table)
-    print(f"From the least to the largest a vehicle-hour costs the size to the power of {power:.2f}.")
+    Console(width=120).print(table)
+    if power is not None:
+        print(f"From the least to the largest a vehicle-hour costs the size to the power of {power:.2f}.")
 
 
 if __name__ == "__main__":

@@ -26,6 +26,7 @@ LONGEST_NAME = 40
 """Characters of a scenario's name, as of any identifier."""
 LARGEST_SEED = 2**32 - 1
 MOST_CORNERS = 1000
+MOST_VEHICLES = 1024
 MOST_HOLES = 20
 MOST_HOLE_CORNERS = 50
 """Of each hole: more would not fit a message, with as many holes as there may be."""
@@ -166,7 +167,7 @@ class RunInfo:
     area: Annotated[tuple[Vertex, ...], AtMost(MOST_CORNERS)]
     grid: Grid
     rho: Probability
-    vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(100)]
+    vehicles: Annotated[tuple[RosterVehicle, ...], AtMost(MOST_VEHICLES)]
     holes: Annotated[tuple[Hole, ...], AtMost(MOST_HOLES)] = ()
     keep_out: Annotated[tuple[Zone, ...], AtMost(MOST_ZONES)] = ()
     keep_out_margin_m: Metres = 0.0

@@ -116,7 +116,7 @@ _BODIES_OWN = {Role.WORLD: Reach.OWN, Role.BODY: Reach.OWN}
 _COORDINATOR = {Role.COORDINATOR: Reach.ALL}
 _EVERYONE = dict.fromkeys(Role, Reach.ALL)
 
-RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 60_000, 0.01, Keep.LATEST, crosses_water=False)
+RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 600_000, 0.01, Keep.LATEST, crosses_water=False)
 NAV = Topic(
     "nav", "veh/{vehicle}/nav", Nav, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 200, 1.0, Keep.LATEST, crosses_water=False,
     wakes=False,

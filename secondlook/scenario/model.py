@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 import shapely
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
-from comms.said.announcement import LARGEST_SEED, LONGEST_NAME
+from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
@@ -31,7 +31,6 @@ from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle, Vehicle, 
 
 DEADLINE_FACTOR = 1.05
 MOST_TOLD = 5  # of what is missing
-MOST_VEHICLES = 1024
 Extent = Annotated[float, Field(ge=0.1, le=1000)]
 PartOf = Annotated[float, Field(ge=0, lt=1)]
 Headings = Annotated[tuple[Heading, Heading], BeforeValidator(check_pair), Field(strict=False)]

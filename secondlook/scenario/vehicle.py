@@ -28,7 +28,7 @@ from secondlook.scenario.values import (
 )
 
 RESERVE_SHARE = 0.1
-_SHARE = re.compile(r"([1-9][0-9]?) of ([1-9][0-9]?)")
+_SHARE = re.compile(r"([1-9][0-9]{0,2}) of ([1-9][0-9]{0,2})")
 
 AUTHORITY, ROUTER = "ca", "router"
 """What is certified beside the nodes of a fleet spread over hosts: its authority, and what all connect to."""
@@ -234,7 +234,7 @@ class SurveyVehicle(VehicleBase):
     def _check_part(cls, part: str | None) -> str | None:
         match = None if part is None else _SHARE.fullmatch(part)
         if part is not None and (match is None or not 1 <= int(match[1]) <= int(match[2])):
-            raise refused("must be such as 1 of 3: which share, and of how many, at most 99")
+            raise refused("must be such as 1 of 3: which share, and of how many, at most 999")
         return part
 
     @property
