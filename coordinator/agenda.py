@@ -28,12 +28,14 @@ class Agenda:
         key = item, sector
         self._deadlines_ms[key] = min(deadline_ms, self._deadlines_ms.get(key, deadline_ms))
 
-    def strike(self, item: Item, now_ms: int) -> list[int]:
-        """Strikes an item off where it is due, whatever was to come of it later; returns of which sectors it was."""
-        due = [sector for (one, sector), due_ms in self._deadlines_ms.items() if one is item and due_ms <= now_ms]
-        for sector in due:
+    def strike(self, item: Item, now_ms: int, most: int | None = None) -> list[int]:
+        """Strikes an item off where it is due, whatever was to come of it later; returns of which sectors it was, those
+        first that were due first. `most`: of so many sectors at most, of the others it stays due."""
+        due = [(due_ms, sector) for (one, sector), due_ms in self._deadlines_ms.items() if one is item]
+        struck = [sector for due_ms, sector in sorted(due) if due_ms <= now_ms][:most]
+        for sector in struck:
             del self._deadlines_ms[item, sector]
-        return sorted(due)
+        return struck
 
     def deadline_ms(self, item: Item) -> int | None:
         """When an item is to be done, of any sector; None where it is not on the agenda."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -26,6 +27,7 @@ class Tile:
         return hash((self.first_row, self.first_column))
 
 
+@lru_cache(maxsize=4)  # all vehicles of a fleet have one grid, and a large one has thousands
 def tiles(grid: GridSpec) -> tuple[Tile, ...]:
     """All tiles of a grid, row by row; those at the far edges may be smaller."""
     return tuple(

@@ -82,6 +82,8 @@ class ExpectedTracks:
         """Adds one primary's."""
         points, lead_m = curve.range_m.tobytes() + curve.p_detect.tobytes(), footprint_of(vehicle.entry.sonar).lead_m
         tracks: list[_Track] = [(_ends(track), points) for track in plan.tracks]
+        if tracks and not _comes_near(self._grid, tracks, float(curve.range_m[-1])):
+            return
         beside = [self._beside.value(one, partial(_beside, self._grid, one[0], curve)) for one in tracks]
         passed_m = [_passed_m(track, vehicle, lead_m) for track in plan.tracks]
         for one, its_m in zip(beside, passed_m, strict=True):
@@ -165,6 +167,19 @@ def curve_of(vehicle: KnownVehicle, primaries: Iterable[KnownVehicle]) -> Detect
         return DetectionCurve(range_m, ASSUMED_P_DETECT * 4.0 * across * (1.0 - across))
     newest = [measured[track] for track in sorted(measured) if track > 0][-NEWEST_CURVES:] or [measured[0]]
     return mean_curve(newest)
+
+
+def _comes_near(grid: GridSpec, tracks: Sequence[_Track], reach_m: float) -> bool:
+    """Whether any of a grid lies within reach of tracks, or between them."""
+    ends = np.array([one[0] for one in tracks])
+    across_m, along_m = grid.frame.to_sweep(ends[:, ::2], ends[:, 1::2])
+    beside_m = reach_m + grid.cell_m
+    return bool(
+        across_m.min() - beside_m <= grid.across_m[-1]
+        and across_m.max() + beside_m >= grid.across_m[0]
+        and along_m.min() - beside_m <= grid.along_m[-1]
+        and along_m.max() + beside_m >= grid.along_m[0]
+    )
 
 
 def _passed_m(track: PlannedTrack, vehicle: KnownVehicle, lead_m: float) -> float:

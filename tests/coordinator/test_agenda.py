@@ -46,7 +46,8 @@ class TestSectors:
         agenda.add(Item.CUT, 90_000, 1)
         assert agenda.deadline_ms(Item.CUT) == 40_000
         assert sorted(agenda.sectors(Item.CUT)) == [0, 1, 2]
-        assert agenda.strike(Item.CUT, 50_000) == [1, 2]
+        assert agenda.strike(Item.CUT, 60_000, most=1) == [1]
+        assert agenda.strike(Item.CUT, 50_000) == [2]
         assert agenda.sectors(Item.CUT) == [0]
         assert agenda.next_wake_ms(0, []) == 20_000
 
