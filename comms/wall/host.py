@@ -70,7 +70,6 @@ class WallHost:
         self._time_limit_ms = time_limit_ms
         self._instance = secrets.token_hex(8)
         self._time = MissionTime()
-        self._early: list[Received] = []
         self._welcomed = False
         self._waits_for_start = False
         self._result: BusResult | None = None
@@ -155,14 +154,13 @@ class WallHost:
                 self._seat.end()
                 return
             event = self._line.get(self._next_s(now_s) - self._now())
-            if event is None:
-                continue
-            for item in self._post.receive(event, self._seat.kept.values):
+            for item in [] if event is None else self._post.receive(event, self._seat.kept.values):
                 match item:
                     case Received():
-                        self._pass_on(item)
+                        self._post.keep(item)
                     case Words(key, words):
                         self._hear(key, words)
+            self._pass_on()
 
     def _is_catching_up(self, now_s: float) -> bool:
         """Whether nodes that were taken up are still to hear what they have missed before they are woken: they would
@@ -202,13 +200,11 @@ class WallHost:
             self._clock_is_heard = heard
             self._notice("the router is heard again" if heard else "the router is not heard")
 
-    def _pass_on(self, received: Received) -> None:
-        if not self._time.known or self._time.is_held:  # by no time it could be told whether it is ahead of that
-            self._early.append(received)
+    def _pass_on(self) -> None:
+        if not self._time.known or self._time.is_held:  # by no time it could be told whether a message is ahead of that
             return
-        now_ms = self._time.now_ms(self._now())
-        if self._post.is_in_time(received, now_ms):
-            self._post.publish(self._seat.hear(received, now_ms))
+        for received in self._post.in_time(self._time.now_ms(self._now()), self._time.factor):
+            self._post.publish(self._seat.hear(received, self._time.now_ms(self._now())))
 
     def _hear(self, key: str, words: list[Any]) -> None:
         try:
@@ -244,9 +240,6 @@ class WallHost:
                 self._notice(f"goes on from {self._seat.taken_up_at_ms / 1000:.0f} s; {at}")
             else:
                 self._notice("the mission begins" if is_first else at)
-        early, self._early = self._early, []
-        for received in early:
-            self._pass_on(received)
 
     def _hear_clock(self, words: list[Any]) -> None:
         match words:

@@ -112,11 +112,12 @@ class WallHub:
             for item in [] if event is None else self._post.receive(event, self._all_kept):
                 match item:
                     case Received():
-                        self._pass_on(item)
+                        self._post.keep(item)
                     case Words(key, words) if key.startswith(FROM):
                         self._hear(key.removeprefix(FROM), words)
                     case Life(host, instance, alive) if not alive:
                         self._lose(host, instance)
+            self._pass_on()
             self._send_words()
         self._send_words()
         self._find_too_late(at_end=True)
@@ -192,14 +193,14 @@ class WallHub:
             names = ", ".join(sorted(silent))
             raise FleetError(f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission from {names}")
 
-    def _pass_on(self, received: Received) -> None:
-        now_ms = self._now_ms(self._now())
-        if not self._post.is_in_time(received, now_ms):
+    def _pass_on(self) -> None:
+        if self._now.is_held:  # what the others have said until they were told waits until the time goes on
             return
-        if received.topic is MISSION_OVER:
-            self._clock.over(received.header.sent_ms)
-        if self._under_way and not self._seat_closed:
-            self._post.publish(self._seat.hear(received, now_ms))
+        for received in self._post.in_time(self._now_ms(self._now()), self._clock.factor):
+            if received.topic is MISSION_OVER:
+                self._clock.over(received.header.sent_ms)
+            if self._under_way and not self._seat_closed:
+                self._post.publish(self._seat.hear(received, self._now_ms(self._now())))
 
     def _hear(self, host: str, words: list[Any]) -> None:
         try:

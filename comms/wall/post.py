@@ -26,7 +26,8 @@ from comms.words import unpack
 BEAT = f"{WORDS}beat/"
 MOST_WORDS_BYTES = 1 << 17  # some four times the beat of a world with a hundred vehicles
 MOST_HELD = 50_000  # messages of a sender, until all that it was asked for has come
-AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time is dropped
+AHEAD_MS = 5000  # a message that is so far ahead of the receiver's time waits
+APART_S = 3.0  # of wall time: so long a stop one process may have noticed and another not, by which their times differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class WallPost:
         self._beats: dict[str, Beat] = {}
         self._asked: dict[str, set[str]] = {}
         self._held: dict[str, list[Received]] = {}
+        self._early: list[Received] = []
 
     def receive(self, event: Event, kept: Callable[[], Iterable[Journal]]) -> list[Item]:
         """Deals with what has arrived; returns messages that are news, words and news of a life, which are for others
@@ -77,12 +79,33 @@ class WallPost:
                 return [event]
         return []
 
-    def is_in_time(self, received: Received, now_ms: int) -> bool:
-        """Whether a message may be handled; one that is too far ahead of our time is dropped."""
-        ahead_ms = received.header.sent_ms - now_ms
-        if ahead_ms > AHEAD_MS:
-            self.intake.drop("ahead of time", received.header.sender, f"{received.key}: by {ahead_ms / 1000:.3f} s")
-        return ahead_ms <= AHEAD_MS
+    def keep(self, received: Received) -> None:
+        """Keeps a message until its time."""
+        self._early.append(received)
+
+    def in_time(self, now_ms: int, factor: float) -> list[Received]:
+        """Takes out what may be handled, in the order of arrival. What is ahead of our time, which runs faster than the
+        wall by a factor, waits for it. It is dropped where it is farther ahead than any two processes' times are apart,
+        or where its sender has said something since that is not ahead: then its time is false."""
+        early, self._early = self._early, []
+        found = [one for one in early if one.header.sent_ms - now_ms <= AHEAD_MS]
+        if len(found) == len(early):
+            return found
+        last: dict[str, tuple[int, int]] = {}
+        for header in (one.header for one in found):
+            number = header.incarnation, header.sequence
+            last[header.sender] = max(last.get(header.sender, number), number)
+        for received in early:
+            header = received.header
+            ahead_ms = header.sent_ms - now_ms
+            if ahead_ms <= AHEAD_MS:
+                continue
+            is_true = header.sender not in last or (header.incarnation, header.sequence) > last[header.sender]
+            if is_true and ahead_ms <= AHEAD_MS + APART_S * 1000 * factor:
+                self._early.append(received)
+            else:
+                self.intake.drop("ahead of time", header.sender, f"{received.key}: by {ahead_ms / 1000:.3f} s")
+        return found
 
     def beat(self, kept: Mapping[str, Journal]) -> None:
         """Tells what the nodes here keep."""
@@ -95,8 +118,8 @@ class WallPost:
 
     @property
     def is_complete(self) -> bool:
-        """Whether all is here that those who have told what they keep have kept for us."""
-        return not any(self._missing(sender) for sender in self._beats)
+        """Whether all is here, and taken out, that those who have told what they keep have kept for us."""
+        return not self._early and not any(self._missing(sender) for sender in self._beats)
 
     @property
     def has_caught_up(self) -> bool:

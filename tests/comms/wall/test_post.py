@@ -178,12 +178,37 @@ def test_answers_without_end_are_dropped_where_there_is_no_room_for_them(monkeyp
     assert len(sequences(post, *states)) == 40
 
 
-def test_a_message_up_to_five_seconds_ahead_is_in_time() -> None:
-    post, alpha = post_over(FakeLine()), Alpha()
-    (received,) = post.receive(mail(alpha.say(contact(1))), list)
+def arrive(post: WallPost, alpha: Alpha, number: int, sent_ms: int = 1000) -> Received:
+    (received,) = post.receive(mail(alpha.say(contact(number))), list)
     assert isinstance(received, Received)
-    assert post.is_in_time(received, 0)
-    assert post.is_in_time(received, 1000 - AHEAD_MS)
-    assert post.intake.dropped == {}
-    assert not post.is_in_time(received, 1000 - AHEAD_MS - 1)
+    received = received._replace(header=received.header._replace(sent_ms=sent_ms))
+    post.keep(received)
+    return received
+
+
+def test_what_is_ahead_of_time_waits_and_what_is_far_ahead_is_dropped() -> None:
+    """All are sent at 1 s; the receiver's time runs twice as fast as the wall, and another's may be 3 s of it ahead."""
+    post, alpha = post_over(FakeLine()), Alpha()
+    first = arrive(post, alpha, 1)
+    assert post.in_time(1000 - AHEAD_MS, 2.0) == [first]
+    second = arrive(post, alpha, 2)
+    assert not post.is_complete
+    assert post.in_time(1000 - AHEAD_MS - 1, 2.0) == []
+    assert post.in_time(1000 - AHEAD_MS - 6000, 2.0) == []
+    assert post.in_time(1000 - AHEAD_MS, 2.0) == [second]
+    assert post.is_complete
+    arrive(post, alpha, 3)
+    assert post.in_time(1000 - AHEAD_MS - 6001, 2.0) == []
     assert post.intake.dropped == {"ahead of time": 1}
+    assert post.is_complete
+
+
+def test_what_is_ahead_of_what_its_sender_says_next_is_dropped() -> None:
+    post, alpha = post_over(FakeLine()), Alpha()
+    arrive(post, alpha, 1, sent_ms=1001)
+    assert post.in_time(1000 - AHEAD_MS, 2.0) == []
+    third = arrive(post, alpha, 2)
+    fourth = arrive(post, alpha, 3, sent_ms=1001)  # that may be true: nothing was said since
+    assert post.in_time(1000 - AHEAD_MS, 2.0) == [third]
+    assert post.intake.dropped == {"ahead of time": 1}
+    assert post.in_time(1001 - AHEAD_MS, 2.0) == [fourth]

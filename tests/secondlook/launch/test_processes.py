@@ -30,7 +30,7 @@ from secondlook.scenario import load_scenario
 from tests.viz.recordings import rows_so_far, verify
 
 SOON_S = 20.0
-PATIENCE_S = 3.0
+PATIENCE_S = 8.0  # more than a busy machine keeps a process from its work
 HOSTS = ("world", "primary", "helper", "coordinator", "recorder")
 ENOUGH_BYTES = 30_000  # of messages, more than 100 of them
 INTERRUPTED = r"interrupted at \d+ s of the mission"
@@ -190,12 +190,12 @@ def run_fleet(
 @pytest.mark.parametrize(
     ("host", "nth", "sentence"),
     [
-        ("primary", 150, r"nothing heard for 3 s at .*: no answer from primary|primary has fallen silent at .*"),
+        ("primary", 150, r"nothing heard for 8 s at .*: no answer from primary|primary has fallen silent at .*"),
         (
             "recorder",
             150,
             # It is waited for in mid-mission, or at the end where all that it has not taken is less than may wait.
-            r"nothing heard for 3 s at .*: no (acknowledgement|last word) from recorder|recorder has fallen silent .*",
+            r"nothing heard for 8 s at .*: no (acknowledgement|last word) from recorder|recorder has fallen silent .*",
         ),
         # Late enough for the hub to have given signs of life in mid-mission.
         ("world", 4000, r"world has fallen silent, last heard at [1-9]\d*\.\d{3} s of the mission"),
