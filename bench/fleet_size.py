@@ -11,20 +11,18 @@ whole of it grows, by the least and the largest fleet.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
-import tempfile
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
-from bench.local_speed import PARTS, Account
+from bench.local_speed import accounted, fly
 from comms.node import Received
-from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.recorded.observer import RunStopped
 from secondlook.scenario import Scenario, make_scenario
 from secondlook.scenario.text import Value
@@ -74,7 +72,7 @@ def fleet_of(shares: int, cell_m: float) -> Scenario:
 
 def flown(scenario: Scenario, seconds: float) -> dict[str, Any]:
     """Flies so long with clocks in every part; the processor time by part, and what was said."""
-    account, words, strips = Account(), 0, set[str]()
+    words, strips = 0, set[str]()
 
     def watch(one: Received) -> None:
         nonlocal words
@@ -84,21 +82,9 @@ def flown(scenario: Scenario, seconds: float) -> dict[str, Any]:
         if one.t_s > seconds:
             raise RunStopped
 
-    before = [(owner, name, owner.__dict__.get(name)) for owner, name, _ in PARTS]
     began_s = time.process_time()
-    with tempfile.TemporaryDirectory() as folder:
-        try:
-            for owner, name, part in PARTS:
-                setattr(owner, name, account.of(part, getattr(owner, name)))
-            run_mission(scenario, RunOptions(Path(folder), "local", record=False, watch=watch))
-        except RunStopped:
-            account.turn_to("")
-        finally:
-            for owner, name, function in before:
-                if function is None:
-                    delattr(owner, name)
-                else:
-                    setattr(owner, name, function)
+    with accounted() as account, contextlib.suppress(RunStopped):
+        fly(scenario, watch)
     by_part: dict[str, float] = {}
     for part, spent_s in account.seconds.items():
         told = TOLD.get(part.split(",")[0], "bus and files")

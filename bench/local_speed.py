@@ -12,13 +12,14 @@ tells the processor time by node and part; what a part calls that has a line of 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import functools
 import hashlib
 import json
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -153,14 +154,15 @@ def bus_alone_s(scenario: Scenario, said: Sequence[Received]) -> float:
     return time.perf_counter() - began_s
 
 
-def parts_of(scenario: Scenario) -> Account:
-    """Flies once with clocks in every part."""
+@contextlib.contextmanager
+def accounted() -> Iterator[Account]:
+    """An account with clocks in every part, until the end of the context."""
     account = Account()
     before = [(owner, name, owner.__dict__.get(name)) for owner, name, _ in PARTS]
     try:
         for owner, name, part in PARTS:
             setattr(owner, name, account.of(part, getattr(owner, name)))
-        fly(scenario)
+        yield account
         account.turn_to("")
     finally:
         for owner, name, function in before:
@@ -168,7 +170,6 @@ def parts_of(scenario: Scenario) -> Account:
                 delattr(owner, name)  # it was inherited
             else:
                 setattr(owner, name, function)
-    return account
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -188,7 +189,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         began_s = time.perf_counter()
         summary = fly(scenario)
         wall_s.append(time.perf_counter() - began_s)
-    account = parts_of(scenario)
+    with accounted() as account:
+        fly(scenario)
     by_cost = sorted(account.seconds.items(), key=lambda one: -one[1])
     found = {
         "scenario": scenario.name,

@@ -72,10 +72,6 @@ class Sectors:
         """Those that share cells with a window."""
         return [one for one in self.all if one.window.shared(window)]
 
-    def of_helper(self, name: str) -> Sector:
-        """The one in whose team a helper is."""
-        return self._by_helper[name]
-
     def surveyed_by(self, primary: KnownVehicle) -> list[Sector]:
         """Those that a primary's plan touches; all, where it has told of none."""
         tracks = primary.plan.tracks if primary.plan is not None else ()

@@ -53,6 +53,17 @@ class TestFromHotspotToTask:
         assert isinstance(offered, StripStatus)
         assert (offered.state, offered.vehicle, offered.revision) == (OFFERED, HELPER, 2)
 
+    def test_a_strip_of_any_sector_lies_where_the_hotspot_is(self) -> None:
+        """A sector a helper: the western and the eastern half, which begins at 202.5 m. Strips lie in whole blocks of
+        two cells from there."""
+        told = coordinator(TWO_HELPERS, idle=(HELPER, SECOND_HELPER), helpers_a_team=1)
+        for number, place in enumerate((HOT, (302.5, 50.0, 352.5, 350.0)), 1):
+            told.hotspot(place, number=number)
+            told.settle()
+        told.settle()
+        found = sorted((one.start_x_m, one.start_y_m, one.length_m, one.vehicle) for one in told.strips().values())
+        assert found == [(122.5, 50, 300, HELPER), (327.5, 50, 300, SECOND_HELPER)]
+
     def test_where_tiles_have_come_the_map_counts(self) -> None:
         told = coordinator()
         risk = np.full(GRID.shape, 0.1)

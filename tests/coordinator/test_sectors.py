@@ -165,7 +165,7 @@ class TestTeams:
         assert self.better(laid) == 1
         laid.sectors.join("alpha", laid.north, 100_000)
         assert (laid.south.team, laid.north.team) == ({"beta"}, {"alpha", "gamma", "delta"})
-        assert laid.sectors.of_helper("alpha") is laid.north
+        assert laid.sectors.about(laid.fleet.vehicles["alpha"]) == [laid.north]
         assert laid.to_cut() == {0: 100_000, 1: 100_000}
 
     def test_who_has_joined_stays_for_a_while(self) -> None:

@@ -158,6 +158,7 @@ def coordinator(
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting",
     area: Sequence[tuple[float, float]] | None = None,
     deadline_s: float | None = None,
+    helpers_a_team: int = 3,
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
     one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration."""
@@ -173,6 +174,7 @@ def coordinator(
         strips=strips,
         across=False,
         objective="mean",
+        helpers_a_team=helpers_a_team,
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
     run = run_info(400, 400, vehicles=vehicles)

@@ -36,11 +36,12 @@ class Told:
     vehicles: tuple[RosterVehicle, ...] = FLEET
     rho: float = 0.0
     inside: BoolArray = field(default_factory=ALL.copy)
+    place: Window = EVERYWHERE
     versions: int = 0
 
     def __post_init__(self) -> None:
         self.fleet = KnownFleet(run_info(400, 400, vehicles=self.vehicles, rho=self.rho), LOST_MS, 0)
-        self.expected = ExpectedMap(self.fleet, EVERYWHERE, self.inside, 0.7)
+        self.expected = ExpectedMap(self.fleet, self.place, self.inside[self.place.cells], 0.7)
 
     def plan(self, *tracks: PlannedTrack, name: str = PRIMARY) -> None:
         """A plan, and what its tracks have seen: half, as far as the area goes."""
@@ -202,6 +203,17 @@ class TestSeabed:
         found = told_p(0.35)
         of_helpers = (found + 0.005) / 0.705
         assert told.now().look == pytest.approx(0.7 * of_helpers * (found / of_helpers + 0.1) / 0.8)
+
+    def test_of_a_part_of_the_map_what_was_found_is_learned_where_it_lies(self) -> None:
+        part, everywhere = Told(place=Window(40, 80, 0, 81)), Told()
+        passed = Window(60, 80, 0, 40)
+        for told in (part, everywhere):
+            told.plan()
+            before = told.fleet.levels(HELPER, passed)
+            told.layer(HELPER, 0.1)
+            told.expected.learn(passed, HELPER, before, 0.7)
+            look = told.now().look[-40:]
+            assert look[25:, :35].max() < 0.9 * look[:15, 45:].min()
 
     def test_a_second_pass_tells_what_it_added(self) -> None:
         told, once = Told(), Told()
