@@ -29,6 +29,7 @@ from planner.types import BoolArray, FloatArray, GridSpec, Point
 LEAST_SWATHS = 4.0  # that a sector is wide and long, and many more where there is room
 JOINS_FOR = 1.5  # times as much a helper's time must bring elsewhere for it to join another team
 STAYS_S = 600.0  # in a team that it has joined: until then prices tell that it is there
+MOST_LONG = 4.0  # times as long as it is wide is a sector left that could be halved: long strips need fewer turns
 EMPTY_COUNTS = 3.0  # times its price a metre is worth where nobody of the team is there
 
 
@@ -169,7 +170,8 @@ def laid_out(
     inside: BoolArray, homes: Mapping[str, Point], helpers_a_team: int, least_cells: int
 ) -> list[tuple[Window, list[str]]]:
     """Sectors for helpers, as many as there are teams of that many, each with its share of the cells inside, and who
-    lies nearest to it in its team: halved along the longer side again and again.
+    lies nearest to it in its team: halved again and again, the halves side by side across the tracks, so that strips
+    stay long, or one behind the other where it is too long or too narrow for that.
 
     `homes`: of each helper, as (row, column) of the map, which may lie beyond it. No side is shorter than
     `least_cells`.
@@ -182,10 +184,12 @@ def _halved(
     inside: BoolArray, window: Window, homes: dict[str, Point], helpers_a_team: int, least_cells: int
 ) -> list[tuple[Window, list[str]]]:
     teams = len(homes) // helpers_a_team
-    axis = 0 if window.rows > window.columns_wide else 1
-    first, end = ((window.first_row, window.end_row), (window.first_column, window.end_column))[axis]
-    if teams < 2 or end - first < 2 * least_cells:
+    sides = (window.first_row, window.end_row), (window.first_column, window.end_column)
+    axes = (0, 1) if window.rows > MOST_LONG * window.columns_wide else (1, 0)
+    axis = next((one for one in axes if sides[one][1] - sides[one][0] >= 2 * least_cells), None)
+    if teams < 2 or axis is None:
         return [(window, sorted(homes))]
+    first, end = sides[axis]
     share = (teams // 2) / teams
     before = inside[window.cells].sum(axis=1 - axis).cumsum()
     at = first + int(np.searchsorted(before, share * before[-1])) + 1

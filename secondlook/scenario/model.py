@@ -149,7 +149,7 @@ class Coordinator(Mapping):
     """A vehicle not heard of for so long counts as lost. Agents tell their state every 10 s: one may be late."""
     min_strip_m: Annotated[float, Field(ge=1, le=1000)] = 30.0
     """Least length of a strip."""
-    max_strip_m: Annotated[float, Field(ge=1, le=10_000)] = 2000.0
+    max_strip_m: Annotated[float, Field(ge=1, le=10_000)] = 10_000.0
     """Largest length of a strip, at least `min_strip_m`."""
     worth_risk: OpenShare = 0.05
     """Mean residual risk, times the weight of the ground, over the helper's swath from which a further metre of strip

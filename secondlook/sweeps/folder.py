@@ -25,7 +25,7 @@ from secondlook.engine.code_here import code_here, differing
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, whole_file, write_whole
 from secondlook.sweeps.plan import SweepPlan
-from secondlook.sweeps.rows import TEXT, WHOLE, Row, schema_of
+from secondlook.sweeps.rows import TEXT, WHOLE, Row, as_cell, schema_of
 
 MADE_WITH, PLAN, ROWS, MISSIONS = "made_with.json", "sweep.yaml", "rows", "missions.parquet"
 BROKEN_OFF = ".*.part"  # what was left by a process that was killed while it wrote
@@ -177,7 +177,8 @@ class SweepFolder:
 
 
 def read_rows(folder: Path, schema: pa.Schema | None = None) -> pa.Table:
-    """All rows that are there, joined or not, by seed; with the columns of a schema, or those of the newest."""
+    """All rows that are there, joined or not, by seed and as the plan has them; with the columns of a schema, or of the
+    newest file."""
     tables = [_read(file) for file in sorted((folder / ROWS).glob("*.parquet"))]
     if (folder / MISSIONS).exists():
         joined = _read(folder / MISSIONS)
@@ -188,7 +189,19 @@ def read_rows(folder: Path, schema: pa.Schema | None = None) -> pa.Table:
         table = pa.concat_tables([schema.empty_table(), *tables], promote_options="permissive").select(schema.names)
     except pa.ArrowException as error:
         raise UserError(f"{folder}: the values that were varied before are of another kind: {error}") from error
-    return table.sort_by([("seed", "ascending"), ("key", "ascending")])
+    places = _places(folder, table)
+    return table.take(pc.sort_indices(places, [(name, "ascending") for name in places.column_names]))
+
+
+def _places(folder: Path, table: pa.Table) -> pa.Table:
+    """Of each row its seed, and the place of each of its values among those that the plan has."""
+    places = {"seed": table["seed"]}
+    for key, values in json.loads((folder / MADE_WITH).read_text())["vary"].items():
+        if key in table.column_names:  # of a table without rows nothing is known
+            kind = table.schema.field(key).type
+            cells = [as_cell(value) if kind == TEXT and value is not None else value for value in values]
+            places[key] = pc.index_in(table[key], value_set=pa.array(cells, kind))
+    return pa.table(places)
 
 
 def _read(file: Path, columns: list[str] | None = None) -> pa.Table:

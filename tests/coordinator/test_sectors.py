@@ -53,7 +53,7 @@ class TestHowTheyAreLaid:
         inside = np.ones((100, 300), dtype=np.bool_)
         assert laid_out(inside, homes, 3, 20) == [(Window(0, 100, 0, 300), sorted(HELPERS))]
 
-    def test_the_longer_side_is_halved_and_who_lies_nearer_is_in_the_team(self) -> None:
+    def test_it_is_halved_across_the_tracks_and_who_lies_nearer_is_in_the_team(self) -> None:
         homes = {"alpha": (-5.0, 290.0), "beta": (-5.0, 10.0), "gamma": (-5.0, 20.0), "delta": (-5.0, 150.0)}
         inside = np.ones((100, 300), dtype=np.bool_)
         found = laid_out(inside, homes, 2, 20)
@@ -61,6 +61,20 @@ class TestHowTheyAreLaid:
             (Window(0, 100, 0, 150), ["beta", "gamma"]),
             (Window(0, 100, 150, 300), ["alpha", "delta"]),
         ]
+
+    @pytest.mark.parametrize(
+        ("shape", "first"),
+        [
+            ((120, 300), Window(0, 120, 0, 150)),
+            ((300, 75), Window(0, 300, 0, 38)),  # strips stay long
+            ((300, 74), Window(0, 150, 0, 74)),  # too long for its width
+            ((100, 39), Window(0, 50, 0, 39)),  # too narrow to be halved
+            ((39, 300), Window(0, 39, 0, 150)),
+        ],
+    )
+    def test_which_side_is_halved(self, shape: tuple[int, int], first: Window) -> None:
+        homes = {name: (float(place), float(place)) for place, name in enumerate(HELPERS)}
+        assert laid_out(np.ones(shape, dtype=np.bool_), homes, 2, 20)[0] == (first, ["alpha", "beta"])
 
     def test_each_has_its_share_of_the_cells_inside(self) -> None:
         inside = np.zeros((100, 300), dtype=np.bool_)

@@ -121,6 +121,8 @@ def each_row_a_file(monkeypatch: pytest.MonkeyPatch) -> None:
 class TestResumed:
     def test_what_is_there_is_not_flown_again(self, tmp_path: Path, each_row_a_file: None) -> None:
         first, second = Here(ends_after=5), Here()
+        with sweep_folder(tmp_path, plan()):
+            assert len(secondlook.load_sweep(tmp_path).table) == 0
         with pytest.raises(KeyboardInterrupt):
             fly(plan(), tmp_path, first)
         there = read_rows(tmp_path)["key"].to_pylist()
@@ -136,7 +138,9 @@ class TestResumed:
         fly(plan(), tmp_path)
         more = fly(plan(range(0, 11), vary={"coordinator.allocator": ["greedy", "plan", "none"]}), tmp_path)
         assert len(more.flown) == 33 - 16
-        assert len(read_rows(tmp_path)) == 33
+        rows = read_rows(tmp_path)
+        assert rows["seed"].to_pylist() == [seed for seed in range(11) for _ in range(3)]
+        assert rows["coordinator.allocator"].to_pylist() == ["greedy", "plan", "none"] * 11
         with pytest.raises(UserError, match="was flown with seeds 0 to 10; must be a new folder, or asked for"):
             fly(plan(vary={"coordinator.allocator": ["greedy", "plan", "none"]}), tmp_path)
 
