@@ -16,7 +16,7 @@ from comms.errors import NO_FAILURES, NodeError, in_words, one_line
 from comms.node import Listener, Node, Publication, Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK, Header, body_of, decode, message_of, packed
-from comms.said.messages import Message
+from comms.said.messages import Heard, Message
 from comms.said.routing import Route, Routing
 from comms.said.wire import WireError
 
@@ -144,13 +144,15 @@ class Intake:
 
 class GuardedNode:
     """A node under its id, kept to the rules of the house: what it publishes is stamped in order, what it raises is
-    told as its failure. `wake_ms`: the wake-up it has asked for."""
+    told as its failure. What a modem has heard for it (`Heard`) it is given as what was said. `wake_ms`: the wake-up it
+    has asked for."""
 
     def __init__(self, node_id: str, node: Node, routing: Routing, incarnation: int = 0) -> None:
         self.node_id = node_id
         self.wake_ms: int | None = None
         self.stamp = Stamp(node_id, routing, incarnation)
         self._node = node
+        self._letters = Intake(routing)
 
     def is_due(self, now_ms: int) -> bool:
         """Whether the wake-up has come."""
@@ -166,7 +168,10 @@ class GuardedNode:
             if start:
                 self._note(self._node.start(now_ms), published)
             for received in mail:
-                self._note(self._node.on_message(received, now_ms), published)
+                message = received.message
+                opened = self._letters.open(message.key, message.payload) if isinstance(message, Heard) else received
+                if opened is not None:
+                    self._note(self._node.on_message(opened, now_ms), published)
             if wake and self.is_due(now_ms):
                 self._note(self._node.on_wake(now_ms), published)
         except (NodeError, *NO_FAILURES):

@@ -103,7 +103,8 @@ class Faults:
         if writer.role is Role.CLOCK:  # its announcement of the run is part of every start
             return [Delivery(payload)]
         if received.topic.crosses_water and any(
-            cut.from_ms <= sent_ms < cut.until_ms and _across(cut.vehicle, receiver, writer) for cut in self._cut_offs
+            cut.from_ms <= sent_ms < cut.until_ms and _across(cut.vehicle, receiver, writer, received)
+            for cut in self._cut_offs
         ):
             return []
         deliveries = [Delivery(payload)]
@@ -145,11 +146,12 @@ def _concerns(fault: MessageFault, receiver: str, key: str, sent_ms: int) -> boo
     )
 
 
-def _across(vehicle: str, receiver: RosterNode, writer: RosterNode) -> bool:
-    """Whether just one of the two sits on this vehicle. The world has no place in the water."""
+def _across(vehicle: str, receiver: RosterNode, writer: RosterNode, received: Received) -> bool:
+    """Whether just one of the two sits on this vehicle. The world has no place in the water: it carries packets
+    from its modem and to it."""
     if Role.WORLD in (receiver.role, writer.role):
-        return False
-    return (vehicle in receiver.vehicles) != (vehicle in writer.vehicles)
+        return received.topic.has_platform and received.vehicle == vehicle
+    return receiver.is_on(vehicle) != writer.is_on(vehicle)
 
 
 NO_FAULTS = Faults(0)

@@ -47,6 +47,7 @@ class Role(enum.Enum):
     RECORDER = "recorder"
     OBSERVER = "observer"
     SURVEY_REVISIT = "survey_revisit"
+    MODEM = "modem"
 
     @property
     def is_single(self) -> bool:

@@ -54,7 +54,9 @@ def key_expression(text: str, vehicles: tuple[str, ...] = (), topics: tuple[Topi
     """
     expression = KeyExpression(text)
     keys = [
-        topic.pattern.format(vehicle=one, number=_NUMBER, tile=_NUMBER) for topic in topics for one in vehicles or "*"
+        topic.pattern.format(vehicle=one, platform=one, number=_NUMBER, tile=_NUMBER)
+        for topic in topics
+        for one in ((*vehicles, "*") if topic.has_platform else vehicles or "*")
     ]
     if not any(map(expression.includes, keys)):
         all_keys = ", ".join(topic.expression() for topic in topics)

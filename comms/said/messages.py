@@ -15,7 +15,10 @@ from comms.said.wire import (
     AtMost,
     CellMask,
     Count,
+    FrameBytes,
     Identifier,
+    Key,
+    Letter,
     Levels,
     Metres,
     MetresPerSecond,
@@ -370,6 +373,27 @@ class MissionOver:
     reason: Text
 
 
+MOST_FRAMES = 64
+"""Of one packet."""
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """What a modem sends in one go, or what has come of it at another: frames, each of which arrives whole or not at
+    all."""
+
+    frames: Annotated[tuple[FrameBytes, ...], AtMost(MOST_FRAMES)]
+
+
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What a modem has heard of a node on another platform, for those on its own: the key, and the payload as if that
+    node had said it here, but for what was rounded or left out on its way."""
+
+    key: Key
+    payload: Letter
+
+
 @dataclass(frozen=True, slots=True)
 class TruthTarget:
     """A target on the seabed, true position."""
@@ -423,6 +447,8 @@ Message = (
     | Task
     | TaskStatus
     | MissionOver
+    | Packet
+    | Heard
     | TruthTargets
     | TruthLook
     | TruthPose

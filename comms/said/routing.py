@@ -15,11 +15,21 @@ MOST_ROUTES = 100_000  # that are remembered by their key
 
 @dataclass(frozen=True, slots=True)
 class RosterNode:
-    """One node of the fleet: its id, its role and the vehicles it acts for (none for coordinator and watchers)."""
+    """One node of the fleet: its id, its role and the vehicles it acts for (none for coordinator and watchers).
+
+    `platform`: a vehicle, or another place, such as a ship, that it is on, where the fleet talks by modems: what
+    crosses from one platform to another goes by theirs. "" for who is nowhere, as the world and those that only listen,
+    and for all in a fleet where everybody hears everybody.
+    """
 
     node_id: str
     role: Role
     vehicles: tuple[str, ...] = ()
+    platform: str = ""
+
+    def is_on(self, vehicle: str) -> bool:
+        """Whether it sits on a vehicle."""
+        return vehicle == self.platform if self.platform else vehicle in self.vehicles
 
     @property
     def listens_only(self) -> bool:
@@ -57,7 +67,7 @@ class Routing:
         self._routes_of: dict[tuple[Topic, str], Route] = {}
         self._kept_by: dict[str, set[str]] = {}
         for topic in TOPICS:
-            for vehicle in {v for node in roster for v in node.vehicles} if topic.has_vehicle else {""}:
+            for vehicle in self._named(topic) if topic.has_vehicle else {""}:
                 writers = self._who(topic, topic.writers, vehicle)
                 if len(writers) > 1:
                     raise ValueError(f"{topic.name} of {vehicle or 'the fleet'} has two writers: {', '.join(writers)}")
@@ -111,6 +121,9 @@ class Routing:
         if not writers:
             return None
         everyone = [n for n in self._who(topic, topic.readers, vehicle) if n != writers[0]]
+        if topic.crosses_water and not topic.has_platform:
+            here = self.nodes[writers[0]].platform
+            everyone = [n for n in everyone if here in ("", self.nodes[n].platform) or not self.nodes[n].platform]
         return Route(
             topic=topic,
             vehicle=vehicle,
@@ -120,22 +133,41 @@ class Routing:
         )
 
     def _who(self, topic: Topic, table: Mapping[Role, Reach], vehicle: str) -> list[str]:
-        known = not topic.has_vehicle or any(vehicle in node.vehicles for node in self.roster)
+        known = not topic.has_vehicle or vehicle in self._named(topic)
         return [
             node.node_id
             for node in self.roster
             if known
             and node.role in table
-            and (table[node.role] is Reach.ALL or not topic.has_vehicle or vehicle in node.vehicles)
+            and (table[node.role] is Reach.ALL or not topic.has_vehicle or vehicle in _own(node, topic))
         ]
+
+    def _named(self, topic: Topic) -> set[str]:
+        """The vehicles, or platforms, that keys of a topic may name."""
+        return {name for node in self.roster for name in _own(node, topic)}
 
     def _expressions(self, node_id: str, *, writing: bool) -> tuple[str, ...]:
         node = self.nodes[node_id]
         found: list[str] = []
         for topic in TOPICS:
             reach = (topic.writers if writing else topic.readers).get(node.role)
-            if reach is Reach.OWN and topic.has_vehicle:
-                found.extend(topic.expression(vehicle) for vehicle in node.vehicles)
-            elif reach is not None:
+            if reach is None:
+                continue
+            if node.platform and topic.crosses_water and not writing:
+                found.extend(self._on_its_platform(node_id, topic))
+            elif reach is Reach.OWN and topic.has_vehicle:
+                found.extend(topic.expression(vehicle) for vehicle in _own(node, topic))
+            else:
                 found.append(topic.expression())
         return tuple(found)
+
+    def _on_its_platform(self, node_id: str, topic: Topic) -> list[str]:
+        """What a node hears of a topic without a modem."""
+        names = sorted(self._named(topic)) if topic.has_vehicle else [""]
+        routes = {name: self._route_of(topic, name) for name in names}
+        return [topic.expression(name) for name, route in routes.items() if route and node_id in route.readers]
+
+
+def _own(node: RosterNode, topic: Topic) -> tuple[str, ...]:
+    """What keys of a topic name as a node's own."""
+    return (node.platform,) * bool(node.platform) if topic.has_platform else node.vehicles

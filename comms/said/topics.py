@@ -17,6 +17,7 @@ from comms.said.messages import (
     Contact,
     CoverageTile,
     Curve,
+    Heard,
     Hotspot,
     Look,
     Maneuver,
@@ -24,6 +25,7 @@ from comms.said.messages import (
     Message,
     MissionOver,
     Nav,
+    Packet,
     Plan,
     StripStatus,
     Task,
@@ -54,7 +56,9 @@ class Keep(enum.Enum):
 class Topic:
     """One row of the table; another topic with the same entries is another one.
 
-    `pattern`: the key below the run id; `{vehicle}`, `{number}` and `{tile}` stand for one chunk each.
+    `pattern`: the key below the run id; `{vehicle}`, `{platform}`, `{number}` and `{tile}` stand for one chunk each.
+    What is said here of vehicles holds for platforms, too, where the key names one: a vehicle, or another place that
+    nodes are on.
     `delay_ms`: from sending to delivery in lockstep, >= 1. `wakes`: whether a message that is due lets its reader act;
     if not it waits until the reader acts for another reason. `max_bytes`: a larger payload is refused.
     `rate_hz`: the most that its writer publishes on average, for one vehicle where the key names one, over all such
@@ -77,7 +81,7 @@ class Topic:
 
     def key(self, *, vehicle: str = "", number: int = 0, tile: str = "") -> str:
         """The key below the run id."""
-        return self.pattern.format(vehicle=vehicle, number=number, tile=tile)
+        return self.pattern.format(vehicle=vehicle, platform=vehicle, number=number, tile=tile)
 
     def due_ms(self, sent_ms: int) -> int:
         """When a message that was sent at a time is due in lockstep, whoever reads it."""
@@ -86,13 +90,19 @@ class Topic:
     @cached_property
     def has_vehicle(self) -> bool:
         """Whether the key names a vehicle."""
-        return "{vehicle}" in self.pattern
+        return "{vehicle}" in self.pattern or self.has_platform
+
+    @cached_property
+    def has_platform(self) -> bool:
+        """Whether what the key names is a platform."""
+        return "{platform}" in self.pattern
 
     @cached_property
     def regex(self) -> re.Pattern[str]:
         """Matches the topic's keys; group `vehicle` where the key names one."""
         chunk = re.escape(self.pattern)
-        chunk = chunk.replace(r"\{vehicle\}", r"(?P<vehicle>[a-z0-9_-]{1,40})")
+        for named in (r"\{vehicle\}", r"\{platform\}"):
+            chunk = chunk.replace(named, r"(?P<vehicle>[a-z0-9_-]{1,40})")
         # A number that is a message's `Count` as well, and written in one way only: else one would have several keys.
         chunk = chunk.replace(r"\{number\}", r"(?P<number>0|[1-9][0-9]{0,8})")
         chunk = chunk.replace(r"\{tile\}", r"(?P<tile>[a-z0-9_-]{1,40})")
@@ -105,7 +115,7 @@ class Topic:
 
     def expression(self, vehicle: str = "*") -> str:
         """The Zenoh key expression, below the run id, of this topic's keys for one vehicle or for all."""
-        return self.pattern.format(vehicle=vehicle, number="*", tile="*")
+        return self.pattern.format(vehicle=vehicle, platform=vehicle, number="*", tile="*")
 
 
 _WATCHERS = {Role.RECORDER: Reach.ALL, Role.OBSERVER: Reach.ALL}
@@ -114,6 +124,8 @@ _HELPERS_OWN = {role: Reach.OWN for role in Role if role.revisits}
 _AGENTS_OWN = _SURVEYORS_OWN | _HELPERS_OWN
 _BODIES_OWN = {Role.WORLD: Reach.OWN, Role.BODY: Reach.OWN}
 _COORDINATOR = {Role.COORDINATOR: Reach.ALL}
+_MODEMS = {Role.MODEM: Reach.ALL}  # each for all that is said on its platform, and no other
+_MODEM_OWN = {Role.MODEM: Reach.OWN}
 _EVERYONE = dict.fromkeys(Role, Reach.ALL)
 
 RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 600_000, 0.01, Keep.LATEST, crosses_water=False)
@@ -122,8 +134,8 @@ NAV = Topic(
     wakes=False,
 )  # fmt: skip
 LOOK = Topic(
-    "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | {Role.OBSERVER: Reach.ALL}, 150_000, 0.2,
-    Keep.EVENTS, crosses_water=False,
+    "look", "veh/{vehicle}/look", Look, _BODIES_OWN, _AGENTS_OWN | _MODEM_OWN | {Role.OBSERVER: Reach.ALL},
+    150_000, 0.2, Keep.EVENTS, crosses_water=False,
 )  # fmt: skip
 MANEUVER_STATUS = Topic(
     "maneuver_status", "veh/{vehicle}/maneuver_status", ManeuverStatus, _BODIES_OWN, _AGENTS_OWN | _WATCHERS, 400, 0.1,
@@ -134,27 +146,27 @@ MANEUVER = Topic(
     crosses_water=False,
 )  # fmt: skip
 STATE = Topic(
-    "state", "agent/{vehicle}/state", AgentState, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 200, 0.3, Keep.LATEST,
-    crosses_water=True,
+    "state", "agent/{vehicle}/state", AgentState, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 200, 0.3,
+    Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 PLAN = Topic(
-    "plan", "agent/{vehicle}/plan", Plan, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 150_000, 0.02,
+    "plan", "agent/{vehicle}/plan", Plan, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 150_000, 0.02,
     Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 CURVE = Topic(
-    "curve", "agent/{vehicle}/curve", Curve, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 9_000, 0.01,
+    "curve", "agent/{vehicle}/curve", Curve, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 9_000, 0.01,
     Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 COVERAGE = Topic(
-    "coverage", "agent/{vehicle}/coverage/{tile}", CoverageTile, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 1_000, 2.0,
-    Keep.LATEST, crosses_water=True, burst=20_000,  # at the mission's end each tile is said up to 8 times
+    "coverage", "agent/{vehicle}/coverage/{tile}", CoverageTile, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
+    2.0, Keep.LATEST, crosses_water=True, burst=20_000,  # at the mission's end each tile is said up to 8 times
 )  # fmt: skip
 CONTACT = Topic(
-    "contact", "agent/{vehicle}/contact/{number}", Contact, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 200, 0.2,
+    "contact", "agent/{vehicle}/contact/{number}", Contact, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 200, 0.2,
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 HOTSPOT = Topic(
-    "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _WATCHERS, 1_000,
+    "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
     0.5, Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 STRIP = Topic(
@@ -163,17 +175,30 @@ STRIP = Topic(
 )  # fmt: skip
 TASK = Topic(
     # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
-    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _WATCHERS, 68, 0.1,
+    "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _MODEMS | _WATCHERS, 68, 0.1,
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 TASK_STATUS = Topic(
     "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
-    _COORDINATOR | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
+    _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
-    dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _WATCHERS, 400, 0.1, Keep.LATEST,
+    dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _MODEMS | _WATCHERS, 400, 0.1, Keep.LATEST,
     crosses_water=True,
+)  # fmt: skip
+MODEM_TX = Topic(
+    "modem_tx", "modem/{platform}/tx", Packet, {Role.MODEM: Reach.OWN}, {Role.WORLD: Reach.ALL} | _WATCHERS, 300_000,
+    10.0, Keep.LATEST, crosses_water=True,
+)  # fmt: skip
+MODEM_RX = Topic(
+    "modem_rx", "modem/{platform}/rx", Packet, {Role.WORLD: Reach.ALL}, {Role.MODEM: Reach.OWN} | _WATCHERS, 300_000,
+    100.0, Keep.LATEST, crosses_water=True,
+)  # fmt: skip
+HEARD = Topic(
+    "heard", "modem/{platform}/heard", Heard, {Role.MODEM: Reach.OWN},
+    dict.fromkeys((*_AGENTS_OWN, Role.COORDINATOR), Reach.OWN) | _WATCHERS, 151_000, 10.0, Keep.EVENTS,
+    crosses_water=False,
 )  # fmt: skip
 TRUTH_TARGETS = Topic(
     "truth_targets", "world/truth/targets", TruthTargets, {Role.WORLD: Reach.ALL}, _WATCHERS, 2_000_000, 0.001,
@@ -190,7 +215,7 @@ TRUTH_POSE = Topic(
 
 TOPICS: tuple[Topic, ...] = (
     RUN, NAV, LOOK, MANEUVER_STATUS, MANEUVER, STATE, PLAN, CURVE, COVERAGE, CONTACT, HOTSPOT, STRIP, TASK,
-    TASK_STATUS, MISSION_OVER, TRUTH_TARGETS, TRUTH_LOOK, TRUTH_POSE,
+    TASK_STATUS, MISSION_OVER, MODEM_TX, MODEM_RX, HEARD, TRUTH_TARGETS, TRUTH_LOOK, TRUTH_POSE,
 )  # fmt: skip
 
 

@@ -156,6 +156,21 @@ class Words:
 
 
 @dataclass(frozen=True)
+class Octets:
+    """At most `longest` bytes."""
+
+    longest: int
+
+    def encode(self, value: bytes) -> bytes:
+        return self.decode(value)
+
+    def decode(self, wire: Any) -> bytes:
+        if type(wire) is not bytes or len(wire) > self.longest:
+            raise WireError(f"not at most {self.longest} bytes")
+        return wire
+
+
+@dataclass(frozen=True)
 class Choice:
     """One member of an enumeration, by its place in it."""
 
@@ -397,4 +412,10 @@ Text = Annotated[str, Words(LONGEST_TEXT)]
 ProbabilityCurve = Annotated[NDArray[np.float64], Packed(1, "<u2", 4096, 10_000, 0.999)]
 ProbabilityLook = Annotated[NDArray[np.float64], Packed(3, "<u2", 65_536, 10_000, 0.999)]
 Levels = Annotated[NDArray[np.uint8], Packed(2, "u1", 1024)]
+LONGEST_KEY = 200
+LONGEST_LETTER = 150_000  # bytes of a message that was heard across the water, as its readers get it
+LONGEST_FRAME = 4096  # bytes
+Key = Annotated[str, Words(LONGEST_KEY, re.compile(r"[a-z0-9_/-]+"))]
+Letter = Annotated[bytes, Octets(LONGEST_LETTER)]
+FrameBytes = Annotated[bytes, Octets(LONGEST_FRAME)]
 CellMask = Annotated[NDArray[np.bool_], Mask(1024)]

@@ -6,7 +6,7 @@ import logging
 from dataclasses import replace
 
 import pytest
-from fleets import ROSTER, RUN_INFO, nav, state
+from fleets import ROSTER, RUN_INFO, nav, state, with_modems
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from same_message import assert_same
@@ -38,7 +38,7 @@ def test_a_message_that_fits_is_opened(intake: Intake) -> None:
 @settings(max_examples=20)
 @given(data=st.data())
 def test_what_is_opened_without_unpacking_is_what_the_payload_holds(topic: Topic, data: st.DataObject) -> None:
-    routing, vehicle = Routing(ROSTER), "beta" if Role.SURVEY not in topic.writers else "alpha"
+    routing, vehicle = Routing(with_modems(ROSTER)), "beta" if Role.SURVEY not in topic.writers else "alpha"
     key = topic.key(vehicle=vehicle, number=7, tile="3-4")
     route = routing.route(key)
     assert route is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -45,6 +45,18 @@ ROSTER = (
     RosterNode("coordinator", Role.COORDINATOR),
     RosterNode("observer", Role.OBSERVER),
 )
+
+
+def with_modems(roster: tuple[RosterNode, ...]) -> tuple[RosterNode, ...]:
+    """The same fleet with its coordinator on a ship, talking by modems."""
+    agents = {one.node_id for one in roster if one.role.surveys or one.role.revisits}
+    ship = {one.node_id: "ship" for one in roster if one.role is Role.COORDINATOR}
+    on = {**{name: name for name in agents}, **ship}
+    return (
+        *(replace(one, platform=on.get(one.node_id, "")) for one in roster),
+        *(RosterNode(f"modem-{name}", Role.MODEM, (name,), name) for name in sorted(agents)),
+        RosterNode("modem-ship", Role.MODEM, (), "ship"),
+    )
 
 
 def nav(x_m: float = 0.0) -> Nav:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from comms.said.codec import LARGEST_INCARNATION, LARGEST_SEQUENCE, Header
 from comms.said.messages import Message
-from comms.said.wire import IDENTIFIER, LARGEST_MS, Flag, Mask, Packed, Scaled, Whole, Words
+from comms.said.wire import IDENTIFIER, LARGEST_MS, Flag, Mask, Octets, Packed, Scaled, Whole, Words
 from secondlook.testing.checks.any_mail import bounded_tuple, kind_of
 
 MESSAGE_TYPES: tuple[type[Any], ...] = get_args(Message)
@@ -41,6 +41,8 @@ def _largest(hint: Any, tile_cells: int) -> Any:
             return True
         case Words(longest=longest):
             return "a" * longest
+        case Octets(longest=longest):
+            return b"a" * longest
         case Packed(dimensions=2, dtype=dtype):
             return np.full((tile_cells, tile_cells), np.iinfo(dtype).max, dtype)
         case Packed() as packed:

@@ -30,7 +30,7 @@ from comms.said.messages import (
     TaskStatus,
 )
 from comms.said.topics import Topic
-from comms.said.wire import AtMost, Flag, Mask, Packed, Scaled, Whole, Words
+from comms.said.wire import AtMost, Flag, Mask, Octets, Packed, Scaled, Whole, Words
 
 MOST_DRAWN = 6  # entries of a tuple and elements along an axis: enough to differ, and quick to draw
 
@@ -67,6 +67,8 @@ def _any(hint: Any) -> st.SearchStrategy[Any]:
         case Words(longest=longest, pattern=pattern):
             assert pattern is not None
             return st.from_regex(pattern, fullmatch=True).filter(lambda text: len(text) <= longest)
+        case Octets(longest=longest):
+            return st.binary(max_size=longest)
         case Packed() as packed:
             return _arrays(packed.dimensions, packed.dtype, packed.steps_per_unit, packed.high)
         case Mask():

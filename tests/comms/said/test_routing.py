@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 import zenoh
+from fleets import with_modems
 
 from comms.said.announcement import Role
 from comms.said.routing import RosterNode, Routing
@@ -61,7 +64,7 @@ ALL_KEYS = [key for topic in TOPICS for _, key in keys_of(topic)]
 
 @by_topic
 def test_a_key_has_the_writer_and_the_readers_that_the_table_says(topic: Topic) -> None:
-    writers, readers = EXPECTED[topic.name]
+    writers, readers = EXPECTED.get(topic.name, ({}, {}))  # without modems nobody writes what is theirs
     watchers = ("observer",) if topic.name == "look" else ("recorder", "observer")
     for vehicle, key in keys_of(topic):
         route = routing.route(key)
@@ -169,3 +172,59 @@ def test_what_a_node_keeps_is_what_it_says_of_each_vehicle(node_id: str, express
 def test_a_roster_that_clashes_is_refused(extra: RosterNode, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         Routing((*ROSTER, extra))
+
+
+class TestWithModems:
+    """Coordinator on a ship or aboard alpha; what crosses from one platform to another is heard by modems alone."""
+
+    routing = Routing(with_modems(ROSTER))
+    aboard = Routing(
+        tuple(replace(one, platform="alpha") if one.node_id == "coordinator" else one for one in with_modems(ROSTER))
+    )
+
+    @pytest.mark.parametrize(
+        ("key", "readers", "aboard_readers"),
+        [
+            ("agent/alpha/state", {"modem-alpha"}, {"modem-alpha", "coordinator"}),
+            ("agent/beta/state", {"modem-beta"}, {"modem-beta"}),
+            ("agent/alpha/hotspot/3", {"modem-alpha"}, {"modem-alpha", "coordinator"}),
+            ("coord/task/alpha/3", {"modem-ship"}, {"modem-alpha", "alpha"}),
+            ("coord/task/beta/3", {"modem-ship"}, {"modem-alpha"}),
+            ("coord/mission_over", {"modem-ship", "world"}, {"modem-alpha", "alpha", "world"}),
+            ("veh/beta/nav", {"beta"}, {"beta"}),
+            ("veh/beta/look", {"beta", "modem-beta"}, {"beta", "modem-beta"}),
+            ("modem/beta/tx", {"world"}, {"world"}),
+            ("modem/beta/rx", {"modem-beta"}, {"modem-beta"}),
+            ("modem/beta/heard", {"beta"}, {"beta"}),
+            ("modem/ship/heard", {"coordinator"}, set()),
+            ("modem/alpha/heard", {"alpha"}, {"alpha", "coordinator"}),
+        ],
+    )
+    def test_readers(self, key: str, readers: set[str], aboard_readers: set[str]) -> None:
+        for routing, expected in ((self.routing, readers), (self.aboard, aboard_readers)):
+            route = routing.route(key)
+            assert route is not None
+            assert {*route.readers} == expected
+            assert route.watchers in (("recorder", "observer"), ("observer",))
+
+    @pytest.mark.parametrize("key", ["modem/delta/tx", "modem/world/rx", "modem/*/heard", "modem/beta/tx/1"])
+    def test_no_platform_of_the_fleet(self, key: str) -> None:
+        assert self.routing.route(key) is None
+
+    @pytest.mark.parametrize("fleet", ["routing", "aboard"])
+    def test_expressions_cover_exactly_the_keys_of_a_node(self, fleet: str) -> None:
+        routing: Routing = getattr(self, fleet)
+        names = (*VEHICLES, "ship")
+        keys = [
+            topic.key(vehicle=name, number=7, tile="7-0")
+            for topic in TOPICS
+            for name in (names if topic.has_vehicle else [""])
+        ]
+        routes = [(key, route) for key in keys if (route := routing.route(key)) is not None]
+        assert len(routes) > 45
+        for node_id in routing.nodes:
+            reads = [zenoh.KeyExpr(one) for one in routing.subscriptions(node_id)]
+            for key, route in routes:
+                is_reader = node_id in (*route.readers, *route.watchers)
+                covered = any(one.includes(zenoh.KeyExpr(key)) for one in reads)
+                assert covered == is_reader or (covered and route.writer == node_id)

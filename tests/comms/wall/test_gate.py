@@ -6,8 +6,10 @@ import logging
 
 import pytest
 from by_wall import ROUTING
+from fleets import ROSTER, with_modems
 
 from comms.runner import OVERHEAD_BYTES, Intake
+from comms.said.routing import Routing
 from comms.said.topics import TOPICS, Topic
 from comms.wall.gate import FLOOD, LEEWAY, MOST_QUESTIONS, MOST_WAITING_BYTES, NOBODY, STALL_S, Gate
 
@@ -35,15 +37,17 @@ def let_in(gate: Gate, key: str, count: int, now_s: float, every_s: float = 0.0,
     return found
 
 
+WITH_MODEMS = Routing(with_modems(ROSTER))
+
+
 def keys_of(topic: Topic) -> str:
-    return topic.key(vehicle="alpha" if ROUTING.route(topic.key(vehicle="alpha", tile="0")) else "beta", tile="0")
+    return topic.key(vehicle="alpha" if WITH_MODEMS.route(topic.key(vehicle="alpha", tile="0")) else "beta", tile="0")
 
 
 @pytest.mark.parametrize("topic", TOPICS, ids=lambda topic: topic.name)
 @pytest.mark.parametrize("factor", [1.0, 100.0])
-def test_what_comes_at_its_topics_rate_is_let_in_for_ever_and_a_burst_on_top_of_it(
-    gate: Gate, topic: Topic, factor: float
-) -> None:
+def test_what_comes_at_its_topics_rate_is_let_in_for_ever_and_a_burst_on_top_of_it(topic: Topic, factor: float) -> None:
+    gate = Gate(WITH_MODEMS, Intake(WITH_MODEMS))
     gate.factor = factor
     key, every_s = keys_of(topic), 1 / topic.rate_hz / factor
     assert let_in(gate, key, 5000, 0.0, every_s) == 5000
