@@ -441,7 +441,8 @@ FEW = [
 
 
 def test_the_short_stream_has_every_message_but_looks() -> None:
-    assert {type(received.message) for received in FEW} == {topic.message for topic in TOPICS} - {Look}
+    without_modems = {topic.message for topic in TOPICS if not topic.has_platform}
+    assert {type(received.message) for received in FEW} == without_modems - {Look}
 
 
 @settings(max_examples=15)
