@@ -7,6 +7,7 @@ import enum
 from dataclasses import dataclass
 from typing import Annotated, ClassVar
 
+from comms.said.over_water import Follows, PlaceX, PlaceY
 from comms.said.wire import (
     AtMost,
     Count,
@@ -112,8 +113,8 @@ class RosterVehicle:
 class Vertex:
     """A corner of an outline."""
 
-    x_m: Metres
-    y_m: Metres
+    x_m: Annotated[PlaceX, Follows(4)]
+    y_m: Annotated[PlaceY, Follows(4)]
 
 
 @dataclass(frozen=True, slots=True)

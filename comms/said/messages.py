@@ -1,5 +1,8 @@
 """Every message the nodes say, field by field, each with its unit in its name or its type.
 
+Those that cross the water by an acoustic modem tell how, beside the kind of each field (`comms.said.over_water`):
+AgentState, Plan, Curve, Contact, Hotspot, Task, TaskStatus and MissionOver.
+
 Positions are in the mission frame (ENU metres), headings are compass radians. Messages are values: frozen, compared
 by what they hold where they hold no arrays. Which key carries which message, and who may say it, is in `topics`.
 
@@ -11,6 +14,19 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from comms.said.announcement import RunInfo, Vertex
+from comms.said.over_water import (
+    Counted,
+    Follows,
+    Heading,
+    Length,
+    Moment,
+    Near,
+    NotOverWater,
+    OnlyWhen,
+    PlaceX,
+    PlaceY,
+    Profile,
+)
 from comms.said.wire import (
     AtMost,
     CellMask,
@@ -178,27 +194,31 @@ class AgentState:
     0 where it has told none since it was started, or keeps no count."""
 
     mode: Mode
-    works_on: Count
+    works_on: Annotated[Count, Counted(5)]
     battery: Probability
-    expected_end_ms: Milliseconds
-    x_m: Metres
-    y_m: Metres
-    heading_rad: Radians
-    tiles_told: Count = 0
-    hotspots_told: Count = 0
+    expected_end_ms: Annotated[Milliseconds, Moment()]
+    x_m: PlaceX
+    y_m: PlaceY
+    heading_rad: Annotated[Radians, Heading(6)]
+    tiles_told: Annotated[Count, NotOverWater(0)] = 0
+    hotspots_told: Annotated[Count, NotOverWater(0)] = 0
 
 
 @dataclass(frozen=True, slots=True)
 class PlannedTrack:
     """One track of a plan, from start to end; `across_m` is its offset in the sweep frame."""
 
-    number: Count
-    across_m: Metres
-    start_x_m: Metres
-    start_y_m: Metres
-    end_x_m: Metres
-    end_y_m: Metres
+    number: Annotated[Count, Follows(0, as_two_before=True)]
+    across_m: Annotated[Metres, Length(0.5, signed=True), Follows(3, as_two_before=True)]
+    start_x_m: Annotated[PlaceX, Follows(3, "end_x_m", as_two_before=True)]
+    start_y_m: Annotated[PlaceY, Follows(3, "end_y_m", as_two_before=True)]
+    end_x_m: Annotated[PlaceX, Follows(3, "start_x_m", as_two_before=True)]
+    end_y_m: Annotated[PlaceY, Follows(3, "start_y_m", as_two_before=True)]
     flown: YesNo
+
+
+RangeBeside = Annotated[Count, Counted(6), Follows(3)]
+"""A range in whole metres, beside others that are much the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,9 +229,9 @@ class Plan:
 
     revision: Count
     tracks: Annotated[tuple[PlannedTrack, ...], AtMost(MOST_TRACKS)]
-    r_adpt_m: Annotated[tuple[Count, ...], AtMost(MOST_TRACKS)]
-    r_eff_m: Annotated[tuple[Count, ...], AtMost(MOST_TRACKS)]
-    note: Text
+    r_adpt_m: Annotated[tuple[RangeBeside, ...], AtMost(MOST_TRACKS)]
+    r_eff_m: Annotated[tuple[RangeBeside, ...], AtMost(MOST_TRACKS)]
+    note: Annotated[Text, NotOverWater("")]
     tentative: Count = 0
 
 
@@ -221,9 +241,9 @@ class Curve:
     `r_eff_m` is 0 for none."""
 
     track: Count
-    range_bin_m: Metres
-    p_detect: ProbabilityCurve
-    r_eff_m: Count
+    range_bin_m: Annotated[Metres, Near(1.0, 0.01)]
+    p_detect: Annotated[ProbabilityCurve, Profile()]
+    r_eff_m: Annotated[Count, Counted(6)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,11 +266,11 @@ class CoverageTile:
 class Contact:
     """A detection: estimated position, its standard deviation, the recogniser's score, the look it comes from."""
 
-    x_m: Metres
-    y_m: Metres
-    sigma_m: Metres
+    x_m: PlaceX
+    y_m: PlaceY
+    sigma_m: Annotated[Metres, Counted(4, 0.5)]
     score: Probability
-    look: Count
+    look: Annotated[Count, Counted(8)]
 
 
 class HotspotState(enum.Enum):
@@ -269,9 +289,9 @@ class Hotspot:
     state: HotspotState
     outline: Annotated[tuple[Vertex, ...], AtMost(60)]
     mean_risk: Probability
-    cells: Count
+    cells: Annotated[Count, Counted(7)]
     growing: YesNo
-    merged_into: Count
+    merged_into: Annotated[Count, Counted(0)]
 
 
 class StripState(enum.Enum):
@@ -326,17 +346,21 @@ class TaskAction(enum.Enum):
     TELL_AGAIN = "tell_again"
 
 
+_WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.STAND_ASIDE))
+_WITH_A_STRIP = OnlyWhen("action", (TaskAction.TAKE,))
+
+
 @dataclass(frozen=True, slots=True)
 class Task:
     """The coordinator's word to one vehicle. It suffices by itself."""
 
     action: TaskAction
     strip: Count
-    start_x_m: Metres
-    start_y_m: Metres
-    heading_rad: Radians
-    length_m: Metres
-    width_m: Metres
+    start_x_m: Annotated[PlaceX, _WITH_A_PLACE]
+    start_y_m: Annotated[PlaceY, _WITH_A_PLACE]
+    heading_rad: Annotated[Radians, Heading(13), _WITH_A_STRIP]
+    length_m: Annotated[Metres, Length(), _WITH_A_STRIP]
+    width_m: Annotated[Metres, Counted(7, 1.0), _WITH_A_STRIP]
 
     @property
     def as_strip(self) -> Strip:
@@ -362,15 +386,15 @@ class TaskStatus:
     strip: Count
     state: TaskState
     progress: Probability
-    ends_ms: Milliseconds
-    reason: Text
+    ends_ms: Annotated[Milliseconds, Moment()]
+    reason: Annotated[Text, NotOverWater("")]
 
 
 @dataclass(frozen=True, slots=True)
 class MissionOver:
     """The coordinator's word that the mission is over, and why. Agents publish what they still hold."""
 
-    reason: Text
+    reason: Annotated[Text, NotOverWater("")]
 
 
 MOST_FRAMES = 64

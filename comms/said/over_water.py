@@ -1,0 +1,310 @@
+"""How a field crosses the water: the ranges and resolutions from which messages are packed to the bit for a modem.
+
+They are notes in a field's `Annotated`, beside its kind on the wire: where it is, `Place("x")`, how large, `Length()`,
+and so on. A field is packed as a whole number of steps, in as many bits as the largest such number needs or, where none
+is the largest, in an exp-Golomb code.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from comms.said.bits import BitReader, BitWriter, folded, unfolded
+from comms.said.wire import LARGEST_MS, Metres, WireError
+
+PLACE_M = 0.5
+"""To which a place is known over water."""
+LATE_S = 600
+"""So long before it is said a moment may lie."""
+CURVE_STEP = 500
+"""Centimetres between the points of P(y) that are sent."""
+CURVE_LEVELS = 63
+HIGHEST_P_DETECT = 0.999
+"""On the wire."""
+
+
+@dataclass(frozen=True)
+class Around:
+    """What sender and receiver both know: the box about all places of the mission, in metres of the mission frame, and
+    when the message was said, in milliseconds of the mission. Raises ValueError where this is no box or no time."""
+
+    low_x_m: float
+    low_y_m: float
+    high_x_m: float
+    high_y_m: float
+    sent_ms: int
+
+    def __post_init__(self) -> None:
+        sides_m = (self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m)
+        if not all(0 <= side_m < math.inf for side_m in sides_m) or self.sent_ms < 0:
+            raise ValueError(f"{self} is no box or no time")
+
+    @property
+    def longest_m(self) -> float:
+        """From corner to corner."""
+        return math.hypot(self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m)
+
+
+class Number:
+    """How a field's value becomes a whole number of steps from 0 and back. `order`: of its exp-Golomb code, where no
+    number is the largest."""
+
+    order = 0
+
+    def steps(self, value: Any, around: Around) -> int:
+        """The steps of a value; any may be outside of what is allowed, which is looked at after this."""
+        raise NotImplementedError
+
+    def value(self, steps: int, around: Around) -> Any:
+        """The value of steps within what is allowed."""
+        raise NotImplementedError
+
+    def most(self, around: Around) -> int | None:
+        """The largest number of steps; None where there is none."""
+        return None
+
+    def checked(self, steps: int, around: Around) -> int:
+        """The steps; raises WireError where they are not allowed."""
+        most = self.most(around)
+        if steps < 0 or (most is not None and steps > most):
+            raise WireError(f"{steps} steps are outside 0 to {most}")
+        return steps
+
+
+@dataclass(frozen=True)
+class Place(Number):
+    """East, "x", or north, "y", in the mission's box, to 0.5 m. One outside of the box does not fit."""
+
+    axis: str
+
+    def steps(self, value: float, around: Around) -> int:
+        return round((value - self._ends_m(around)[0]) / PLACE_M)
+
+    def value(self, steps: int, around: Around) -> float:
+        return self._ends_m(around)[0] + steps * PLACE_M
+
+    def most(self, around: Around) -> int:
+        low_m, high_m = self._ends_m(around)
+        return math.ceil((high_m - low_m) / PLACE_M)
+
+    def _ends_m(self, around: Around) -> tuple[float, float]:
+        x_m, y_m = (around.low_x_m, around.high_x_m), (around.low_y_m, around.high_y_m)
+        return x_m if self.axis == "x" else y_m
+
+
+@dataclass(frozen=True)
+class Length(Number):
+    """A length that is at most the mission's box from corner to corner, to `step_m`; `signed`: to either side."""
+
+    step_m: float = 1.0
+    signed: bool = False
+
+    def steps(self, value: float, around: Around) -> int:
+        return round(value / self.step_m) + self.signed * self._reach(around)
+
+    def value(self, steps: int, around: Around) -> float:
+        return (steps - self.signed * self._reach(around)) * self.step_m
+
+    def most(self, around: Around) -> int:
+        return self._reach(around) * (1 + self.signed)
+
+    def _reach(self, around: Around) -> int:
+        return math.ceil(around.longest_m / self.step_m)
+
+
+@dataclass(frozen=True)
+class Heading(Number):
+    """A heading in so many bits, as one in [0, 2 pi). A strip's has 13, steps of 0.044 degrees: half of one moves the
+    far end of a strip of 2 km by 0.8 m. That of a vehicle under way has 6, steps of 5.6 degrees: all that hangs on it
+    is its next turn."""
+
+    bits: int
+
+    def steps(self, value: float, around: Around) -> int:
+        return round(value / math.tau * (1 << self.bits)) % (1 << self.bits)
+
+    def value(self, steps: int, around: Around) -> float:
+        return steps * math.tau / (1 << self.bits)
+
+    def most(self, around: Around) -> int:
+        return (1 << self.bits) - 1
+
+
+@dataclass(frozen=True)
+class Share(Number):
+    """A share or a probability from 0 to 1, in 127 steps: 0 and 1 are exact."""
+
+    def steps(self, value: float, around: Around) -> int:
+        return round(value * 127)
+
+    def value(self, steps: int, around: Around) -> float:
+        return steps / 127
+
+    def most(self, around: Around) -> int:
+        return 127
+
+
+@dataclass(frozen=True)
+class Moment(Number):
+    """A time as whole seconds from when the message was said, rounded up: 12 bits to 24 minutes ahead, 14 to 92, 16 to
+    228. 0 ms stands for none and stays so. What lies more than `LATE_S` before does not fit."""
+
+    order = 11
+
+    def steps(self, value: int, around: Around) -> int:
+        if value == 0:
+            return 0
+        ahead_s = -((around.sent_ms - value) // 1000)
+        if ahead_s < -LATE_S or around.sent_ms + ahead_s * 1000 > LARGEST_MS:
+            raise WireError(f"{value} ms is too long before it is said, at {around.sent_ms} ms, or too late")
+        return LATE_S + 1 + ahead_s
+
+    def value(self, steps: int, around: Around) -> int:
+        if steps == 0:
+            return 0
+        value = around.sent_ms + (steps - LATE_S - 1) * 1000
+        if value <= 0:
+            raise WireError("a moment is not after the mission's start")
+        return value
+
+
+@dataclass(frozen=True)
+class OneOf(Number):
+    """One of some values, by its place among them."""
+
+    values: tuple[Any, ...]
+
+    def steps(self, value: Any, around: Around) -> int:
+        return self.values.index(value)
+
+    def value(self, steps: int, around: Around) -> Any:
+        return self.values[steps]
+
+    def most(self, around: Around) -> int:
+        return len(self.values) - 1
+
+
+@dataclass(frozen=True)
+class Counted(Number):
+    """A number from 0 without a bound of its own, in steps of `step`: `order` + 1 bits below 2^order of them."""
+
+    order: int = 4
+    step: float = 1
+
+    def steps(self, value: float, around: Around) -> int:
+        return round(value / self.step)
+
+    def value(self, steps: int, around: Around) -> float:
+        return steps * self.step
+
+
+@dataclass(frozen=True)
+class Near(Number):
+    """A number that is nearly always `usual`, which takes one bit, in steps of `step`."""
+
+    usual: float
+    step: float
+
+    def steps(self, value: float, around: Around) -> int:
+        return folded(round((value - self.usual) / self.step))
+
+    def value(self, steps: int, around: Around) -> float:
+        return self.usual + unfolded(steps) * self.step
+
+
+@dataclass(frozen=True)
+class Follows:
+    """In a tuple an entry is told by how far it is from where those before lead, in an exp-Golomb code of `order`.
+
+    They lead to the field `field` of the one before, or the same field where none is named. `as_two_before`: and on
+    from there as far as it went two entries before. So with tracks that are flown to and fro and spaced in pairs: one
+    is expected to begin beside where the one before ended, as far from it as two tracks before, along the same edge.
+    """
+
+    order: int
+    field: str = ""
+    as_two_before: bool = False
+
+    def expected(self, name: str, earlier: list[dict[str, int]]) -> int:
+        """The steps to be expected of a field by those of the entries before, at least one."""
+        field = self.field or name
+        if self.as_two_before and len(earlier) > 2:
+            return earlier[-1][field] + earlier[-2][name] - earlier[-3][field]
+        return earlier[-1][field]
+
+
+@dataclass(frozen=True)
+class OnlyWhen:
+    """The field crosses only where another, before it, is one of `values`; else the receiver has 0."""
+
+    field: str
+    values: tuple[Any, ...]
+
+
+@dataclass(frozen=True)
+class NotOverWater:
+    """The field does not cross: the receiver has `instead`."""
+
+    instead: Any
+
+    def put(self, writer: BitWriter, value: Any, around: Around, said: Mapping[str, Any]) -> None:
+        """Writes nothing."""
+
+    def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> Any:
+        """What is there instead."""
+        return self.instead
+
+
+@dataclass(frozen=True)
+class Profile:
+    """P(y) over bins of `range_bin_m`, said before it: how many, the first and the last one that see anything, and from
+    there to there P_d at every 5th metre and at the last, in 63 steps of 0.016. The receiver draws straight lines
+    between these. The first and the last are at least one step, so up to 0.016 too high; between, each point is off by
+    0.008 at most, and what is curved within 5 m by as much more as it is."""
+
+    def put(self, writer: BitWriter, value: NDArray[np.float64], around: Around, said: Mapping[str, Any]) -> None:
+        """Writes it. Raises WireError where a bin has no width."""
+        seen = np.flatnonzero(value)
+        first, last = (int(seen[0]), int(seen[-1])) if seen.size else (value.size, value.size)
+        writer.write_count(value.size, 6)
+        writer.write_count(first, 0)
+        if not seen.size:
+            return
+        writer.write_count(value.size - 1 - last, 0)
+        for at in _points(first, last, said["range_bin_m"]):
+            # Where it begins and ends stays so: what is seen there at all is at least a step.
+            level = round(float(value[at]) / HIGHEST_P_DETECT * CURVE_LEVELS)
+            writer.write(max(level, 1) if at in (first, last) else level, 6)
+
+    def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> NDArray[np.float64]:
+        """What was written, drawn out. Raises WireError where this is no curve."""
+        size, first = reader.read_count(6), reader.read_count(0)
+        last = size if first == size else size - 1 - reader.read_count(0)
+        if first > last or size > 4096:
+            raise WireError("a curve's bins are not in order, or too many")
+        curve = np.zeros(size)
+        if first < size:
+            points = _points(first, last, said["range_bin_m"])
+            levels = [reader.read(6) for _ in points]
+            if not (levels[0] and levels[-1]):
+                raise WireError("a curve begins and ends where something is seen")
+            bins = np.arange(first, last + 1)
+            curve[bins] = np.interp(bins, points, np.array(levels) * (HIGHEST_P_DETECT / CURVE_LEVELS))
+        return curve
+
+
+def _points(first: int, last: int, range_bin_m: float) -> list[int]:
+    width = round(range_bin_m * 100)  # centimetres, as on the wire: both ends must find the same
+    if width <= 0:
+        raise WireError(f"a bin of {range_bin_m} m has no width")
+    return [*range(first, last, max(1, CURVE_STEP // width)), last]
+
+
+PlaceX = Annotated[Metres, Place("x")]
+PlaceY = Annotated[Metres, Place("y")]
