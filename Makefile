@@ -137,7 +137,7 @@ lock: .venv-lock/.uv-$(UV_VERSION)
 	@touch $@
 
 # What the targets above have made, but for the missions in runs/, and nothing else.
-SOURCES := bench comms coordinator docs examples planner secondlook sim_world tests vehicle_agent viz
+SOURCES := bench comms coordinator docs examples modem planner secondlook sim_world tests vehicle_agent viz
 clean:
 	rm -rf .venv .venv-lock build secondlook.egg-info .mypy_cache .ruff_cache .pytest_cache .import_linter_cache \
 		.hypothesis site runs/golden runs/pictures

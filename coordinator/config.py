@@ -14,6 +14,9 @@ from planner.currents import FlowGrid
 from planner.region import Region
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 
+ANSWER_WITHIN_MS = 10_000
+"""Where everybody hears everybody."""
+
 
 def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[PriorityGround]) -> FloatArray:
     """The weight of each cell, shape of the grid, as a multiple of their mean over the area: 1, or that of the last
@@ -30,7 +33,8 @@ def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priorit
 class CoordinatorConfig:
     """The mission ends at the latest at `deadline_factor` times the last primary's end, or at `deadline_s`; what does
     not hold is infinite.
-    `lost_after_ms`: age of a vehicle's state from which it counts as lost.
+    `lost_after_ms`: age of a vehicle's state from which it counts as lost. `answer_within_ms`: age of an offer from
+    which no answer is expected any more.
     `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
@@ -56,3 +60,4 @@ class CoordinatorConfig:
     strips: Literal["reacting", "beforehand", "lanes", "lanes_across"] = "reacting"
     priorities: tuple[PriorityGround, ...] = ()
     flows: FlowGrid | None = None
+    answer_within_ms: int = ANSWER_WITHIN_MS

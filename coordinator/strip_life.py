@@ -13,6 +13,7 @@ from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, StripState, TaskAction, TaskState, TaskStatus
 from comms.strip_books import LEFT
 from coordinator.allocate.service import Service
+from coordinator.config import ANSWER_WITHIN_MS
 from coordinator.cut.strips import Cut
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
@@ -23,7 +24,6 @@ from planner.risk import MOST_LEVELS
 from planner.types import BoolArray, Strip
 
 WORTH_SAYING = 0.05  # relative change of what a strip is worth from which it is published again
-ANSWER_WITHIN_MS = 10_000
 COVERED_SHARE = 0.5  # of a strip's cells, that must have been seen anew for the map to agree that it is done
 LATE_SHARE = 0.5  # of the time that a service was expected to take, that it may take longer
 LATE_MS = 60_000  # and so much more
@@ -33,7 +33,7 @@ class StripLife:
     """Writes the `ledger`, and says each change of it; nobody else does.
 
     `inside`: the area's cells, shape of the grid. `sectors`: where strips lie; what is expected there learns from those
-    that are done.
+    that are done. `answer_within_ms`: age of an offer from which no answer is expected any more.
     """
 
     def __init__(
@@ -43,12 +43,14 @@ class StripLife:
         inside: BoolArray,
         sectors: Sectors,
         outbox: Outbox,
+        answer_within_ms: int = ANSWER_WITHIN_MS,
     ) -> None:
         self.ledger = ledger
         self._fleet = fleet
         self._inside = inside
         self._sectors = sectors
         self._outbox = outbox
+        self._answer_within_ms = answer_within_ms
 
     def open(self, cut: Cut, now_ms: int, why: str) -> None:
         """Opens a new strip where it is cut. `why`: what makes it worth a second look."""
@@ -144,7 +146,7 @@ class StripLife:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
                     self._sectors.cut_by(now_ms, [record.window])
         for record in self.ledger.in_state(StripState.OFFERED):
-            if now_ms - record.since_ms >= ANSWER_WITHIN_MS:
+            if now_ms - record.since_ms >= self._answer_within_ms:
                 self._fleet.vehicles[record.vehicle].note_silence()
                 self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
                 self._sectors.assign_by(now_ms, record.window)
@@ -159,7 +161,7 @@ class StripLife:
 
     def deadlines_ms(self) -> Iterator[int]:
         """When an answer, or a service, is overdue."""
-        yield from (one.since_ms + ANSWER_WITHIN_MS for one in self.ledger.in_state(StripState.OFFERED))
+        yield from (one.since_ms + self._answer_within_ms for one in self.ledger.in_state(StripState.OFFERED))
         at_work = self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY)
         yield from (self._of(one)[1].due_ms for one in at_work)
 

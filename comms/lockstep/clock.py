@@ -24,6 +24,7 @@ from comms.said.topics import MISSION_OVER
 
 WRAP_UP_MS = 100  # simulated time in which the fleet's last words are delivered after the mission is over
 LATE_WORDS_MS = 10_000  # simulated time in which an agent may still learn that it is over
+LATE_WORDS_BY_MODEM_MS = 300_000
 MOST_ROUNDS_A_SECOND = 10_000
 MOST_MESSAGES_A_SECOND = 200_000
 
@@ -100,6 +101,8 @@ class LockstepClock:
         acting = [node.node_id for node in routing.roster if not node.listens_only and node.role.value != "clock"]
         self._wakes: dict[str, int | None] = {node: None if node in self._absent else 0 for node in acting}
         self._agents = [node.node_id for node in routing.roster if node.role.surveys or node.role.revisits]
+        by_modem = any(node.platform for node in routing.roster)
+        self._late_words_ms = LATE_WORDS_BY_MODEM_MS if by_modem else LATE_WORDS_MS
         self._all_rest_ms: int | None = None  # since when no agent wants to be woken, once the mission is over
         self._to_start = set(acting) - self._absent
         self._waiting: set[str] = set()
@@ -258,9 +261,8 @@ class LockstepClock:
         """The last time at which anything happens; an agent that has heard of the end asks for no wake-up any more."""
         if self.over_ms is None:
             return self._time_limit_ms
-        if self._all_rest_ms is None:
-            return self.over_ms + LATE_WORDS_MS
-        return min(self._all_rest_ms + WRAP_UP_MS, self.over_ms + LATE_WORDS_MS)
+        latest_ms = self.over_ms + self._late_words_ms
+        return latest_ms if self._all_rest_ms is None else min(self._all_rest_ms + WRAP_UP_MS, latest_ms)
 
     def _count_round(self, now_ms: int) -> None:
         self.rounds += 1

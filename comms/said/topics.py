@@ -52,6 +52,22 @@ class Keep(enum.Enum):
     EVENTS = "events"
 
 
+@dataclass(frozen=True, slots=True)
+class Crossing:
+    """How messages of a topic cross the water by modem: what is worth most a bit, the longer it waits the more, is said
+    first.
+
+    `value`: what one is worth beside those of other topics. `ttl_s`: what has waited for so long is worth twice as
+    much; what need not be acknowledged is then said no more. `newest_only`: of a key a newer one takes the place of one
+    that waits. `acknowledged`: it is said again until it is known to have arrived.
+    """
+
+    value: float
+    ttl_s: float
+    newest_only: bool = False
+    acknowledged: bool = True
+
+
 @dataclass(frozen=True, eq=False)
 class Topic:
     """One row of the table; another topic with the same entries is another one.
@@ -63,7 +79,9 @@ class Topic:
     if not it waits until the reader acts for another reason. `max_bytes`: a larger payload is refused.
     `rate_hz`: the most that its writer publishes on average, for one vehicle where the key names one, over all such
     keys. `burst`: the most that it may publish beyond that at once. By the wall clock both are held where a message
-    arrives, the rate with some leeway (`comms.wall.gate`).
+    arrives, the rate with some leeway (`comms.wall.gate`). `crossing`: how it goes by modem; None for what modems do
+    not carry: what nobody on another platform reads, and maps and contacts, which are told in fewer bits by stretches
+    (`modem.stretches`) or not at all.
     """
 
     name: str
@@ -78,6 +96,7 @@ class Topic:
     delay_ms: int = 1
     wakes: bool = True
     burst: int = 2000
+    crossing: Crossing | None = None
 
     def key(self, *, vehicle: str = "", number: int = 0, tile: str = "") -> str:
         """The key below the run id."""
@@ -147,15 +166,15 @@ MANEUVER = Topic(
 )  # fmt: skip
 STATE = Topic(
     "state", "agent/{vehicle}/state", AgentState, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 200, 0.3,
-    Keep.LATEST, crosses_water=True,
+    Keep.LATEST, crosses_water=True, crossing=Crossing(80, 30, newest_only=True, acknowledged=False),
 )  # fmt: skip
 PLAN = Topic(
     "plan", "agent/{vehicle}/plan", Plan, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 150_000, 0.02,
-    Keep.LATEST, crosses_water=True,
+    Keep.LATEST, crosses_water=True, crossing=Crossing(150, 300, newest_only=True),
 )  # fmt: skip
 CURVE = Topic(
     "curve", "agent/{vehicle}/curve", Curve, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 9_000, 0.01,
-    Keep.LATEST, crosses_water=True,
+    Keep.LATEST, crosses_water=True, crossing=Crossing(200, 300, newest_only=True),
 )  # fmt: skip
 COVERAGE = Topic(
     "coverage", "agent/{vehicle}/coverage/{tile}", CoverageTile, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
@@ -167,7 +186,7 @@ CONTACT = Topic(
 )  # fmt: skip
 HOTSPOT = Topic(
     "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
-    0.5, Keep.LATEST, crosses_water=True,
+    0.5, Keep.LATEST, crosses_water=True, crossing=Crossing(150, 300, newest_only=True),
 )  # fmt: skip
 STRIP = Topic(
     "strip", "coord/strip/{number}", StripStatus, _COORDINATOR, _WATCHERS, 1_000, 1.0, Keep.LATEST,
@@ -176,16 +195,16 @@ STRIP = Topic(
 TASK = Topic(
     # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
     "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _MODEMS | _WATCHERS, 68, 0.1,
-    Keep.EVENTS, crosses_water=True,
+    Keep.EVENTS, crosses_water=True, crossing=Crossing(1000, 60),
 )  # fmt: skip
 TASK_STATUS = Topic(
     "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
-    _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
+    _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True, crossing=Crossing(500, 60),
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
     dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _MODEMS | _WATCHERS, 400, 0.1, Keep.LATEST,
-    crosses_water=True,
+    crosses_water=True, crossing=Crossing(2000, 60),
 )  # fmt: skip
 MODEM_TX = Topic(
     "modem_tx", "modem/{platform}/tx", Packet, {Role.MODEM: Reach.OWN}, {Role.WORLD: Reach.ALL} | _WATCHERS, 300_000,

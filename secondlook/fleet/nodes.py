@@ -55,6 +55,7 @@ NODES: Mapping[Role, Row] = {
     Role.REVISIT: Row(Process.OWN, Process.OWN, "vehicle_agent.revisit:RevisitAgent"),
     Role.SURVEY_REVISIT: Row(Process.OWN, Process.OWN, "vehicle_agent.survey_revisit:SurveyRevisitAgent"),
     Role.COORDINATOR: Row(Process.OWN, Process.OWN, "coordinator.coordinator:Coordinator"),
+    Role.MODEM: Row(Process.OWN, Process.OWN, "modem.modem:Modem"),
     Role.RECORDER: Row(Process.OWN, Process.RECORDER, "viz.recorder:Recorder"),
     Role.OBSERVER: Row(Process.LAUNCHER, Process.RECORDER),
 }
@@ -98,17 +99,26 @@ def hosts_of_run(
 ) -> tuple[list[str], tuple[HostSpec, ...]]:
     """Which nodes live in the hub's process of `secondlook run`, and all other processes, each under a name of its own.
 
-    `processes`: over how many processes the acting nodes are spread, the hub's included; None: one a node. Those that
-    only listen have a process each. `apart`: processes of nodes that must be alone (`comms.drive.Drive.hosts_apart`).
+    `processes`: over how many processes the acting nodes are spread, the hub's included; None: one a node, and modems
+    with the first node of their platform. Those that only listen have a process each. `apart`: processes of nodes that
+    must be alone (`comms.drive.Drive.hosts_apart`).
     """
     alone = {node_id for spec in apart for node_id in spec.nodes}
     acting = [one for one in roster if not one.listens_only]
-    others = [one.node_id for one in acting if NODES[one.role].run is Process.OWN and one.node_id not in alone]
+    own = [one for one in acting if NODES[one.role].run is Process.OWN and one.node_id not in alone]
+    modems = {one.platform: one.node_id for one in own if one.role is Role.MODEM}
+    beside: dict[str, str] = {}
+    for one in own:
+        if one.role is not Role.MODEM and one.platform in modems:
+            beside[one.node_id] = modems.pop(one.platform)
+    others = [one.node_id for one in own if one.node_id not in beside.values()]
     count = len(others) if processes is None else min(processes - 1, len(others))
     groups = [others[index::count] for index in range(count)]
+    names = [_name(group) for group in groups]
+    groups = [[*group, *(beside[one] for one in group if one in beside)] for group in groups]
     listeners = [one.node_id for one in roster if one.listens_only]
-    return [HUB] if groups else [HUB, *others], (
-        *(HostSpec(_name(group), tuple(group)) for group in groups),
+    return [HUB] if groups else [HUB, *others, *beside.values()], (
+        *(HostSpec(name, tuple(group)) for name, group in zip(names, groups, strict=True)),
         *apart,
         *(HostSpec(name, (name,)) for name in listeners),
     )

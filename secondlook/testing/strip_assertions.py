@@ -19,8 +19,8 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from coordinator.config import ANSWER_WITHIN_MS
 from coordinator.ledger import NUMBERS_A_SECOND, WITH_A_VEHICLE
-from coordinator.strip_life import ANSWER_WITHIN_MS
 from secondlook.testing.flight import Flight, fail_if, lives, reached
 
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)

@@ -1,0 +1,84 @@
+"""A frame: from whom it is and what is in it, behind a tag by which damage and strangers are noticed.
+
+The tag is a CRC-32 over the run and the frame, cut to 16 bits, or to 8 in small frames: a frame that is damaged, of
+another run or of another version of these words has the right one once in 65,536 times, or in 256. What is said in it
+then rarely reads as anything.
+"""
+
+from __future__ import annotations
+
+import zlib
+
+from comms.said.announcement import RunInfo
+from comms.said.bits import BitReader, BitWriter
+from modem.config import ModemConfig
+from modem.streams import Window
+
+VERSION = 1
+"""Of what frames hold: modems of another one do not understand each other."""
+SMALL_BITS = 128
+START_BITS = 3
+"""Of the number by which a modem that was started anew is told from its past."""
+LEAST_ROOM_BITS = 16
+
+
+class FrameForm:
+    """How frames of a run are made. `room`: the bits that one has for what is said. `window`: of the streams in them.
+    `is_small`: whether one holds either acknowledgements or a single piece, which then need not tell its size.
+
+    Raises ValueError for frames in which nothing has room.
+    """
+
+    def __init__(self, config: ModemConfig, run: RunInfo) -> None:
+        self.is_small = config.frame_bits < SMALL_BITS
+        self._tag_bits = 8 if self.is_small else 16
+        self._platform_bits = (len(config.platforms) - 1).bit_length()
+        self._frame_bits = config.frame_bits
+        self._platforms = config.platforms
+        self._salt = f"{VERSION} {run.scenario_sha256} {run.seed}".encode()
+        self.window = Window(3 if self.is_small else 5)
+        self.room = room_of(config.frame_bits, len(config.platforms))
+        self.size_bits = 0 if self.is_small else self.room.bit_length()
+        if self.room < LEAST_ROOM_BITS:
+            raise ValueError(f"a frame of {config.frame_bits} bits has no room for what is said")
+
+    def pack(self, platform: str, start: int, said: BitWriter) -> bytes:
+        """A frame of a platform. `start`: tells the modem's starts apart. What is said has at most `room` bits."""
+        writer = BitWriter()
+        writer.write(self._platforms.index(platform), self._platform_bits)
+        writer.write(start, START_BITS)
+        writer.write(said.value << self.room - said.bits, self.room)
+        content = writer.to_bytes()
+        whole = BitWriter()
+        whole.write(self._tag(content), self._tag_bits)
+        whole.write(writer.value, writer.bits)
+        return whole.to_bytes()
+
+    def unpack(self, frame: bytes) -> tuple[str, int, BitReader] | None:
+        """Platform, start, and what is said; None where it is no frame of this run."""
+        if len(frame) != (self._frame_bits + 7) // 8:
+            return None
+        reader = BitReader(frame)
+        tag = reader.read(self._tag_bits)
+        content = BitWriter()
+        bits = self._platform_bits + START_BITS + self.room
+        content.write(reader.read(bits), bits)
+        if tag != self._tag(content.to_bytes()) or reader.read(reader.left):
+            return None
+        reader = BitReader(content.to_bytes())
+        place, start = reader.read(self._platform_bits), reader.read(START_BITS)
+        return (self._platforms[place], start, reader) if place < len(self._platforms) else None
+
+    def _tag(self, content: bytes) -> int:
+        return zlib.crc32(content, zlib.crc32(self._salt)) & (1 << self._tag_bits) - 1
+
+
+def start_number(now_ms: int) -> int:
+    """The number of a modem's start at that time: 0 for who is there from the beginning."""
+    return now_ms and 1 + now_ms // 1000 % ((1 << START_BITS) - 1)
+
+
+def room_of(frame_bits: int, platforms: int) -> int:
+    """How many bits a frame has for what is said; none or fewer where it has no room for that."""
+    tag_bits = 8 if frame_bits < SMALL_BITS else 16
+    return frame_bits - tag_bits - (platforms - 1).bit_length() - START_BITS

@@ -1,0 +1,88 @@
+"""One message packed for the water: what it is, who said it and when, and what it says.
+
+Of the time a message was said the last 12 bits of its second cross, so that one is taken to be at most 68 minutes old.
+Its sequence number is made of that second and its place within it: messages of one sender stay in order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from comms.said.bits import BitReader, BitWriter
+from comms.said.codec import LARGEST_INCARNATION, Header
+from comms.said.over_water import Around
+from comms.said.packing import get_message, put_message
+from comms.said.topics import TOPICS, Topic, number_of
+from comms.said.wire import WireError
+from modem.config import ModemConfig
+from modem.stretches import Stretch
+
+CROSSING: tuple[Topic | None, ...] = (*(topic for topic in TOPICS if topic.crossing is not None), None)
+"""What may be said; None for a stretch."""
+KIND_BITS = (len(CROSSING) - 1).bit_length()
+SECOND_BITS = 12
+MOST_A_SECOND = 64
+"""Messages of a sender that are told apart within a second."""
+COORDINATOR = "coordinator"
+
+
+class Said(NamedTuple):
+    """A message as it was said: under which key (below the run id), by whom and when; of a stretch the key is ""."""
+
+    key: str
+    header: Header
+    message: Any
+
+
+@dataclass(frozen=True)
+class Letters:
+    """Packs and opens messages for one fleet. `config`: of any of its modems."""
+
+    config: ModemConfig
+
+    def pack(self, topic: Topic | None, said: Said) -> BitWriter:
+        """The bits of a message. `said.header.sequence`: its place among those that were said in the same second.
+
+        Raises WireError where it does not fit, as a place outside the mission's box.
+        """
+        writer, header = BitWriter(), said.header
+        writer.write(CROSSING.index(topic), KIND_BITS)
+        writer.write_count(header.incarnation, 0)
+        writer.write(header.sent_ms // 1000 % (1 << SECOND_BITS), SECOND_BITS)
+        writer.write_count(min(header.sequence, MOST_A_SECOND - 1), 1)
+        if topic is not None and header.sender == COORDINATOR and topic.has_vehicle:
+            vehicles = self.config.vehicles
+            writer.write(vehicles.index(topic.vehicle_of(said.key)), (len(vehicles) - 1).bit_length())
+        if topic is not None and "{number}" in topic.pattern:
+            writer.write_count(number_of(said.key), 4)
+        put_message(writer, said.message, self._around(header.sent_ms // 1000 * 1000))
+        return writer
+
+    def open(self, reader: BitReader, platform: str, now_ms: int) -> tuple[Topic | None, Said]:
+        """Topic and message of a letter from a platform. Raises WireError where it is none."""
+        kind = reader.read(KIND_BITS)
+        if kind >= len(CROSSING):
+            raise WireError("not a kind of message")
+        topic, incarnation = CROSSING[kind], reader.read_count(0)
+        if incarnation > LARGEST_INCARNATION:
+            raise WireError("not an incarnation")
+        sent_s = now_ms // 1000 - (now_ms // 1000 - reader.read(SECOND_BITS)) % (1 << SECOND_BITS)
+        place = reader.read_count(1)
+        if sent_s < 0 or place >= MOST_A_SECOND:
+            raise WireError("a message from before the mission, or more in a second than there may be")
+        by_coordinator = topic is not None and any(role.value == COORDINATOR for role in topic.writers)
+        vehicle = platform
+        if by_coordinator and topic is not None and topic.has_vehicle:
+            number = reader.read((len(self.config.vehicles) - 1).bit_length())
+            if number >= len(self.config.vehicles):
+                raise WireError("no vehicle of the fleet")
+            vehicle = self.config.vehicles[number]
+        number = reader.read_count(4) if topic is not None and "{number}" in topic.pattern else 0
+        message = get_message(reader, Stretch if topic is None else topic.message, self._around(sent_s * 1000))
+        key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
+        sender = COORDINATOR if by_coordinator else vehicle
+        return topic, Said(key, Header(sender, incarnation, sent_s * MOST_A_SECOND + place, sent_s * 1000), message)
+
+    def _around(self, sent_ms: int) -> Around:
+        return Around(*self.config.low_m, *self.config.high_m, sent_ms)

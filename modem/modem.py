@@ -1,0 +1,372 @@
+"""The modem's node: it hears what is said on its platform for others, and says that in its slots; what others have said
+in theirs it tells its own platform (`comms.said.messages.Heard`).
+
+All platforms talk with the coordinator's, each in its turn, so that no two send at a time. A packet holds what is owed
+of acknowledgements, then messages and pieces of messages, what is worth most a bit first.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from copy import copy
+from typing import Any
+
+from comms.node import Publication, Received, Step
+from comms.said.announcement import RunInfo
+from comms.said.bits import BitReader, BitWriter
+from comms.said.codec import Header, body_of, packed
+from comms.said.messages import (
+    AgentState,
+    CoverageTile,
+    Curve,
+    Heard,
+    Look,
+    Message,
+    Mode,
+    Packet,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
+from comms.said.wire import WireError
+from modem.config import ModemConfig
+from modem.frames import START_BITS, FrameForm, start_number
+from modem.letters import Letters, Said
+from modem.streams import Piece, Receiving, Sending, cut_up, of_bits
+from modem.stretches import Gathering, LayerOf, Stretch
+from modem.waiting import Queue, Waiting, worth
+
+log = logging.getLogger("secondlook.modem")
+
+STRETCH = Crossing(3000, 300)
+LATE_MS = 100
+"""So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
+LEAST_PIECE_BITS = 8
+"""A piece of a message with fewer bits is not worth the bits about it."""
+
+
+class Modem:
+    """A node (`comms.node.Node`). Before `run` has told it of the fleet it does nothing."""
+
+    def __init__(self, config: ModemConfig) -> None:
+        self.config = config
+        self.dropped: Counter[str] = Counter()
+        self._letters = Letters(config)
+        self._queue = Queue()
+        self._sending: dict[str, Sending] = {}
+        self._receiving: dict[str, Receiving] = {}
+        self._starts: dict[str, int] = {}  # of the others, as their frames tell
+        self._start = 0
+        self._spoke_ms = -1
+        self._form: FrameForm | None = None
+        self._run: RunInfo | None = None
+        self._gathering: Gathering | None = None
+        self._layers: dict[tuple[str, int], LayerOf] = {}
+        self._heard: list[Publication] = []
+        self._told = 0
+        self._left_out = False  # whether the last packet had no acknowledgement
+        self._said_at: Counter[int] = Counter()
+        self._incarnation = 0
+
+    def start(self, now_ms: int) -> Step:
+        """Waits for the run's announcement."""
+        self._start = start_number(now_ms)
+        return Step()
+
+    def on_message(self, received: Received, now_ms: int) -> Step:
+        """Takes in what its platform says, and what has come through the water."""
+        message = received.message
+        if isinstance(message, RunInfo):
+            if self._run is None:
+                self._begin(message)
+        elif self._form is None:
+            pass
+        elif isinstance(message, Packet):
+            self._hear(message, now_ms)
+        elif isinstance(message, Look):
+            if self._gathering is not None:
+                self._say_stretch(self._gathering.add(message), now_ms)
+        else:
+            self._take(received, now_ms)
+        return self._step(now_ms)
+
+    def on_wake(self, now_ms: int) -> Step:
+        """Says what there is to be said, if its slot begins now."""
+        publish: list[Publication] = []
+        slot_ms = self.config.slot_of(self.config.platform, now_ms)
+        if self._form is not None and now_ms - slot_ms <= LATE_MS and slot_ms > self._spoke_ms:
+            self._spoke_ms = slot_ms
+            frames = self._frames(self._form, now_ms)
+            if frames:
+                publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
+        step = self._step(now_ms)
+        return Step((*publish, *step.publish), step.wake_ms)
+
+    def _begin(self, run: RunInfo) -> None:
+        self._run, self._form = run, FrameForm(self.config, run)
+        for other in self.config.others:
+            self._sending[other] = Sending(self._form.window)
+            self._receiving[other] = self._receiver(other)
+        entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
+        if entry is not None and self.config.platform != self.config.hub:
+            self._gathering = Gathering(entry)
+
+    def _receiver(self, other: str) -> Receiving:
+        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said."""
+        assert self._form is not None
+        return Receiving(self._form.window, in_order=other == self.config.hub)
+
+    def _take(self, received: Received, now_ms: int) -> None:
+        """Something that was said on this platform: it waits for its turn, if it is for another."""
+        topic, message = received.topic, received.message
+        is_hub = self.config.platform == self.config.hub
+        if topic.crossing is None or is_hub != (received.sender == "coordinator"):
+            return
+        if isinstance(message, Curve) and self._gathering is not None:
+            self._say_stretch(self._gathering.hear_curve(message), now_ms)
+        if not is_hub:
+            self._incarnation = received.header.incarnation
+        if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
+            self._say_stretch(self._gathering.flush(), now_ms)
+        to = self.config.others
+        if topic is TASK:
+            if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
+                return
+            to = (received.vehicle,)
+        for platform in to:
+            self._enqueue(topic, topic.crossing, Said(received.key, received.header, message), platform, now_ms)
+
+    def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
+        if stretch is not None:
+            header = Header(self.config.platform, self._incarnation, 0, now_ms)
+            said = Said("", header, stretch)
+            self._enqueue(None, STRETCH, said, self.config.hub, now_ms)
+
+    def _enqueue(self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int) -> None:
+        second = said.header.sent_ms // 1000
+        place = self._said_at[second]
+        self._said_at = Counter({second: place + 1})
+        try:
+            bits = self._letters.pack(topic, said._replace(header=said.header._replace(sequence=place)))
+        except WireError as error:
+            self._drop("does not fit the water", f"{said.key}: {error}")
+            return
+        self._queue.add(Waiting(said.key, platform, crossing, bits, now_ms))
+
+    def _drop(self, why: str, detail: str) -> None:
+        self.dropped[why] += 1
+        if self.dropped[why] == 1:
+            log.warning("modem of %s: %s: %s (said once)", self.config.platform, why, detail)
+
+    # What is said.
+
+    def _frames(self, form: FrameForm, now_ms: int) -> tuple[bytes, ...]:
+        self._queue.drop_old(now_ms)
+        frames: list[bytes] = []
+        said: set[tuple[str, int]] = set()  # pieces that are in this packet already
+        while len(frames) < self.config.frames:
+            writer = BitWriter()
+            has_acks = not frames and self._write_acks(form, writer)
+            if frames:
+                writer.write(0, 1)
+            while not (form.is_small and writer.bits > 1) and self._write_next(form, writer, said, now_ms):
+                pass
+            if not has_acks and writer.bits == 1:
+                break
+            frames.append(form.pack(self.config.platform, self._start, writer))
+        return tuple(frames)
+
+    def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
+        """What has come of the others, where that is owed, and as far as it has room: in a packet's first frame. Where
+        it leaves little room for anything else it is left out every other time."""
+        a_frame = (form.room - 1 - len(self.config.others)) // (START_BITS + form.window.ack_bits)
+        owed = [name for name in self.config.others if self._receiving[name].owes][:a_frame]
+        left = form.room - 1 - len(owed) * (1 + START_BITS + form.window.ack_bits)
+        if owed and left < form.room // 2 and not self._left_out and self._has_more_than_acks():
+            owed = []
+        self._left_out = not owed
+        writer.write(bool(owed), 1)
+        for name in self.config.others if owed else ():
+            if len(self.config.others) > 1:
+                writer.write(name in owed, 1)
+            if name in owed:
+                writer.write(self._starts.get(name, 0), START_BITS)
+                self._receiving[name].acknowledge(writer)
+        return bool(owed)
+
+    def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
+        """Writes into a frame what is worth most and has room, if anything is."""
+        left = form.room - writer.bits
+        about = self._about_bits(form)
+        pieces = [
+            (worth(value, STRETCH.ttl_s, queued_ms, now_ms) / piece.bits, name, number, piece)
+            for name, sending in self._sending.items()
+            for number, piece, value, queued_ms in sending.may_be_said()
+            if (name, number) not in said and piece.bits + about + form.size_bits * (not piece.is_whole) <= left
+        ]
+        best = max(pieces, key=lambda one: one[0], default=None)
+        for one in self._queue.best_first(now_ms):
+            if best is not None and best[0] >= one.worth(now_ms):
+                break
+            if one.crossing.acknowledged or form.is_small or one.said.bits + 2 > form.room - 1:
+                room = left - about
+                if one.said.bits > room:
+                    room -= form.size_bits
+                if room < min(LEAST_PIECE_BITS, one.said.bits) or not self._may_begin(one.to):
+                    continue
+                most = form.room - 1 - about - form.size_bits
+                self._queue.remove(one)
+                pieces_of_it = cut_up(one.said.value, one.said.bits, room, most)
+                self._sending[one.to].add(pieces_of_it, one.crossing.value, one.queued_ms)
+                return self._write_next(form, writer, said, now_ms)
+            if one.said.bits + 2 <= left:
+                self._queue.remove(one)
+                writer.write(0b10, 2)
+                writer.write(one.said.value, one.said.bits)
+                return True
+        if best is None:
+            return False
+        _, name, number, piece = best
+        said.add((name, number))
+        self._write_piece(form, writer, name, number, piece)
+        return True
+
+    def _may_begin(self, to: str) -> bool:
+        """Whether there is room in the window for the first piece of another message."""
+        sending = self._sending[to]
+        return len(sending.unheard) < sending.window.size
+
+    def _about_bits(self, form: FrameForm) -> int:
+        """Bits about a piece, but for its size."""
+        return (2 if form.is_small else 4) + form.window.number_bits + self._to_bits
+
+    @property
+    def _to_bits(self) -> int:
+        return (len(self.config.others) - 1).bit_length()
+
+    def _write_piece(self, form: FrameForm, writer: BitWriter, name: str, number: int, piece: Piece) -> None:
+        if not form.is_small:
+            writer.write(0b11, 2)
+        writer.write(self.config.others.index(name), self._to_bits)
+        writer.write(number % (1 << form.window.number_bits), form.window.number_bits)
+        writer.write(piece.first, 1)
+        writer.write(piece.last, 1)
+        if not form.is_small and not piece.is_whole:
+            writer.write(piece.bits, form.size_bits)
+        writer.write(piece.value, piece.bits)
+
+    # What is heard.
+
+    def _hear(self, packet: Packet, now_ms: int) -> None:
+        assert self._form is not None
+        for frame in packet.frames:
+            opened = self._form.unpack(frame)
+            if opened is None or opened[0] not in self.config.others:
+                if opened is None:
+                    self._drop("no frame of this run", f"{len(frame)} bytes")
+                continue
+            platform, start, reader = opened
+            if start != self._starts.get(platform, start):
+                self._receiving[platform] = self._receiver(platform)
+            self._starts[platform] = start
+            try:
+                self._read(self._form, platform, reader, now_ms)
+            except WireError as error:
+                self._drop("malformed frame", f"{platform}: {error}")
+
+    def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
+        """Reads a frame; raises WireError where the rest of it is none."""
+        to_hub = platform != self.config.hub
+        if reader.read(1):
+            receivers = (self.config.hub,) if to_hub else self.config.platforms[1:]
+            for name in receivers:
+                if len(receivers) == 1 or reader.read(1):
+                    start = reader.read(START_BITS)
+                    is_ours = name == self.config.platform and start == self._start
+                    sending = self._sending[platform] if is_ours else Sending(form.window)
+                    sending.hear(reader)
+            if form.is_small:
+                return
+        elif form.is_small:
+            self._read_piece(form, platform, reader, now_ms)
+            return
+        while reader.left and reader.read(1):
+            if reader.read(1):
+                self._read_piece(form, platform, reader, now_ms)
+            else:
+                self._open(reader, platform, now_ms)
+
+    def _read_piece(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
+        receivers = (self.config.hub,) if platform != self.config.hub else self.config.platforms[1:]
+        to_bits = (len(receivers) - 1).bit_length()
+        place = reader.read(to_bits)
+        number = reader.read(form.window.number_bits)
+        first, last = bool(reader.read(1)), bool(reader.read(1))
+        if form.is_small:  # behind the last one's end there are zeros
+            size = form.room - 3 - to_bits - form.window.number_bits
+        elif first and last:  # it tells by itself where it ends
+            ahead = copy(reader)
+            self._letters.open(ahead, platform, now_ms)
+            size = reader.left - ahead.left
+        else:
+            size = reader.read(form.size_bits)
+        piece = Piece(reader.read(size), size, first, last)
+        if place < len(receivers) and receivers[place] == self.config.platform:
+            for value, bits in self._receiving[platform].take(number, piece):
+                self._open(of_bits(value, bits), platform, now_ms)
+
+    def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
+        self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
+
+    def _tell(self, platform: str, topic: Topic | None, said: Said, now_ms: int) -> None:
+        """Tells what was heard to the nodes here."""
+        assert self._run is not None
+        header, message = said.header, said.message
+        if (header.sender == "coordinator") != (platform == self.config.hub):
+            self._drop("not its to say", f"{platform}: {said.key}")
+            return
+        if topic is TASK and said.key.split("/")[2] != self.config.platform:
+            return
+        if topic is not None:
+            self._say_here(said.key, header, message)
+        if isinstance(message, Curve | Stretch) and platform != self.config.hub:
+            layer = self._layers.get((platform, header.incarnation))
+            if layer is None:
+                entry = next(one for one in self._run.vehicles if one.vehicle == platform)
+                layer = self._layers[platform, header.incarnation] = LayerOf(entry, self._run.grid.spec)
+            tiles = layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
+            for tile in tiles:
+                self._say_tile(platform, header, tile)
+
+    def _say_tile(self, platform: str, header: Header, tile: CoverageTile) -> None:
+        self._told += 1
+        name = f"{tile.first_row // 20}-{tile.first_column // 20}"
+        key = COVERAGE.key(vehicle=platform, tile=name)
+        self._say_here(key, header._replace(sequence=self._told), tile)
+
+    def _say_here(self, key: str, header: Header, message: Any) -> None:
+        heard = Heard(key, packed(header, body_of(message)))
+        self._heard.append(Publication(HEARD.key(vehicle=self.config.platform), heard))
+
+    def _step(self, now_ms: int) -> Step:
+        heard, self._heard = tuple(self._heard), []
+        if self._form is None or not self._has_anything_to_say():
+            return Step(heard)
+        slot_ms = self.config.slot_of(self.config.platform, now_ms)
+        may_speak_now = slot_ms == now_ms and slot_ms > self._spoke_ms
+        return Step(heard, slot_ms if may_speak_now else slot_ms + self.config.cycle_ms)
+
+    def _has_anything_to_say(self) -> bool:
+        return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())
+
+    def _has_more_than_acks(self) -> bool:
+        return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+
+
+def _ends_a_stretch(message: Message) -> bool:
+    """Whether a vehicle has stopped looking along a track."""
+    if isinstance(message, AgentState):
+        return message.mode is Mode.IDLE or message.mode.has_ended
+    return isinstance(message, TaskStatus) and message.state not in (TaskState.ACCEPTED, TaskState.UNDER_WAY)

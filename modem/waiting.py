@@ -1,0 +1,65 @@
+"""What a platform has to say, and what of it is said first: what is worth most a bit, the longer it waits the more."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from comms.said.bits import BitWriter
+from comms.said.topics import Crossing
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A message that waits. `to`: the platform that it is for. `key`: what it is about; of a topic with `newest_only` a
+    newer one with the same takes its place."""
+
+    key: str
+    to: str
+    crossing: Crossing
+    said: BitWriter
+    queued_ms: int
+
+    def worth(self, now_ms: int) -> float:
+        """What a bit of it is worth."""
+        return worth(self.crossing.value, self.crossing.ttl_s, self.queued_ms, now_ms) / self.said.bits
+
+
+def worth(value: float, ttl_s: float, queued_ms: int, now_ms: int) -> float:
+    """What something is worth that has waited since a time."""
+    return value * (1.0 + (now_ms - queued_ms) / 1000 / ttl_s)
+
+
+class Queue:
+    """Messages that wait, none of which was said yet."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[int, Waiting] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def add(self, one: Waiting) -> None:
+        """Takes a message."""
+        if one.crossing.newest_only:
+            for number, before in list(self._waiting.items()):
+                if (before.key, before.to) == (one.key, one.to):
+                    del self._waiting[number]
+        self._waiting[self._count] = one
+        self._count += 1
+
+    def remove(self, one: Waiting) -> None:
+        """It is said now."""
+        number = next(number for number, other in self._waiting.items() if other is one)
+        del self._waiting[number]
+
+    def drop_old(self, now_ms: int) -> None:
+        """What need not arrive, and has waited for too long, is not said any more."""
+        for number, one in list(self._waiting.items()):
+            if not one.crossing.acknowledged and now_ms - one.queued_ms > one.crossing.ttl_s * 1000:
+                del self._waiting[number]
+
+    def best_first(self, now_ms: int) -> Iterable[Waiting]:
+        """All, what is worth most a bit first; of equals what waits longer."""
+        return sorted(self._waiting.values(), key=lambda one: -one.worth(now_ms))

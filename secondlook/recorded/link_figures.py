@@ -1,0 +1,88 @@
+"""What went across the water, and how old what the coordinator knows of each vehicle was. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from comms.node import Received
+from comms.said.codec import header_of
+from comms.said.messages import AgentState, Heard, Packet
+from comms.said.topics import MODEM_TX, topic_of
+
+
+@dataclass
+class Age:
+    """How old the newest word of a vehicle was: between two of them it grows with time."""
+
+    said_ms: int = 0
+    came_ms: int = 0
+    largest_ms: int = 0
+    _sum: float = 0.0  # of ages over time, in ms^2
+
+    def hear(self, said_ms: int, came_ms: int) -> None:
+        """A word has come; one that is older than the newest is none."""
+        if said_ms >= self.said_ms:
+            self._pass_until(came_ms)
+            self.said_ms = said_ms
+
+    def told(self, now_ms: int) -> dict[str, float | None]:
+        """Mean and largest until now, in seconds."""
+        self._pass_until(now_ms)
+        mean_s = None if now_ms <= 0 else round(self._sum / now_ms / 1000, 1)
+        return {"mean_s": mean_s, "largest_s": round(self.largest_ms / 1000, 1)}
+
+    def _pass_until(self, now_ms: int) -> None:
+        before_ms, age_ms = self.came_ms - self.said_ms, now_ms - self.said_ms
+        self._sum += (age_ms**2 - before_ms**2) / 2
+        self.largest_ms = max(self.largest_ms, age_ms)
+        self.came_ms = now_ms
+
+
+@dataclass
+class LinkFigures:
+    """Hears messages in the order of their sending."""
+
+    modem_bytes: int = 0
+    said_bytes: int = 0
+    frames_sent: int = 0
+    frames_heard: int = 0
+    packets: dict[str, int] = field(default_factory=dict)
+    _said: dict[str, Age] = field(default_factory=dict)  # by vehicle, as it was said
+    _heard: dict[str, Age] = field(default_factory=dict)  # as a modem told it
+
+    def hear(self, received: Received) -> None:
+        """Takes one message."""
+        message, sent_ms = received.message, received.header.sent_ms
+        if isinstance(message, Packet):
+            if received.topic is MODEM_TX:
+                self.packets[received.vehicle] = self.packets.get(received.vehicle, 0) + 1
+                self.frames_sent += len(message.frames)
+                self.modem_bytes += sum(map(len, message.frames))
+            else:
+                self.frames_heard += len(message.frames)
+        elif isinstance(message, Heard):
+            found = topic_of(message.key)
+            if found is not None and found[0].message is AgentState:
+                self._heard.setdefault(found[1], Age()).hear(header_of(message.payload).sent_ms, sent_ms)
+        elif received.topic.crosses_water:
+            self.said_bytes += len(received.payload)
+            if isinstance(message, AgentState):
+                self._said.setdefault(received.vehicle, Age()).hear(sent_ms, sent_ms)
+
+    def summary(self, profile: str, platforms: int, hub: str, now_ms: int) -> dict[str, Any]:
+        """`link` of summary.json. `profile`: its name; `platforms`: how many talk by modems, 0 where nobody does: then
+        all that might have crossed counts as if it had; `hub`: the coordinator's platform."""
+        ages = {
+            name: age if not platforms or name == hub else self._heard.get(name, Age())
+            for name, age in self._said.items()
+        }
+        crossed = self.modem_bytes if platforms else self.said_bytes
+        return {
+            "profile": profile,
+            "bytes_per_s": round(crossed / now_ms * 1000, 1) if now_ms else None,
+            "packets": dict(sorted(self.packets.items())),
+            "frames_sent": self.frames_sent,
+            "frames_lost": self.frames_sent * max(0, platforms - 1) - self.frames_heard,
+            "age": {name: age.told(now_ms) for name, age in sorted(ages.items())},
+        }

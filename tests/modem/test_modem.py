@@ -1,0 +1,131 @@
+"""What is said on one platform is heard on the others that it is for, in bits of packets, whatever of these is lost."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from fleets import state
+from modems import Waters
+
+from comms.said.announcement import Vertex
+from comms.said.messages import (
+    AgentState,
+    Hotspot,
+    HotspotState,
+    MissionOver,
+    Mode,
+    Packet,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
+
+TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
+OUTLINE = tuple(Vertex(100.0 + 10 * place, 50.0 + 5 * (place % 3)) for place in range(12))
+FOUND = Hotspot(1, HotspotState.ACTIVE, OUTLINE, 0.6, 40, True, 0)
+
+
+def heard(waters: Waters, platform: str) -> list[tuple[str, str]]:
+    """Key, and type of message, of what a platform has heard, in order."""
+    return [(one.key, type(one.message).__name__) for _, to, one in waters.heard if to == platform]
+
+
+def test_a_task_reaches_its_vehicle_alone_and_the_answer_comes_back() -> None:
+    waters = Waters()
+    waters.say("coordinator", "coord/task/beta/3", TAKE)
+    waters.run(5000)
+    ((at_ms, platform, told),) = waters.heard
+    assert (at_ms, platform, told.key, told.sender) == (3500, "beta", "coord/task/beta/3", "coordinator")
+    assert isinstance(told.message, Task)
+    assert (told.message.action, told.message.strip) == (TaskAction.TAKE, 7)
+    assert abs(told.message.start_x_m - 100.0) <= 0.25
+    assert abs(told.message.length_m - 180.0) <= 0.5
+    assert told.t_s == 0.0
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.run(20_000)
+    assert heard(waters, "ship") == [("agent/beta/task_status/1", "TaskStatus")]
+    assert heard(waters, "alpha") == []
+
+
+def test_each_speaks_in_its_slots_and_nobody_who_has_nothing_to_say() -> None:
+    waters = Waters()
+    waters.say("alpha", "agent/alpha/state", state())
+    waters.say("beta", "agent/beta/state", state())
+    waters.run(60_000)
+    assert [(at_ms, platform) for at_ms, platform, _ in waters.packets] == [(4000, "alpha"), (8000, "beta")]
+
+
+def test_of_states_the_newest_alone_is_said_and_no_old_one() -> None:
+    waters = Waters()
+    for place in range(5):
+        waters.say("beta", "agent/beta/state", AgentState(Mode.TRANSIT, place, 1.0, 0, 0, 0, 0))
+    waters.run(12_000)
+    assert [one.message.works_on for _, _, one in waters.heard] == [4]  # type: ignore[union-attr]
+
+
+def test_what_is_lost_is_said_again_until_it_is_known_to_have_arrived() -> None:
+    waters = Waters(arrives=lambda _, to, count: count >= 3)
+    waters.say("coordinator", "coord/task/beta/1", TAKE)
+    waters.run(200_000)
+    assert heard(waters, "beta") == [("coord/task/beta/1", "Task")]
+    ships = [at_ms for at_ms, platform, _ in waters.packets if platform == "ship"]
+    betas = [at_ms for at_ms, platform, _ in waters.packets if platform == "beta"]
+    assert ships[:4] == [0, 12_000, 24_000, 36_000]
+    assert len(ships) == len(betas) + 3  # each that came was acknowledged, the last of these acknowledgements came
+
+
+def test_the_end_of_the_mission_is_heard_by_all() -> None:
+    waters = Waters()
+    waters.say("coordinator", "coord/mission_over", MissionOver("every primary has finished"))
+    waters.run(30_000)
+    assert heard(waters, "alpha") == heard(waters, "beta") == [("coord/mission_over", "MissionOver")]
+
+
+@pytest.mark.parametrize("frame_bits", [34, 48, 128, 256, 512])
+@pytest.mark.parametrize("frames", [1, 3])
+@pytest.mark.parametrize("seed", range(3))
+def test_whatever_the_frames_and_whatever_is_lost_all_that_is_acknowledged_arrives_once(
+    frame_bits: int, frames: int, seed: int
+) -> None:
+    lost = random.Random(f"{seed} {frame_bits}")
+    waters = Waters(arrives=lambda *_: lost.random() < 0.7, frame_bits=frame_bits, frames=frames)
+    expected = []
+    for number in range(1, 13):
+        waters.say("alpha", f"agent/alpha/hotspot/{number}", FOUND)
+        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.REFUSED, 0.5, 0, ""))
+        waters.say("coordinator", f"coord/task/{('alpha', 'beta')[number % 2]}/{number}", TAKE)
+        expected += [f"agent/alpha/hotspot/{number}", f"agent/beta/task_status/{number}"]
+        waters.run(waters.now_ms + 9000)
+    waters.run(waters.now_ms + 6_000_000)
+    assert sorted(key for key, _ in heard(waters, "ship")) == sorted(expected)
+    assert [key for key, _ in heard(waters, "beta")] == [f"coord/task/beta/{number}" for number in range(1, 13, 2)]
+    assert not any(modem.dropped for modem in waters.modems.values())
+    assert waters.packets[-1][0] < waters.now_ms - 100_000  # then all is quiet
+
+
+def test_a_modem_that_is_started_anew_is_understood() -> None:
+    waters = Waters()
+    for number in range(1, 6):
+        waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.DONE, 1.0, 0, ""))
+        waters.run(waters.now_ms + 24_000)
+    waters.start("beta")
+    waters.say("beta", "agent/beta/task_status/6", TaskStatus(6, TaskState.DONE, 1.0, 0, ""))
+    waters.run(waters.now_ms + 60_000)
+    assert [key for key, _ in heard(waters, "ship")] == [f"agent/beta/task_status/{number}" for number in range(1, 7)]
+
+
+@pytest.mark.parametrize("damage", ["bit", "short", "long", "empty"])
+def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
+    waters = Waters()
+    waters.say("beta", "agent/beta/state", state())
+    waters.run(9000)
+    ((_, _, packet),) = waters.packets
+    (frame,) = packet.frames
+    changed = bytearray(frame)
+    changed[5] ^= 4
+    struck = {"bit": bytes(changed), "short": frame[:-1], "long": frame + b"\0", "empty": b""}[damage]
+    waters.say("world", "modem/ship/rx", Packet((struck,)))
+    assert waters.modems["ship"].dropped == {"no frame of this run": 1}
+    assert waters.heard == []
