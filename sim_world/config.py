@@ -17,6 +17,7 @@ from comms.said.wire import IDENTIFIER
 from planner.currents import FlowGrid
 from planner.keep_out import NOWHERE, KeepOut
 from planner.types import DetectionCurve, Point, SonarShape
+from sim_world.channel_config import ChannelConfig
 from sim_world.footprints import FOOTPRINTS
 from sim_world.sonar import HIGHEST_P_DETECT, CheckedSonar, CurveSonar, Seabed, SonarModel, SufferedSeabed
 
@@ -226,7 +227,8 @@ class TargetsConfig:
 class WorldConfig:
     """The whole sea. `area`, `holes`: outlines of the survey area and of what is left out of it, at least three corners
     each. `vehicles`: those simulated here, all of them faster than the current. `keep_out`: what none of them may
-    enter, and where no target lies."""
+    enter, and where no target lies. `channel`: between the modems of these vehicles, and of platforms that lie still;
+    None where there are no modems."""
 
     seed: int
     area: tuple[Point, ...]
@@ -236,6 +238,7 @@ class WorldConfig:
     holes: tuple[tuple[Point, ...], ...] = ()
     current: CurrentConfig | None = None
     keep_out: KeepOut = NOWHERE
+    channel: ChannelConfig | None = None
 
     def __post_init__(self) -> None:
         _require(self.seed >= 0, "seed", self.seed, "0 or more")
@@ -250,6 +253,10 @@ class WorldConfig:
         slowest_mps = min((vehicle.speed_mps for vehicle in self.vehicles), default=math.inf)
         holds = self.current is None or self.current.drift_mps < slowest_mps
         _require(holds, "current", self.current, f"slower than every vehicle, {slowest_mps:g} m/s")
+        if self.channel is not None:
+            placed = {*names, *(name for name, _ in self.channel.still)}
+            here = {*self.channel.platforms} <= placed
+            _require(here, "channel", ", ".join(self.channel.platforms), "vehicles of the world and what lies still")
 
 
 def _require(holds: bool, name: str, value: object, allowed: str) -> None:

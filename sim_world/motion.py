@@ -262,6 +262,11 @@ class Motion:
         """The pose at a time not before the last manoeuvre's start."""
         return self._start if self._path is None else self._path.pose_at(time_ms)
 
+    def place_at(self, time_ms: int) -> Point:
+        """Where it is at a time; before the last manoeuvre's start, which is a moment at most, where it was then."""
+        pose = self.pose_at(time_ms if self._path is None else max(time_ms, self._path.start_ms))
+        return pose.x_m, pose.y_m
+
     def speed_mps(self, time_ms: int) -> float:
         """The speed over the ground: 0 where it lies."""
         if isinstance(self._path, CarriedPath):

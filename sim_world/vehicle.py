@@ -94,6 +94,11 @@ class SimulatedVehicle:
         nav, (east_m, north_m) = self.nav(now_ms), self.offset_at(now_ms)
         return TruthPose(nav.x_m + east_m, nav.y_m + north_m, nav.heading_rad, nav.speed_mps, nav.turn_radps)
 
+    def true_place(self, time_ms: int) -> Point:
+        """Where it truly is."""
+        (x_m, y_m), (east_m, north_m) = self._motion.place_at(time_ms), self.offset_at(time_ms)
+        return x_m + east_m, y_m + north_m
+
     @property
     def lies(self) -> bool:
         """Whether it has not been told to go anywhere yet, or has come home, or its battery is empty."""

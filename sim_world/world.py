@@ -1,12 +1,15 @@
-"""The world's node: it moves the simulated vehicles, lets them look, and publishes what they say and the truth."""
+"""The world's node: it moves the simulated vehicles, lets them look, and publishes what they say and the truth; and it
+carries what their modems send."""
 
 from __future__ import annotations
 
 from operator import itemgetter
 
 from comms.node import Publication, Received, Step
-from comms.said.messages import Maneuver, ManeuverStatus, MissionOver
-from comms.said.topics import LOOK, MANEUVER_STATUS, NAV, TRUTH_LOOK, TRUTH_POSE, TRUTH_TARGETS
+from comms.said.messages import Maneuver, ManeuverStatus, MissionOver, Packet
+from comms.said.topics import LOOK, MANEUVER_STATUS, MODEM_RX, NAV, TRUTH_LOOK, TRUTH_POSE, TRUTH_TARGETS
+from planner.types import Point
+from sim_world.channel import Channel
 from sim_world.config import VehicleConfig, WorldConfig
 from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
@@ -61,6 +64,10 @@ class Body:
         assert self._said is not None
         return Publication(self._status_key, self._said)
 
+    def true_place(self, time_ms: int) -> Point:
+        """Where the vehicle truly is."""
+        return self._vehicle.true_place(time_ms)
+
     @property
     def next_event_ms(self) -> int | None:
         """When the vehicle has something to say next besides its course, None for never."""
@@ -92,8 +99,10 @@ class Body:
 class World:
     """The node of the simulated sea, for all its vehicles (`comms.node.Node`).
 
-    Reads manoeuvres and the mission's end. Publishes the targets once; for each vehicle its course when that changes
-    and at each heartbeat, a word on each manoeuvre, and a look for each stretch of track, the moment it is passed.
+    Reads manoeuvres, packets of modems and the mission's end. Publishes the targets once; for each vehicle its course
+    when that changes and at each heartbeat, a word on each manoeuvre, and a look for each stretch of track, the moment
+    it is passed; and what comes through of a packet to each other modem, the moment it has been heard. When the mission
+    is over it only carries packets.
     """
 
     def __init__(self, config: WorldConfig) -> None:
@@ -102,6 +111,8 @@ class World:
         current = make_current(config.current, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)
         self._bodies = {one.vehicle: Body(one, config, seabed, current, self._targets) for one in by_id}
+        self._channel = None if config.channel is None else Channel(config.channel, config.seed)
+        self._still = {} if config.channel is None else dict(config.channel.still)
         self._over = False
 
     def start(self, now_ms: int) -> Step:
@@ -111,14 +122,14 @@ class World:
         return Step((targets, *publish), wake_ms)
 
     def on_message(self, received: Received, now_ms: int) -> Step:
-        """Takes a manoeuvre, after all that was due until now; falls silent when the mission is over."""
+        """Takes a manoeuvre, after all that was due until now, or a packet; when the mission is over packets alone."""
         if isinstance(received.message, MissionOver):
             self._over = True
-        if self._over:
-            return Step()
+        if isinstance(received.message, Packet):
+            self._send(received.vehicle, received.message, received.header.sent_ms)
         publish, wake_ms = self._due(now_ms)
         body = self._bodies.get(received.vehicle)
-        if body is not None and isinstance(received.message, Maneuver):
+        if body is not None and isinstance(received.message, Maneuver) and not self._over:
             publish.append(body.command(received.message, received.header.incarnation, now_ms))
             more, wake_ms = self._due(now_ms)  # a manoeuvre may be done, or on its track, at once
             publish += more
@@ -126,13 +137,28 @@ class World:
 
     def on_wake(self, now_ms: int) -> Step:
         """Publishes what has happened since."""
-        if self._over:
-            return Step()
         publish, wake_ms = self._due(now_ms)
         return Step(tuple(publish), wake_ms)
 
+    def _send(self, platform: str, packet: Packet, sent_ms: int) -> None:
+        """Puts a packet on its way, from and to where all are at that time."""
+        if self._channel is not None:
+            moving = {vehicle: body.true_place(sent_ms) for vehicle, body in self._bodies.items()}
+            self._channel.send(platform, packet.frames, sent_ms, {**moving, **self._still})
+
     def _due(self, now_ms: int) -> tuple[list[Publication], int | None]:
         """What there is to say by now, and when there is more."""
+        publish, wake_ms = ([], None) if self._over else self._of_bodies(now_ms)
+        if self._channel is None:
+            return publish, wake_ms
+        publish += [
+            Publication(MODEM_RX.key(vehicle=platform), Packet(frames))
+            for platform, frames in self._channel.arrivals(now_ms)
+        ]
+        return publish, min((at_ms for at_ms in (wake_ms, self._channel.next_ms) if at_ms is not None), default=None)
+
+    def _of_bodies(self, now_ms: int) -> tuple[list[Publication], int | None]:
+        """What there is to say of the vehicles by now, and when there is more."""
         publish: list[Publication] = []
         while due := [
             (at_ms, body)

@@ -17,6 +17,7 @@ from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
+from secondlook.fleet.link import channel_config
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
 from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
@@ -203,6 +204,7 @@ def world_config(scenario: Scenario) -> WorldConfig:
         seabed=_seabed(scenario.seabed),
         targets=TargetsConfig(scenario.targets.count),
         current=None if current is None else _current(current),
+        channel=channel_config(scenario),
     )
 
 

@@ -7,6 +7,7 @@ from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, Current, GridCurrent
 from secondlook.scenario.degrees import Origin
 from secondlook.scenario.errors import Place, Problem, ScenarioError
+from secondlook.scenario.link import IDEAL, SHIP, Link, Loss, Outage, Position, Profile, Sonar
 from secondlook.scenario.load import bundled_scenarios, load_scenario, make_scenario
 from secondlook.scenario.model import (
     Coordinator,
@@ -21,6 +22,8 @@ from secondlook.scenario.sensor import Curve
 from secondlook.scenario.vehicle import Home, RevisitVehicle, Settling, Start, SurveyVehicle, body_of
 
 __all__ = [
+    "IDEAL",
+    "SHIP",
     "AnyCurrent",
     "Area",
     "Coordinator",
@@ -28,15 +31,21 @@ __all__ = [
     "Curve",
     "GridCurrent",
     "Home",
+    "Link",
+    "Loss",
     "Mission",
     "Origin",
+    "Outage",
     "PatchySeabed",
     "Place",
+    "Position",
     "Problem",
+    "Profile",
     "RevisitVehicle",
     "Scenario",
     "ScenarioError",
     "Settling",
+    "Sonar",
     "Start",
     "SurveyVehicle",
     "Targets",

@@ -1,4 +1,4 @@
-"""What comes with the package: scenarios and detection curves, by name."""
+"""What comes with the package: scenarios, detection curves and profiles of modems, by name."""
 
 from __future__ import annotations
 
@@ -30,6 +30,17 @@ def curve(name: str) -> dict[str, Value]:
     """A bundled detection curve: `range_m` and `p_detect`, lists of the same length, and the noise calibrated with it,
     `noise_cell` and `noise_track`."""
     return read(_text("curves", name), name).data
+
+
+def link_names() -> list[str]:
+    """Names of the bundled profiles of modems, sorted."""
+    return _names("links")
+
+
+@cache
+def link(name: str) -> dict[str, Value]:
+    """A bundled profile of a modem, by its keys."""
+    return read(_text("links", name), name).data
 
 
 def _names(folder: str) -> list[str]:

@@ -18,6 +18,7 @@ from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
 from secondlook.scenario.current import Current, CurrentFromFile, FlowFileError, GridCurrent, read_flows
 from secondlook.scenario.errors import KeyPath
+from secondlook.scenario.link import Position
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import Mapping, check_pair, refused
 from secondlook.scenario.vehicle import Home, Start
@@ -108,7 +109,7 @@ class PriorityInDegrees(Mapping):
 
 
 class PlaceInDegrees(Mapping):
-    """What of a start or home may be given in degrees or in UTM metres."""
+    """What of a start, home or position may be given in degrees or in UTM metres."""
 
     latitude_deg: Latitude | None = None
     """In place of `y_m`, with `longitude_deg`: degrees north, WGS84."""
@@ -128,6 +129,7 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
     Priority: PriorityInDegrees,
     Start: PlaceInDegrees,
     Home: PlaceInDegrees,
+    Position: PlaceInDegrees,
     Current: CurrentFromFile,
 }
 """What may be given in degrees, in UTM metres or in a file in place of keys of a mapping."""
@@ -275,6 +277,10 @@ def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value]
             place = vehicle.get(name) if isinstance(vehicle, dict) else None
             if isinstance(place, dict):
                 yield ("vehicles", key, name), place, PlaceInDegrees
+    coordinator = data.get("coordinator")
+    position = coordinator.get("position") if isinstance(coordinator, dict) else None
+    if isinstance(position, dict):
+        yield ("coordinator", "position"), position, PlaceInDegrees
 
 
 def _take_flows(turned: InMetres, current: dict[str, Value], folder: Path) -> None:

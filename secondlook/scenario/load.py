@@ -14,7 +14,8 @@ from secondlook.errors import UserError
 from secondlook.scenario import bundled
 from secondlook.scenario.degrees import in_metres
 from secondlook.scenario.errors import KeyPath, Place, Problem, ScenarioError, dotted, shown
-from secondlook.scenario.explain import explain, nearest
+from secondlook.scenario.explain import explain, nearest, place_of
+from secondlook.scenario.link import Profile
 from secondlook.scenario.model import Scenario
 from secondlook.scenario.text import LARGEST_FILE_BYTES, Document, Value, decode, read, read_value
 
@@ -143,6 +144,7 @@ def _validated(document: Document, folder: Path) -> Scenario:
     classes: dict[int, type[BaseModel]] = {}
     turned = in_metres(document.data, folder)
     problems = document.problems + explain(turned.errors, document.data, document.places, classes)
+    problems += _take_profile(turned.data, document, folder)
     try:
         scenario = Scenario.model_validate(turned.data, context=classes)
     except ValidationError as error:
@@ -150,6 +152,27 @@ def _validated(document: Document, folder: Path) -> Scenario:
     if problems:
         raise ScenarioError(problems)
     return scenario
+
+
+def _take_profile(data: dict[str, Value], document: Document, folder: Path) -> list[Problem]:
+    """Puts the profile that a file of the user's own holds into the scenario's link; or tells what is wrong with it,
+    and leaves the link out."""
+    link = data.get("link")
+    file = link.get("profile") if isinstance(link, dict) else None
+    if not isinstance(link, dict) or not isinstance(file, str) or Path(file).suffix not in (".yaml", ".yml"):
+        return []
+    try:
+        found, _ = load_model(folder / file, Profile)
+    except ScenarioError as error:
+        problems = list(error.problems)
+    except (UserError, ValueError) as error:  # the latter of a name that no file may have
+        place = place_of(("link", "profile"), document.places)
+        problems = [Problem(place, f"link.profile: {shown(file)} is not allowed; must be a file: {error}")]
+    else:
+        link["profile"] = found.model_dump(mode="json", exclude_none=True)
+        return []
+    del data["link"]
+    return problems
 
 
 def _text(source: str) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import shapely
@@ -13,6 +14,7 @@ from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
+from secondlook.scenario.link import SHIP, Link, Position
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.text import dump
 from secondlook.scenario.values import (
@@ -170,6 +172,18 @@ class Coordinator(Mapping):
     sector rests on what lies in it and on its team; who is free joins another team where it is needed more."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
     """A helper is turned round for a plan that is better by at least this share."""
+    platform: Annotated[str, Field(max_length=LONGEST_NAME)] | None = None
+    """Where it is, which matters with a `link`: on a `ship`, or aboard a vehicle, by its id. Left out, on the ship."""
+    position: Position | None = None
+    """Where that ship lies. Left out, in the middle of where the vehicles start."""
+
+    @field_validator("position")
+    @classmethod
+    def _check_ship(cls, position: Position | None, info: ValidationInfo) -> Position | None:
+        platform = info.data.get("platform")
+        if position is not None and platform not in (None, SHIP):
+            raise refused(f"must be left out aboard a vehicle, {platform}")
+        return position
 
     @field_validator("max_strip_m")
     @classmethod
@@ -204,6 +218,37 @@ class Scenario(Mapping):
     """An entry for each vehicle, under its id (a-z, 0-9, `_` and `-`); at least one surveys."""
     coordinator: Coordinator = Coordinator()
     """How strips are cut and given out."""
+    link: Link | None = None
+    """How platforms talk. Left out, everybody hears everybody, at once."""
+
+    @field_validator("coordinator")
+    @classmethod
+    def _check_platform(cls, coordinator: Coordinator, info: ValidationInfo) -> Coordinator:
+        vehicles: dict[str, Vehicle] | None = info.data.get("vehicles")
+        if vehicles is not None and coordinator.platform not in (None, SHIP, *vehicles):
+            names = _listed([SHIP, *vehicles])
+            raise refused(f"must have as platform {names}, and not {coordinator.platform}")
+        return coordinator
+
+    @field_validator("link")
+    @classmethod
+    def _check_link(cls, link: Link | None, info: ValidationInfo) -> Link | None:
+        if link is None or link.profile is None:
+            return None  # the same fleet, so the same scenario
+        vehicles: dict[str, Vehicle] = info.data.get("vehicles", {})
+        coordinator: Coordinator | None = info.data.get("coordinator")
+        ship = coordinator is not None and coordinator.platform in (None, SHIP)
+        if ship and SHIP in vehicles:
+            raise refused(f"must stand with no vehicle called {SHIP}, as the coordinator is on a ship of that name")
+        if external := [key for key, vehicle in vehicles.items() if vehicle.body == "external"]:
+            raise refused(f"must be left out with a vehicle whose body is external, {external[0]}: where is it?")
+        platforms = [*([SHIP] if ship else []), *vehicles]
+        for number, outage in enumerate(link.outages if vehicles else ()):
+            if outage.platform not in (None, *platforms):
+                raise refused(
+                    f"must have as outages[{number}].platform {_listed(platforms)}, and not {outage.platform}"
+                )
+        return link
 
     @field_validator("current")
     @classmethod
@@ -296,6 +341,10 @@ class Scenario(Mapping):
     def to_yaml(self) -> str:
         """This scenario as a file that loads as an equal one, defaults filled in and bundled curves written out."""
         return dump(self.model_dump(mode="json", exclude_none=True))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names[:MOST_TOLD]) + (", and so on" if len(names) > MOST_TOLD else "")
 
 
 def scenario_hash(scenario: Scenario) -> str:

@@ -144,6 +144,7 @@ SONAR = PlugInKind(
     methods={"p_detect": ("range_m", "look_bearing_rad", "altitude_m", "position_m", "time_s")},
 )
 CURVE = PlugInKind("a detection curve's maker")
+PROFILE = PlugInKind("a modem profile's maker")
 NODE = PlugInKind(
     "a node",
     arguments=("config",),

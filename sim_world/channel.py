@@ -1,0 +1,143 @@
+"""The channel between modems: what was sent, when it comes to each other platform, and what of it comes through.
+
+All platforms share one channel. Who sends during any part of a reception hears nothing of it; packets that overlap
+where they are received are lost there, both; of what is left frames are lost by range and by chance, each by itself.
+What becomes of a reception is decided when it ends, as all that overlaps it is known by then.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from comms.node import random_stream
+from planner.types import Point
+from sim_world.channel_config import ChannelConfig
+
+log = logging.getLogger("secondlook.world")
+
+LATEST_MS = 60_000
+"""So late it may be told what was sent, for it to count for what it overlaps."""
+
+
+class Arrival(NamedTuple):
+    """Frames that have come through to a platform, in the order in which they were sent."""
+
+    platform: str
+    frames: tuple[bytes, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Reception:
+    """A packet on its way to one platform: which of its sender's it is, and from when until when it is heard there."""
+
+    ends_ms: int
+    begins_ms: int
+    sender: str
+    receiver: str
+    count: int
+    frames: tuple[bytes, ...]
+    share_lost: float
+
+    @property
+    def order(self) -> tuple[int, str, str, int]:
+        """By their ends, whatever the order in which they were sent."""
+        return self.ends_ms, self.sender, self.receiver, self.count
+
+    def overlaps(self, begins_ms: int, ends_ms: int) -> bool:
+        """Whether any part of it is heard within that time."""
+        return self.begins_ms < ends_ms and begins_ms < self.ends_ms
+
+
+class Channel:
+    """What is on its way between the modems of a fleet. Times are simulated milliseconds, places mission frame.
+
+    What is lost by chance hangs on the seed, sender, receiver and which of the sender's packets it is, and on nothing
+    else. `dropped_frames`: how many were not sent, as they were longer than a frame, or more than a packet, may be.
+    """
+
+    def __init__(self, config: ChannelConfig, seed: int) -> None:
+        self._config, self._seed = config, seed
+        self._counts = dict.fromkeys(config.platforms, 0)
+        self._sent: dict[str, list[tuple[int, int]]] = {name: [] for name in config.platforms}
+        self._heard: dict[str, list[_Reception]] = {name: [] for name in config.platforms}
+        self._open: list[_Reception] = []
+        self.dropped_frames = 0
+
+    @property
+    def next_ms(self) -> int | None:
+        """When the next reception ends, None where nothing is on its way."""
+        return min((one.ends_ms for one in self._open), default=None)
+
+    def send(self, sender: str, frames: tuple[bytes, ...], sent_ms: int, places: Mapping[str, Point]) -> None:
+        """Puts a packet on its way, with all platforms where they are then. One of no platform's is nobody's."""
+        if sender not in self._counts:
+            return
+        signal = self._config.signal
+        fitting = tuple(frame for frame in frames if len(frame) <= signal.frame_bytes)[: signal.frames]
+        self._drop(sender, len(frames) - len(fitting))
+        count = self._counts[sender]
+        self._counts[sender] += 1
+        if not fitting:
+            return
+        lasts_ms = signal.packet_ms(len(fitting))
+        if self._is_out(sender, sent_ms, sent_ms + lasts_ms):
+            return
+        self._sent[sender].append((sent_ms, sent_ms + lasts_ms))
+        for receiver in self._config.platforms:
+            range_m = math.dist(places[sender], places[receiver])
+            if receiver != sender and range_m <= signal.max_range_m:
+                begins_ms = sent_ms + signal.way_ms(range_m)
+                reception = _Reception(
+                    begins_ms + lasts_ms, begins_ms, sender, receiver, count, fitting, signal.share_lost(range_m)
+                )
+                self._open.append(reception)
+                self._heard[receiver].append(reception)
+
+    def arrivals(self, now_ms: int) -> list[Arrival]:
+        """What has come through of the receptions that have ended by now, in the order of their ends."""
+        ended = sorted((one for one in self._open if one.ends_ms <= now_ms), key=lambda one: one.order)
+        if not ended:
+            return []
+        self._open = [one for one in self._open if one.ends_ms > now_ms]
+        arrivals = [Arrival(one.receiver, frames) for one in ended if (frames := self._came_through(one))]
+        self._forget(now_ms)
+        return arrivals
+
+    def _came_through(self, reception: _Reception) -> tuple[bytes, ...]:
+        begins_ms, ends_ms, receiver = reception.begins_ms, reception.ends_ms, reception.receiver
+        if any(begins_ms < until_ms and from_ms < ends_ms for from_ms, until_ms in self._sent[receiver]):
+            return ()
+        if any(one is not reception and one.overlaps(begins_ms, ends_ms) for one in self._heard[receiver]):
+            return ()
+        if self._is_out(receiver, begins_ms, ends_ms):
+            return ()
+        lost = 1.0 - (1.0 - reception.share_lost) * (1.0 - self._config.loss)
+        if lost == 0.0:
+            return reception.frames
+        stream = random_stream(self._seed, "channel", reception.sender, receiver, str(reception.count))
+        drawn = stream.random(len(reception.frames))
+        return tuple(frame for frame, chance in zip(reception.frames, drawn, strict=True) if chance >= lost)
+
+    def _is_out(self, platform: str, from_ms: int, until_ms: int) -> bool:
+        return any(outage.concerns(platform, from_ms, until_ms) for outage in self._config.outages)
+
+    def _drop(self, sender: str, frames: int) -> None:
+        if frames and not self.dropped_frames:
+            signal = self._config.signal
+            log.warning(
+                "frames of the modem on %s are not sent: a packet has at most %d, of at most %d bits (said once)",
+                sender, signal.frames, signal.frame_bits,
+            )  # fmt: skip
+        self.dropped_frames += frames
+
+    def _forget(self, now_ms: int) -> None:
+        """Forgets what overlaps nothing that is still on its way, or that is told of late."""
+        signal = self._config.signal
+        since_ms = now_ms - signal.packet_ms(signal.frames) - LATEST_MS
+        for name in self._config.platforms:
+            self._heard[name] = [one for one in self._heard[name] if one.ends_ms > since_ms]
+            self._sent[name] = [one for one in self._sent[name] if one[1] > since_ms]
