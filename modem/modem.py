@@ -66,6 +66,7 @@ class Modem:
         self._layers: dict[tuple[str, int], LayerOf] = {}
         self._heard: list[Publication] = []
         self._told = 0
+        self._last_said: dict[str, tuple[int, Any]] = {}
         self._left_out = False  # whether the last packet had no acknowledgement
         self._said_at: Counter[int] = Counter()
         self._incarnation = 0
@@ -130,6 +131,11 @@ class Modem:
             self._incarnation = received.header.incarnation
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
+        if topic.crossing.newest_only and topic.crossing.acknowledged:
+            said = (received.header.incarnation, message)
+            if _are_same(self._last_said.get(received.key), said):
+                return  # it will arrive
+            self._last_said[received.key] = said
         to = self.config.others
         if topic is TASK:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
@@ -363,6 +369,11 @@ class Modem:
 
     def _has_more_than_acks(self) -> bool:
         return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+
+
+def _are_same(before: tuple[int, Any] | None, now: tuple[int, Any]) -> bool:
+    """Whether an incarnation says what it has said before."""
+    return before is not None and before[0] == now[0] and body_of(before[1]) == body_of(now[1])
 
 
 def _ends_a_stretch(message: Message) -> bool:

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from secondlook.errors import UserError
 
-ROOMS = ("comms", "coordinator", "planner", "sim_world", "vehicle_agent", "viz")
+ROOMS = ("comms", "coordinator", "modem", "planner", "sim_world", "vehicle_agent", "viz")
 
 
 HOME = Path(__file__).resolve().parent.parent

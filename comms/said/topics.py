@@ -59,7 +59,8 @@ class Crossing:
 
     `value`: what one is worth beside those of other topics. `ttl_s`: what has waited for so long is worth twice as
     much; what need not be acknowledged is then said no more. `newest_only`: of a key a newer one takes the place of one
-    that waits. `acknowledged`: it is said again until it is known to have arrived.
+    that waits. `acknowledged`: it is said again until it is known to have arrived, and not once more where it is told
+    again as it was.
     """
 
     value: float
@@ -204,7 +205,7 @@ TASK_STATUS = Topic(
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
     dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _MODEMS | _WATCHERS, 400, 0.1, Keep.LATEST,
-    crosses_water=True, crossing=Crossing(2000, 60),
+    crosses_water=True, crossing=Crossing(2000, 60, newest_only=True),
 )  # fmt: skip
 MODEM_TX = Topic(
     "modem_tx", "modem/{platform}/tx", Packet, {Role.MODEM: Reach.OWN}, {Role.WORLD: Reach.ALL} | _WATCHERS, 300_000,

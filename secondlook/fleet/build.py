@@ -12,12 +12,19 @@ import shapely
 from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode, Routing
-from coordinator.config import CoordinatorConfig
+from coordinator.config import ANSWER_WITHIN_MS, CoordinatorConfig
 from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
-from secondlook.fleet.link import channel_config
+from secondlook.fleet.link import (
+    channel_config,
+    coordinator_platform,
+    link_times,
+    modem_configs,
+    modem_of,
+    platforms_of,
+)
 from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
 from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
@@ -44,6 +51,9 @@ from sim_world.config import (
 )
 from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
+LOST_CYCLES, ANSWER_CYCLES = 6, 5
+"""After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
+waits for its slot, and may have to be said again."""
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
 
@@ -123,6 +133,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     roster = _roster_of(scenario, record=record)
     specs = {name: _agent_spec(scenario, name, vehicle, heading_rad) for name, vehicle in scenario.vehicles.items()}
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
+    specs |= {modem_of(platform): node_spec(Role.MODEM, config) for platform, config in modem_configs(scenario).items()}
     if any(one.role is Role.WORLD for one in roster):
         specs = {WORLD: node_spec(Role.WORLD, world_config(scenario)), **specs}
     return Fleet(run_info, roster, specs, round(scenario.mission.time_limit_s * 1000))
@@ -130,14 +141,21 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
 
 def _roster_of(scenario: Scenario, *, record: bool) -> tuple[RosterNode, ...]:
     """Every node of a scenario's fleet; `record`: with a recorder."""
-    external = scenario.external_vehicles
+    external, by_modem = scenario.external_vehicles, scenario.link is not None
     simulated = tuple(name for name in scenario.vehicles if name not in external)
     return (
         RosterNode(CLOCK, Role.CLOCK),
         *([RosterNode(WORLD, Role.WORLD, simulated)] if simulated else []),
         *(RosterNode(body_of(name), Role.BODY, (name,)) for name in external),
-        *(RosterNode(name, role_of(vehicle), (name,)) for name, vehicle in scenario.vehicles.items()),
-        RosterNode(COORDINATOR, Role.COORDINATOR),
+        *(
+            RosterNode(name, role_of(vehicle), (name,), name if by_modem else "")
+            for name, vehicle in scenario.vehicles.items()
+        ),
+        RosterNode(COORDINATOR, Role.COORDINATOR, (), coordinator_platform(scenario) if by_modem else ""),
+        *(
+            RosterNode(modem_of(platform), Role.MODEM, (platform,) * (platform in scenario.vehicles), platform)
+            for platform in (platforms_of(scenario) if by_modem else ())
+        ),
         *([RosterNode(RECORDER, Role.RECORDER)] if record else []),
         RosterNode(OBSERVER, Role.OBSERVER),
     )
@@ -279,11 +297,14 @@ def _named(key: str) -> Iterator[None]:
 
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
+    times = link_times(scenario)
+    cycle_ms = 0 if times is None else times.cycle_ms
     return CoordinatorConfig(
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor or math.inf,
         deadline_s=scenario.mission.deadline_s or math.inf,
-        lost_after_ms=round(scenario.coordinator.lost_after_s * 1000),
+        lost_after_ms=max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms),
+        answer_within_ms=max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms),
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
         across=scenario.coordinator.across,

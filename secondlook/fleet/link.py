@@ -7,10 +7,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
+from comms.said.announcement import Role
+from modem.config import ModemConfig
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
 from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, SonarEquation
+
+ABOUT_M = 1000.0
+"""So far beyond all places of the scenario a vehicle may be and still tell where it is."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,32 @@ def reach_m_of(scenario: Scenario, link: Link) -> float:
         return link.reach_m
     farthest_m = max((math.dist(*pair) for pair in combinations(_places(scenario), 2)), default=0.0)
     return min(farthest_m, link.modem.max_range_m)
+
+
+def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
+    """What each modem is told, by its platform; none where everybody hears everybody."""
+    times = link_times(scenario)
+    if times is None:
+        return {}
+    x_m, y_m = zip(*_places(scenario), strict=True)
+    return {
+        platform: ModemConfig(
+            platform=platform,
+            platforms=times.platforms,
+            vehicles=tuple(scenario.vehicles),
+            frame_bits=times.frame_bits,
+            frames=times.frames,
+            slot_ms=times.slot_ms,
+            low_m=(min(x_m) - ABOUT_M, min(y_m) - ABOUT_M),
+            high_m=(max(x_m) + ABOUT_M, max(y_m) + ABOUT_M),
+        )
+        for platform in times.platforms
+    }
+
+
+def modem_of(platform: str) -> str:
+    """The id of a platform's modem."""
+    return f"{Role.MODEM.value}-{platform}"
 
 
 def channel_config(scenario: Scenario) -> ChannelConfig | None:

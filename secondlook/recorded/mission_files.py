@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, Self
 
 from comms.node import Received
 from comms.said.codec import unpack
-from comms.said.topics import COVERAGE, LOOK, NAV
+from comms.said.topics import COVERAGE, HEARD, LOOK, NAV
 from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.files import GrowingFile
@@ -27,7 +27,7 @@ from secondlook.recorded.message_records import (
     records_in,
 )
 
-NOT_FOR_PEOPLE = (LOOK, COVERAGE, NAV)  # looks and tiles are arrays, positions are better drawn
+NOT_FOR_PEOPLE = (LOOK, COVERAGE, NAV, HEARD)  # arrays, positions, which are better drawn, and what was said elsewhere
 
 
 class MissionFiles:
@@ -124,8 +124,10 @@ def _field_names(kind: type[Any]) -> tuple[str, ...]:
 
 
 def _plain(value: Any) -> Any:
-    """What JSON has no word for: a message or a part of one, an enumeration's member, an array."""
+    """What JSON has no word for: a message or a part of one, an enumeration's member, bytes, an array."""
     kind: type[Any] = type(value)
     if is_dataclass(kind):
         return {name: getattr(value, name) for name in _field_names(kind)}
+    if isinstance(value, bytes):
+        return value.hex()
     return value.value if isinstance(value, enum.Enum) else value.tolist()

@@ -11,6 +11,7 @@ import numpy as np
 from comms.errors import Stop
 from comms.node import Received
 from secondlook.files import whole_file
+from secondlook.recorded.link_figures import LinkFigures
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.mission_files import MissionFiles
 
@@ -35,6 +36,7 @@ class Observer:
         self, folder: Path, *, with_messages: bool, progress: Progress | None = None, watch: Watch | None = None
     ) -> None:
         self.metrics = Metrics()
+        self.link = LinkFigures()
         self.messages: Counter[str] = Counter()
         self._folder = folder
         self._files = MissionFiles(folder, with_messages=with_messages)
@@ -47,6 +49,7 @@ class Observer:
         self.messages[received.topic.name] += 1
         self._files.write(received)
         self.metrics.hear(received)
+        self.link.hear(received)
         if self._progress is not None and self.metrics.now_ms >= self._progress_due_ms:
             self._progress_due_ms = self.metrics.now_ms + PROGRESS_EVERY_MS
             self._progress(self.metrics)

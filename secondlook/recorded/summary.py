@@ -20,6 +20,7 @@ from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Observer
 from secondlook.scenario import Scenario
 from secondlook.scenario.area import priority_grounds
+from secondlook.scenario.link import IDEAL, SHIP
 
 
 def summarise(
@@ -68,6 +69,7 @@ def summarise(
             "closest": closest,
         },
         **({"keep_out": {"entered": entered}} if scenario.area.keep_out else {}),
+        "link": _link(scenario, observer, mission_s),
         "latency_ms": {
             "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
         },
@@ -95,6 +97,14 @@ def _priorities(scenario: Scenario, metrics: Metrics) -> list[dict[str, float | 
         }
         for one in risk_in_priorities(grounds, replace(after, risk=risk, seen=seen), after)
     ]
+
+
+def _link(scenario: Scenario, observer: Observer, mission_s: float) -> dict[str, Any]:
+    """What went across the water."""
+    link, hub = scenario.link, scenario.coordinator.platform or SHIP
+    platforms = {hub, *scenario.vehicles} if link is not None else ()
+    profile = IDEAL if link is None else link.modem.name
+    return observer.link.summary(profile, len(platforms), hub, round(mission_s * 1000))
 
 
 def _times(mission_s: float, primary_s: float | None, wall_s: float) -> dict[str, float | None]:

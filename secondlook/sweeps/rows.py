@@ -47,6 +47,7 @@ FIGURES: Mapping[str, Any] = {
         **dict.fromkeys(("first_published_s", "first_assigned_s"), REAL),
     },
     "separation": {"least_m": REAL, "pairs_closer": WHOLE},
+    "link": {"profile": TEXT, "bytes_per_s": REAL, "frames_sent": WHOLE, "frames_lost": WHOLE},
     "rounds": WHOLE,
     "messages": {topic.name: WHOLE for topic in TOPICS},
 }
@@ -58,7 +59,8 @@ def schema_of(plan: SweepPlan) -> pa.Schema:
     varied comes after it; `command` flies the mission again."""
     columns = {"key": TEXT, "seed": WHOLE, **{key: _type_of(values) for key, values in plan.vary.items()}}
     figures = dict(FIGURES)
-    figures["vehicles"] = _vehicles(plan)
+    figures["vehicles"] = vehicles = _vehicles(plan)
+    figures["link"] = {**FIGURES["link"], "age": {name: {"mean_s": REAL, "largest_s": REAL} for name in vehicles}}
     most = max(len(one.scenario.area.priorities) for one in plan.combinations)
     figures["priorities"] = {str(place): {"weight": REAL, "mean": REAL} for place in range(most)}
     columns.update((".".join(path), kind) for path, kind in _leaves(figures) if ".".join(path) not in columns)

@@ -1,0 +1,88 @@
+"""Whole missions in which platforms talk by modems."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from flights import BRIEF
+
+from comms.drive import Drive
+from comms.lockstep.drive import Lockstep
+from comms.lockstep.faults import CutOff, Faults
+from secondlook.launch.mission import Bus, RunOptions, run_mission
+from secondlook.scenario import load_scenario
+
+
+def fly(
+    folder: Path,
+    *settings: str,
+    bus: Bus = "local",
+    processes: int | None = None,
+    drive: Drive | None = None,
+) -> dict[str, Any]:
+    """The summary of the brief mission."""
+    folder.mkdir(exist_ok=True)
+    options = RunOptions(folder, bus=bus, processes=processes, record=False, drive=drive or Lockstep())
+    summary = run_mission(load_scenario(str(BRIEF), settings), options)
+    assert json.loads((folder / "summary.json").read_text()) == summary
+    return summary
+
+
+LONG = "mission.deadline_factor=3"  # so that there is time to wait for slots
+
+
+@pytest.mark.parametrize("platform", ["ship", "primary"])
+@pytest.mark.parametrize("profile", ["radio", "micromodem-6", "micromodem-1", "micromodem-0", "unet-data"])
+def test_second_looks_are_had_by_any_modem(tmp_path: Path, profile: str, platform: str) -> None:
+    summary = fly(tmp_path, f"link.profile={profile}", f"coordinator.platform={platform}", LONG)
+    assert summary["ending"] == "over"
+    assert summary["dropped"] == {}
+    assert summary["hotspots"]["revisited"] > 0
+    assert summary["risk"]["mean"] < summary["risk_primary_alone"]["mean"] - 0.05
+    link = summary["link"]
+    assert link["profile"] == profile
+    platforms = {platform, "primary", "helper"}
+    assert {*link["packets"]} == platforms
+    assert 0 < link["bytes_per_s"] < 200
+    assert link["frames_sent"] >= sum(link["packets"].values())
+    assert link["age"]["helper"]["largest_s"] > link["age"]["helper"]["mean_s"] > 0
+
+
+@pytest.mark.parametrize("profile", ["micromodem-6", "janus"])
+def test_it_is_one_mission_on_either_bus_in_any_number_of_processes(tmp_path: Path, profile: str) -> None:
+    settings = (f"link.profile={profile}", "link.loss=0.2")
+    local = fly(tmp_path / "local", *settings)
+    zenoh = [
+        fly(tmp_path / f"zenoh-{processes}", *settings, bus="zenoh", processes=processes) for processes in (None, 2)
+    ]
+    assert {one["digest"] for one in zenoh} == {local["digest"]}
+    assert local["link"]["frames_lost"] > 0
+    assert fly(tmp_path / "again", *settings, "link.loss=0.21")["digest"] != local["digest"]
+
+
+def test_the_ideal_link_is_no_link(tmp_path: Path) -> None:
+    without, ideal = fly(tmp_path / "without"), fly(tmp_path / "ideal", "link.profile=ideal")
+    assert ideal["digest"] == without["digest"]
+    assert ideal["link"]["profile"] == without["link"]["profile"] == "ideal"
+    assert ideal["link"]["packets"] == {}
+
+
+def test_who_is_cut_off_is_neither_heard_nor_hears(tmp_path: Path) -> None:
+    cut = Lockstep(faults=Faults(0, cut_offs=(CutOff("helper", 0, 10_000_000),)))
+    summary = fly(tmp_path, "link.profile=micromodem-6", drive=cut)
+    assert summary["ending"] == "over"
+    assert summary["hotspots"]["revisited"] == 0
+    assert summary["link"]["age"]["helper"]["largest_s"] == pytest.approx(summary["time"]["mission_s"], abs=0.1)
+
+
+def test_an_outage_makes_what_is_known_old_and_ends(tmp_path: Path) -> None:
+    outage = "link.outages=[{platform: helper, from_s: 20, for_s: 60}]"
+    calm, out = (
+        fly(tmp_path / name, "link.profile=micromodem-6", *more, LONG)
+        for name, more in (("calm", ()), ("out", (outage,)))
+    )
+    assert out["link"]["age"]["helper"]["largest_s"] >= 60 > calm["link"]["age"]["helper"]["largest_s"]
+    assert out["hotspots"]["revisited"] > 0
