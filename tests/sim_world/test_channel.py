@@ -97,6 +97,13 @@ class TestOneAtATime:
             channel.send(sender, ONE, begins_ms, places)
         assert [one for _, one in heard(channel) if one.platform == "d"] == []
 
+    def test_what_ends_at_one_time_comes_by_its_senders_whoever_spoke_first(self) -> None:
+        places: dict[str, Point] = {"a": (0.0, 0.0), "b": (0.0, 9e3), "c": (0.0, 10e3), "d": (0.0, 1e3)}
+        channel = Channel(ChannelConfig(SIGNAL, tuple(places)), seed=1)
+        for sender in "ba":
+            channel.send(sender, (sender.encode(),), 0, places)
+        assert [arrival for _, arrival in heard(channel)] == [Arrival("d", (b"a",)), Arrival("c", (b"b",))]
+
     def test_what_is_told_late_still_counts_for_what_it_overlaps(self) -> None:
         channel = Channel(CONFIG, seed=1)
         channel.send("a", ONE, 0, PLACES)
@@ -116,8 +123,8 @@ class TestLoss:
         assert shares == pytest.approx([0.1, 0.1, 0.15, 0.2, 0.5, 0.8, 0.8])
 
     def test_the_sonar_equation_by_hand(self) -> None:
-        # 160 dB, less 45 dB over 1 km and 22 dB in the receiver, over 60 dB and 10 log 100: 13 dB, next to nothing being
-        # absorbed at 100 Hz. That is a ratio of 19.95: 0.5 exp(-9.976) = 2.33e-5 of bits are wrong, 0.594 % of frames.
+        # 160 dB, less 45 dB over 1 km and 22 dB in the receiver, over 60 dB and 10 log 100: 13 dB, as at 100 Hz next to
+        # nothing is absorbed. That is a ratio of 19.95: 0.5 exp(-9.976) = 2.33e-5 of bits are wrong, 0.594 % of frames.
         sonar = SonarEquation(160.0, 60.0, 100.0, "fsk", receiver_loss_db=22.0)
         assert sonar.bit_error_rate(1000.0, 100.0) == pytest.approx(2.33e-5, rel=0.01)
         assert sonar.share_at(1000.0, 256, 100.0) == pytest.approx(0.00594, rel=0.01)
@@ -143,6 +150,21 @@ class TestLoss:
             half.send("a", TWO, 10_000 * number, PLACES)
             came |= {arrival.frames for _, arrival in heard(half)}
         assert came == {TWO, (b"one",), (b"two",)}
+
+    def test_each_pair_of_platforms_has_chances_of_its_own(self) -> None:
+        places: dict[str, Point] = {"a": (0.0, 0.0), "b": (1500.0, 0.0), "c": (750.0, 1000.0)}
+        half = Channel(replace(CONFIG, loss=0.5), seed=3)
+        came: dict[str, set[int]] = {}
+        for number in range(64):
+            for sender in "abc":
+                half.send(
+                    sender, (f"{sender}{number}".encode(),), 30_000 * number + 10_000 * "abc".index(sender), places
+                )
+        for _, arrival in heard(half):
+            pair = arrival.frames[0][:1].decode() + arrival.platform
+            came.setdefault(pair, set()).add(int(arrival.frames[0][1:]))
+        assert sorted(came) == ["ab", "ac", "ba", "bc", "ca", "cb"]
+        assert len({frozenset(numbers) for numbers in came.values()}) == 6
 
     def test_an_outage_silences_who_sends_and_who_hears(self) -> None:
         out = Channel(replace(CONFIG, outages=(Outage(1_200, 2_100, "b"),)), seed=1)
