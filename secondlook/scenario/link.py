@@ -147,7 +147,7 @@ def _made(text: str) -> object:
     try:
         made = PROFILE.maker(text)()
         if not isinstance(made, dict):
-            raise refused(f"must make a profile's keys as a dict; it makes a {type(made).__name__}")
+            raise PlugInError(f"must make a profile's keys as a dict; it makes a {type(made).__name__}")
         return Profile.model_validate(made).model_dump(exclude_none=True)
     except PlugInError as error:
         raise refused(str(error)) from error

@@ -186,7 +186,7 @@ def keys(model: type[BaseModel], path: str = "") -> Iterator[str]:
         here = rf"{path}{name}"
         yield here
         for inner in inner_models(info.annotation):
-            between = {"vehicles": r"\.\w+", "priorities": r"\[\d\]"}.get(name, "")
+            between = {"vehicles": r"\.\w+", "priorities": r"\[\d\]", "outages": r"\[\d\]"}.get(name, "")
             yield from keys(inner, rf"{here}{between}\.")
 
 

@@ -1,0 +1,109 @@
+"""From a scenario's link to the channel and the slots: who is on it, where the ship lies, and how long slots are."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from secondlook.fleet.build import world_config
+from secondlook.fleet.link import LinkTimes, channel_config, link_times, platforms_of, ship_position
+from secondlook.scenario import Scenario, load_scenario
+from sim_world.channel_config import ChannelConfig, Outage
+
+AREA_M = math.hypot(1212, 400)
+"""From corner to corner of tellaro's area."""
+
+
+def linked(*settings: str, profile: str = "micromodem-0") -> Scenario:
+    return load_scenario("tellaro", [f"link.profile={profile}", *settings])
+
+
+def times_of(*settings: str, profile: str = "micromodem-0") -> LinkTimes:
+    times = link_times(linked(*settings, profile=profile))
+    assert times is not None
+    return times
+
+
+def channel_of(*settings: str) -> ChannelConfig:
+    channel = channel_config(linked(*settings))
+    assert channel is not None
+    return channel
+
+
+def test_without_a_link_there_is_no_channel_and_no_slot() -> None:
+    scenario = load_scenario("tellaro")
+    assert link_times(scenario) is None
+    assert channel_config(scenario) is None
+    assert world_config(scenario).channel is None
+
+
+class TestPlatforms:
+    def test_the_ship_is_first_and_lies_amid_the_starts(self) -> None:
+        scenario = linked("vehicles.primary.start={x_m: 0, y_m: -40}", "vehicles.helper.start={x_m: 30, y_m: -80}")
+        assert platforms_of(scenario) == ("ship", "primary", "helper")
+        assert ship_position(scenario) == (15.0, -60.0)
+        channel = world_config(scenario).channel
+        assert channel is not None
+        assert channel.still == (("ship", (15.0, -60.0)),)
+
+    def test_the_ship_lies_where_the_scenario_has_it(self) -> None:
+        assert channel_of("coordinator.position={x_m: -5, y_m: 7}").still == (("ship", (-5.0, 7.0)),)
+
+    def test_aboard_a_vehicle_there_is_no_ship_and_that_is_first(self) -> None:
+        channel = channel_of("coordinator.platform=helper")
+        assert channel.platforms == ("helper", "primary")
+        assert channel.still == ()
+
+
+class TestSlots:
+    def test_a_slot_has_the_longest_packet_its_way_and_the_guard(self) -> None:
+        times = times_of("link.reach_m=3000")
+        assert (times.frame_bits, times.frames, times.packet_ms) == (256, 1, (3500,))
+        assert (times.way_ms, times.guard_ms, times.slot_ms) == (2000, 500, 6000)
+        assert times.cycle_ms == 18_000
+        assert times_of("link.reach_m=3000", "link.guard_s=0.2").slot_ms == 5700
+
+    def test_fewer_frames_make_slots_shorter(self) -> None:
+        all_six = times_of("link.reach_m=1500", profile="micromodem-6")
+        assert all_six.packet_ms == (792, 1284, 1775, 2267, 2759, 3250)  # 300 ms and 256 bits at 520.68 bit/s each
+        assert all_six.slot_ms == 3250 + 1000 + 500
+        two = times_of("link.reach_m=1500", "link.slot_frames=2", profile="micromodem-6")
+        assert (two.frames, two.slot_ms) == (2, 1284 + 1000 + 500)
+
+    @pytest.mark.parametrize(
+        ("profile", "slots_ms"),
+        [
+            ("janus", (2267, 3600)),
+            ("micromodem-0", (4667, 6000)),
+            ("micromodem-1", (7611, 8944)),
+            ("micromodem-6", (4417, 5750)),
+            ("radio", (915, 915)),
+            ("unet-control", (932, 2265)),
+            ("unet-data", (986, 2319)),
+        ],
+    )
+    def test_over_1_and_3_km(self, profile: str, slots_ms: tuple[int, int]) -> None:
+        both = (times_of(f"link.reach_m={reach_m}", profile=profile).slot_ms for reach_m in (1000, 3000))
+        assert tuple(both) == slots_ms
+
+    def test_they_reach_over_all_places_that_the_scenario_names(self) -> None:
+        starts = "vehicles.primary.start={x_m: 0, y_m: 0}", "vehicles.helper.start={x_m: 0, y_m: 0}"
+        assert times_of(*starts).reach_m == pytest.approx(AREA_M)
+        assert times_of(*starts, "vehicles.helper.home={x_m: 0, y_m: -900}").reach_m == pytest.approx(
+            math.hypot(1212, 1300)
+        )
+        assert times_of(*starts, "coordinator.position={x_m: -800, y_m: 0}").reach_m == pytest.approx(
+            math.hypot(2012, 400)
+        )
+
+    def test_but_no_farther_than_the_modem_is_heard(self) -> None:
+        assert times_of("coordinator.position={x_m: -9000, y_m: 0}", profile="unet-data").reach_m == 2000
+
+
+def test_extra_loss_and_outages_reach_the_world_in_milliseconds() -> None:
+    channel = channel_of(
+        "link.loss=0.25", "link.outages=[{platform: ship, from_s: 1.5, for_s: 2}, {from_s: 9, for_s: 1}]"
+    )
+    assert channel.loss == 0.25
+    assert channel.outages == (Outage(1500, 3500, "ship"), Outage(9000, 10_000))
