@@ -6,11 +6,15 @@ Its sequence number is made of that second and its place within it: messages of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+import shapely
+
+from comms.said.announcement import Vertex
 from comms.said.bits import BitReader, BitWriter
 from comms.said.codec import LARGEST_INCARNATION, Header
+from comms.said.messages import Hotspot
 from comms.said.over_water import Around
 from comms.said.packing import get_message, put_message
 from comms.said.topics import TOPICS, Topic, number_of
@@ -25,6 +29,9 @@ SECOND_BITS = 12
 MOST_A_SECOND = 64
 """Messages of a sender that are told apart within a second."""
 COORDINATOR = "coordinator"
+MOST_CORNERS = 10
+"""Of a hotspot as it is told over water: what it looks like in detail the stretches tell as well."""
+FIRST_TOLERANCE_M = 2.0
 
 
 class Said(NamedTuple):
@@ -56,7 +63,10 @@ class Letters:
             writer.write(vehicles.index(topic.vehicle_of(said.key)), (len(vehicles) - 1).bit_length())
         if topic is not None and "{number}" in topic.pattern:
             writer.write_count(number_of(said.key), 4)
-        put_message(writer, said.message, self._around(header.sent_ms // 1000 * 1000))
+        message = said.message
+        if isinstance(message, Hotspot):
+            message = replace(message, outline=with_fewer_corners(message.outline))
+        put_message(writer, message, self._around(header.sent_ms // 1000 * 1000))
         return writer
 
     def open(self, reader: BitReader, platform: str, now_ms: int) -> tuple[Topic | None, Said]:
@@ -86,3 +96,14 @@ class Letters:
 
     def _around(self, sent_ms: int) -> Around:
         return Around(*self.config.low_m, *self.config.high_m, sent_ms)
+
+
+def with_fewer_corners(outline: tuple[Vertex, ...]) -> tuple[Vertex, ...]:
+    """An outline with at most 10 corners, out of its own: those are left out that change it least."""
+    corners, tolerance_m = outline, FIRST_TOLERANCE_M
+    while len(corners) > MOST_CORNERS:
+        simple = shapely.Polygon([(one.x_m, one.y_m) for one in outline]).simplify(tolerance_m)
+        assert isinstance(simple, shapely.Polygon), "what its topology is kept of stays one piece"
+        corners = tuple(Vertex(x_m, y_m) for x_m, y_m in simple.exterior.coords[:-1])
+        tolerance_m *= 1.5
+    return corners

@@ -41,6 +41,8 @@ from modem.waiting import Queue, Waiting, worth
 log = logging.getLogger("secondlook.modem")
 
 STRETCH = Crossing(3000, 300)
+STRETCH_BITS = 130
+"""That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
 LATE_MS = 100
 """So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
 LEAST_PIECE_BITS = 8
@@ -99,6 +101,11 @@ class Modem:
         slot_ms = self.config.slot_of(self.config.platform, now_ms)
         if self._form is not None and now_ms - slot_ms <= LATE_MS and slot_ms > self._spoke_ms:
             self._spoke_ms = slot_ms
+            if (
+                self._gathering is not None
+                and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
+            ):
+                self._say_stretch(self._gathering.flush(), now_ms)
             frames = self._frames(self._form, now_ms)
             if frames:
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
@@ -366,6 +373,11 @@ class Modem:
 
     def _has_anything_to_say(self) -> bool:
         return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())
+
+    def _bits_to_say(self) -> int:
+        """Bits of what waits, but for what is about it."""
+        pieces = (piece.bits for sending in self._sending.values() for _, piece, _, _ in sending.may_be_said())
+        return self._queue.bits + sum(pieces)
 
     def _has_more_than_acks(self) -> bool:
         return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))

@@ -40,6 +40,11 @@ class Queue:
     def __len__(self) -> int:
         return len(self._waiting)
 
+    @property
+    def bits(self) -> int:
+        """Of all of them."""
+        return sum(one.said.bits for one in self._waiting.values())
+
     def add(self, one: Waiting) -> None:
         """Takes a message."""
         if one.crossing.newest_only:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import random
 
+import numpy as np
 import pytest
+import shapely
 from fleets import state
 from modems import Waters
 
@@ -21,6 +24,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from modem.letters import with_fewer_corners
 
 TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
 OUTLINE = tuple(Vertex(100.0 + 10 * place, 50.0 + 5 * (place % 3)) for place in range(12))
@@ -129,3 +133,18 @@ def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
     waters.say("world", "modem/ship/rx", Packet((struck,)))
     assert waters.modems["ship"].dropped == {"no frame of this run": 1}
     assert waters.heard == []
+
+
+def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
+    round_about = tuple(
+        Vertex(round(200 + 80 * math.cos(angle), 2), round(200 + 40 * math.sin(angle), 2))
+        for angle in np.linspace(0, math.tau, 40, endpoint=False)
+    )
+    fewer = with_fewer_corners(round_about)
+    assert 5 <= len(fewer) <= 10
+    assert {*fewer} <= {*round_about}
+    whole, rough = (shapely.Polygon([(one.x_m, one.y_m) for one in corners]) for corners in (round_about, fewer))
+    assert whole.symmetric_difference(rough).area < 0.15 * whole.area
+    for few in (10, 2, 0):
+        assert with_fewer_corners(OUTLINE[:few]) == OUTLINE[:few]
+    assert 1 <= len(with_fewer_corners(OUTLINE)) <= 10  # of no area

@@ -1,0 +1,73 @@
+"""How much of the risk that second looks remove over an ideal link they remove over others, from sweeps.
+
+`secondlook sweep SCENARIO --seeds 1001..1020 --vary link.profile=ideal,micromodem-1,... [--vary
+coordinator.platform=ship,primary] --out DIR` flies them; `python -m bench.link_share DIR ...` pools the folders, and
+prints a line for each link: the share kept, mean and least over the seeds of any scenario, bytes a second across the
+water, and how old what the coordinator knew was on average.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import defaultdict
+from statistics import fmean
+from typing import Any
+
+import secondlook
+
+Row = dict[str, Any]
+LINK, IDEAL = "link.profile", "ideal"
+
+
+def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tuple[Row, float]]]:
+    """Of each combination of what was varied, by its values as text, the missions with the share that each keeps of
+    what the ideal link's removes; those that failed, and those of which nothing was removed by that, are left out.
+
+    Raises ValueError where the ideal link was not flown.
+    """
+    others = [key for key in varied if key != LINK]
+    removed = {
+        (row["scenario"], row["seed"], *(row[key] for key in others)): _removed(row)
+        for row in rows
+        if row[LINK] == IDEAL and row["failure"] is None
+    }
+    if not removed:
+        raise ValueError(f"no mission was flown with {LINK}={IDEAL}, which the others are compared with")
+    found = defaultdict[tuple[str, ...], list[tuple[Row, float]]](list)
+    for row in rows:
+        ideal = removed.get((row["scenario"], row["seed"], *(row[key] for key in others)), 0.0)
+        if row["failure"] is None and ideal > 0.0:
+            found[tuple(str(row[key]) for key in varied)].append((row, _removed(row) / ideal))
+    return found
+
+
+def _removed(row: Row) -> float:
+    return float(row["risk_primary_alone.mean"] - row["risk.mean"])
+
+
+def _age_s(row: Row) -> float:
+    return fmean(value for key, value in row.items() if key.endswith(".mean_s") and value is not None)
+
+
+def main(folders: list[str]) -> None:
+    """Prints the table. Raises UserError for what is no sweep."""
+    rows, varied = list[Row](), list[str]()
+    for folder in folders:
+        sweep = secondlook.load_sweep(folder)
+        varied = list(sweep.vary)
+        rows += [{**row, "scenario": sweep.scenario} for row in sweep.table.to_pylist()]
+    print(f"| {' | '.join(varied)} | missions | share kept | least | bytes a second | age in s |")
+    print(f"|{'---|' * (len(varied) + 5)}")
+    for values, missions in shares(rows, varied).items():
+        kept = [share for _, share in missions]
+        bytes_per_s, age_s = (fmean(of(row) for row, _ in missions) for of in (_bytes_per_s, _age_s))
+        names = " | ".join(f"`{one}`" for one in values)
+        print(f"| {names} | {len(kept)} | {fmean(kept):.3f} | {min(kept):.3f} | {bytes_per_s:.1f} | {age_s:.0f} |")
+
+
+def _bytes_per_s(row: Row) -> float:
+    return float(row["link.bytes_per_s"])
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
