@@ -103,7 +103,7 @@ def test_who_does_not_heed_it_is_told(tmp_path: Path, monkeypatch: pytest.Monkey
         return SimulatedVehicle(config, seed, current)
 
     monkeypatch.setattr("sim_world.world.SimulatedVehicle", heedless)
-    flight = fly(tmp_path, ROCKS, over_by(600))
+    flight = fly(tmp_path, ROCKS)
     entered = flight.entered[0]
     with pytest.raises(AssertionError, match=f"{entered.vehicle} entered zone 1 at {entered.t_s:.3f} s"):
         assert_kept_out(flight)
