@@ -83,17 +83,21 @@ class Coordinator:
         """Finds who is lost and what is late, does what is due, and finds whether the mission is over."""
         if self.has_begun and self._end.over is None:
             self._strips.find_overdue(self.fleet.find_lost(now_ms), now_ms)
-            # One sector at a time: a wake-up of a large fleet's coordinator takes no longer than of a small one's.
-            for number in self._agenda.strike(Item.CUT, now_ms, most=1):
-                self._cut(number, now_ms)
-            for number in self._agenda.strike(Item.ASSIGN, now_ms, most=1):
-                self._assign(self._sectors.all[number], now_ms)
-            if self._agenda.strike(Item.KEEP_APART, now_ms):
-                self._dispatch.keep_apart(now_ms)
+            if now_ms < self._end.deadline_ms():  # what is offered then is left in the same breath
+                self._do_what_is_due(now_ms)
             self._end.find(now_ms)
         elif self._agenda.strike(Item.SAY_OVER, now_ms):
             self._end.say_again(now_ms)
         return self._step(now_ms)
+
+    def _do_what_is_due(self, now_ms: int) -> None:
+        """One sector at a time: a wake-up of a large fleet's coordinator takes no longer than of a small one's."""
+        for number in self._agenda.strike(Item.CUT, now_ms, most=1):
+            self._cut(number, now_ms)
+        for number in self._agenda.strike(Item.ASSIGN, now_ms, most=1):
+            self._assign(self._sectors.all[number], now_ms)
+        if self._agenda.strike(Item.KEEP_APART, now_ms):
+            self._dispatch.keep_apart(now_ms)
 
     def _begin(self, run: RunInfo, now_ms: int) -> None:
         config, agenda, outbox = self.config, self._agenda, self._outbox

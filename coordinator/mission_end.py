@@ -53,7 +53,7 @@ class MissionEnd:
             early = ", ".join(name for name, one in self._fleet.primaries.items() if one.ended_early)
             cut_short = f"; the survey of {early} has ended early, as the battery lasted for no more" if early else ""
             reason = f"every primary has finished and no strip is left{cut_short}"
-        elif now_ms >= self._deadline_ms():
+        elif now_ms >= self.deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
             end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"
             cut_short = ", the survey is not finished" if surveying else ""
@@ -101,10 +101,11 @@ class MissionEnd:
 
     def deadlines_ms(self) -> list[int]:
         """When the mission is over at the latest, if that is known already."""
-        deadline_ms = self._deadline_ms()
+        deadline_ms = self.deadline_ms()
         return [] if deadline_ms == math.inf else [int(deadline_ms)]
 
-    def _deadline_ms(self) -> float:
+    def deadline_ms(self) -> float:
+        """When the mission is over at the latest; infinite where that is not known yet."""
         if math.isfinite(self._config.deadline_s):
             return math.ceil(self._config.deadline_s * 1000)
         if self._fleet.surveying:

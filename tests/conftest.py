@@ -19,7 +19,7 @@ settings.load_profile("secondlook")
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The longest comes first, as at the end one process would wait for the other to be done with it."""
-    items.sort(key=lambda item: "both_buses[wide]" not in item.name)
+    items.sort(key=lambda item: "both_buses[armada]" not in item.name)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

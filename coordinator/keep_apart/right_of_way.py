@@ -41,7 +41,9 @@ GIVES_BACK_S = 50.0
 """So long before it would come too close a helper gives its strip back: until then the other's plan may change. So
 long before it begins to sweep, the whole sweep must be clear."""
 TOLD_AGAIN_S = 10.0
-BEARINGS = 8
+ASIDE_RAD = tuple(number * math.pi / 4 for number in range(8) if number != 4)
+"""Where places to stand aside lie off the bow, to starboard: dead astern a turn to either side is as short, and nobody
+can tell which the vehicle takes."""
 
 
 @dataclass(frozen=True)
@@ -210,8 +212,8 @@ class RightOfWay:
         """The nearest place in the area at which it can wait; None where there is none."""
         here = self._traffic.holding(one.vehicle, one.strip, now_s).at(now_s)
         for for_s in (2 * CLEAR_AHEAD_S, STANDS_ASIDE_S):
-            for share, number in product((2.0, 3.5, 5.0), range(BEARINGS)):
-                bearing_rad = here.heading_rad + 2 * math.pi * number / BEARINGS
+            for share, aside_rad in product((2.0, 3.5, 5.0), ASIDE_RAD):
+                bearing_rad = here.heading_rad + aside_rad
                 far_m = share * self.separation_m
                 place = (here.x_m + far_m * math.sin(bearing_rad), here.y_m + far_m * math.cos(bearing_rad))
                 if self._is_inside(place) and self._traffic.has_room(one.vehicle, one.strip, place, now_s):

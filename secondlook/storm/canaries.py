@@ -128,7 +128,7 @@ CANARIES: dict[str, Canary] = {
     "a look that comes again counts again": Canary(Agent, "_hear_look", _hear_look),
     "tiles are not said again to who asks for them": Canary(CoverageLayer, "again", lambda method, layer: []),
     "the mission ends before all has come": Canary(KnownFleet, "lacking", lambda method, fleet, now_ms: []),
-    "the deadline is passed over": Canary(MissionEnd, "_deadline_ms", lambda method, end: math.inf),
+    "the deadline is passed over": Canary(MissionEnd, "deadline_ms", lambda method, end: math.inf),
     "who is under way does not give way": Canary(RightOfWay, "check", _check),
 }
 """By name in plain words."""

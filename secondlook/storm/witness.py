@@ -145,7 +145,10 @@ _NONE_YET = (-1, -1)
 
 @dataclass
 class CoordinatorWitness:
-    """Beside one start of the coordinator. `tiles`: of each vehicle, place and incarnation the newest that came."""
+    """Beside one start of the coordinator. `tiles`: of each vehicle, place and incarnation the newest that came.
+
+    `over`: whether it has said that the mission is over.
+    """
 
     node_id: str
     node: Coordinator
@@ -153,6 +156,7 @@ class CoordinatorWitness:
     noted: set[str]
     tiles: dict[tuple[str, Place], dict[int, CoverageTile]] = field(default_factory=dict)
     started_ms: int = 0
+    over: bool = False
     _states: dict[str, tuple[Header, AgentState]] = field(default_factory=dict)  # the newest of each vehicle
     _hotspots: dict[tuple[str, int], dict[int, int]] = field(default_factory=dict)
     _answers: dict[tuple[str, int], tuple[int, int]] = field(default_factory=dict)
@@ -245,8 +249,10 @@ class CoordinatorWitness:
         for key, message in step.publish:
             if isinstance(message, Task) and message.action is TaskAction.TAKE:
                 self._check_offer(key.split("/")[2], message.strip, now_ms)
-            elif isinstance(message, MissionOver) and message.reason.startswith("every primary"):
-                self._check_all_has_come(now_ms)
+            elif isinstance(message, MissionOver) and not self.over:
+                self.over = True  # said again it decides nothing: more may have come by then than states tell of
+                if message.reason.startswith("every primary"):
+                    self._check_all_has_come(now_ms)
 
     def _check_offer(self, name: str, number: int, now_ms: int) -> None:
         record, heard_ms = self.node.ledger.get(number), self._heard_ms(name)

@@ -23,6 +23,7 @@ from comms.said.messages import AgentState, MissionOver, Mode, StripStatus, Task
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator
 from coordinator.coordinator import Coordinator
+from coordinator.fixed import FixedRoutes
 from coordinator.vehicles import KnownVehicle
 from planner.tiles import tiles
 
@@ -68,6 +69,17 @@ class TestTheEnd:
         reason = "1.05 times the last primary's end is reached, 0 strips are left"
         assert [one.message for one in said] == [MissionOver(reason)]
         assert said[0].at_ms == 21_000
+
+    def test_at_the_deadline_nothing_is_offered_any_more(self) -> None:
+        # Routes planned beforehand are kept to, however late it is, and so may an allocator of a user's do.
+        told = coordinator(allocator=FixedRoutes({HELPER: [1]}), idle=(), deadline_s=100)
+        told.hotspot()
+        told.state(HELPER, Mode.FINISHED)
+        told.node.wait_until(99_999)
+        assert told.states() == {1: OPEN}
+        told.state(HELPER, Mode.IDLE)
+        assert [type(one.message) for one in told.settle()] == [StripStatus, MissionOver]
+        assert told.tasks() == []
 
     def test_it_says_so_again_for_10_s_until_all_have_answered(self) -> None:
         told = coordinator()

@@ -44,7 +44,7 @@ CHARTED = (
 )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def valid_text() -> str:
     return VALID
 

@@ -19,7 +19,7 @@ from coordinator.keep_apart.right_of_way import RightOfWay, Underway
 from coordinator.vehicles import KnownVehicle
 from planner.types import Strip
 
-NORTH = 0.0
+NORTH, WEST = 0.0, 1.5 * math.pi
 
 
 def known(name: str, role: Role, mode: Mode, x_m: float, y_m: float, works_on: int = 0, **other: int) -> KnownVehicle:
@@ -123,6 +123,16 @@ class TestCheck:
         assert its is not None
         assert mine is not None
         assert too_close(mine, its, 15, 0, 180) is None
+
+    def test_none_is_sent_dead_astern_as_it_may_turn_to_either_side(self) -> None:
+        me = known("helper", Role.REVISIT, Mode.IDLE, 10, 90)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=WEST)
+        fleet = [Underway(primary(0), None), Underway(me, None)]
+        (told,) = RightOfWay(15, lambda place: place[0] > 10).check(fleet, 0.0)
+        assert told.place is not None
+        assert abs(told.place[1] - 90) > 10
+        assert RightOfWay(15, lambda place: place[0] > 10 and abs(place[1] - 90) < 1).check(fleet, 0.0) == []
 
     def test_one_that_is_far_does_not(self) -> None:
         fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]

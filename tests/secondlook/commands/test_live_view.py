@@ -11,7 +11,9 @@ import subprocess
 import sys
 import urllib.request
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from urllib.error import URLError
 from urllib.parse import parse_qs, urlsplit
 
@@ -31,6 +33,23 @@ COMMAND = [sys.executable, "-P", "-c", "from secondlook.installed_command import
 def scenario(write: Callable[[str], str], valid_text: str) -> str:
     """A short mission."""
     return write(valid_text)
+
+
+@dataclass(frozen=True)
+class Alone:
+    """What the command says of the same mission when nobody watches it, and what it recorded."""
+
+    told: dict[str, Any]
+    recording: Path
+
+
+@pytest.fixture(scope="module")
+def unwatched(tmp_path_factory: pytest.TempPathFactory, valid_text: str) -> Alone:
+    folder = tmp_path_factory.mktemp("unwatched")
+    (folder / "bad.yaml").write_text(valid_text)
+    command = [*COMMAND, "bad.yaml", "--bus", "local", "--out", "alone", "--no-report", "--json"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True, timeout=120)
+    return Alone(json.loads(done.stdout), folder / "alone" / "mission.rrd")
 
 
 def test_on_a_terminal_the_page_stays_until_ctrl_c(scenario: str, tmp_path: Path) -> None:
@@ -57,28 +76,24 @@ def test_on_a_terminal_the_page_stays_until_ctrl_c(scenario: str, tmp_path: Path
         urllib.request.urlopen(found[1], timeout=30)
 
 
-def test_without_a_terminal_it_ends_with_the_mission(scenario: str) -> None:
+def test_without_a_terminal_it_ends_with_the_mission(scenario: str, unwatched: Alone) -> None:
     command = [*COMMAND, scenario, "--live", "--web", "--processes", "1", "--out", "run", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0
     assert re.fullmatch(r"The mission is shown until it is over at\nhttp://127\.0\.0\.1:\d+/\S+\n", done.stderr)
     # What it says is the same as with nobody watching.
-    alone = [*COMMAND, scenario, "--bus", "local", "--out", "alone", "--json"]
-    unwatched = subprocess.run(alone, capture_output=True, text=True, check=True, timeout=120)
-    assert json.loads(done.stdout)["digest"] == json.loads(unwatched.stdout)["digest"]
+    assert json.loads(done.stdout)["digest"] == unwatched.told["digest"]
 
 
 @pytest.mark.parametrize("harm", [signal.SIGSTOP, signal.SIGKILL])
 @pytest.mark.parametrize("whom", ["viewer", "server"])
 def test_who_watches_can_stall_or_die_and_the_mission_is_the_same(
-    scenario: str, tmp_path: Path, whom: str, harm: signal.Signals
+    scenario: str, unwatched: Alone, tmp_path: Path, whom: str, harm: signal.Signals
 ) -> None:
     if (missing := what_is_missing()) is not None:  # the viewer that watches draws its window, if nobody sees it
         if os.environ.get("SECONDLOOK_REQUIRE_ALL") == "1":
             pytest.fail(missing)
         pytest.skip(missing)
-    alone = [*COMMAND, scenario, "--bus", "local", "--out", "alone", "--no-report", "--json"]
-    unwatched = subprocess.run(alone, capture_output=True, text=True, check=True, timeout=120)
     recording = tmp_path / "run" / "mission.rrd"
     command = [*COMMAND, scenario, "--live", "--web", "--out", "run", "--no-report", "--json"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as run:
@@ -102,14 +117,13 @@ def test_who_watches_can_stall_or_die_and_the_mission_is_the_same(
         finally:
             run.kill()
     assert (run.returncode, said) == (0, "")
-    told, expected = json.loads(out), json.loads(unwatched.stdout)
-    assert (told["digest"], told["ending"]) == (expected["digest"], "over")
+    told = json.loads(out)
+    assert (told["digest"], told["ending"]) == (unwatched.told["digest"], "over")
     assert not server.is_running()
     assert verify(recording).returncode == 0
-    unharmed = tmp_path / "alone" / "mission.rrd"
-    assert entities(recording) == entities(unharmed)
+    assert entities(recording) == entities(unwatched.recording)
     for entity, component in (("/area/risk/0-0", "GridMap:data"), ("/fleet/primary", "Transform3D:translation")):
-        assert rows(recording, entity, component) == rows(unharmed, entity, component)
+        assert rows(recording, entity, component) == rows(unwatched.recording, entity, component)
 
 
 def is_connected(viewer: int) -> bool:

@@ -77,8 +77,14 @@ def with_room_for(most_bytes: int, *arguments: str | Path) -> subprocess.Complet
     )
 
 
-@pytest.mark.parametrize("bus", ["local", "zenoh"])
-@pytest.mark.parametrize("most_bytes", [3_000, 20_001, 60_000, 100_003])
+@pytest.mark.parametrize(
+    ("most_bytes", "bus"),
+    [
+        *((most_bytes, "local") for most_bytes in (3_000, 20_001, 60_000, 100_003)),
+        (3_000, "zenoh"),  # first the launcher fails at it,
+        (20_001, "zenoh"),  # then the recorder
+    ],
+)
 def test_a_full_disk_ends_the_run_in_one_sentence(tmp_path: Path, most_bytes: int, bus: str) -> None:
     folder = tmp_path / "out"
     done = with_room_for(most_bytes, "run", BRIEF, "--out", folder, "--bus", bus)

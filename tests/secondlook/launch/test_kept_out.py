@@ -52,6 +52,11 @@ def fly(
     return Fleet("two-helpers", folder=folder, overrides=said, record=record).run()
 
 
+def over_by(deadline_s: int) -> dict[str, Any]:
+    """What makes a mission shorter, for where no more of it is needed."""
+    return {"mission.deadline_factor": None, "mission.deadline_s": deadline_s}
+
+
 def refused(flight: Flight) -> list[str]:
     said = flight.said(ManeuverStatus)
     return [one.message.reason for one in said if one.message.state is ManeuverState.REFUSED]
@@ -75,7 +80,7 @@ def test_all_stay_out_and_what_is_left_is_looked_at(tmp_path: Path, zones: list[
 
 
 def test_zones_are_drawn(tmp_path: Path) -> None:
-    flight = fly(tmp_path, PIERS, {"vehicles.primary.start.x_m": 640}, record=True)
+    flight = fly(tmp_path, PIERS, {"vehicles.primary.start.x_m": 640, **over_by(300)}, record=True)
     mission = load(flight.folder)
     kinds = [one["properties"]["kind"] for one in to_geojson(mission)["features"]]
     assert kinds.count("keep_out") == 2
@@ -109,7 +114,7 @@ def test_who_does_not_heed_it_is_told(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_without_zones_there_is_nothing_to_assert(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="needs a scenario with area"):
-        assert_kept_out(Fleet("two-helpers", folder=tmp_path, overrides=AREA).run())
+        assert_kept_out(Fleet("two-helpers", folder=tmp_path, overrides={**AREA, **over_by(30)}).run())
 
 
 def test_what_cannot_be_reached_is_left_out(tmp_path: Path) -> None:

@@ -175,29 +175,30 @@ def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path) -> Non
     assert (sensor.curve.range_m, sensor.curve.p_detect) == ((5, 40, 75), (0.1, 0.6, 0.1))
 
 
-@pytest.mark.parametrize("bus", ["local", "zenoh"])
-@pytest.mark.parametrize(
-    ("setting", "sentence"),
-    [
-        (
-            "coordinator.allocator=own:Quits",
-            r"coordinator has failed at \d+\.\d+ s: SystemExit \(own\.py, line \d+, in assign\)",
-        ),
-        (
-            "coordinator.allocator=own:Leaves",
-            r"coordinator has failed at \d+\.\d+ s: GeneratorExit: no more \(own.*, in assign\)",
-        ),
-        (
-            "vehicles.primary.spacing=own:QuitsPlanning",
-            r"primary has failed at 0\.001 s: SystemExit \(own.*, in decide\)",
-        ),
-        (
-            "vehicles.primary.agent=own:QuitsAtStart",
-            r"primary has failed at 0\.000 s: SystemExit: 0 \(own.*, in start\)",
-        ),
-        ("vehicles.primary.agent=own:AgentNeverMade", r"primary has failed: SystemExit: 0 \(own.*, in __init__\)"),
-    ],
-)
+EXITS = [
+    (
+        "coordinator.allocator=own:Quits",
+        r"coordinator has failed at \d+\.\d+ s: SystemExit \(own\.py, line \d+, in assign\)",
+    ),
+    (
+        "coordinator.allocator=own:Leaves",
+        r"coordinator has failed at \d+\.\d+ s: GeneratorExit: no more \(own.*, in assign\)",
+    ),
+    (
+        "vehicles.primary.spacing=own:QuitsPlanning",
+        r"primary has failed at 0\.001 s: SystemExit \(own.*, in decide\)",
+    ),
+    (
+        "vehicles.primary.agent=own:QuitsAtStart",
+        r"primary has failed at 0\.000 s: SystemExit: 0 \(own.*, in start\)",
+    ),
+    ("vehicles.primary.agent=own:AgentNeverMade", r"primary has failed: SystemExit: 0 \(own.*, in __init__\)"),
+]
+# In a process of its own: at work, at its start, and while it is made.
+IN_PROCESSES = [(*one, "zenoh") for one in (EXITS[0], *EXITS[3:])]
+
+
+@pytest.mark.parametrize(("setting", "sentence", "bus"), [*((*one, "local") for one in EXITS), *IN_PROCESSES])
 def test_a_part_that_exits_has_failed(folder: Path, setting: str, sentence: str, bus: str) -> None:
     code, _, error = run(folder, setting, bus=bus)
     assert code == 1
@@ -231,17 +232,20 @@ def test_a_part_that_fails_ends_the_mission_with_one_sentence(
 SONAR = "ValueError: the sonar model of helper, own:"
 
 
-@pytest.mark.parametrize("bus", ["local", "zenoh"])
+WRONG_SONARS = [
+    ("Undecided", SONAR + r"Undecided, gives a P_d of nan at a range of \d+ m; must be 0 to 0\.999"),
+    ("Certain", SONAR + r"Certain, gives a P_d of 1\.95 at a range of \d+ m; must be 0 to 0\.999"),
+    ("Negative", SONAR + r"Negative, gives a P_d of -0\.3 at a range of \d+ m; must be 0 to 0\.999"),
+    ("Narrow", SONAR + r"Narrow, answers in the shape \(2, 4, 1\) to what has the shape \(2, 4, 26\)"),
+    ("Wordy", SONAR + r"Wordy, must answer with an array of P_d, not 'well'"),
+    ("Broken", r"IndexError: tuple index out of range \(own\.py, line \d+, in p_detect\)"),
+]
+
+
 @pytest.mark.parametrize(
-    ("model", "sentence"),
-    [
-        ("Undecided", SONAR + r"Undecided, gives a P_d of nan at a range of \d+ m; must be 0 to 0\.999"),
-        ("Certain", SONAR + r"Certain, gives a P_d of 1\.95 at a range of \d+ m; must be 0 to 0\.999"),
-        ("Negative", SONAR + r"Negative, gives a P_d of -0\.3 at a range of \d+ m; must be 0 to 0\.999"),
-        ("Narrow", SONAR + r"Narrow, answers in the shape \(2, 4, 1\) to what has the shape \(2, 4, 26\)"),
-        ("Wordy", SONAR + r"Wordy, must answer with an array of P_d, not 'well'"),
-        ("Broken", r"IndexError: tuple index out of range \(own\.py, line \d+, in p_detect\)"),
-    ],
+    ("model", "sentence", "bus"),
+    # In the world's own process: what we find wrong, and what the model itself fails at.
+    [*((*one, "local") for one in WRONG_SONARS), *((*one, "zenoh") for one in (WRONG_SONARS[0], WRONG_SONARS[-1]))],
 )
 def test_a_sonar_model_that_answers_wrongly_is_named(folder: Path, model: str, sentence: str, bus: str) -> None:
     code, _, error = run(folder, f"vehicles.helper.sensor.sonar=own:{model}", bus=bus)
