@@ -75,8 +75,10 @@ class Agent:
         self._task_order = (-1, -1)
 
     def start(self, now_ms: int) -> Step:
-        """Waits for the run's announcement."""
+        """Waits for the run's announcement. A later start numbers its manoeuvres from its second on: a word on one of
+        an earlier start, which may come late, is then none on one of its own."""
         self._started_ms = now_ms
+        self._maneuvers = now_ms // 1000
         return Step()
 
     def on_message(self, received: Received, now_ms: int) -> Step:

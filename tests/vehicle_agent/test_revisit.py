@@ -193,6 +193,17 @@ class TestAWordRepeated:
         assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/1", STRIP, sent_ms=4999)) == []
         assert agent.all(TaskStatus, agent.hear(f"coord/task/{HELPER}/2", STRIP, sent_ms=5000)) != []
 
+    def test_a_word_on_a_manoeuvre_of_its_predecessor_is_none_on_its_own(self) -> None:
+        config = RevisitConfig(HELPER, SEES, speed_mps=2, turn_radius_m=6, run_in_m=5, endurance_ms=14_400_000)
+        agent = OneNode(RevisitAgent(config), Role.REVISIT, now_ms=895_700)
+        agent.hear("run", RUN, at_ms=895_701, sent_ms=0)
+        agent.hear(f"veh/{HELPER}/nav", nav(100, 0))
+        agent.hear(f"coord/task/{HELPER}/2", STRIP)
+        assert [one.number for one in agent.all(Maneuver)] == [896]
+        tell_status(agent, HELPER, 1, ManeuverState.ACCEPTED, 900_000)
+        agent.wait_until(930_000)
+        assert [one.number for one in agent.all(Maneuver)] == [896] * 4  # asked of every 10 s, as nobody answers
+
     def test_a_strip_done_is_not_swept_again(self) -> None:
         agent = revisit()
         tell(agent, STRIP)
