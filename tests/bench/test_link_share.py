@@ -1,0 +1,38 @@
+"""The share of an ideal link's gain that another keeps, by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from bench.link_share import shares
+
+
+def row(profile: str, seed: int, mean: float, alone: float = 0.6, **more: Any) -> dict[str, Any]:
+    return {
+        "scenario": "toy", "seed": seed, "link.profile": profile, "failure": None, "risk.mean": mean,
+        "risk_primary_alone.mean": alone, **more,
+    }  # fmt: skip
+
+
+def test_each_mission_is_held_against_that_of_its_own_seed() -> None:
+    rows = [row("ideal", 1, 0.4), row("janus", 1, 0.5), row("ideal", 2, 0.2), row("janus", 2, 0.3, alone=0.7)]
+    found = shares(rows, ["link.profile"])
+    assert [share for _, share in found[("ideal",)]] == pytest.approx([1.0, 1.0])
+    assert [share for _, share in found[("janus",)]] == pytest.approx([0.5, 1.0])
+
+
+def test_and_of_its_own_platform() -> None:
+    on = [{"platform": "ship"}, {"platform": "primary"}]
+    rows = [row("ideal", 1, 0.4, **on[0]), row("ideal", 1, 0.5, **on[1]), row("radio", 1, 0.5, **on[1])]
+    found = shares(rows, ["link.profile", "platform"])
+    assert [share for _, share in found["radio", "primary"]] == pytest.approx([1.0])
+
+
+def test_what_failed_and_where_nothing_was_to_be_removed_is_left_out() -> None:
+    failed = row("radio", 1, 0.4) | {"failure": "node died", "risk.mean": None}
+    rows = [row("ideal", 1, 0.4), failed, row("ideal", 2, 0.6), row("radio", 2, 0.6)]
+    assert [len(one) for one in shares(rows, ["link.profile"]).values()] == [1]
+    with pytest.raises(ValueError, match=r"no mission was flown with link\.profile=ideal"):
+        shares([failed], ["link.profile"])
