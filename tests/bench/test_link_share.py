@@ -9,10 +9,10 @@ import pytest
 from bench.link_share import shares
 
 
-def row(profile: str, seed: int, mean: float, alone: float = 0.6, **more: Any) -> dict[str, Any]:
+def row(profile: str, seed: int, mean: float, *, alone: float = 0.6, platform: str = "ship") -> dict[str, Any]:
     return {
-        "scenario": "toy", "seed": seed, "link.profile": profile, "failure": None, "risk.mean": mean,
-        "risk_primary_alone.mean": alone, **more,
+        "scenario": "toy", "seed": seed, "link.profile": profile, "platform": platform, "failure": None,
+        "risk.mean": mean, "risk_primary_alone.mean": alone,
     }  # fmt: skip
 
 
@@ -24,8 +24,7 @@ def test_each_mission_is_held_against_that_of_its_own_seed() -> None:
 
 
 def test_and_of_its_own_platform() -> None:
-    on = [{"platform": "ship"}, {"platform": "primary"}]
-    rows = [row("ideal", 1, 0.4, **on[0]), row("ideal", 1, 0.5, **on[1]), row("radio", 1, 0.5, **on[1])]
+    rows = [row("ideal", 1, 0.4), *(row(profile, 1, 0.5, platform="primary") for profile in ("ideal", "radio"))]
     found = shares(rows, ["link.profile", "platform"])
     assert [share for _, share in found["radio", "primary"]] == pytest.approx([1.0])
 
