@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-import heapq
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from itertools import product
 from types import MappingProxyType
 
 import numpy as np
-import shapely
 from numpy.typing import NDArray
 
 from planner.groups import label_groups, neighbours
+from planner.outline import outline
 from planner.types import BoolArray, FloatArray, GridSpec, Point
 
 NumberArray = NDArray[np.int32]
 IndexArray = NDArray[np.intp]
+Window = tuple[slice, slice]
 
 MOST_VERTICES = 40
 """An outline has no more."""
@@ -39,16 +38,47 @@ class Hotspot:
 
 
 @dataclass(frozen=True, eq=False)
+class _Cells:
+    """What hotspots are made of: the hot cells, their risk (0 elsewhere) and the cells beside unsettled ones, arrays of
+    the grid's shape; patches are cut at blocks of so many cells, and left out below an area."""
+
+    hot: BoolArray
+    risk: FloatArray
+    beside_unsettled: BoolArray
+    block: int
+    least_area_m2: float
+
+    def news(self, before: _Cells | None) -> Window | None:
+        """The blocks in which something is another than before, as far as hotspots go by it; None for none."""
+        rows, columns = self.hot.shape
+        if before is None or (before.block, before.least_area_m2) != (self.block, self.least_area_m2):
+            return slice(0, rows), slice(0, columns)
+        differs = (self.risk != before.risk) | (self.hot != before.hot)
+        differs |= self.hot & (self.beside_unsettled != before.beside_unsettled)
+        if not differs.any():
+            return None
+        return self._blocks(differs.any(axis=1)), self._blocks(differs.any(axis=0))
+
+    def _blocks(self, differs: BoolArray) -> slice:
+        """From the first to the last block that holds one of these rows, or columns."""
+        (places,) = differs.nonzero()
+        first, last = (int(place) // self.block for place in (places[0], places[-1]))
+        return slice(first * self.block, min((last + 1) * self.block, differs.size))
+
+
+@dataclass(frozen=True, eq=False)
 class HotspotMap:
     """The hotspots at one time.
 
     `numbers`: which hotspot each cell belongs to, shape `grid.shape`, 0 for none; `hotspots`: by number;
-    `next_number`: the number that the next new one gets, above all that were ever given.
+    `next_number`: the number that the next new one gets, above all that were ever given; `made_of`: what all that
+    follows from, None before the first update.
     """
 
     numbers: NumberArray
     hotspots: Mapping[int, Hotspot] = field(default_factory=lambda: MappingProxyType({}))
     next_number: int = 1
+    made_of: _Cells | None = None
 
     @classmethod
     def empty(cls, grid: GridSpec) -> HotspotMap:
@@ -103,52 +133,65 @@ def update_hotspots(
         raise ValueError(f"hotspots need arrays of the grid's shape, {grid.shape}")
     if not 0 < block_m < np.inf:
         raise ValueError(f"a block's side must be finite and above 0, not {block_m} m")
-    patches = _Patches.of(grid, hot, max(1, int(block_m / grid.cell_m)), least_area_m2)
-    numbers, number_of, next_number = _numbered(patches, previous)
-    reshaped = _reshaped(numbers, previous.numbers)
+    block = max(1, int(block_m / grid.cell_m))
+    cells = _Cells(hot.copy(), np.where(hot, risk, 0.0), neighbours(unsettled), block, least_area_m2)
+    # No patch reaches from one block into another, so that where nothing is new they are what they were.
+    window = cells.news(previous.made_of)
+    if window is None:
+        return HotspotUpdate(previous, (), {})
+    before = previous.numbers[window]
+    patches = _Patches.of(grid, cells, window)
+    numbers_there, number_of, next_number = _numbered(patches, before, previous.next_number)
+    reshaped = _numbers_in(numbers_there, before, numbers_there != before)
     outlines = {
         number: previous.hotspots[number].outline
         if number in previous.hotspots and number not in reshaped
-        else _outline(grid, patches.cells(label))
+        else _outline(grid, *patches.cells(label))
         for label, number in number_of.items()
     }
-    hotspots = patches.told(number_of, outlines, risk, unsettled)
-    changed = [now for now in hotspots.values() if now != previous.hotspots.get(now.number)]
+    told = patches.told(number_of, outlines)
+    changed = [now for now in told.values() if now != previous.hotspots.get(now.number)]
+    gone = [number for number in reshaped if number in previous.hotspots and number not in told]
+    numbers = previous.numbers.copy()
+    numbers[window] = numbers_there
+    hotspots = {number: one for number, one in previous.hotspots.items() if number not in gone} | told
     return HotspotUpdate(
-        HotspotMap(numbers, MappingProxyType(hotspots), next_number),
+        HotspotMap(numbers, MappingProxyType(hotspots), next_number, cells),
         tuple(sorted(changed, key=lambda hotspot: hotspot.number)),
-        {number: _heir(numbers[previous.numbers == number]) for number in previous.hotspots if number not in hotspots},
+        {number: _heir(numbers_there[before == number]) for number in _by_first_cell(gone, before)},
     )
 
 
 @dataclass(frozen=True, eq=False)
 class _Patches:
-    """Patches of hot cells. `labels`: which one each cell is in, from 1, shape of the grid; `occupied`: the cells that
-    are in one, counted along the rows; `labels_there`: the label of each of these; `sizes`: cells by label; `kept`: the
-    labels of those that are large enough."""
+    """Patches of hot cells in a window. `occupied`: the window's cells that are in one, counted along its rows;
+    `labels_there`: which one each of these is in, from 1; `sizes`: cells by label; `kept`: the labels of those that are
+    large enough."""
 
-    labels: NumberArray
+    made_of: _Cells
+    window: Window
     occupied: IndexArray
     labels_there: NumberArray
     sizes: IndexArray
     kept: list[int]
 
     @classmethod
-    def of(cls, grid: GridSpec, hot: BoolArray, block_cells: int, least_area_m2: float) -> _Patches:
-        labels, count = label_groups(hot, block_cells)
+    def of(cls, grid: GridSpec, cells: _Cells, window: Window) -> _Patches:
+        hot = cells.hot[window]
+        labels, count = label_groups(hot, cells.block)
         occupied = np.flatnonzero(hot)
         labels_there = labels.ravel()[occupied]
         sizes = np.bincount(labels_there, minlength=count + 1)
-        kept = np.flatnonzero((sizes > 0) & (sizes * grid.cell_area_m2 >= least_area_m2))
-        return cls(labels, occupied, labels_there, sizes, kept.tolist())
+        kept = np.flatnonzero((sizes > 0) & (sizes * grid.cell_area_m2 >= cells.least_area_m2))
+        return cls(cells, window, occupied, labels_there, sizes, kept.tolist())
 
-    def told(
-        self, number_of: dict[int, int], outlines: dict[int, tuple[Point, ...]], risk: FloatArray, unsettled: BoolArray
-    ) -> dict[int, Hotspot]:
+    def told(self, number_of: dict[int, int], outlines: dict[int, tuple[Point, ...]]) -> dict[int, Hotspot]:
         """The hotspots that they are, by number; `outlines` by number, too."""
         count = self.sizes.size
-        risk_sums = np.bincount(self.labels_there, weights=risk.ravel()[self.occupied], minlength=count)
-        beside_unsettled = neighbours(unsettled).ravel()[self.occupied]
+        risk, beside_unsettled = (
+            of_all[self.window].ravel()[self.occupied] for of_all in (self.made_of.risk, self.made_of.beside_unsettled)
+        )
+        risk_sums = np.bincount(self.labels_there, weights=risk, minlength=count)
         growing = np.bincount(self.labels_there[beside_unsettled], minlength=count)
         return {
             number: Hotspot(
@@ -161,32 +204,40 @@ class _Patches:
             for label, number in number_of.items()
         }
 
-    def cells(self, label: int) -> IndexArray:
-        """The cells of one patch."""
-        found: IndexArray = self.occupied[self.labels_there == label]
-        return found
+    def cells(self, label: int) -> tuple[IndexArray, IndexArray]:
+        """The rows and columns of one patch's cells, as the grid counts them."""
+        rows, columns = self.window
+        its_rows, its_columns = np.divmod(self.occupied[self.labels_there == label], columns.stop - columns.start)
+        return its_rows + rows.start, its_columns + columns.start
 
 
-def _numbered(patches: _Patches, previous: HotspotMap) -> tuple[NumberArray, dict[int, int], int]:
-    """The number of each cell's hotspot, that of each patch by its label, and the next new number."""
+def _numbered(patches: _Patches, before: NumberArray, next_number: int) -> tuple[NumberArray, dict[int, int], int]:
+    """The number of the hotspot of each of the window's cells, that of each patch by its label, and the next new
+    number; by the numbers that these cells had before."""
     is_kept = np.zeros(patches.sizes.size, dtype=np.bool_)
     is_kept[patches.kept] = True
     in_kept = is_kept[patches.labels_there]
-    before = previous.numbers.ravel()[patches.occupied[in_kept]]
-    carried_on = _carried_on(patches.labels_there[in_kept], before, patches.sizes)
-    number_of, next_number = {}, previous.next_number
+    had = before.ravel()[patches.occupied[in_kept]]
+    carried_on = _carried_on(patches.labels_there[in_kept], had, patches.sizes)
+    number_of = {}
     for label in patches.kept:
         number_of[label] = carried_on.get(label, next_number)
         next_number += label not in carried_on
     lookup = np.zeros(patches.sizes.size, dtype=np.int32)
     lookup[patches.kept] = list(number_of.values())
-    return lookup[patches.labels], number_of, next_number
+    numbers = np.zeros(before.size, dtype=np.int32)
+    numbers[patches.occupied] = lookup[patches.labels_there]
+    return numbers.reshape(before.shape), number_of, next_number
 
 
-def _reshaped(numbers: NumberArray, before: NumberArray) -> set[int]:
-    """The numbers of hotspots that hold other cells than before, 0 for none among them."""
-    moved = np.flatnonzero(numbers != before)
-    return set(np.flatnonzero(np.bincount(np.concatenate([numbers.ravel()[moved], before.ravel()[moved]]))).tolist())
+def _numbers_in(numbers: NumberArray, before: NumberArray, cells: BoolArray) -> set[int]:
+    """The numbers that some cells have, or had before, 0 for none among them."""
+    return set(np.flatnonzero(np.bincount(np.concatenate([numbers[cells], before[cells]]))).tolist())
+
+
+def _by_first_cell(some: Iterable[int], numbers: NumberArray) -> list[int]:
+    """Some numbers in the order of their first cells, row by row."""
+    return sorted(some, key=lambda number: int((numbers == number).argmax()))
 
 
 def _carried_on(labels: NumberArray, previous_numbers: NumberArray, sizes: IndexArray) -> dict[int, int]:
@@ -220,9 +271,8 @@ def _carried_on(labels: NumberArray, previous_numbers: NumberArray, sizes: Index
     return number_of
 
 
-def _outline(grid: GridSpec, patch: IndexArray) -> tuple[Point, ...]:
-    """A patch's outline in the mission frame; `patch`: its cells' places in the flattened grid."""
-    rows, columns = np.divmod(patch, grid.columns)
+def _outline(grid: GridSpec, rows: IndexArray, columns: IndexArray) -> tuple[Point, ...]:
+    """A patch's outline in the mission frame, by its cells."""
     first_row, first_column = int(rows.min()), int(columns.min())
     cells = np.zeros((int(rows.max()) - first_row + 1, int(columns.max()) - first_column + 1), dtype=np.bool_)
     cells[rows - first_row, columns - first_column] = True
@@ -239,131 +289,3 @@ def _heir(numbers: NumberArray) -> int | None:
     counts = np.bincount(numbers, minlength=1)
     counts[0] = 0
     return int(np.argmax(counts)) if counts.any() else None
-
-
-Corner = tuple[int, int]
-
-
-def outline(cells: BoolArray, most_vertices: int) -> FloatArray:
-    """A polygon without holes about a patch, which it covers with little to spare.
-
-    Starts from the patch's exact boundary and fills its notches, smallest first, until few enough vertices are left.
-    Where a patch is so round that even without notches too many are, a regular polygon's sides are laid about it.
-
-    Args:
-        cells: the patch, connected by cell sides (one that falls apart gives the outline of one part); shape
-            (rows, columns), at least one cell.
-        most_vertices: how many vertices it may have, >= 4.
-
-    Returns:
-        Vertices (column, row) in units of cells, counterclockwise, the first not repeated; shape (n, 2).
-    """
-    corners = _without_notches(_boundary(cells), most_vertices)
-    if len(corners) > most_vertices:
-        return _sides_about(np.array(corners, dtype=np.float64), most_vertices)
-    return np.array(corners, dtype=np.float64)
-
-
-def _boundary(cells: BoolArray) -> list[Corner]:
-    """The corners of a patch's outer boundary, counterclockwise.
-
-    Follows the sides of cells with the patch on the left, from the first cell of the lowest row. Where the patch
-    touches itself at a corner only, it turns right: what the patch encloses there is a hole, and left out.
-    """
-    rows, columns = cells.shape
-    wide = columns + 2
-    padded = np.zeros((rows + 2, wide), dtype=np.bool_)
-    padded[1:-1, 1:-1] = cells
-    patch = padded.tobytes()  # cell (i, j) is at j * wide + i, and so is the lattice point (i, j)
-    ways = (1, wide, -1, -wide)  # right, up, left, down
-    ahead = (-wide, 0, -1, -wide - 1)  # the cell to the right of a point and ahead; the next one is to the left
-    start = place = patch.index(1)
-    way = 0
-    turns: list[int] = []
-    while True:
-        place += ways[way]
-        if patch[place + ahead[way]]:
-            turns.append(place)
-            way = (way - 1) % 4
-        elif not patch[place + ahead[(way + 1) % 4]]:
-            turns.append(place)
-            way = (way + 1) % 4
-        if place == start:
-            return [(place % wide - 1, place // wide - 1) for place in turns]
-
-
-def _without_notches(corners: list[Corner], most_vertices: int) -> list[Corner]:
-    """Fills a polygon's notches, smallest first, until it has few enough vertices or no notch that can be filled.
-
-    A notch is a vertex at which the polygon does not bend outward; it is filled by leaving that vertex out, where the
-    triangle with its neighbours, which the polygon gains, holds no other vertex. Corners counterclockwise; no corner
-    twice.
-    """
-    before_each, after_each = corners[-1:] + corners[:-1], corners[1:] + corners[:1]
-    preceding = dict(zip(corners, before_each, strict=True))
-    following = dict(zip(corners, after_each, strict=True))
-    turns = map(_turn, before_each, corners, after_each)
-    queue = [(-turn, corner) for turn, corner in zip(turns, corners, strict=True) if turn <= 0]
-    areas = {corner: area for area, corner in queue}
-    heapq.heapify(queue)
-    while queue and len(following) > most_vertices:
-        area, corner = heapq.heappop(queue)
-        if areas.get(corner) != area:
-            continue  # filled already, or changed when its neighbour was
-        before, after = preceding[corner], following[corner]
-        # A triangle of half a cell holds no other lattice point, and a flat one has no inside.
-        if area > 1 and _any_in_triangle(before, corner, after, following):
-            continue  # what blocks it is part of the polygon, until a neighbour is left out, which queues it anew
-        following[before], preceding[after] = after, before
-        del following[corner], preceding[corner], areas[corner]
-        for beside in (before, after):
-            turn = _turn(preceding[beside], beside, following[beside])
-            if turn > 0:
-                areas.pop(beside, None)
-            else:
-                areas[beside] = -turn
-                heapq.heappush(queue, (-turn, beside))
-    return list(_ring(following))
-
-
-def _turn(a: Corner, b: Corner, c: Corner) -> int:
-    """Twice the area of the triangle a, b, c: above 0 where the way from a over b to c bends left."""
-    return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
-
-
-def _any_in_triangle(a: Corner, b: Corner, c: Corner, vertices: dict[Corner, Corner]) -> bool:
-    """Whether any vertex but its own lies in or on a triangle that bends right."""
-    x0, x1 = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
-    y0, y1 = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
-    near: Iterable[Corner]
-    if (x1 - x0 + 1) * (y1 - y0 + 1) < len(vertices):
-        near = [p for p in product(range(x0, x1 + 1), range(y0, y1 + 1)) if p in vertices]
-    else:
-        near = [p for p in vertices if x0 <= p[0] <= x1 and y0 <= p[1] <= y1]
-    return any(_turn(a, b, p) <= 0 and _turn(b, c, p) <= 0 and _turn(c, a, p) <= 0 for p in near if p not in (a, b, c))
-
-
-def _ring(following: dict[Corner, Corner]) -> Iterator[Corner]:
-    """The corners in their order."""
-    first = corner = next(iter(following))
-    while True:
-        yield corner
-        corner = following[corner]
-        if corner == first:
-            return
-
-
-def _sides_about(corners: FloatArray, sides: int) -> FloatArray:
-    """The polygon of so many sides, at equal angles to each other, that corners touch from within; shape (n, 2).
-
-    A side that touches no more than its neighbours' meeting point has no length and is left out.
-    """
-    angles = np.arange(sides) * (2 * np.pi / sides)
-    normals = np.column_stack([np.cos(angles), np.sin(angles)])
-    reach = (corners @ normals.T).max(axis=0)
-    # Two neighbouring sides meet where both their equations, normal . point = reach, hold.
-    pairs = np.stack([normals, np.roll(normals, -1, axis=0)], axis=1)
-    meetings = np.linalg.solve(pairs, np.stack([reach, np.roll(reach, -1)], axis=1)[..., np.newaxis])[..., 0]
-    # The hull of what is convex already: it drops meeting points that coincide but for rounding.
-    hull = shapely.orient_polygons(shapely.MultiPoint(meetings).convex_hull)
-    return shapely.get_coordinates(hull)[:-1]

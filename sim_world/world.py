@@ -25,6 +25,7 @@ class Body:
     def __init__(
         self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, current: Stream, targets: Targets
     ) -> None:
+        self.name = config.vehicle
         self._vehicle = SimulatedVehicle(config, world.seed, current, world.keep_out)
         sensor = config.sensor
         self._looks = Looks(
@@ -113,6 +114,7 @@ class World:
         self._bodies = {one.vehicle: Body(one, config, seabed, current, self._targets) for one in by_id}
         self._channel = None if config.channel is None else Channel(config.channel, config.seed)
         self._still = {} if config.channel is None else dict(config.channel.still)
+        self._next_ms = dict.fromkeys(self._bodies, 0)
         self._over = False
 
     def start(self, now_ms: int) -> Step:
@@ -131,6 +133,7 @@ class World:
         body = self._bodies.get(received.vehicle)
         if body is not None and isinstance(received.message, Maneuver) and not self._over:
             publish.append(body.command(received.message, received.header.incarnation, now_ms))
+            self._next_ms[received.vehicle] = body.next_ms
             more, wake_ms = self._due(now_ms)  # a manoeuvre may be done, or on its track, at once
             publish += more
         return Step(tuple(publish), wake_ms)
@@ -160,14 +163,14 @@ class World:
     def _of_bodies(self, now_ms: int) -> tuple[list[Publication], int | None]:
         """What there is to say of the vehicles by now, and when there is more."""
         publish: list[Publication] = []
+        bodies = [self._bodies[name] for name, next_ms in self._next_ms.items() if next_ms <= now_ms]
         while due := [
-            (at_ms, body)
-            for body in self._bodies.values()
-            if (at_ms := body.next_event_ms) is not None and at_ms <= now_ms
+            (at_ms, body) for body in bodies if (at_ms := body.next_event_ms) is not None and at_ms <= now_ms
         ]:
             # Of several events at one time min takes the first body's: bodies are in the order of their ids.
             at_ms, body = min(due, key=itemgetter(0))
             publish += body.next_event(at_ms)
-        for body in self._bodies.values():
+        for body in bodies:
             publish += body.course(now_ms)
-        return publish, min((body.next_ms for body in self._bodies.values()), default=None)
+            self._next_ms[body.name] = body.next_ms
+        return publish, min(self._next_ms.values(), default=None)

@@ -100,6 +100,9 @@ class LockstepClock:
         }
         acting = [node.node_id for node in routing.roster if not node.listens_only and node.role.value != "clock"]
         self._wakes: dict[str, int | None] = {node: None if node in self._absent else 0 for node in acting}
+        self._places = {node: place for place, node in enumerate(acting)}
+        # Each wake-up that was ever wanted; those count that a node still wants.
+        self._wake_times = [(0, node) for node in acting if node not in self._absent]
         self._agents = [node.node_id for node in routing.roster if node.role.surveys or node.role.revisits]
         by_modem = any(node.platform for node in routing.roster)
         self._late_words_ms = LATE_WORDS_BY_MODEM_MS if by_modem else LATE_WORDS_MS
@@ -161,7 +164,7 @@ class LockstepClock:
         self._waiting.remove(node_id)
         if wake_ms is not None and wake_ms <= self.now_ms:
             raise ValueError(f"{node_id} asks at {self.now_ms} ms to be woken at {wake_ms} ms, which is not later")
-        self._wakes[node_id] = wake_ms
+        self._wake(node_id, wake_ms)
         self.publish(node_id, sent)
         if self.over_ms is not None:
             resting = all(self._wakes[agent] is None for agent in self._agents)
@@ -183,14 +186,9 @@ class LockstepClock:
                 return None
             happenings = self._happen(next_ms)
             receivers = self._receivers(next_ms)
-            grants = tuple(
-                [
-                    self._grant(node_id, woken)
-                    for node_id, wake_ms in self._wakes.items()
-                    if (woken := wake_ms is not None and wake_ms <= next_ms and node_id not in self._frozen)
-                    or node_id in receivers
-                ]
-            )
+            woken = self._woken(next_ms)
+            acting = sorted(woken | receivers, key=self._places.__getitem__)
+            grants = tuple([self._grant(node_id, node_id in woken) for node_id in acting])
             if grants or happenings:  # else all receivers are frozen or gone
                 self._count_round(next_ms)
                 self.now_ms = next_ms
@@ -198,12 +196,34 @@ class LockstepClock:
 
     def _next_ms(self) -> int | None:
         """The next time at which anything may happen."""
-        times = [wake for node, wake in self._wakes.items() if wake is not None and node not in self._frozen]
+        times = [] if (wake_ms := self._first_wake_ms()) is None else [wake_ms]
         if self._due_times:
             times.append(self._due_times[0])
         if self._happenings:
             times.append(self._happenings[-1].at_ms)
         return min(times, default=None)
+
+    def _wake(self, node_id: str, wake_ms: int | None) -> None:
+        """From now on this is the wake-up that a node wants."""
+        self._wakes[node_id] = wake_ms
+        if wake_ms is not None:
+            heapq.heappush(self._wake_times, (wake_ms, node_id))
+
+    def _first_wake_ms(self) -> int | None:
+        """When the next node is woken; forgets wake-ups that nobody wants any more, and those of who is frozen."""
+        while self._wake_times:
+            wake_ms, node_id = self._wake_times[0]
+            if self._wakes[node_id] == wake_ms and node_id not in self._frozen:
+                return wake_ms
+            heapq.heappop(self._wake_times)
+        return None
+
+    def _woken(self, now_ms: int) -> set[str]:
+        """Those who are woken by now."""
+        woken = set[str]()
+        while (wake_ms := self._first_wake_ms()) is not None and wake_ms <= now_ms:
+            woken.add(heapq.heappop(self._wake_times)[1])
+        return woken
 
     def _happen(self, now_ms: int) -> tuple[Happening, ...]:
         """Takes note of the events of this time."""
@@ -220,9 +240,10 @@ class LockstepClock:
                     self._frozen.add(one.node_id)
                 case Change.THAW:
                     self._frozen.remove(one.node_id)
+                    self._wake(one.node_id, self._wakes[one.node_id])
                 case Change.JOIN:
                     self._absent.remove(one.node_id)
-                    self._wakes[one.node_id] = self._wake_of(one)
+                    self._wake(one.node_id, self._wake_of(one))
                     self._sent_to[one.node_id].clear()
                     self._grown[one.node_id].clear()
                     self._make_due([one.node_id], now_ms + JOINER_DELAY_MS)  # what was kept for it

@@ -6,6 +6,7 @@ import math
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import NamedTuple
 
 from planner.types import Point
@@ -36,7 +37,13 @@ class _Leg(NamedTuple):
 
     def at(self, time_s: float) -> Point:
         share = (time_s - self.from_s) / (self.to_s - self.from_s) if self.to_s > self.from_s else 1.0
-        return tuple(a + share * (b - a) for a, b in zip(self.start, self.end, strict=True))  # type: ignore[return-value]
+        (x_m, y_m), (end_x_m, end_y_m) = self.start, self.end
+        return x_m + share * (end_x_m - x_m), y_m + share * (end_y_m - y_m)
+
+    def to_other(self, other: _Leg, time_s: float) -> Point:
+        """From where it is on this way to where the other vehicle is on its own."""
+        (x_m, y_m), (its_x_m, its_y_m) = self.at(time_s), other.at(time_s)
+        return its_x_m - x_m, its_y_m - y_m
 
 
 class ClosestApproaches:
@@ -77,7 +84,7 @@ class ClosestApproaches:
             pair = (name, other) if name < other else (other, name)
             if other == name or self._due_s.get(pair, 0.0) > leg.to_s:
                 continue
-            for its in [its for its in others if its.to_s >= leg.from_s]:
+            for its in reversed(list(takewhile(lambda its: its.to_s >= leg.from_s, reversed(others)))):
                 self._compare(pair, leg, its)
 
     def rest(self, name: str) -> None:
@@ -90,17 +97,19 @@ class ClosestApproaches:
         return sorted(self._closest.values(), key=lambda one: (one.closest_m, one.vehicles))
 
     def _compare(self, pair: tuple[str, str], one: _Leg, other: _Leg) -> None:
-        from_s = max(one.from_s, other.from_s, *(self._counts_from_s[name] for name in pair))
+        first, second = pair
+        from_s = max(one.from_s, other.from_s, self._counts_from_s[first], self._counts_from_s[second])
         to_s = min(one.to_s, other.to_s)
         if from_s > to_s:
             return
-        begin, end = ([b - a for a, b in zip(one.at(t_s), other.at(t_s), strict=True)] for t_s in (from_s, to_s))
-        change = [b - a for a, b in zip(begin, end, strict=True)]
-        square = math.hypot(*change) ** 2
-        share = min(1.0, max(0.0, -sum(a * b for a, b in zip(begin, change, strict=True)) / square)) if square else 0.0
-        apart_m = math.hypot(*(a + share * b for a, b in zip(begin, change, strict=True)))
+        (x_m, y_m), (end_x_m, end_y_m) = one.to_other(other, from_s), one.to_other(other, to_s)
+        by_x_m, by_y_m = end_x_m - x_m, end_y_m - y_m
+        square = math.hypot(by_x_m, by_y_m) ** 2
+        share = min(1.0, max(0.0, -(x_m * by_x_m + y_m * by_y_m) / square)) if square else 0.0
+        apart_m = math.hypot(x_m + share * by_x_m, y_m + share * by_y_m)
         known = self._closest.get(pair)
         if known is None or apart_m < known.closest_m:
             known = self._closest[pair] = Closest(pair, apart_m, from_s + share * (to_s - from_s))
-        closing_mps = sum(self._speeds_mps.get(name, math.inf) for name in pair)
-        self._due_s[pair] = to_s + (math.hypot(*end) - known.closest_m) / closing_mps if closing_mps > 0 else to_s
+        closing_mps = self._speeds_mps.get(first, math.inf) + self._speeds_mps.get(second, math.inf)
+        last_m = math.hypot(end_x_m, end_y_m)
+        self._due_s[pair] = to_s + (last_m - known.closest_m) / closing_mps if closing_mps > 0 else to_s

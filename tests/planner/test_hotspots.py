@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -226,11 +227,19 @@ class TestProperties:
         rng = np.random.default_rng(seed)
         hot = rng.random(self.GRID.shape) < share
         seen_last: dict[int, Hotspot] = {}
-        before = HotspotMap.empty(self.GRID)
+        before, risk_before = HotspotMap.empty(self.GRID), rng.random(self.GRID.shape)
+        looked_at_last = rng.random(self.GRID.shape) < 0.05
         for _ in range(5):
-            risk: FloatArray = rng.random(self.GRID.shape)
-            unsettled = ~hot & (rng.random(self.GRID.shape) < 0.05)
+            news = rng.random(self.GRID.shape) < change
+            news[:, int(rng.integers(self.GRID.columns)) :] = False  # so that not all blocks are touched
+            risk: FloatArray = np.where(news, rng.random(self.GRID.shape), risk_before)
+            risk_before = risk
+            unsettled = ~hot & looked_at_last
             now = update_hotspots(self.GRID, hot, unsettled, risk, before, block_m=60, least_area_m2=75)
+            afresh = replace(before, made_of=None)
+            anew = update_hotspots(self.GRID, hot, unsettled, risk, afresh, block_m=60, least_area_m2=75)
+            assert (anew.changed, list(anew.withdrawn)) == (now.changed, list(now.withdrawn))
+            assert (anew.map.numbers == now.map.numbers).all()
             self.check_patches(now.map, hot, unsettled, risk)
             self.check_numbers(now, before)
             # Who follows the reports alone knows the same hotspots.
@@ -240,7 +249,7 @@ class TestProperties:
             assert seen_last == now.map.hotspots
             assert all(before.hotspots.get(hotspot.number) != hotspot for hotspot in now.changed)
             before = now.map
-            hot = hot ^ (rng.random(self.GRID.shape) < change)
+            hot = hot ^ news
 
     def check_patches(self, found: HotspotMap, hot: BoolArray, unsettled: BoolArray, risk: FloatArray) -> None:
         patches = {number: cells_numbered(found.numbers, number) for number in found.hotspots}

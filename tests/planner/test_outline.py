@@ -8,7 +8,7 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.hotspots import outline
+from planner.outline import outline
 from planner.types import BoolArray
 
 
