@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
+from modem.streams import Window
+
 MOST_PLATFORMS = 64
+SMALL_BITS = 128
+"""Frames with fewer hold either acknowledgements or a single piece of a message."""
+START_BITS = 3
+"""Of the number by which a modem that was started anew is told from its past."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +40,12 @@ class ModemConfig:
             raise ValueError(f"{self.platform} and {', '.join(self.vehicles)} are not all among the platforms")
         if self.slot_ms < 1 or self.frames < 1:
             raise ValueError("a slot has at least 1 ms, a packet at least one frame")
+        acknowledgement = START_BITS + self.window.ack_bits
+        if self.room < 1 + (len(self.platforms) - 1) + acknowledgement:
+            raise ValueError(
+                f"link.profile: frames of {self.frame_bits} bits are too small for {len(self.platforms)} platforms; "
+                "must be larger, or the platforms fewer"
+            )
 
     @property
     def hub(self) -> str:
@@ -57,6 +68,26 @@ class ModemConfig:
         return (now_ms - first_ms) // self.cycle_ms * self.cycle_ms + first_ms
 
     @property
-    def numbers(self) -> Mapping[str, int]:
-        """The place of each platform among all."""
-        return {name: place for place, name in enumerate(self.platforms)}
+    def is_small(self) -> bool:
+        """Whether a frame holds either acknowledgements or a single piece."""
+        return self.frame_bits < SMALL_BITS
+
+    @property
+    def tag_bits(self) -> int:
+        """Of the tag by which damage and strangers are noticed."""
+        return 8 if self.is_small else 16
+
+    @property
+    def platform_bits(self) -> int:
+        """Of the number of a platform."""
+        return (len(self.platforms) - 1).bit_length()
+
+    @property
+    def room(self) -> int:
+        """How many bits a frame has for what is said."""
+        return self.frame_bits - self.tag_bits - self.platform_bits - START_BITS
+
+    @property
+    def window(self) -> Window:
+        """Of the streams of pieces."""
+        return Window(3 if self.is_small else 5)

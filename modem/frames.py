@@ -11,36 +11,24 @@ import zlib
 
 from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
-from modem.config import ModemConfig
-from modem.streams import Window
+from modem.config import START_BITS, ModemConfig
 
 VERSION = 1
 """Of what frames hold: modems of another one do not understand each other."""
-SMALL_BITS = 128
-START_BITS = 3
-"""Of the number by which a modem that was started anew is told from its past."""
-LEAST_ROOM_BITS = 16
 
 
 class FrameForm:
     """How frames of a run are made. `room`: the bits that one has for what is said. `window`: of the streams in them.
     `is_small`: whether one holds either acknowledgements or a single piece, which then need not tell its size.
-
-    Raises ValueError for frames in which nothing has room.
     """
 
     def __init__(self, config: ModemConfig, run: RunInfo) -> None:
-        self.is_small = config.frame_bits < SMALL_BITS
-        self._tag_bits = 8 if self.is_small else 16
-        self._platform_bits = (len(config.platforms) - 1).bit_length()
+        self.is_small, self.room, self.window = config.is_small, config.room, config.window
+        self.size_bits = 0 if self.is_small else self.room.bit_length()
+        self._tag_bits, self._platform_bits = config.tag_bits, config.platform_bits
         self._frame_bits = config.frame_bits
         self._platforms = config.platforms
         self._salt = f"{VERSION} {run.scenario_sha256} {run.seed}".encode()
-        self.window = Window(3 if self.is_small else 5)
-        self.room = room_of(config.frame_bits, len(config.platforms))
-        self.size_bits = 0 if self.is_small else self.room.bit_length()
-        if self.room < LEAST_ROOM_BITS:
-            raise ValueError(f"a frame of {config.frame_bits} bits has no room for what is said")
 
     def pack(self, platform: str, start: int, said: BitWriter) -> bytes:
         """A frame of a platform. `start`: tells the modem's starts apart. What is said has at most `room` bits."""
@@ -76,9 +64,3 @@ class FrameForm:
 def start_number(now_ms: int) -> int:
     """The number of a modem's start at that time: 0 for who is there from the beginning."""
     return now_ms and 1 + now_ms // 1000 % ((1 << START_BITS) - 1)
-
-
-def room_of(frame_bits: int, platforms: int) -> int:
-    """How many bits a frame has for what is said; none or fewer where it has no room for that."""
-    tag_bits = 8 if frame_bits < SMALL_BITS else 16
-    return frame_bits - tag_bits - (platforms - 1).bit_length() - START_BITS

@@ -31,8 +31,8 @@ from comms.said.messages import (
 )
 from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
-from modem.config import ModemConfig
-from modem.frames import START_BITS, FrameForm, start_number
+from modem.config import START_BITS, ModemConfig
+from modem.frames import FrameForm, start_number
 from modem.letters import Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up, of_bits
 from modem.stretches import Gathering, LayerOf, Stretch
@@ -69,6 +69,7 @@ class Modem:
         self._heard: list[Publication] = []
         self._told = 0
         self._last_said: dict[str, tuple[int, Any]] = {}
+        self._acked: dict[str, int] = {}  # when each was acknowledged last
         self._left_out = False  # whether the last packet had no acknowledgement
         self._said_at: Counter[int] = Counter()
         self._incarnation = 0
@@ -195,7 +196,10 @@ class Modem:
         """What has come of the others, where that is owed, and as far as it has room: in a packet's first frame. Where
         it leaves little room for anything else it is left out every other time."""
         a_frame = (form.room - 1 - len(self.config.others)) // (START_BITS + form.window.ack_bits)
-        owed = [name for name in self.config.others if self._receiving[name].owes][:a_frame]
+        owed = sorted(
+            (name for name in self.config.others if self._receiving[name].owes),
+            key=lambda name: self._acked.get(name, 0),
+        )[:a_frame]
         left = form.room - 1 - len(owed) * (1 + START_BITS + form.window.ack_bits)
         if owed and left < form.room // 2 and not self._left_out and self._has_more_than_acks():
             owed = []
@@ -205,6 +209,7 @@ class Modem:
             if len(self.config.others) > 1:
                 writer.write(name in owed, 1)
             if name in owed:
+                self._acked[name] = self._spoke_ms
                 writer.write(self._starts.get(name, 0), START_BITS)
                 self._receiving[name].acknowledge(writer)
         return bool(owed)

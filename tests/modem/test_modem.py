@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import shapely
 from fleets import state
-from modems import Waters
+from modems import Waters, config_of
 
 from comms.said.announcement import Vertex
 from comms.said.messages import (
@@ -148,3 +148,16 @@ def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
     for few in (10, 2, 0):
         assert with_fewer_corners(OUTLINE[:few]) == OUTLINE[:few]
     assert 1 <= len(with_fewer_corners(OUTLINE)) <= 10  # of no area
+
+
+@pytest.mark.parametrize(
+    ("terms", "told"),
+    [
+        ({"frame_bits": 20}, "link.profile: frames of 20 bits are too small for 3 platforms"),
+        ({"frames": 0}, "a packet at least one frame"),
+        ({"slot_ms": 0}, "a slot has at least 1 ms"),
+    ],
+)
+def test_what_cannot_be_said_anything_in_is_refused(terms: dict[str, int], told: str) -> None:
+    with pytest.raises(ValueError, match=told):
+        config_of("ship", **terms)
