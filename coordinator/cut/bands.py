@@ -20,7 +20,7 @@ class Bands:
     """Bands in windows of `width` columns of a map, which is searched at one price after another and may change; where
     nothing has changed since the last search they are known.
 
-    `worth`: what one look brings of each cell, shape (rows, columns); where that is changed in place, `change` is told.
+    `worth`: what one look brings of each cell, shape (rows, columns).
     """
 
     def __init__(self, worth: FloatArray, width: int) -> None:
@@ -31,26 +31,20 @@ class Bands:
         self._value: FloatArray = np.zeros(self._changed.size)
         self._first_row, self._end_row = np.zeros((2, self._changed.size), dtype=np.intp)
 
-    def copy(self, worth: FloatArray) -> Bands:
-        """One that may be changed by itself, of a map of the same worth."""
+    def copy(self) -> Bands:
+        """One that may be changed by itself."""
         new = copy(self)
-        new._worth, new._sums = worth, self._sums.copy()
         new._value, new._first_row, new._end_row = self._value.copy(), self._first_row.copy(), self._end_row.copy()
         new._changed = self._changed.copy()
         return new
 
-    def change(self, windows: Iterable[Window]) -> None:
-        """Looks now bring something else at cells of these windows."""
-        if self._width > MOST_ADDED:  # rounding reaches farther
-            self._sums = _window_sums(self._worth, self._width)
-            self._changed[:] = True
-            return
+    def change(self, worth: FloatArray, windows: Iterable[Window]) -> None:
+        """From now on looks bring this, which is something else at cells of these windows alone."""
+        self._worth, self._sums = worth, _window_sums(worth, self._width)
         for window in windows:
-            rows = slice(window.first_row, window.end_row)
-            first, end = max(window.first_column - self._width + 1, 0), window.end_column
-            beside = self._worth[rows, first : end + self._width - 1]
-            self._sums[rows, first:end] = _window_sums(beside, self._width)
-            self._changed[first:end] = True
+            self._changed[max(window.first_column - self._width + 1, 0) : window.end_column] = True
+        if self._width > MOST_ADDED:  # rounding reaches farther
+            self._changed[:] = True
 
     def side_by_side(self, row_cost: float, fixed_cost: float) -> list[Window]:
         """The bands that do not overlap which together are worth most beyond their costs; best first.

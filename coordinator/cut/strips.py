@@ -72,8 +72,7 @@ class Cutting:
     def copy(self) -> Cutting:
         """One that may be cut by itself."""
         new = copy(self)
-        new._ground, new._worth = self._ground.copy(), self._worth.copy()
-        new._bands = self._bands.copy(new._worth)
+        new._ground, new._bands = self._ground.copy(), self._bands.copy()
         return new
 
     def cut(self, price: float) -> list[Window]:
@@ -86,9 +85,8 @@ class Cutting:
                 break
             for window in new:
                 self._ground.fly(window)
-            for window in new:
-                self._worth[window.cells] = self._ground.worth_of(window.cells)
-            self._bands.change(new)
+            self._worth = self._ground.worth()
+            self._bands.change(self._worth, new)
             found += new
         return [one.turned for one in found] if self._across else found
 

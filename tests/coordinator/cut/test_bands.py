@@ -65,8 +65,9 @@ class TestByHand:
         for number, row_cost in enumerate([0.4, 0.4, 0.4, 0.6, 0.6]):
             assert bands.side_by_side(width * row_cost, 0.1) == side_by_side(worth, width, width * row_cost, 0.1)
             changed = Window(number, number + 2, 7 * number, 7 * number + 3)
+            worth = worth.copy()
             worth[changed.cells] *= 2 * rng.random()
-            bands.change([changed])
+            bands.change(worth, [changed])
 
 
 @given(
