@@ -39,7 +39,7 @@ NO_FAILURES = (KeyboardInterrupt, Stop)
 
 
 _NO_PARTS = sys.stdlib_module_names | {
-    *("comms", "coordinator", "planner", "secondlook", "sim_world", "vehicle_agent", "viz"),
+    *("comms", "coordinator", "modem", "planner", "secondlook", "sim_world", "vehicle_agent", "viz"),
     *("numpy", "shapely"),
 }
 """Packages that are ours or that we call ourselves: all else is a part of a user's own, or called by one."""

@@ -26,6 +26,8 @@ OUT_OF_REACH = {
     "dropped a message from {}: {} (said once)": "a tile that fits no grid: no agent of ours tells of one",
     "{}: dropped a look that makes no sense (said once)": "no sonar of ours tells of one",
     "{} cannot be pickled ({}): whoever takes it up has to handle again all that it has handled": "no files are kept",
+    "frames of the modem on {} are not sent: a packet has at most {}, of at most {} bits (said once)": "no link",
+    "modem of {}: {}: {} (said once)": "no link is flown",
     "{} has failed": "then the storm has failed",
     "unknown key": "nobody writes one within one process",
     "too long": "nobody writes one within one process",
@@ -90,7 +92,15 @@ def test_each_cause_of_a_strip_is_in_the_table() -> None:
 
 def test_each_warning_of_a_node_is_in_the_table() -> None:
     warned = []
-    for room in ("coordinator", "vehicle_agent", "comms/lockstep", "comms/memory", "comms/runner.py", "sim_world"):
+    for room in (
+        "coordinator",
+        "vehicle_agent",
+        "modem",
+        "comms/lockstep",
+        "comms/memory",
+        "comms/runner.py",
+        "sim_world",
+    ):
         files = [ROOT / room] if room.endswith(".py") else sorted((ROOT / room).rglob("*.py"))
         for file in files:
             for node in ast.walk(ast.parse(file.read_text())):

@@ -118,7 +118,7 @@ def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch)
 @pytest.mark.parametrize(
     ("name", "invariant"),
     [
-        ("the map forgets what a vehicle told before it was started anew", "the map is what came"),
+        ("the map forgets what a vehicle told before it was started anew", "risk never rises"),
         ("a strip is offered to two", "an offer is in the books"),
         ("a helper stays at a strip that it gives back", "who is told to give back does"),
     ],
