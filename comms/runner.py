@@ -10,6 +10,7 @@ import threading
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from comms.errors import NO_FAILURES, NodeError, in_words, one_line
@@ -152,7 +153,11 @@ class GuardedNode:
         self.wake_ms: int | None = None
         self.stamp = Stamp(node_id, routing, incarnation)
         self._node = node
-        self._letters = Intake(routing)
+        self._routing = routing
+
+    @cached_property
+    def _letters(self) -> Intake:
+        return Intake(self._routing)  # few fleets have modems, and a large one's announcement takes a while to check
 
     def is_due(self, now_ms: int) -> bool:
         """Whether the wake-up has come."""

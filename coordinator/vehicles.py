@@ -5,8 +5,6 @@ from __future__ import annotations
 import logging
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Curve, Mode, Plan, PlannedTrack
@@ -225,11 +223,11 @@ class KnownVehicle:
 
     def _hear_curve(self, header: Header, curve: Curve) -> bool:
         order = (header.incarnation, header.sequence)
-        range_m = np.arange(curve.p_detect.size, dtype=np.float64) * curve.range_bin_m
-        if order <= self._curve_orders.get(curve.track, _NONE_YET) or range_m.size < 2 or curve.range_bin_m <= 0:
+        measured = curve.detection_curve
+        if measured is None or order <= self._curve_orders.get(curve.track, _NONE_YET):
             return False
         self._curve_orders[curve.track] = order
-        self.curves[curve.track] = DetectionCurve(range_m, curve.p_detect)
+        self.curves[curve.track] = measured
         return True
 
     @property

@@ -55,7 +55,11 @@ class ModemConfig:
     @property
     def others(self) -> tuple[str, ...]:
         """The platforms that it talks with."""
-        return self.platforms[1:] if self.platform == self.hub else (self.hub,)
+        return self.who_talks_with(self.platform)
+
+    def who_talks_with(self, platform: str) -> tuple[str, ...]:
+        """The platforms that one talks with."""
+        return self.platforms[1:] if platform == self.hub else (self.hub,)
 
     @property
     def cycle_ms(self) -> int:

@@ -32,6 +32,8 @@ COORDINATOR = "coordinator"
 MOST_CORNERS = 10
 """Of a hotspot as it is told over water: what it looks like in detail the stretches tell as well."""
 FIRST_TOLERANCE_M = 2.0
+LARGEST_NUMBER = 999_999_999
+"""That a key may end in."""
 
 
 class Said(NamedTuple):
@@ -89,6 +91,8 @@ class Letters:
                 raise WireError("no vehicle of the fleet")
             vehicle = self.config.vehicles[number]
         number = reader.read_count(4) if topic is not None and "{number}" in topic.pattern else 0
+        if number > LARGEST_NUMBER:
+            raise WireError(f"{number} is no number of a key")
         message = get_message(reader, Stretch if topic is None else topic.message, self._around(sent_s * 1000))
         key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
         sender = COORDINATOR if by_coordinator else vehicle
@@ -99,11 +103,15 @@ class Letters:
 
 
 def with_fewer_corners(outline: tuple[Vertex, ...]) -> tuple[Vertex, ...]:
-    """An outline with at most 10 corners, out of its own: those are left out that change it least."""
+    """An outline with at most 10 corners, out of its own: those are left out that change it least.
+
+    Raises WireError for one that meets itself so that it falls apart.
+    """
     corners, tolerance_m = outline, FIRST_TOLERANCE_M
     while len(corners) > MOST_CORNERS:
         simple = shapely.Polygon([(one.x_m, one.y_m) for one in outline]).simplify(tolerance_m)
-        assert isinstance(simple, shapely.Polygon), "what its topology is kept of stays one piece"
+        if not isinstance(simple, shapely.Polygon):
+            raise WireError("a hotspot's outline is none")
         corners = tuple(Vertex(x_m, y_m) for x_m, y_m in simple.exterior.coords[:-1])
         tolerance_m *= 1.5
     return corners

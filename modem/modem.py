@@ -18,7 +18,6 @@ from comms.said.bits import BitReader, BitWriter
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import (
     AgentState,
-    CoverageTile,
     Curve,
     Heard,
     Look,
@@ -33,8 +32,8 @@ from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import START_BITS, ModemConfig
 from modem.frames import FrameForm, start_number
-from modem.letters import Letters, Said
-from modem.streams import Piece, Receiving, Sending, cut_up, of_bits
+from modem.letters import COORDINATOR, Letters, Said
+from modem.streams import Piece, Receiving, Sending, cut_up
 from modem.stretches import Gathering, LayerOf, Stretch
 from modem.waiting import Queue, Waiting, worth
 
@@ -131,7 +130,7 @@ class Modem:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
         topic, message = received.topic, received.message
         is_hub = self.config.platform == self.config.hub
-        if topic.crossing is None or is_hub != (received.sender == "coordinator"):
+        if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
         if isinstance(message, Curve) and self._gathering is not None:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
@@ -236,8 +235,7 @@ class Modem:
                     continue
                 most = form.room - 1 - about - form.size_bits
                 self._queue.remove(one)
-                pieces_of_it = cut_up(one.said.value, one.said.bits, room, most)
-                self._sending[one.to].add(pieces_of_it, one.crossing.value, one.queued_ms)
+                self._sending[one.to].add(cut_up(one.said, room, most), one.crossing.value, one.queued_ms)
                 return self._write_next(form, writer, said, now_ms)
             if one.said.bits + 2 <= left:
                 self._queue.remove(one)
@@ -296,9 +294,8 @@ class Modem:
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
-        to_hub = platform != self.config.hub
         if reader.read(1):
-            receivers = (self.config.hub,) if to_hub else self.config.platforms[1:]
+            receivers = self.config.who_talks_with(platform)
             for name in receivers:
                 if len(receivers) == 1 or reader.read(1):
                     start = reader.read(START_BITS)
@@ -317,7 +314,7 @@ class Modem:
                 self._open(reader, platform, now_ms)
 
     def _read_piece(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
-        receivers = (self.config.hub,) if platform != self.config.hub else self.config.platforms[1:]
+        receivers = self.config.who_talks_with(platform)
         to_bits = (len(receivers) - 1).bit_length()
         place = reader.read(to_bits)
         number = reader.read(form.window.number_bits)
@@ -332,8 +329,8 @@ class Modem:
             size = reader.read(form.size_bits)
         piece = Piece(reader.read(size), size, first, last)
         if place < len(receivers) and receivers[place] == self.config.platform:
-            for value, bits in self._receiving[platform].take(number, piece):
-                self._open(of_bits(value, bits), platform, now_ms)
+            for letter in self._receiving[platform].take(number, piece):
+                self._open(letter, platform, now_ms)
 
     def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
         self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
@@ -342,7 +339,7 @@ class Modem:
         """Tells what was heard to the nodes here."""
         assert self._run is not None
         header, message = said.header, said.message
-        if (header.sender == "coordinator") != (platform == self.config.hub):
+        if (header.sender == COORDINATOR) != (platform == self.config.hub):
             self._drop("not its to say", f"{platform}: {said.key}")
             return
         if topic is TASK and said.key.split("/")[2] != self.config.platform:
@@ -354,15 +351,11 @@ class Modem:
             if layer is None:
                 entry = next(one for one in self._run.vehicles if one.vehicle == platform)
                 layer = self._layers[platform, header.incarnation] = LayerOf(entry, self._run.grid.spec)
-            tiles = layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
-            for tile in tiles:
-                self._say_tile(platform, header, tile)
-
-    def _say_tile(self, platform: str, header: Header, tile: CoverageTile) -> None:
-        self._told += 1
-        name = f"{tile.first_row // 20}-{tile.first_column // 20}"
-        key = COVERAGE.key(vehicle=platform, tile=name)
-        self._say_here(key, header._replace(sequence=self._told), tile)
+            told = layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
+            for name, tile in told:
+                self._told += 1
+                key = COVERAGE.key(vehicle=platform, tile=name)
+                self._say_here(key, header._replace(sequence=self._told), tile)
 
     def _say_here(self, key: str, header: Header, message: Any) -> None:
         heard = Heard(key, packed(header, body_of(message)))

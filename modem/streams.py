@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from comms.said.bits import BitReader, BitWriter
-from comms.said.wire import WireError
 
 
 class Piece(NamedTuple):
@@ -93,11 +92,10 @@ class Receiving:
         self._missing = 0
         self._come: set[int] = set()
         self._parts: dict[int, Piece] = {}
-        self._wait: dict[int, tuple[int, int]] = {}  # messages, by the number of their last piece
+        self._wait: dict[int, BitWriter] = {}  # messages, by the number of their last piece
 
-    def take(self, told: int, piece: Piece) -> list[tuple[int, int]]:
-        """Takes a piece under the last bits of its number; returns the messages that are to be told now, each as a
-        number and how many bits it has."""
+    def take(self, told: int, piece: Piece) -> list[BitReader]:
+        """Takes a piece under the last bits of its number; returns the messages that are to be told now."""
         self.owes = True
         number = self.window.near(told, self._missing)
         if number >= self._missing + self.window.size or number in self._come:
@@ -109,7 +107,7 @@ class Receiving:
         self._parts[number] = piece
         self._join(number)
         tell = sorted(one for one in self._wait if not self._in_order or one < self._missing)
-        return [self._wait.pop(one) for one in tell]
+        return [BitReader(self._wait.pop(one).to_bytes()) for one in tell]
 
     def _join(self, number: int) -> None:
         first = number
@@ -120,11 +118,10 @@ class Receiving:
             last += 1
         if first not in self._parts or last not in self._parts:
             return
-        writer = BitWriter()
+        whole = self._wait[last] = BitWriter()
         for one in range(first, last + 1):
             piece = self._parts.pop(one)
-            writer.write(piece.value, piece.bits)
-        self._wait[last] = writer.value, writer.bits
+            whole.write(piece.value, piece.bits)
 
     def acknowledge(self, writer: BitWriter) -> None:
         """Writes what has come and what has not."""
@@ -134,24 +131,7 @@ class Receiving:
         self.owes = False
 
 
-def cut_up(value: int, bits: int, first_bits: int, most_bits: int) -> list[Piece]:
+def cut_up(said: BitWriter, first_bits: int, most_bits: int) -> list[Piece]:
     """A message cut into pieces: the first of at most `first_bits`, the others of at most `most_bits`, both > 0."""
-    if bits <= first_bits:
-        return [Piece(value, bits, first=True, last=True)]
-    sizes = [first_bits]
-    while (left := bits - sum(sizes)) > 0:
-        sizes.append(min(most_bits, left))
-    pieces, left = list[Piece](), bits
-    for place, size in enumerate(sizes):
-        left -= size
-        pieces.append(Piece(value >> left & (1 << size) - 1, size, place == 0, place == len(sizes) - 1))
-    return pieces
-
-
-def of_bits(value: int, bits: int) -> BitReader:
-    """A reader of a message. Raises WireError where it has no bits."""
-    if bits < 1:
-        raise WireError("a message has no bits")
-    writer = BitWriter()
-    writer.write(value, bits)
-    return BitReader(writer.to_bytes())
+    pieces = said.pieces(most_bits, first_bits)
+    return [Piece(*one, place == 0, place == len(pieces) - 1) for place, one in enumerate(pieces)]

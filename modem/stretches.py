@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -66,17 +66,19 @@ class Gathering:
         self._number = 0
 
     def hear_curve(self, curve: Curve) -> Stretch | None:
-        """From now on looks are told by this curve; returns the stretch that was told by the one before."""
+        """From now on looks are told by this curve, if it is one; returns the stretch that was told by that before."""
+        if curve.detection_curve is None:
+            return None
         before = self.flush()
         self._curve = curve
         return before
 
     def add(self, look: Look) -> Stretch | None:
         """Takes a look; returns the stretch that has come to an end."""
-        ended = None
-        if self._looks and (not look.valid or not _goes_on(self._looks[-1], look)):
+        ended, counts = None, look.valid and look.makes_sense
+        if self._looks and (not counts or not _goes_on(self._looks[-1], look)):
             ended = self.flush()
-        if look.valid:
+        if counts:
             self._looks.append(look)
             if ended is None and _length_m(self._looks) > MOST_CHUNKS * CHUNK_M - _length_m([look]):
                 ended = self.flush()
@@ -120,7 +122,11 @@ class Gathering:
 def _steps(seen: float, expected: float) -> int:
     if expected <= 0.0:
         return 0
-    return max(LEAST_STEPS, min(-LEAST_STEPS, round(STEPS_TO_HALF * math.log2(max(seen / expected, 1e-6)))))
+    return _within(round(STEPS_TO_HALF * math.log2(max(seen / expected, 1e-6))))
+
+
+def _within(steps: int) -> int:
+    return max(LEAST_STEPS, min(-LEAST_STEPS, steps))
 
 
 def _goes_on(before: Look, look: Look) -> bool:
@@ -141,14 +147,20 @@ def _length_m(looks: list[Look]) -> float:
 
 def p_expected(entry: RosterVehicle, curve: Curve | None) -> DetectionCurve:
     """P(y) of a vehicle's looks: its curve, or else that of its sonar as it was announced, flat between its ranges."""
-    if curve is not None:
-        range_m = np.arange(curve.p_detect.size, dtype=np.float64) * curve.range_bin_m
-        return DetectionCurve(range_m, np.asarray(curve.p_detect))
+    if curve is not None and (measured := curve.detection_curve) is not None:
+        return measured
     near_m, far_m = entry.near_m, entry.far_m
     range_m = np.array([0.0, max(0.0, near_m - 1e-3), near_m, far_m, far_m + 1e-3])
     p_detect = entry.p_detect * np.array([near_m <= 0.0, near_m <= 0.0, 1.0, 1.0, 0.0])
     keep = np.append(True, np.diff(range_m) > 0)
     return DetectionCurve(range_m[keep], p_detect[keep])
+
+
+class Told(NamedTuple):
+    """A tile under its name."""
+
+    name: str
+    tile: CoverageTile
 
 
 class LayerOf:
@@ -164,20 +176,20 @@ class LayerOf:
         self._waiting: list[Stretch] = []
         self._version = 0
 
-    def hear_curve(self, curve: Curve) -> list[CoverageTile]:
+    def hear_curve(self, curve: Curve) -> list[Told]:
         """Takes a curve; returns the tiles that are others by the stretches that have waited for it."""
         self._curves[curve.track + 1] = curve
         waiting, self._waiting = self._waiting, []
         return [tile for stretch in waiting for tile in self._add(stretch)]
 
-    def hear(self, stretch: Stretch) -> list[CoverageTile]:
-        """Takes a stretch; returns the tiles that are others now."""
+    def hear(self, stretch: Stretch) -> list[Told]:
+        """Takes a stretch; returns the tiles that are others now, under their names."""
         if stretch.number in self._come:
             return []
         self._come.add(stretch.number)
         return self._add(stretch)
 
-    def _add(self, stretch: Stretch) -> list[CoverageTile]:
+    def _add(self, stretch: Stretch) -> list[Told]:
         if stretch.curve and stretch.curve not in self._curves:
             self._waiting.append(stretch)
             return []
@@ -189,7 +201,7 @@ class LayerOf:
             length_m = min(stretch.length_m - first_m, CHUNK_M if place < len(stretch.seen) - 1 else math.inf)
             if length_m <= 0:
                 continue
-            shares = [2.0 ** (unfolded(steps) / STEPS_TO_HALF) for steps in (seen.port, seen.starboard)]
+            shares = [2.0 ** (_within(unfolded(steps)) / STEPS_TO_HALF) for steps in (seen.port, seen.starboard)]
             p_detect: FloatArray = -np.expm1(-np.outer(shares, nats))[:, np.newaxis, :]
             geometry = LookGeometry(
                 (stretch.x_m, stretch.y_m), stretch.heading_rad, first_m, length_m, 1.0, 1, len(range_m)
@@ -199,14 +211,9 @@ class LayerOf:
             changed.update(tiles_within(self._grid, self._tiles, *look[:2]))
         return [self._told(tile) for tile in sorted(changed, key=lambda one: (one.first_row, one.first_column))]
 
-    def _told(self, tile: Tile) -> CoverageTile:
+    def _told(self, tile: Tile) -> Told:
         self._version += 1
         sums, largest = self._layer.sum_levels[tile.window], self._layer.largest_levels[tile.window]
-        return CoverageTile(
-            self._version,
-            tile.first_row,
-            tile.first_column,
-            sums.copy(),
-            largest.copy(),
-            np.zeros(sums.shape, np.bool_),
-        )
+        settled = np.zeros(sums.shape, dtype=np.bool_)
+        told = CoverageTile(self._version, tile.first_row, tile.first_column, sums.copy(), largest.copy(), settled)
+        return Told(tile.name, told)

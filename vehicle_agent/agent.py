@@ -8,6 +8,7 @@ from comms.node import Publication, Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.codec import Header
 from comms.said.messages import (
+    FARTHEST_M,
     AgentState,
     Contact,
     Look,
@@ -37,8 +38,6 @@ log = logging.getLogger("secondlook.agent")
 
 REPORT_EVERY_MS = 10_000
 REPORTS_A_TILE = 2  # with every so many reports a tile goes out that has not changed, as it may have been lost
-FARTHEST_M = 1e6  # a look or a vehicle farther away is none: what follows from it would not fit the wire's metres
-FARTHEST_RANGE_M = 1e4
 STRAIGHT_IN_M = 100.0  # behind home lies the start of the way there, which tells the heading of arrival
 
 
@@ -295,7 +294,7 @@ class Agent:
         if (incarnation, look.number) in self._looks_taken:  # a look that comes twice was one look
             return
         self._looks_taken.add((incarnation, look.number))
-        if not makes_sense(look):
+        if not look.makes_sense:
             if not self._complained:
                 self._complained = True
                 log.warning("%s: dropped a look that makes no sense (said once)", self.vehicle)
@@ -320,18 +319,6 @@ def _next_word_due_ms(status: ManeuverStatus) -> int | None:
     if status.state in (ManeuverState.DONE, ManeuverState.REFUSED, ManeuverState.EMPTY) or status.ends_ms == 0:
         return None
     return status.ends_ms + REPORT_EVERY_MS
-
-
-def makes_sense(look: Look) -> bool:
-    """Whether a look has sides, bins and places that a sonar can have; no other counts."""
-    sides, along_bins, range_bins = look.p_detect.shape
-    if sides != 2 or along_bins == 0 or range_bins < 2 or look.along_bin_m <= 0 or look.range_bin_m <= 0:
-        return False
-    end_along_m = look.first_along_m + along_bins * look.along_bin_m
-    places_m = [look.origin_x_m, look.origin_y_m, look.first_along_m, end_along_m]
-    places_m += [metres for contact in look.contacts for metres in (contact.along_m, contact.lateral_m)]
-    near_enough = all(abs(place_m) <= FARTHEST_M for place_m in places_m)
-    return near_enough and range_bins * look.range_bin_m <= FARTHEST_RANGE_M
 
 
 def _in_mission_frame(look: Look, along_m: float, lateral_m: float) -> Point:

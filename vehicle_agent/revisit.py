@@ -6,14 +6,24 @@ from __future__ import annotations
 import math
 
 from comms.said.announcement import RunInfo
-from comms.said.messages import Look, ManeuverState, ManeuverStatus, Mode, Task, TaskAction, TaskState, TaskStatus
+from comms.said.messages import (
+    FARTHEST_M,
+    Look,
+    ManeuverState,
+    ManeuverStatus,
+    Mode,
+    Task,
+    TaskAction,
+    TaskState,
+    TaskStatus,
+)
 from comms.said.topics import TASK_STATUS
 from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.region import share_within
 from planner.sweep import NoSweepError, Pass, Sweep, shortest_sweep, sweeps_by
 from planner.types import Strip, Track
-from vehicle_agent.agent import FARTHEST_M, Agent
+from vehicle_agent.agent import Agent
 from vehicle_agent.config import RevisitConfig
 from vehicle_agent.endurance import MARGIN_MS, ON_ITS_WAY_HOME
 

@@ -41,10 +41,11 @@ class BitWriter:
         size = (self.bits + 7) // 8
         return (self.value << 8 * size - self.bits).to_bytes(size, "big")
 
-    def pieces(self, most_bits: int) -> list[tuple[int, int]]:
-        """The bits cut into pieces of at most `most_bits` > 0, each as its number and how many bits it has: `write`
-        puts them together again."""
-        sizes = [min(most_bits, self.bits - first) for first in range(0, self.bits, most_bits)]
+    def pieces(self, most_bits: int, first_bits: int | None = None) -> list[tuple[int, int]]:
+        """The bits cut into pieces of at most `most_bits` > 0, the first of at most `first_bits` > 0 if that is given,
+        each as its number and how many bits it has: `write` puts them together again."""
+        first = min(self.bits, first_bits or most_bits)
+        sizes = [first] * bool(first) + [min(most_bits, self.bits - at) for at in range(first, self.bits, most_bits)]
         ends = accumulate(sizes)
         return [(self.value >> self.bits - end & (1 << size) - 1, size) for size, end in zip(sizes, ends, strict=True)]
 

@@ -13,6 +13,8 @@ import enum
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
+
 from comms.said.announcement import RunInfo, Vertex
 from comms.said.over_water import (
     Counted,
@@ -49,10 +51,14 @@ from comms.said.wire import (
     Text,
     YesNo,
 )
-from planner.types import LookGeometry, Strip
+from planner.types import DetectionCurve, LookGeometry, Strip
 
 MOST_TRACKS = 2000
 """Of one vehicle's plan."""
+FARTHEST_M = 1e6
+"""A look or a vehicle farther away is none: what follows from it would not fit the wire's metres."""
+FARTHEST_RANGE_M = 1e4
+"""Of a look, to a side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +122,18 @@ class Look:
             along_bins=along_bins,
             range_bins=range_bins,
         )
+
+    @property
+    def makes_sense(self) -> bool:
+        """Whether it has sides, bins and places that a sonar can have; no other counts."""
+        sides, along_bins, range_bins = self.p_detect.shape
+        if sides != 2 or along_bins == 0 or range_bins < 2 or self.along_bin_m <= 0 or self.range_bin_m <= 0:
+            return False
+        end_along_m = self.first_along_m + along_bins * self.along_bin_m
+        places_m = [self.origin_x_m, self.origin_y_m, self.first_along_m, end_along_m]
+        places_m += [metres for contact in self.contacts for metres in (contact.along_m, contact.lateral_m)]
+        near_enough = all(abs(place_m) <= FARTHEST_M for place_m in places_m)
+        return near_enough and range_bins * self.range_bin_m <= FARTHEST_RANGE_M
 
 
 class ManeuverKind(enum.Enum):
@@ -244,6 +262,14 @@ class Curve:
     range_bin_m: Annotated[Metres, Near(1.0, 0.01)]
     p_detect: Annotated[ProbabilityCurve, Profile()]
     r_eff_m: Annotated[Count, Counted(6)]
+
+    @property
+    def detection_curve(self) -> DetectionCurve | None:
+        """P(y) as planning uses it; None where it has fewer than two points, or these are not apart or too far."""
+        count = self.p_detect.size
+        if count < 2 or self.range_bin_m <= 0 or count * self.range_bin_m > FARTHEST_RANGE_M:
+            return None
+        return DetectionCurve(np.arange(count, dtype=np.float64) * self.range_bin_m, self.p_detect)
 
 
 @dataclass(frozen=True, slots=True)

@@ -142,9 +142,17 @@ class Routing:
             and (table[node.role] is Reach.ALL or not topic.has_vehicle or vehicle in _own(node, topic))
         ]
 
-    def _named(self, topic: Topic) -> set[str]:
+    def _named(self, topic: Topic) -> frozenset[str]:
         """The vehicles, or platforms, that keys of a topic may name."""
-        return {name for node in self.roster for name in _own(node, topic)}
+        return self._platforms if topic.has_platform else self._vehicles
+
+    @cached_property
+    def _vehicles(self) -> frozenset[str]:
+        return frozenset(vehicle for node in self.roster for vehicle in node.vehicles)
+
+    @cached_property
+    def _platforms(self) -> frozenset[str]:
+        return frozenset(node.platform for node in self.roster if node.platform)
 
     def _expressions(self, node_id: str, *, writing: bool) -> tuple[str, ...]:
         node = self.nodes[node_id]

@@ -38,7 +38,6 @@ from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.recorded.kept_out import Entries
 from secondlook.recorded.vehicles import Ending
 from secondlook.recorded.whereabouts import Place, Whereabouts
-from vehicle_agent.agent import makes_sense
 
 RISK_AT_FACTORS = (1.0, 1.05)
 
@@ -119,7 +118,7 @@ class Metrics:
         elif isinstance(message, RunInfo) and self.run is None:
             self._begin(message)
         elif isinstance(message, Look) and message.valid and vehicle is not None:
-            if makes_sense(message):
+            if message.makes_sense:
                 vehicle.looked_m += vehicle.footprint.track_length_m(message.geometry)
             else:
                 self.misfits += 1

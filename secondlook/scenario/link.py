@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Annotated, Literal, Self
 
 from pydantic import BeforeValidator, Field, ValidationError, ValidationInfo, field_validator, model_validator
@@ -13,7 +12,7 @@ from comms.said.wire import LONGEST_FRAME
 from secondlook.scenario import bundled
 from secondlook.scenario.errors import dotted
 from secondlook.scenario.plug_ins import PROFILE, PlugInError
-from secondlook.scenario.values import Coordinate, Mapping, Share, refused
+from secondlook.scenario.values import Coordinate, Mapping, Share, check_as_many, check_ascending, refused
 
 IDEAL = "ideal"
 """The profile of a fleet in which everybody hears everybody, at once."""
@@ -40,17 +39,12 @@ class Loss(Mapping):
     @field_validator("range_m")
     @classmethod
     def _check_ascending(cls, range_m: tuple[float, ...]) -> tuple[float, ...]:
-        for before_m, after_m in pairwise(range_m):
-            if after_m <= before_m:
-                raise refused(f"must ascend, but {after_m:g} follows {before_m:g}")
-        return range_m
+        return check_ascending(range_m)
 
     @field_validator("share")
     @classmethod
     def _check_length(cls, share: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        if "range_m" in info.data and len(share) != len(info.data["range_m"]):
-            raise refused(f"must have as many entries as range_m, {len(info.data['range_m'])} and not {len(share)}")
-        return share
+        return check_as_many(share, info, "range_m")
 
 
 class Sonar(Mapping):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -24,6 +23,8 @@ from secondlook.scenario.values import (
     Noise,
     PDetect,
     Share,
+    check_as_many,
+    check_ascending,
     plug_in,
     refused,
 )
@@ -44,17 +45,12 @@ class Curve(Mapping):
     @field_validator("range_m")
     @classmethod
     def _check_ascending(cls, range_m: tuple[float, ...]) -> tuple[float, ...]:
-        for before_m, after_m in pairwise(range_m):
-            if after_m <= before_m:
-                raise refused(f"must ascend, but {after_m:g} follows {before_m:g}")
-        return range_m
+        return check_ascending(range_m)
 
     @field_validator("p_detect")
     @classmethod
     def _check_length(cls, p_detect: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
-        if "range_m" in info.data and len(p_detect) != len(info.data["range_m"]):
-            raise refused(f"must have as many entries as range_m, {len(info.data['range_m'])} and not {len(p_detect)}")
-        return p_detect
+        return check_as_many(p_detect, info, "range_m")
 
     @property
     def detection_curve(self) -> DetectionCurve:

@@ -7,6 +7,7 @@ float.
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from itertools import pairwise
 from typing import Annotated
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationInfo, model_validator
@@ -86,3 +87,18 @@ class Mapping(BaseModel):
         if isinstance(info.context, dict):
             info.context[id(data)] = cls
         return data
+
+
+def check_ascending(values: tuple[float, ...]) -> tuple[float, ...]:
+    """The values, if each is larger than the one before; else what pydantic refuses."""
+    for before, after in pairwise(values):
+        if after <= before:
+            raise refused(f"must ascend, but {after:g} follows {before:g}")
+    return values
+
+
+def check_as_many(values: tuple[float, ...], info: ValidationInfo, other: str) -> tuple[float, ...]:
+    """The values, if there are as many as of another key, which comes before; else what pydantic refuses."""
+    if other in info.data and len(values) != len(info.data[other]):
+        raise refused(f"must have as many entries as {other}, {len(info.data[other])} and not {len(values)}")
+    return values

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from modems import RUN_INFO
 
-from comms.said.messages import CoverageTile, Curve, Look
-from modem.stretches import CHUNK_M, Gathering, LayerOf, Stretch
+from comms.said.messages import Curve, Look
+from modem.stretches import CHUNK_M, Gathering, LayerOf, Stretch, Told
 from planner.risk import NATS_PER_LEVEL
 from vehicle_agent.coverage import CoverageLayer
 
@@ -35,10 +35,10 @@ def gathered(looks: list[Look], curve: Curve | None = CURVE) -> list[Stretch]:
     return [one for one in found if one is not None]
 
 
-def layer(tiles: list[CoverageTile]) -> np.ndarray:
+def layer(told: list[Told]) -> np.ndarray:
     """Sums in levels, of the newest version of each tile."""
     sums = np.zeros(GRID.shape)
-    for tile in sorted(tiles, key=lambda one: one.version):
+    for _, tile in sorted(told, key=lambda one: one.tile.version):
         rows, columns = tile.sum_levels.shape
         sums[tile.first_row : tile.first_row + rows, tile.first_column : tile.first_column + columns] = tile.sum_levels
     return sums
