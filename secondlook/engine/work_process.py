@@ -147,7 +147,8 @@ def main() -> None:
     # Behind our own path, so that nothing there can stand in a room's way.
     sys.path.extend(entry for entry in path if entry not in sys.path)
     work: queue.SimpleQueue[bytes] = queue.SimpleQueue()
-    threading.Thread(target=_receive, args=(pipe, work), daemon=True).start()
+    receiving = threading.Thread(target=_receive, args=(pipe, work), daemon=True)
+    receiving.start()
     while True:
         try:
             function, arguments = pickle.loads(work.get())
@@ -156,7 +157,10 @@ def main() -> None:
             pipe.send((None, None))  # begun
             pipe.send((True, function(*arguments)))
         except Exception as error:
-            pipe.send((False, error))
+            try:
+                pipe.send((False, error))
+            except OSError:  # who started it is gone: `_receive` sees it, too, and tidies up before the process ends
+                receiving.join()
 
 
 def _receive(pipe: Connection, work: queue.SimpleQueue[bytes]) -> None:
