@@ -19,6 +19,8 @@ from planner.footprints import footprint_of
 from planner.types import Strip
 from planner.way_home import MARGIN_S
 
+AT_WORK = (StripState.ACCEPTED, StripState.UNDER_WAY)
+
 
 class Briefing:
     """Reads ledger and vehicles as they are when it is asked; changes none of them. `p_detect`: what a look along a
@@ -75,7 +77,8 @@ class Briefing:
         stays_away = vehicle.is_finished and not vehicle.is_idle  # or on its way home
         if not entry.role.revisits or vehicle.lost or state is None or stays_away or not vehicle.is_trusted:
             return None
-        record = self._ledger.strip_of(entry.vehicle)
+        following = self._ledger.next_of(entry.vehicle)
+        record = following or self._ledger.strip_of(entry.vehicle)
         if record is None and not vehicle.is_idle:
             return None
         pose = Pose(state.x_m, state.y_m, state.heading_rad)
@@ -86,6 +89,8 @@ class Briefing:
             if state.works_on == record.strip.number and state.expected_end_ms > 0:
                 ends_ms = state.expected_end_ms
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
+            if following is None and free_ms - now_ms <= self._config.ahead_ms and record.state in AT_WORK:
+                record, pose = None, free_at  # it is given its next now
         sees = footprint_of(entry.sonar)
         helper = Helper(
             vehicle=entry.vehicle,
@@ -102,7 +107,7 @@ class Briefing:
             way_home=way_home_of(entry, vehicle.keep_out, vehicle.flows),
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
-            sweeping=record is not None and record.state is StripState.UNDER_WAY,
+            sweeping=record is not None and (record is following or record.state is StripState.UNDER_WAY),
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
             keep_out=vehicle.keep_out,
         )

@@ -34,7 +34,8 @@ class CoordinatorConfig:
     """The mission ends at the latest at `deadline_factor` times the last primary's end, or at `deadline_s`; what does
     not hold is infinite.
     `lost_after_ms`: age of a vehicle's state from which it counts as lost. `answer_within_ms`: age of an offer from
-    which no answer is expected any more.
+    which no answer is expected any more. `ahead_ms`: so long before a vehicle is expected to be done with a strip it is
+    offered its next; 0 to wait until it is.
     `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
@@ -61,3 +62,4 @@ class CoordinatorConfig:
     priorities: tuple[PriorityGround, ...] = ()
     flows: FlowGrid | None = None
     answer_within_ms: int = ANSWER_WITHIN_MS
+    ahead_ms: int = 0

@@ -70,12 +70,12 @@ class Dispatch:
         self._offer(offers, situation, now_ms)
         if math.isfinite(again_s):
             self._agenda.add(Item.ASSIGN, now_ms + round(again_s * 1000), sector)
-        self._instruct(right.make_room(departures, self._under_way()))
+        self._instruct(right.make_room(departures, self._under_way()), now_ms)
 
     def keep_apart(self, now_ms: int) -> None:
         """Tells helpers to give way to whom they would come too close."""
         if self._right_of_way is not None:
-            self._instruct(self._right_of_way.check(self._under_way(), now_ms / 1000))
+            self._instruct(self._right_of_way.check(self._under_way(), now_ms / 1000), now_ms)
 
     def _offer(self, offers: Iterable[tuple[str, int]], situation: Situation, now_ms: int) -> None:
         """Offers strips; a helper that has one is first to give that back."""
@@ -84,16 +84,18 @@ class Dispatch:
         for name, number in offers:
             helper = helpers[name]
             if helper.task is not None:
-                self._strips.ask_back(helper.task.strip, self._fleet.vehicles[name])
+                self._strips.ask_back(helper.task.strip, self._fleet.vehicles[name], now_ms)
             else:
-                self._strips.offer(number, name, expected_service(open_strips[number], helper), now_ms)
+                expected = expected_service(open_strips[number], helper)
+                as_next = self._strips.ledger.strip_of(name) is not None
+                self._strips.offer(number, name, expected, now_ms, as_next=as_next)
 
-    def _instruct(self, instructions: Iterable[Instruction]) -> None:
+    def _instruct(self, instructions: Iterable[Instruction], now_ms: int) -> None:
         for one in instructions:
             if one.gives_back is not None:
                 vehicle = self._fleet.vehicles[one.name]
                 vehicle.gave_way.add(one.gives_back.number)
-                self._strips.ask_back(one.gives_back, vehicle)
+                self._strips.ask_back(one.gives_back, vehicle, now_ms)
             if one.place is not None:
                 self._outbox.add_task(TaskAction.STAND_ASIDE, one.name, replace(NO_STRIP, start=one.place))
 

@@ -1,5 +1,6 @@
-"""The ledger of strips: each has one state at a time and at most one vehicle, each vehicle at most one strip, and each
-change a reason. Nothing is ever removed. What would break that is refused with an error: it is a mistake of ours."""
+"""The ledger of strips: each has one state at a time and at most one vehicle, each vehicle at most one strip and one
+that is its next, and each change a reason. Nothing is ever removed. What would break that is refused with an error: it
+is a mistake of ours."""
 
 from __future__ import annotations
 
@@ -13,8 +14,13 @@ from planner.types import Strip
 
 NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
+TAKEN = WITH_A_VEHICLE | {StripState.NEXT}
+"""With a vehicle, or to be with it next."""
 ALLOWED: dict[StripState, frozenset[StripState]] = {
-    StripState.OPEN: frozenset({StripState.OFFERED, StripState.WITHDRAWN}),
+    StripState.OPEN: frozenset({StripState.OFFERED, StripState.NEXT, StripState.WITHDRAWN}),
+    StripState.NEXT: frozenset(
+        {StripState.ACCEPTED, StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}
+    ),
     StripState.OFFERED: frozenset(
         {StripState.ACCEPTED, StripState.UNDER_WAY, StripState.OPEN, StripState.DONE, StripState.FAILED}
     ),
@@ -52,6 +58,7 @@ class Ledger:
         self._records: dict[int, StripRecord] = {}
         self._by_state: dict[StripState, set[int]] = {state: set() for state in StripState}
         self._with: dict[str, int] = {}  # the strip of each vehicle that has one
+        self._next: dict[str, int] = {}
 
     def __iter__(self) -> Iterator[StripRecord]:
         return iter(self._records.values())
@@ -63,6 +70,11 @@ class Ledger:
     def strip_of(self, vehicle: str) -> StripRecord | None:
         """The strip that is with a vehicle; None where it has none."""
         number = self._with.get(vehicle)
+        return None if number is None else self._records[number]
+
+    def next_of(self, vehicle: str) -> StripRecord | None:
+        """The strip that a vehicle is to serve next; None where there is none."""
+        number = self._next.get(vehicle)
         return None if number is None else self._records[number]
 
     @property
@@ -92,30 +104,33 @@ class Ledger:
         """Moves a strip to a state. `vehicle`: who it is then with, or who has ended it.
 
         Raises ValueError, and changes nothing, where its present state does not lead there, where it would be with
-        nobody or with two, and where its vehicle has another strip.
+        nobody or with two, and where its vehicle has another strip, or another next one.
         """
         self._check(record, state, vehicle)
         number = record.strip.number
         self._by_state[record.state].discard(number)
         self._by_state[state].add(number)
-        if record.state in WITH_A_VEHICLE:
-            del self._with[record.vehicle]
-        if state in WITH_A_VEHICLE:
-            self._with[vehicle] = number
+        if record.state in TAKEN:
+            del self._taken(record.state)[record.vehicle]
+        if state in TAKEN:
+            self._taken(state)[vehicle] = number
         record.state, record.since_ms, record.reason = state, now_ms, reason
-        record.vehicle = vehicle if state in WITH_A_VEHICLE or state.has_ended else ""
+        record.vehicle = vehicle if state in TAKEN or state.has_ended else ""
         record.revision += 1
 
     def _check(self, record: StripRecord, state: StripState, vehicle: str) -> None:
         what = f"strip {record.strip.number} cannot become {state.value}"
         if state not in ALLOWED[record.state]:
             raise ValueError(f"{what}: it is {record.state.value}")
-        if state in WITH_A_VEHICLE and not vehicle:
+        if state in TAKEN and not vehicle:
             raise ValueError(f"{what} with nobody")
-        if record.state in WITH_A_VEHICLE and vehicle and vehicle != record.vehicle:
+        if record.state in TAKEN and vehicle and vehicle != record.vehicle:
             raise ValueError(f"{what} by {vehicle}: it is with {record.vehicle}")
-        if state in WITH_A_VEHICLE and self._with.get(vehicle, record.strip.number) != record.strip.number:
-            raise ValueError(f"{what} with {vehicle}, which has strip {self._with[vehicle]}")
+        if state in TAKEN and self._taken(state).get(vehicle, record.strip.number) != record.strip.number:
+            raise ValueError(f"{what} with {vehicle}, which has strip {self._taken(state)[vehicle]}")
+
+    def _taken(self, state: StripState) -> dict[str, int]:
+        return self._next if state is StripState.NEXT else self._with
 
     def leave(self, record: StripRecord, now_ms: int, reason: str) -> None:
         """Leaves a strip that has not ended open for good, with nobody."""

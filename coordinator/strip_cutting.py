@@ -17,7 +17,7 @@ from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.fleet import KnownFleet
-from coordinator.ledger import WITH_A_VEHICLE
+from coordinator.ledger import TAKEN
 from coordinator.reasons import Reasons
 from coordinator.sectors import Sector
 from coordinator.strip_life import StripLife
@@ -103,7 +103,7 @@ class StripCutting:
             objective=self._objective,
             threshold=self._cutter.threshold,
         )
-        claimed = [one.window.within(place) for one in ledger.in_state(*WITH_A_VEHICLE) if one.window.shared(place)]
+        claimed = [one.window.within(place) for one in ledger.in_state(*TAKEN) if one.window.shared(place)]
         unmatched = [one for one in ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
         opened = [record.window.within(place) for record in unmatched]
         situation = self._briefing.situation(now_ms, sector)

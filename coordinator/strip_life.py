@@ -1,4 +1,5 @@
-"""The life of a strip: what moves it from open, through offered, accepted and under way, to done, failed or withdrawn.
+"""The life of a strip: what moves it from open, through offered, or next of a vehicle that has one still, accepted and
+under way, to done, failed or withdrawn.
 
 A vehicle's word on a strip counts if it is newer than all that the vehicle has told of that strip. Whether a strip is
 done the map decides, not the word.
@@ -16,7 +17,7 @@ from coordinator.allocate.service import Service
 from coordinator.config import ANSWER_WITHIN_MS
 from coordinator.cut.strips import Cut
 from coordinator.fleet import KnownFleet
-from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
+from coordinator.ledger import TAKEN, Ledger, StripRecord
 from coordinator.outbox import NO_STRIP, Outbox
 from coordinator.sectors import Sectors
 from coordinator.vehicles import KnownVehicle, Offer
@@ -75,22 +76,32 @@ class StripLife:
         """Withdraws an open strip, where none is cut any more."""
         self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
 
-    def offer(self, number: int, name: str, expected: Service, now_ms: int) -> None:
-        """Offers an open strip to a vehicle. `expected`: how the service is expected to go."""
+    def offer(self, number: int, name: str, expected: Service, now_ms: int, *, as_next: bool = False) -> None:
+        """Offers an open strip to a vehicle. `expected`: how the service is expected to go. `as_next`: it is to serve
+        it when it is done with the strip that it has."""
         record, vehicle = self.ledger.get(number), self._fleet.vehicles[name]
         assert record is not None
-        self._outbox.add_task(TaskAction.TAKE, name, record.strip)
+        self._outbox.add_task(TaskAction.TAKE_NEXT if as_next else TaskAction.TAKE, name, record.strip)
         vehicle.asked_back = 0
         ends_ms = round(expected.ends_s * 1000)
         due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
         levels = self._fleet.levels(name, record.window)
         vehicle.offers[number] = Offer(record.strip, record.cut, expected, due_ms, levels)
-        self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
+        if as_next:
+            vehicle.agreed_next = 0
+            self._move(record, StripState.NEXT, now_ms, f"offered to {name} as its next", name)
+        else:
+            self._move(record, StripState.OFFERED, now_ms, f"offered to {name}", name)
 
-    def ask_back(self, strip: Strip, vehicle: KnownVehicle) -> None:
-        """Tells a vehicle to give a strip back."""
+    def ask_back(self, strip: Strip, vehicle: KnownVehicle, now_ms: int) -> None:
+        """Tells a vehicle to give a strip back, and with it what it was to do next."""
+        name = vehicle.entry.vehicle
         vehicle.asked_back = strip.number
-        self._outbox.add_task(TaskAction.GIVE_BACK, vehicle.entry.vehicle, strip)
+        self._outbox.add_task(TaskAction.GIVE_BACK, name, strip)
+        following = self.ledger.next_of(name)
+        if following is not None:
+            self._move(following, StripState.OPEN, now_ms, f"{name} is told to give strip {strip.number} back")
+            self._sectors.assign_by(now_ms, following.window)
 
     def hear_state(
         self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int, *, was_idle: bool
@@ -114,8 +125,11 @@ class StripLife:
             under_way = status.state is TaskState.UNDER_WAY
             self._hear_at_work(status.strip, vehicle, header, now_ms, under_way=under_way)
             return
+        if status.state is TaskState.NEXT:
+            self._hear_next(status.strip, vehicle, now_ms)
+            return
         record, name = self.ledger.get(status.strip), vehicle.entry.vehicle
-        if record is None or record.vehicle != name or record.state not in WITH_A_VEHICLE:
+        if record is None or record.vehicle != name or record.state not in TAKEN:
             if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
                 self._sectors.cut_by(now_ms, None if record is None else [record.window])
             return
@@ -141,34 +155,46 @@ class StripLife:
     def find_overdue(self, lost: Iterable[str], now_ms: int) -> None:
         """Opens again what vehicles had that are `lost` now, have not answered, or are late."""
         for name in lost:
-            for record in self.ledger.in_state(*WITH_A_VEHICLE):
+            for record in self.ledger.in_state(*TAKEN):
                 if record.vehicle == name:
                     self._move(record, StripState.OPEN, now_ms, f"{name} is lost: nothing heard of it")
                     self._sectors.cut_by(now_ms, [record.window])
-        for record in self.ledger.in_state(StripState.OFFERED):
+        for record in self._unanswered():
             if now_ms - record.since_ms >= self._answer_within_ms:
                 self._fleet.vehicles[record.vehicle].note_silence()
                 self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
                 self._sectors.assign_by(now_ms, record.window)
-        for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
+        for record in self._answered():
             vehicle, offer = self._of(record)
             if now_ms >= offer.due_ms:
                 late = f"{record.vehicle} has not served it, which was expected by {offer.service.ends_s:.0f} s"
-                self.ask_back(record.strip, vehicle)
+                self.ask_back(record.strip, vehicle, now_ms)
                 vehicle.note_failure(record.window)
                 self._move(record, StripState.OPEN, now_ms, late)
                 self._sectors.cut_by(now_ms, [record.window])
 
     def deadlines_ms(self) -> Iterator[int]:
         """When an answer, or a service, is overdue."""
-        yield from (one.since_ms + self._answer_within_ms for one in self.ledger.in_state(StripState.OFFERED))
-        at_work = self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY)
-        yield from (self._of(one)[1].due_ms for one in at_work)
+        yield from (one.since_ms + self._answer_within_ms for one in self._unanswered())
+        yield from (self._of(one)[1].due_ms for one in self._answered())
+
+    def _unanswered(self) -> list[StripRecord]:
+        offered = self.ledger.in_state(StripState.OFFERED, StripState.NEXT)
+        return [one for one in offered if not self._is_agreed(one)]
+
+    def _answered(self) -> list[StripRecord]:
+        taken = self.ledger.in_state(StripState.NEXT, StripState.ACCEPTED, StripState.UNDER_WAY)
+        return [one for one in taken if one.state is not StripState.NEXT or self._is_agreed(one)]
+
+    def _is_agreed(self, record: StripRecord) -> bool:
+        """Whether its vehicle has said that it does it next."""
+        is_next = record.state is StripState.NEXT
+        return is_next and self._fleet.vehicles[record.vehicle].agreed_next == record.strip.number
 
     @property
     def unended(self) -> list[StripRecord]:
-        """The strips that are open or with a vehicle."""
-        return self.ledger.in_state(StripState.OPEN, *WITH_A_VEHICLE)
+        """The strips that are open or taken."""
+        return self.ledger.in_state(StripState.OPEN, *TAKEN)
 
     def leave_all(self, now_ms: int) -> None:
         """Leaves what has not ended open for good: the mission is over."""
@@ -192,6 +218,9 @@ class StripLife:
                 self._outbox.add_task(TaskAction.GIVE_BACK, name, replace(NO_STRIP, number=number))
             return
         offer = vehicle.offers.get(number)
+        is_next = record.state is StripState.NEXT and record.vehicle == name
+        if is_next and not self._leaves_its_other(vehicle, number, header, now_ms):
+            return
         if record.state is StripState.OPEN and offer is not None and vehicle.asked_back != number:
             if not self._leaves_its_other(vehicle, number, header, now_ms):
                 return
@@ -201,17 +230,32 @@ class StripLife:
                 self._sectors.cut_by(now_ms, [record.window])
             vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + LATE_MS))
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
-        if record.vehicle != name or record.state not in WITH_A_VEHICLE:
-            self.ask_back(record.strip, vehicle)
+        if record.vehicle != name or record.state not in TAKEN:
+            self.ask_back(record.strip, vehicle, now_ms)
             return
         vehicle.unanswered = 0
         if under_way and record.state is not StripState.UNDER_WAY:
             self._move(record, StripState.UNDER_WAY, now_ms, "under way", name)
-        elif record.state is StripState.OFFERED:
+        elif record.state in (StripState.OFFERED, StripState.NEXT):
             self._move(record, StripState.ACCEPTED, now_ms, "accepted", name)
 
+    def _hear_next(self, number: int, vehicle: KnownVehicle, now_ms: int) -> None:
+        """A vehicle says that it does a strip next; one that is not its next any more it is to give back."""
+        record, name, offer = self.ledger.get(number), vehicle.entry.vehicle, vehicle.offers.get(number)
+        is_open = record is not None and record.state is StripState.OPEN
+        may = vehicle.asked_back != number and self.ledger.next_of(name) is None
+        if record is not None and is_open and may and offer is not None and record.strip == offer.strip:
+            self._move(record, StripState.NEXT, now_ms, f"{name} does it next after all", name)  # it has answered late
+        if record is None or record.state is not StripState.NEXT or record.vehicle != name:
+            strip = replace(NO_STRIP, number=number) if record is None else record.strip
+            if number > 0:
+                self.ask_back(strip, vehicle, now_ms)
+            return
+        vehicle.unanswered, vehicle.agreed_next = 0, number
+
     def _leaves_its_other(self, vehicle: KnownVehicle, number: int, header: Header, now_ms: int) -> bool:
-        """Opens again what a vehicle has beside the strip that it says it is at, as it can be at one alone.
+        """Opens again what a vehicle has beside the strip that it says it is at, as it can be at one alone; where it
+        has seen that, it is done.
 
         Returns False, and opens nothing, where it has since said that it is at the other: what it says now is old.
         """
@@ -220,14 +264,19 @@ class StripLife:
         if other is not None:
             if other.state is not StripState.OFFERED and vehicle.has_told_since(header, other.strip.number):
                 return False
-            self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
-            self._sectors.assign_by(now_ms, other.window)
+            if other.state is not StripState.OFFERED and self._seen_share(other) >= COVERED_SHARE:
+                self._move(other, StripState.DONE, now_ms, f"seen by {name}, which is at strip {number}", name)
+                self._sectors.cut_by(now_ms, [other.window])
+            else:
+                self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
+                self._sectors.assign_by(now_ms, other.window)
         return True
 
     def _hear_no_work(self, vehicle: KnownVehicle, header: Header, now_ms: int) -> None:
-        """A vehicle says once more that it has no work: its last word on a strip that it still has here was lost."""
+        """A vehicle says once more that it has no work: its last word on a strip that it still has here was lost, or
+        what it had agreed to do next is forgotten."""
         name = vehicle.entry.vehicle
-        for record in self.ledger.in_state(StripState.ACCEPTED, StripState.UNDER_WAY):
+        for record in self._answered():
             if record.vehicle == name and vehicle.tells_news_of(record.strip.number, header):
                 if self._seen_share(record) >= COVERED_SHARE:
                     vehicle.failures = 0

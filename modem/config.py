@@ -18,7 +18,8 @@ class ModemConfig:
     """`platform`: which one it is on. `platforms`: all, in the order in which they speak; the first is the
     coordinator's, with which all others talk, and no two others talk with each other. `vehicles`: those of the fleet in
     the order of the roster, each a platform. `frame_bits`: of one frame, `frames`: the most that one packet has.
-    `slot_ms`: so long one platform has the water, packet and way of sound included. `low_m`, `high_m`: south-west and
+    `slot_ms`: so long one platform has the water, packet and way of sound included. `deck_ms`: before this all are on
+    deck, and what is said goes from hand to hand at once, not through the water. `low_m`, `high_m`: south-west and
     north-east corner of the box in which all places lie that are told.
 
     Raises ValueError where these do not go together.
@@ -32,6 +33,7 @@ class ModemConfig:
     slot_ms: int
     low_m: tuple[float, float]
     high_m: tuple[float, float]
+    deck_ms: int = 0
 
     def __post_init__(self) -> None:
         if not 2 <= len(set(self.platforms)) == len(self.platforms) <= MOST_PLATFORMS:

@@ -7,6 +7,7 @@ then rarely reads as anything.
 
 from __future__ import annotations
 
+import struct
 import zlib
 
 from comms.said.announcement import RunInfo
@@ -57,8 +58,26 @@ class FrameForm:
         place, start = reader.read(self._platform_bits), reader.read(START_BITS)
         return (self._platforms[place], start, reader) if place < len(self._platforms) else None
 
+    def pack_on_deck(self, platform: str, start: int, said: BitWriter) -> bytes:
+        """A message as it goes from hand to hand on deck: by itself, as long as it is."""
+        content = BitWriter()
+        content.write(self._platforms.index(platform), 8)
+        content.write(start, 8)
+        content.write(said.value, said.bits)
+        return struct.pack(">I", self._crc(content.to_bytes())) + content.to_bytes()
+
+    def unpack_on_deck(self, frame: bytes) -> tuple[str, int, BitReader] | None:
+        """See `unpack`; behind the message there may be zeros."""
+        tag, content = frame[:4], frame[4:]
+        if len(content) < 2 or tag != struct.pack(">I", self._crc(content)) or content[0] >= len(self._platforms):
+            return None
+        return self._platforms[content[0]], content[1] % (1 << START_BITS), BitReader(content[2:])
+
     def _tag(self, content: bytes) -> int:
-        return zlib.crc32(content, zlib.crc32(self._salt)) & (1 << self._tag_bits) - 1
+        return self._crc(content) & (1 << self._tag_bits) - 1
+
+    def _crc(self, content: bytes) -> int:
+        return zlib.crc32(content, zlib.crc32(self._salt))
 
 
 def start_number(now_ms: int) -> int:

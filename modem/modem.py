@@ -17,6 +17,7 @@ from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import (
+    MOST_FRAMES,
     AgentState,
     Curve,
     Heard,
@@ -44,6 +45,8 @@ STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
 LATE_MS = 100
 """So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
+FROM_DECK_MS = 10_000
+"""For so long after it has left the deck it may still hear what was said there."""
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
 
@@ -66,6 +69,7 @@ class Modem:
         self._gathering: Gathering | None = None
         self._layers: dict[tuple[str, int], LayerOf] = {}
         self._heard: list[Publication] = []
+        self._on_deck: list[bytes] = []
         self._told = 0
         self._last_said: dict[str, tuple[int, Any]] = {}
         self._acked: dict[str, int] = {}  # when each was acknowledged last
@@ -98,6 +102,8 @@ class Modem:
     def on_wake(self, now_ms: int) -> Step:
         """Says what there is to be said, if its slot begins now."""
         publish: list[Publication] = []
+        if now_ms < self.config.deck_ms:
+            return self._step(now_ms)
         slot_ms = self.config.slot_of(self.config.platform, now_ms)
         if self._form is not None and now_ms - slot_ms <= LATE_MS and slot_ms > self._spoke_ms:
             self._spoke_ms = slot_ms
@@ -166,7 +172,10 @@ class Modem:
         except WireError as error:
             self._drop("does not fit the water", f"{said.key}: {error}")
             return
-        self._queue.add(Waiting(said.key, platform, crossing, bits, now_ms))
+        if now_ms < self.config.deck_ms and self._form is not None:
+            self._on_deck.append(self._form.pack_on_deck(self.config.platform, self._start, bits))
+        else:
+            self._queue.add(Waiting(said.key, platform, crossing, bits, now_ms))
 
     def _drop(self, why: str, detail: str) -> None:
         self.dropped[why] += 1
@@ -277,8 +286,10 @@ class Modem:
 
     def _hear(self, packet: Packet, now_ms: int) -> None:
         assert self._form is not None
+        may_be_on_deck = now_ms < self.config.deck_ms + FROM_DECK_MS
         for frame in packet.frames:
-            opened = self._form.unpack(frame)
+            on_deck = self._form.unpack_on_deck(frame) if may_be_on_deck else None
+            opened = on_deck or self._form.unpack(frame)
             if opened is None or opened[0] not in self.config.others:
                 if opened is None:
                     self._drop("no frame of this run", f"{len(frame)} bytes")
@@ -288,7 +299,10 @@ class Modem:
                 self._receiving[platform] = self._receiver(platform)
             self._starts[platform] = start
             try:
-                self._read(self._form, platform, reader, now_ms)
+                if on_deck is not None:
+                    self._open(reader, platform, now_ms)
+                else:
+                    self._read(self._form, platform, reader, now_ms)
             except WireError as error:
                 self._drop("malformed frame", f"{platform}: {error}")
 
@@ -362,12 +376,16 @@ class Modem:
         self._heard.append(Publication(HEARD.key(vehicle=self.config.platform), heard))
 
     def _step(self, now_ms: int) -> Step:
-        heard, self._heard = tuple(self._heard), []
+        publish, self._heard = self._heard, []
+        on_deck, self._on_deck = self._on_deck, []
+        key = MODEM_TX.key(vehicle=self.config.platform)
+        for first in range(0, len(on_deck), MOST_FRAMES):
+            publish.append(Publication(key, Packet(tuple(on_deck[first : first + MOST_FRAMES]))))
         if self._form is None or not self._has_anything_to_say():
-            return Step(heard)
+            return Step(tuple(publish))
         slot_ms = self.config.slot_of(self.config.platform, now_ms)
         may_speak_now = slot_ms == now_ms and slot_ms > self._spoke_ms
-        return Step(heard, slot_ms if may_speak_now else slot_ms + self.config.cycle_ms)
+        return Step(tuple(publish), slot_ms if may_speak_now else slot_ms + self.config.cycle_ms)
 
     def _has_anything_to_say(self) -> bool:
         return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())
@@ -390,4 +408,8 @@ def _ends_a_stretch(message: Message) -> bool:
     """Whether a vehicle has stopped looking along a track."""
     if isinstance(message, AgentState):
         return message.mode is Mode.IDLE or message.mode.has_ended
-    return isinstance(message, TaskStatus) and message.state not in (TaskState.ACCEPTED, TaskState.UNDER_WAY)
+    return isinstance(message, TaskStatus) and message.state not in (
+        TaskState.NEXT,
+        TaskState.ACCEPTED,
+        TaskState.UNDER_WAY,
+    )

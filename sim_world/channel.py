@@ -65,6 +65,7 @@ class Channel:
         self._sent: dict[str, list[tuple[int, int]]] = {name: [] for name in config.platforms}
         self._heard: dict[str, list[_Reception]] = {name: [] for name in config.platforms}
         self._open: list[_Reception] = []
+        self._on_deck: list[Arrival] = []
         self.dropped_frames = 0
 
     @property
@@ -75,6 +76,9 @@ class Channel:
     def send(self, sender: str, frames: tuple[bytes, ...], sent_ms: int, places: Mapping[str, Point]) -> None:
         """Puts a packet on its way, with all platforms where they are then. One of no platform's is nobody's."""
         if sender not in self._counts:
+            return
+        if sent_ms < self._config.deck_ms:
+            self._on_deck += [Arrival(one, frames) for one in self._config.platforms if one != sender]
             return
         signal = self._config.signal
         fitting = tuple(frame for frame in frames if len(frame) <= signal.frame_bytes)[: signal.frames]
@@ -98,14 +102,16 @@ class Channel:
                 self._heard[receiver].append(reception)
 
     def arrivals(self, now_ms: int) -> list[Arrival]:
-        """What has come through of the receptions that have ended by now, in the order of their ends."""
+        """What was said on deck, and what has come through of the receptions that have ended by now, in the order of their
+        ends."""
+        on_deck, self._on_deck = self._on_deck, []
         ended = sorted((one for one in self._open if one.ends_ms <= now_ms), key=lambda one: one.order)
         if not ended:
-            return []
+            return on_deck
         self._open = [one for one in self._open if one.ends_ms > now_ms]
         arrivals = [Arrival(one.receiver, frames) for one in ended if (frames := self._came_through(one))]
         self._forget(now_ms)
-        return arrivals
+        return on_deck + arrivals
 
     def _came_through(self, reception: _Reception) -> tuple[bytes, ...]:
         begins_ms, ends_ms, receiver = reception.begins_ms, reception.ends_ms, reception.receiver

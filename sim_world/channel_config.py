@@ -158,6 +158,7 @@ class Outage:
 class ChannelConfig:
     """The channel of a fleet. `platforms`: all that have a modem, each a vehicle of the world or one of `still`, which
     lie where they are, mission frame. `loss`: the share of frames lost at random beside what the signal loses, below 1.
+    `deck_ms`: what is sent before this goes from hand to hand, at once and as it is.
     """
 
     signal: Signal
@@ -165,6 +166,7 @@ class ChannelConfig:
     still: tuple[tuple[str, Point], ...] = ()
     loss: float = 0.0
     outages: tuple[Outage, ...] = ()
+    deck_ms: int = 0
 
     def __post_init__(self) -> None:
         _require(len(set(self.platforms)) == len(self.platforms), "platforms", self.platforms, "different ones")

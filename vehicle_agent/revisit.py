@@ -34,7 +34,8 @@ NO_ROOM = "it cannot be flown without entering ground to keep out of"
 
 
 class SecondLooks:
-    """Works on one strip at a time, with the agent's vehicle; repeated words about a strip change nothing.
+    """Works on one strip at a time, with the agent's vehicle, and keeps the one it is to do next; repeated words about
+    a strip change nothing.
 
     `rest`: the agent's mode between two strips.
     """
@@ -42,6 +43,7 @@ class SecondLooks:
     def __init__(self, agent: Agent, config: RevisitConfig, rest: Mode) -> None:
         self.config = config
         self.strip: Strip | None = None
+        self._next: Strip | None = None
         self._agent = agent
         self._sailing = Sailing(config.speed_mps) if config.homing is None else config.homing.way.sailing
         self._rest = rest
@@ -71,6 +73,8 @@ class SecondLooks:
             self._tell(task.strip, TaskState.DONE, now_ms)
         elif busy or agent.mode.is_out_of_work:
             self._tell(task.strip, TaskState.REFUSED, 0, busy or ON_ITS_WAY_HOME)
+        elif self.strip is not None and task.action is TaskAction.TAKE_NEXT:
+            self._keep(strip)
         else:
             self._consider(strip, now_ms)
 
@@ -99,11 +103,16 @@ class SecondLooks:
                 agent.follow(self._legs[0], self.config.run_in_m)
             else:
                 self._leave(TaskState.DONE, now_ms)
+                self._go_on(now_ms)
         elif status.state is ManeuverState.REFUSED:
             self._leave(TaskState.FAILED, now_ms, status.reason)
+            self._go_on(now_ms)
 
     def leave(self, now_ms: int, why: str) -> None:
-        """What is not done of a strip under way is left."""
+        """What is not done of a strip under way is left, and what was to be done next."""
+        if self._next is not None:
+            self._tell(self._next.number, TaskState.REFUSED, 0, why)
+            self._next = None
         if self.strip is not None:
             self._leave(TaskState.FAILED, now_ms, why)
 
@@ -113,39 +122,18 @@ class SecondLooks:
             self._tell(self.strip.number, TaskState.UNDER_WAY, self._agent.expected_end_ms)
 
     def _consider(self, strip: Strip, now_ms: int) -> None:
-        agent, config = self._agent, self.config
+        """Goes to a strip, or tells why not."""
+        agent = self._agent
         if self.strip is not None:
             self._tell(strip.number, TaskState.REFUSED, 0, f"at work on strip {self.strip.number}")
             return
-        pose = agent.pose
-        if pose is None:
+        if agent.pose is None:
             self._tell(strip.number, TaskState.REFUSED, 0, "no position yet")
             return
-        if not _makes_sense(strip):
-            self._tell(strip.number, TaskState.REFUSED, 0, "that is no strip")
-            return
-        if not agent.region.meets(strip):
-            self._tell(strip.number, TaskState.REFUSED, 0, "it lies outside the area")
-            return
-        least_ms = round(
-            (strip.length_m + strip.width_m - agent.footprint.reach.strip_width_m)
-            / (config.speed_mps + self._sailing.drift_mps)
-            * 1000
-        )
-        if agent.endurance.left(now_ms + least_ms) <= 0.0:  # told before the legs of what may be far too large are laid
-            self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
-            return
-        radius_m, keep_out = config.turn_radius_m, agent.keep_out.nearer()
-        ways = sweeps_by(agent.footprint, strip, radius_m, config.run_in_m, keep_out)
         try:
-            sweep, way_m = shortest_sweep(ways, pose, radius_m, keep_out)
-        except NoSweepError:
-            self._tell(strip.number, TaskState.REFUSED, 0, NO_ROOM)
-            return
-        ends_ms = now_ms + self._takes_ms(sweep, pose, way_m)
-        free_ms = ends_ms + agent.endurance.run_out_ms(sweep.passes[-1], config.run_in_m)
-        if not agent.endurance.lasts_from(sweep.leave, free_ms, MARGIN_MS):
-            self._tell(strip.number, TaskState.REFUSED, 0, BATTERY_TOO_LOW)
+            sweep, ends_ms = self._planned(strip, agent.pose, now_ms)
+        except _RefusedError as refused:
+            self._tell(strip.number, TaskState.REFUSED, 0, str(refused))
             return
         self.strip = strip
         self._legs, self._passes = list(sweep.legs), list(sweep.passes)
@@ -155,8 +143,54 @@ class SecondLooks:
         agent.works_on = strip.number
         agent.expected_end_ms = ends_ms
         self._tell(strip.number, TaskState.ACCEPTED, ends_ms)
-        agent.follow(sweep.legs[0], config.run_in_m)
+        agent.follow(sweep.legs[0], self.config.run_in_m)
         agent.report_state(now_ms)
+
+    def _keep(self, strip: Strip) -> None:
+        """Keeps a strip as the next one, in place of any other, or tells why not: as it looks from the end of the
+        present one. It is considered again from where the vehicle is by then."""
+        try:
+            _, ends_ms = self._planned(strip, self._passes[-1].end, self._agent.expected_end_ms)
+        except _RefusedError as refused:
+            self._tell(strip.number, TaskState.REFUSED, 0, str(refused))
+            return
+        if self._next is not None and self._next.number != strip.number:
+            self._tell(self._next.number, TaskState.GIVEN_BACK, 0)
+        self._next = strip
+        self._tell(strip.number, TaskState.NEXT, ends_ms)
+
+    def _go_on(self, now_ms: int) -> bool:
+        """Goes on with the next strip; returns whether there is one that it goes to."""
+        strip, self._next = self._next, None
+        if strip is not None:
+            self._consider(strip, now_ms)
+        return self.strip is not None
+
+    def _planned(self, strip: Strip, pose: Pose, begin_ms: int) -> tuple[Sweep, int]:
+        """The sweep of a strip from a pose, and when it ends if it is begun then; else why it cannot be swept."""
+        agent, config = self._agent, self.config
+        if not _makes_sense(strip):
+            raise _RefusedError("that is no strip")
+        if not agent.region.meets(strip):
+            raise _RefusedError("it lies outside the area")
+        least_ms = round(
+            (strip.length_m + strip.width_m - agent.footprint.reach.strip_width_m)
+            / (config.speed_mps + self._sailing.drift_mps)
+            * 1000
+        )
+        if agent.endurance.left(begin_ms + least_ms) <= 0.0:  # before the legs of what may be far too large are laid
+            raise _RefusedError(BATTERY_TOO_LOW)
+        radius_m, keep_out = config.turn_radius_m, agent.keep_out.nearer()
+        ways = sweeps_by(agent.footprint, strip, radius_m, config.run_in_m, keep_out)
+        try:
+            sweep, way_m = shortest_sweep(ways, pose, radius_m, keep_out)
+        except NoSweepError:
+            raise _RefusedError(NO_ROOM) from None
+        ends_ms = begin_ms + self._takes_ms(sweep, pose, way_m)
+        free_ms = ends_ms + agent.endurance.run_out_ms(sweep.passes[-1], config.run_in_m)
+        if not agent.endurance.lasts_from(sweep.leave, free_ms, MARGIN_MS):
+            raise _RefusedError(BATTERY_TOO_LOW)
+        return sweep, ends_ms
 
     def _takes_ms(self, sweep: Sweep, pose: Pose, way_m: float) -> int:
         """How long a sweep takes, with the way there from a pose, which is so long."""
@@ -178,7 +212,10 @@ class SecondLooks:
         return endurance.lasts_from(self._passes[-1].end, free_ms)
 
     def _give_back(self, number: int, now_ms: int) -> None:
-        if self.strip is not None and self.strip.number == number:
+        is_at_it = self.strip is not None and self.strip.number == number
+        if is_at_it or (self._next is not None and self._next.number == number):
+            self._next = None  # what was to come after it rests on what is no more
+        if is_at_it:
             self._leave(TaskState.GIVEN_BACK, now_ms)
             self._agent.hold()
         else:
@@ -206,6 +243,10 @@ class SecondLooks:
         self._status_number += 1
         key = TASK_STATUS.key(vehicle=self._agent.vehicle, number=self._status_number)
         self._agent.publish(key, TaskStatus(number, state, progress, ends_ms, reason))
+
+
+class _RefusedError(Exception):
+    """Why a strip is not taken."""
 
 
 def _is_done_with(known: Strip, strip: Strip) -> bool:

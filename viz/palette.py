@@ -32,6 +32,7 @@ FORESEEN: Colour = (110, 160, 255)  # while it is open
 
 STRIP: dict[StripState, Colour] = {
     StripState.OPEN: (255, 64, 64),
+    StripState.NEXT: (255, 180, 220),
     StripState.OFFERED: (255, 180, 220),
     StripState.ACCEPTED: (255, 180, 220),
     StripState.UNDER_WAY: (255, 110, 199),
@@ -39,6 +40,7 @@ STRIP: dict[StripState, Colour] = {
     StripState.FAILED: (190, 90, 255),
 }
 TASK: dict[TaskState, Colour] = {
+    TaskState.NEXT: (255, 180, 220),
     TaskState.ACCEPTED: (255, 180, 220),
     TaskState.REFUSED: (150, 155, 165),
     TaskState.UNDER_WAY: (255, 110, 199),

@@ -15,7 +15,7 @@ from viz.canvas import Canvas, Pace
 from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_ring
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each
-IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
+IN_HAND = (StripState.NEXT, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
 CHANGES_OFTEN = (HotspotState.ACTIVE, StripState.OPEN)
 OFTEN_EVERY_MS = 60_000
 

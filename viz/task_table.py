@@ -17,7 +17,7 @@ from viz.canvas import Canvas, Pace
 
 MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
 IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
-STRIP_IN_HAND = (StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
+STRIP_IN_HAND = (StripState.NEXT, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
 STANDING = ("open", "in hand", "left", "failed")
 HEAD = "| vehicle | strip | state | risk to remove | ends |\n|---|---|---|---|---|"
 

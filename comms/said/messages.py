@@ -321,9 +321,11 @@ class Hotspot:
 
 
 class StripState(enum.Enum):
-    """The life of a strip in the coordinator's ledger."""
+    """The life of a strip in the coordinator's ledger. One that is next is to be served by a vehicle when it is done
+    with the strip that it has; only then is it with that vehicle."""
 
     OPEN = "open"
+    NEXT = "next"
     OFFERED = "offered"
     ACCEPTED = "accepted"
     UNDER_WAY = "under_way"
@@ -363,17 +365,19 @@ class StripStatus:
 
 
 class TaskAction(enum.Enum):
-    """What a task message asks. To stand aside is to go to its start point and wait there, without a strip; to tell
-    again is to say its tiles and hotspots once more, as some have not arrived."""
+    """What a task message asks. To take a strip next is to take it when done with the one at hand, at once without one.
+    To stand aside is to go to its start point and wait there, without a strip; to tell again is to say its tiles and
+    hotspots once more, as some have not arrived."""
 
     TAKE = "take"
+    TAKE_NEXT = "take_next"
     GIVE_BACK = "give_back"
     STAND_ASIDE = "stand_aside"
     TELL_AGAIN = "tell_again"
 
 
-_WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.STAND_ASIDE))
-_WITH_A_STRIP = OnlyWhen("action", (TaskAction.TAKE,))
+_WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.TAKE_NEXT, TaskAction.STAND_ASIDE))
+_WITH_A_STRIP = OnlyWhen("action", (TaskAction.TAKE, TaskAction.TAKE_NEXT))
 
 
 @dataclass(frozen=True, slots=True)
@@ -395,8 +399,9 @@ class Task:
 
 
 class TaskState(enum.Enum):
-    """A vehicle's answer to a task."""
+    """A vehicle's answer to a task. Next: it will do that when it is done with what it has."""
 
+    NEXT = "next"
     ACCEPTED = "accepted"
     REFUSED = "refused"
     UNDER_WAY = "under_way"

@@ -29,12 +29,13 @@ class Helper:
     """A helper that is there, free or at work.
 
     `pose`: where it is, mission frame. `free_at`, `free_s`: where and when it will be free; where it is, and now, if it
-    is free. `task`: the strip that it has, None if it is free. `swath_m`: the full width that one leg covers;
-    `p_detect`: its P_d there. `lasts_until_s`: until when its battery lasts, less its reserve; with `way_home` it must
-    be home by then, else at the end of a sweep. `refused`: strips that it is not to be offered. `sweeping`: whether it
-    is on its task's strip already. `beside_m`: how far beside the middle of what a leg covers it flies it, on either
-    side; `lead_m`: how much earlier than over the ground that it sees. Times are seconds since the mission's start.
-    `keep_out`: what it may not enter; strips that it cannot fly therefore are among those refused.
+    is free. `task`: the strip that it has, None if it is free, or so soon that it is to be given its next now.
+    `swath_m`: the full width that one leg covers; `p_detect`: its P_d there. `lasts_until_s`: until when its battery
+    lasts, less its reserve; with `way_home` it must be home by then, else at the end of a sweep. `refused`: strips that
+    it is not to be offered. `sweeping`: whether it is on its task's strip already, or cannot be turned round otherwise.
+    `beside_m`: how far beside the middle of what a leg covers it flies it, on either side; `lead_m`: how much earlier
+    than over the ground that it sees. Times are seconds since the mission's start. `keep_out`: what it may not enter;
+    strips that it cannot fly therefore are among those refused.
     """
 
     vehicle: str

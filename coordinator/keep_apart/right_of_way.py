@@ -99,12 +99,13 @@ class RightOfWay:
         return Departures(self.separation_m, self._traffic, fleet, now_s)
 
     def offered(self, name: str, number: int, departures: Departures) -> None:
-        """A helper is sent to a strip."""
+        """A helper is sent to a strip, at once or when it is done with its present one."""
         way = departures.ways.get((name, number))
         if way is not None:
+            self._to_sweep[name] = departures.sweeps_s[name, number]
+        if way is not None and departures.is_free(name):
             self._traffic.offered(name, *way)
             self._sent_s[name] = departures.now_s
-            self._to_sweep[name] = departures.sweeps_s[name, number]
             self.changed(name)
 
     def changed(self, name: str) -> None:
@@ -267,6 +268,8 @@ class Departures:
         """
         name, now_s = helper.vehicle, self.now_s
         mine = next(other for other in self.fleet if other.name == name)
+        if helper.task is None and mine.strip is not None:
+            return self._wait_for_next_s(mine, helper, one)
         course, sweep = self._traffic.to_strip(mine.vehicle, mine.strip, one.strip, now_s)
         self.ways[name, one.strip.number] = one.strip, course, sweep
         begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
@@ -288,8 +291,25 @@ class Departures:
             return delay_s
         return math.inf
 
-    def _meet(self, one: Course, other: Course, until_s: float) -> bool:
-        return too_close(one, other, self._least_m, self.now_s, until_s, self._soon_m) is not None
+    def is_free(self, name: str) -> bool:
+        """Whether a vehicle has no strip."""
+        return next(one for one in self.fleet if one.name == name).strip is None
+
+    def _wait_for_next_s(self, mine: Underway, helper: Helper, one: OpenStrip) -> float:
+        """The same for a strip that it goes on to from its present one: 0, or infinite as it will not wait then. Who is
+        free by now has time to stand aside."""
+        course, sweep = self._traffic.onward(mine.vehicle, helper.free_at, helper.free_s, one.strip)
+        self.ways[mine.name, one.strip.number] = one.strip, course, sweep
+        begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
+        self.sweeps_s[mine.name, one.strip.number] = begins_s
+        soon_s = helper.free_s + CLEAR_AHEAD_S
+        until_s = course.arrives_s + RESTS_S if begins_s <= soon_s else soon_s
+        _, busy = self._others(mine.name)
+        return math.inf if any(self._meet(course, its, until_s, helper.free_s) for its in busy) else 0.0
+
+    def _meet(self, one: Course, other: Course, until_s: float, from_s: float | None = None) -> bool:
+        from_s = self.now_s if from_s is None else from_s
+        return too_close(one, other, self._least_m, from_s, until_s, self._soon_m) is not None
 
     def _others(self, name: str) -> tuple[dict[str, Course], list[Course]]:
         """The courses of the other vehicles: of those that can stand aside, by name, and of those that cannot."""

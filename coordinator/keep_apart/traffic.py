@@ -89,6 +89,12 @@ class Traffic:
         laid = sweep_course(pose, now_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
         return laid, sweep
 
+    def onward(self, vehicle: KnownVehicle, pose: Pose, from_s: float, other: Strip) -> tuple[Course, Sweep]:
+        """The course of a helper that sets out to another strip from a pose at a time, and how it sweeps it."""
+        sweep = self._sweep_from(pose, vehicle, other)
+        radius_m, keep_out = vehicle.entry.turn_radius_m, self._keep_out
+        return sweep_course(pose, from_s, vehicle.sailing, radius_m, sweep, keep_out=keep_out), sweep
+
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""
         return self._to_place(vehicle, self._here(vehicle, now_s, strip), now_s, place)

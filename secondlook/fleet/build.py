@@ -299,12 +299,14 @@ def _named(key: str) -> Iterator[None]:
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
     times = link_times(scenario)
     cycle_ms = 0 if times is None else times.cycle_ms
+    answer_within_ms = max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms)
     return CoordinatorConfig(
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor or math.inf,
         deadline_s=scenario.mission.deadline_s or math.inf,
         lost_after_ms=max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms),
-        answer_within_ms=max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms),
+        answer_within_ms=answer_within_ms,
+        ahead_ms=0 if times is None else answer_within_ms,
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
         across=scenario.coordinator.across,

@@ -25,6 +25,7 @@ class LinkTimes:
     `platforms`: that of the coordinator first, then the vehicles in the roster's order. `frame_bits`: of one frame.
     `frames`: the most in a packet that a slot has time for. `packet_ms`: how long a packet of 1, 2 ... `frames` frames
     is on the water. `way_ms`: how long it takes over `reach_m`. `guard_ms`: time to spare.
+    `deck_ms`: until when all are on deck, and need no modem.
     """
 
     platforms: tuple[str, ...]
@@ -34,6 +35,7 @@ class LinkTimes:
     reach_m: float
     way_ms: int
     guard_ms: int
+    deck_ms: int
 
     @property
     def slot_ms(self) -> int:
@@ -83,7 +85,13 @@ def link_times(scenario: Scenario) -> LinkTimes | None:
         reach_m=reach_m,
         way_ms=math.ceil(reach_m / signal.speed_mps * 1000.0),
         guard_ms=math.ceil(guard_s * 1000.0),
+        deck_ms=deck_ms_of(link),
     )
+
+
+def deck_ms_of(link: Link | None) -> int:
+    """Until when all are on deck."""
+    return 0 if link is None else round(link.on_deck_s * 1000)
 
 
 def reach_m_of(scenario: Scenario, link: Link) -> float:
@@ -111,6 +119,7 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             slot_ms=times.slot_ms,
             low_m=(min(x_m) - ABOUT_M, min(y_m) - ABOUT_M),
             high_m=(max(x_m) + ABOUT_M, max(y_m) + ABOUT_M),
+            deck_ms=times.deck_ms,
         )
         for platform in times.platforms
     }
@@ -131,6 +140,7 @@ def channel_config(scenario: Scenario) -> ChannelConfig | None:
         platforms=platforms_of(scenario),
         still=() if ship is None else ((SHIP, ship),),
         loss=link.loss,
+        deck_ms=deck_ms_of(link),
         outages=tuple(
             Outage(round(one.from_s * 1000), round((one.from_s + one.for_s) * 1000), one.platform)
             for one in link.outages

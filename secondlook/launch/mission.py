@@ -25,6 +25,7 @@ from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, passing_folder, room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
+from secondlook.fleet.link import deck_ms_of
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.launch.run_display import ending_of
@@ -96,7 +97,11 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
     with room_kept(options.folder), log_to_file(options.folder / LOGS / "launcher.txt"):
         observer = Observer(
-            options.folder, with_messages=options.record, progress=options.progress, watch=options.watch
+            options.folder,
+            with_messages=options.record,
+            progress=options.progress,
+            watch=options.watch,
+            deck_ms=deck_ms_of(scenario.link),
         )
         run = _Run(scenario, fleet, observer, options)
         result, ending, failure = run.fly()

@@ -26,6 +26,7 @@ from comms.wall.seats import ListenerSeat, NodeSeat, Seat
 from secondlook.errors import UserError
 from secondlook.files import room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
+from secondlook.fleet.link import deck_ms_of
 from secondlook.fleet.nodes import (
     OBSERVER,
     RECORDER,
@@ -152,7 +153,7 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     recorder = node_spec(Role.RECORDER, recorder_config(scenario, folder / "mission.rrd"))
     outcome = _Outcome()
     with room_kept(folder):
-        observer = Observer(folder, with_messages=True)
+        observer = Observer(folder, with_messages=True, deck_ms=deck_ms_of(scenario.link))
         try:
             listeners = {OBSERVER: observer, RECORDER: make_node(RECORDER, recorder)}
             outcome = _run_as_guest(fleet, link, RECORDER, ListenerSeat(listeners, fleet.routing()))

@@ -41,8 +41,9 @@ class Age:
 
 @dataclass
 class LinkFigures:
-    """Hears messages in the order of their sending."""
+    """Hears messages in the order of their sending. `deck_ms`: what is sent before goes from hand to hand."""
 
+    deck_ms: int = 0
     modem_bytes: int = 0
     said_bytes: int = 0
     frames_sent: int = 0
@@ -54,7 +55,9 @@ class LinkFigures:
     def hear(self, received: Received) -> None:
         """Takes one message."""
         message, sent_ms = received.message, received.header.sent_ms
-        if isinstance(message, Packet):
+        if isinstance(message, Packet) and sent_ms < self.deck_ms:
+            pass
+        elif isinstance(message, Packet):
             if received.topic is MODEM_TX:
                 self.packets[received.vehicle] = self.packets.get(received.vehicle, 0) + 1
                 self.frames_sent += len(message.frames)

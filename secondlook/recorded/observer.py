@@ -29,14 +29,20 @@ class Observer:
     """A listener that writes messages.mpk, events.jsonl and at the end risk.npz into `folder`. Raises CannotWriteError.
 
     `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds. `watch` is told each
-    message, last of all, and may raise RunStopped.
+    message, last of all, and may raise RunStopped. `deck_ms`: what modems send before this does not cross the water.
     """
 
     def __init__(
-        self, folder: Path, *, with_messages: bool, progress: Progress | None = None, watch: Watch | None = None
+        self,
+        folder: Path,
+        *,
+        with_messages: bool,
+        progress: Progress | None = None,
+        watch: Watch | None = None,
+        deck_ms: int = 0,
     ) -> None:
         self.metrics = Metrics()
-        self.link = LinkFigures()
+        self.link = LinkFigures(deck_ms)
         self.messages: Counter[str] = Counter()
         self._folder = folder
         self._files = MissionFiles(folder, with_messages=with_messages)

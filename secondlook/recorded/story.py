@@ -29,6 +29,11 @@ from comms.strip_books import LEFT, StripBooks, state_in_words
 from planner.types import Point
 
 MOST_NAMED = 3
+TASKS = {
+    TaskAction.TAKE: "take strip {}",
+    TaskAction.TAKE_NEXT: "take strip {} next",
+    TaskAction.GIVE_BACK: "give back strip {}",
+}
 
 
 class Line(NamedTuple):
@@ -100,8 +105,7 @@ class Story:
             case Task(action=TaskAction.TELL_AGAIN):
                 return f"{received.vehicle}, tell again: not all has arrived", False
             case Task() as task:
-                what = "take" if task.action is TaskAction.TAKE else "give back"
-                return f"{received.vehicle}, {what} strip {task.strip}", False
+                return f"{received.vehicle}, {TASKS[task.action].format(task.strip)}", False
             case TaskStatus() as status:
                 return self._task(received, status)
             case ManeuverStatus(state=ManeuverState.EMPTY):
@@ -148,6 +152,7 @@ class Story:
         if not self._is_news((received.vehicle, status.strip), status.state):
             return None
         what = {
+            TaskState.NEXT: "to be done next",
             TaskState.ACCEPTED: f"accepted{self._worth(status.strip)}, done at about {status.ends_ms / 1000:.0f} s",
             TaskState.REFUSED: "refused",
             TaskState.UNDER_WAY: "under way",

@@ -17,6 +17,7 @@ from secondlook.recorded.story import Line, Story
 # The classes under which the style sheet knows the states.
 FATE_CLASS = {
     StripState.OPEN: "left",
+    StripState.NEXT: "left",
     StripState.OFFERED: "left",
     StripState.ACCEPTED: "begun",
     StripState.UNDER_WAY: "begun",
@@ -26,6 +27,7 @@ FATE_CLASS = {
 }
 _IN_WORDS = {
     StripState.OPEN: "left",
+    StripState.NEXT: "left",
     StripState.OFFERED: "left",
     StripState.ACCEPTED: "left: given to {vehicle}, not begun",
     StripState.UNDER_WAY: "left: begun by {vehicle}, and cut short",

@@ -178,6 +178,9 @@ class Link(Mapping):
     """An extra share of frames that is lost, at random, at every range."""
     outages: Annotated[tuple[Outage, ...], Field(strict=False, max_length=1000)] = ()
     """When modems fail."""
+    on_deck_s: Annotated[float, Field(ge=0, le=600)] = 1.0
+    """For so long from the start all are still on deck, and what is said goes from hand to hand: the first plans
+    and tasks are known when the vehicles are in the water. 0: modems carry all from the beginning."""
     guard_s: Guard | None = None
     """Time between slots beyond the sound's way: for clocks that are not quite right, and vehicles farther off than
     expected. Left out, the profile's."""
