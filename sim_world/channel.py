@@ -102,8 +102,8 @@ class Channel:
                 self._heard[receiver].append(reception)
 
     def arrivals(self, now_ms: int) -> list[Arrival]:
-        """What was said on deck, and what has come through of the receptions that have ended by now, in the order of their
-        ends."""
+        """What was said on deck, and what has come through of the receptions that have ended by now, in the order of
+        their ends."""
         on_deck, self._on_deck = self._on_deck, []
         ended = sorted((one for one in self._open if one.ends_ms <= now_ms), key=lambda one: one.order)
         if not ended:
