@@ -165,6 +165,8 @@ class StripLife:
                 self._move(record, StripState.OPEN, now_ms, f"no answer from {record.vehicle}")
                 self._sectors.assign_by(now_ms, record.window)
         for record in self._answered():
+            if record.state not in TAKEN:
+                continue  # it was to come after one that was late
             vehicle, offer = self._of(record)
             if now_ms >= offer.due_ms:
                 late = f"{record.vehicle} has not served it, which was expected by {offer.service.ends_s:.0f} s"

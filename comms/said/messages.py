@@ -325,13 +325,13 @@ class StripState(enum.Enum):
     with the strip that it has; only then is it with that vehicle."""
 
     OPEN = "open"
-    NEXT = "next"
     OFFERED = "offered"
     ACCEPTED = "accepted"
     UNDER_WAY = "under_way"
     DONE = "done"
     FAILED = "failed"
     WITHDRAWN = "withdrawn"
+    NEXT = "next"
 
     @property
     def has_ended(self) -> bool:
@@ -370,10 +370,10 @@ class TaskAction(enum.Enum):
     hotspots once more, as some have not arrived."""
 
     TAKE = "take"
-    TAKE_NEXT = "take_next"
     GIVE_BACK = "give_back"
     STAND_ASIDE = "stand_aside"
     TELL_AGAIN = "tell_again"
+    TAKE_NEXT = "take_next"
 
 
 _WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.TAKE_NEXT, TaskAction.STAND_ASIDE))
@@ -401,13 +401,13 @@ class Task:
 class TaskState(enum.Enum):
     """A vehicle's answer to a task. Next: it will do that when it is done with what it has."""
 
-    NEXT = "next"
     ACCEPTED = "accepted"
     REFUSED = "refused"
     UNDER_WAY = "under_way"
     DONE = "done"
     FAILED = "failed"
     GIVEN_BACK = "given_back"
+    NEXT = "next"
 
 
 @dataclass(frozen=True, slots=True)

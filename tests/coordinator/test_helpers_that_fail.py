@@ -26,7 +26,7 @@ from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
 from coordinator.vehicles import MOST_FAILURES, MOST_UNANSWERED
 
-OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN = StripState
+OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN, NEXT = StripState
 TAKE, GIVE_BACK = TaskAction.TAKE, TaskAction.GIVE_BACK
 
 # From (122.5, 0), heading north, strip 1 takes 50 m and 300 m at 2 m/s: 175 s, half as long again, and 60 s.

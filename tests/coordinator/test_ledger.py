@@ -11,14 +11,20 @@ from hypothesis import strategies as st
 from comms.said.messages import StripState
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
-from coordinator.ledger import WITH_A_VEHICLE, Ledger, StripRecord
+from coordinator.ledger import TAKEN, WITH_A_VEHICLE, Ledger, StripRecord
 from planner.types import Strip
 
-OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN = StripState
+OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN, NEXT = StripState
 WINDOW = Window(0, 10, 0, 10)
 CUT = Cut(WINDOW, 100, 100)
 ALLOWED = {
     (OPEN, OFFERED),
+    (OPEN, NEXT),
+    (NEXT, ACCEPTED),
+    (NEXT, UNDER_WAY),
+    (NEXT, OPEN),
+    (NEXT, DONE),
+    (NEXT, FAILED),
     (OPEN, WITHDRAWN),
     (OFFERED, ACCEPTED),
     (OFFERED, UNDER_WAY),
@@ -41,6 +47,7 @@ WAYS_TO = {
     DONE: [OFFERED, DONE],
     FAILED: [OFFERED, FAILED],
     WITHDRAWN: [WITHDRAWN],
+    NEXT: [NEXT],
 }
 
 
@@ -92,10 +99,29 @@ def test_a_vehicle_has_one_strip_at_most() -> None:
     assert ledger.strip_of("alpha") is other
 
 
+def test_a_vehicle_has_one_next_strip_at_most_beside_its_present_one() -> None:
+    ledger = Ledger()
+    one, other, third = (opened(ledger) for _ in range(3))
+    ledger.move(one, OFFERED, 10, "", "alpha")
+    ledger.move(other, NEXT, 10, "", "alpha")
+    assert (ledger.strip_of("alpha"), ledger.next_of("alpha"), ledger.next_of("beta")) == (one, other, None)
+    with pytest.raises(ValueError, match="strip 3 cannot become next with alpha, which has strip 2"):
+        ledger.move(third, NEXT, 20, "", "alpha")
+    with pytest.raises(ValueError, match="strip 2 cannot become accepted with alpha, which has strip 1"):
+        ledger.move(other, ACCEPTED, 20, "", "alpha")
+    ledger.move(one, DONE, 30, "", "alpha")
+    ledger.move(other, ACCEPTED, 30, "", "alpha")
+    assert (ledger.strip_of("alpha"), ledger.next_of("alpha")) == (other, None)
+    ledger.move(third, NEXT, 40, "", "alpha")
+    assert ledger.next_of("alpha") is third
+
+
 @pytest.mark.parametrize(
     ("before", "after", "vehicle", "why"),
     [
         ([], OFFERED, "", "offered with nobody"),
+        ([], NEXT, "", "next with nobody"),
+        ([NEXT], ACCEPTED, "beta", "accepted by beta: it is with alpha"),
         ([OFFERED], ACCEPTED, "", "accepted with nobody"),
         ([OFFERED], ACCEPTED, "beta", "accepted by beta: it is with alpha"),
         ([OFFERED, UNDER_WAY], DONE, "beta", "done by beta: it is with alpha"),
@@ -113,7 +139,8 @@ def test_a_strip_is_with_one_vehicle(before: list[StripState], after: StripState
 
 
 def test_the_kinds_of_states_share_none_and_leave_out_open() -> None:
-    assert {state for state in StripState if not state.has_ended} == {OPEN} | WITH_A_VEHICLE
+    assert {state for state in StripState if not state.has_ended} == {OPEN} | TAKEN
+    assert {NEXT} == TAKEN - WITH_A_VEHICLE
 
 
 def test_strips_are_numbered_from_1_and_never_taken_out() -> None:
@@ -133,7 +160,7 @@ def test_numbers_may_begin_anywhere() -> None:
     assert ledger.get(1) is None
 
 
-@pytest.mark.parametrize("before", [OPEN, OFFERED, ACCEPTED, UNDER_WAY])
+@pytest.mark.parametrize("before", [OPEN, NEXT, OFFERED, ACCEPTED, UNDER_WAY])
 def test_what_is_left_is_open_with_nobody_and_says_why(before: StripState) -> None:
     ledger = Ledger()
     record = opened(ledger)
@@ -190,6 +217,9 @@ def test_whatever_is_asked_of_it_the_books_are_in_order(moves: list[tuple[int, S
         at_work = [one for one in records if one.state in WITH_A_VEHICLE]
         assert all(one.vehicle for one in at_work)
         assert len({one.vehicle for one in at_work}) == len(at_work)
+        to_come = [one for one in records if one.state is NEXT]
+        assert len({one.vehicle for one in to_come}) == len(to_come)
         for name in ("alpha", "beta"):
             assert ledger.strip_of(name) is next((one for one in at_work if one.vehicle == name), None)
+            assert ledger.next_of(name) is next((one for one in to_come if one.vehicle == name), None)
         assert not any(one.vehicle for one in records if one.state is OPEN)

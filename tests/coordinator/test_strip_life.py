@@ -16,6 +16,7 @@ from coordinator_by_hand import (
     TWO_HELPERS,
     UNDER_WAY,
     WITHDRAWN,
+    InTurn,
     Told,
     coordinator,
     looked,
@@ -31,17 +32,6 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.allocate.situation import Situation
-
-
-class InTurn:
-    """Offers the helper these strips, one each time."""
-
-    def __init__(self, *numbers: int) -> None:
-        self.numbers = list(numbers)
-
-    def assign(self, situation: Situation) -> dict[str, int]:
-        return {HELPER: self.numbers.pop(0)} if self.numbers else {}
 
 
 def with_a_late_answer() -> Told:

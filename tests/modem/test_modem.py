@@ -135,6 +135,40 @@ def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
     assert waters.heard == []
 
 
+@pytest.mark.parametrize("frame_bits", [34, 256])
+def test_on_deck_all_is_told_at_once_and_whole_and_from_then_on_by_frames(frame_bits: int) -> None:
+    waters = Waters(way_ms=0, deck_ms=1000, frame_bits=frame_bits, frames=1)
+    for number in range(1, 80):
+        waters.say("alpha", f"agent/alpha/hotspot/{number}", FOUND)
+    waters.say("coordinator", "coord/task/beta/1", TAKE)
+    waters.run(0)
+    assert [key for key, _ in heard(waters, "ship")] == [f"agent/alpha/hotspot/{number}" for number in range(1, 80)]
+    assert heard(waters, "beta") == [("coord/task/beta/1", "Task")]
+    told = next(one.message for _, to, one in waters.heard if to == "beta")
+    assert (told.action, told.strip) == (TaskAction.TAKE, 7)  # type: ignore[union-attr]
+    waters.run(1000)
+    waters.say("coordinator", "coord/task/beta/2", TAKE)
+    waters.run(1001)
+    assert len(heard(waters, "beta")) == 1
+    waters.run(400_000)
+    assert heard(waters, "beta") == [("coord/task/beta/1", "Task"), ("coord/task/beta/2", "Task")]
+    assert not any(modem.dropped for modem in waters.modems.values())
+
+
+def test_a_damaged_word_from_hand_to_hand_is_dropped() -> None:
+    waters = Waters(way_ms=0, deck_ms=1000)
+    waters.say("coordinator", "coord/task/beta/1", TAKE)
+    waters.run(0)
+    ((_, _, packet),) = waters.packets
+    beta = waters.modems["beta"]
+    for place in range(8 * len(packet.frames[0])):
+        damaged = bytearray(packet.frames[0])
+        damaged[place // 8] ^= 1 << place % 8
+        waters._tell("beta", "world", "modem/beta/rx", Packet((bytes(damaged),)))
+    assert beta.dropped == {"no frame of this run": 8 * len(packet.frames[0])}
+    assert len(heard(waters, "beta")) == 1
+
+
 def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
     round_about = tuple(
         Vertex(round(200 + 80 * math.cos(angle), 2), round(200 + 40 * math.sin(angle), 2))

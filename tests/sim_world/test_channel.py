@@ -258,3 +258,24 @@ def test_what_comes_was_sent_and_the_order_of_calls_means_nothing(
         _, begins_ms, frames = queues[sender].pop(0)
         second.send(sender, sent_by(sender, begins_ms, frames), begins_ms, PLACES)
     assert heard(second) == came
+
+
+class TestOnDeck:
+    def test_what_is_said_there_goes_from_hand_to_hand_whatever_is_said_at_once_and_however_long_it_is(self) -> None:
+        channel = Channel(replace(CONFIG, loss=0.9, deck_ms=1000), seed=1)
+        long = (bytes(200),) * 9
+        channel.send("a", long, 999, PLACES)
+        channel.send("b", ONE, 999, PLACES)
+        assert channel.arrivals(999) == [
+            Arrival("b", long),
+            Arrival("c", long),
+            Arrival("a", ONE),
+            Arrival("c", ONE),
+        ]
+        assert channel.arrivals(5000) == []
+        assert channel.dropped_frames == 0
+
+    def test_from_then_on_it_crosses_the_water(self) -> None:
+        channel = Channel(replace(CONFIG, deck_ms=1000), seed=1)
+        channel.send("a", ONE, 1000, PLACES)
+        assert heard(channel)[0] == (2500, Arrival("b", ONE))

@@ -28,7 +28,7 @@ from comms.said.messages import (
     TaskStatus,
 )
 from coordinator.allocate.simple import GreedyAllocator
-from coordinator.allocate.situation import Allocator
+from coordinator.allocate.situation import Allocator, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
 from planner.risk import to_levels
@@ -37,7 +37,7 @@ from planner.tiles import tiles
 RUN = run_info(400, 400)
 GRID = RUN.grid.spec  # 81 columns, 80 rows of 5 m
 TWO_HELPERS = (*FLEET, vehicle(SECOND_HELPER, Role.REVISIT))
-OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN = StripState
+OPEN, OFFERED, ACCEPTED, UNDER_WAY, DONE, FAILED, WITHDRAWN, NEXT = StripState
 
 # Columns 20 to 29 and rows 10 to 69: a swath wide, 300 m long.
 HOT = (97.5, 50.0, 147.5, 350.0)
@@ -82,11 +82,12 @@ class Told:
         *,
         tiles_told: int = 0,
         hotspots_told: int = 0,
+        ends_ms: int = 0,
     ) -> None:
         """An agent's state; helpers are at (122.5, 0) and head north. A primary inches on: by 1 m in 1000 s."""
         x_m = 122.5 if name != SECOND_HELPER else 322.5
         y_m = self.node.now_ms / 1e6 if name == PRIMARY else 0.0
-        message = AgentState(mode, works_on, battery, 0, x_m, y_m, 0, tiles_told, hotspots_told)
+        message = AgentState(mode, works_on, battery, ends_ms, x_m, y_m, 0, tiles_told, hotspots_told)
         self.node.hear(f"agent/{name}/state", message, at_ms=at_ms)
 
     def status(self, name: str, strip: int, state: TaskState, reason: str = "", at_ms: int | None = None) -> None:
@@ -149,6 +150,16 @@ class Told:
         return state
 
 
+class InTurn:
+    """Offers the helper these strips, one each time."""
+
+    def __init__(self, *numbers: int) -> None:
+        self.numbers = list(numbers)
+
+    def assign(self, situation: Situation) -> dict[str, int]:
+        return {HELPER: self.numbers.pop(0)} if self.numbers else {}
+
+
 def coordinator(
     vehicles: tuple[RosterVehicle, ...] = FLEET,
     *,
@@ -159,9 +170,12 @@ def coordinator(
     area: Sequence[tuple[float, float]] | None = None,
     deadline_s: float | None = None,
     helpers_a_team: int = 3,
+    ahead_ms: int = 0,
+    separation_m: float = 0.0,
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
-    one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration."""
+    one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration.
+    `ahead_ms`: so long before its end a helper is offered the next strip."""
     config = CoordinatorConfig(
         allocator=allocator or GreedyAllocator(),
         deadline_factor=1.05 if deadline_s is None else math.inf,
@@ -175,6 +189,8 @@ def coordinator(
         across=False,
         objective="mean",
         helpers_a_team=helpers_a_team,
+        ahead_ms=ahead_ms,
+        separation_m=separation_m,
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
     run = run_info(400, 400, vehicles=vehicles)

@@ -392,3 +392,76 @@ class TestTheEnd:
         assert (maneuver.start_x_m, maneuver.start_y_m) == (50, 50)
         assert maneuver.end_x_m == pytest.approx(50 + 200 * math.sin(math.radians(120)), abs=0.01)
         assert maneuver.end_y_m == pytest.approx(50 + 200 * math.cos(math.radians(120)), abs=0.01)
+
+
+class TestTheNextStrip:
+    then = replace(STRIP, action=TaskAction.TAKE_NEXT, strip=4, start_x_m=200)
+
+    def with_a_next(self) -> OneNode:
+        agent = revisit()
+        tell(agent, STRIP)
+        assert answer(agent, self.then).state is TaskState.NEXT
+        return agent
+
+    def test_is_kept_and_its_end_is_told(self) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        before = agent.last(Maneuver)
+        status = answer(agent, self.then)
+        # From (100, 255), behind the run-out, by half a circle of 6 m to the east, 88 m on and back over 200 m.
+        assert status.state is TaskState.NEXT
+        assert status.ends_ms == pytest.approx(125_001 + (5 + 6 * math.pi + 88 + 200) / 2 * 1000, abs=3_000)
+        assert agent.last(Maneuver) == before
+        assert (agent.last(AgentState).works_on, agent.last(AgentState).mode) == (3, Mode.TRANSIT)
+        assert answer(agent, self.then) == status
+
+    def test_it_goes_on_to_it_when_it_is_done(self) -> None:
+        agent = self.with_a_next()
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        statuses = [(one.strip, one.state) for one in agent.all(TaskStatus)]
+        assert statuses[-2:] == [(3, TaskState.DONE), (4, TaskState.ACCEPTED)]
+        state = agent.last(AgentState)
+        assert (state.mode, state.works_on) == (Mode.TRANSIT, 4)
+        assert (agent.last(Maneuver).start_x_m, agent.last(Maneuver).kind) == (200, ManeuverKind.FOLLOW)
+
+    def test_who_is_free_takes_it_at_once(self) -> None:
+        assert answer(revisit(), self.then).state is TaskState.ACCEPTED
+
+    def test_a_newer_one_takes_its_place(self) -> None:
+        agent = self.with_a_next()
+        said = agent.all(TaskStatus, tell(agent, replace(self.then, strip=5, start_x_m=150)))
+        assert [(one.strip, one.state) for one in said] == [(4, TaskState.GIVEN_BACK), (5, TaskState.NEXT)]
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        assert agent.last(AgentState).works_on == 5
+
+    def test_it_is_given_back_and_the_present_one_is_not(self) -> None:
+        agent = self.with_a_next()
+        assert answer(agent, give_back(4)).state is TaskState.GIVEN_BACK
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        assert agent.last(AgentState).mode is Mode.IDLE
+
+    def test_who_gives_the_present_one_back_waits(self) -> None:
+        agent = self.with_a_next()
+        assert answer(agent, give_back()).state is TaskState.GIVEN_BACK
+        assert agent.last(AgentState).mode is Mode.IDLE
+        assert agent.last(Maneuver).kind is ManeuverKind.HOLD
+
+    @pytest.mark.parametrize(
+        ("task", "why"),
+        [
+            (replace(then, length_m=0), "that is no strip"),
+            (replace(then, start_x_m=5000), "it lies outside the area"),
+            (replace(then, length_m=380, width_m=390), "the battery does not last"),
+        ],
+    )
+    def test_what_it_cannot_do_it_refuses_beforehand(self, task: Task, why: str) -> None:
+        agent = revisit(endurance_ms=400_000)
+        tell(agent, STRIP)
+        status = answer(agent, task)
+        assert (status.state, status.reason) == (TaskState.REFUSED, why)
+        assert agent.last(AgentState).works_on == 3
+
+    def test_with_the_mission_it_is_over(self) -> None:
+        agent = self.with_a_next()
+        said = agent.all(TaskStatus, agent.hear("coord/mission_over", MissionOver("the deadline is reached")))
+        assert [(one.strip, one.state) for one in said] == [(4, TaskState.REFUSED), (3, TaskState.FAILED)]

@@ -71,7 +71,7 @@ TAKE = Task(TaskAction.TAKE, 5, 100.0, 200.5, math.pi / 2, 800.0, 60.0)
 def test_a_task_to_take_a_strip() -> None:
     assert _bits(TAKE) == "".join(
         [
-            "00",  # the first of four actions
+            "000",  # the first of five actions
             "10101",  # strip 5: 16 + 5
             "0000011001000",  # 200 half metres east
             "0000110010001",  # 401 north
@@ -84,10 +84,10 @@ def test_a_task_to_take_a_strip() -> None:
 
 
 def test_a_task_that_needs_no_strip_is_short() -> None:
-    assert _bits(replace(TAKE, action=TaskAction.GIVE_BACK, strip=20)) == "01" + "0100100"  # 16 + 20, in 6 bits
-    assert _bits(replace(TAKE, action=TaskAction.TELL_AGAIN, strip=0)) == "11" + "10000"
+    assert _bits(replace(TAKE, action=TaskAction.GIVE_BACK, strip=20)) == "001" + "0100100"  # 16 + 20, in 6 bits
+    assert _bits(replace(TAKE, action=TaskAction.TELL_AGAIN, strip=0)) == "011" + "10000"
     aside = replace(TAKE, action=TaskAction.STAND_ASIDE, strip=0)
-    assert _bits(aside) == "10" + "10000" + "0000011001000" + "0000110010001"
+    assert _bits(aside) == "010" + "10000" + "0000011001000" + "0000110010001"
     assert_same(_got(aside), Task(TaskAction.STAND_ASIDE, 0, 100.0, 200.5, 0.0, 0.0, 0.0))
 
 
@@ -263,8 +263,9 @@ def _assert_got(got: Any, put: Any) -> None:
 
 def _is_left_out(task: Task, name: str) -> bool:
     if name in ("start_x_m", "start_y_m"):
-        return task.action not in (TaskAction.TAKE, TaskAction.STAND_ASIDE)
-    return name in ("heading_rad", "length_m", "width_m") and task.action is not TaskAction.TAKE
+        return task.action not in (TaskAction.TAKE, TaskAction.TAKE_NEXT, TaskAction.STAND_ASIDE)
+    takes = task.action in (TaskAction.TAKE, TaskAction.TAKE_NEXT)
+    return name in ("heading_rad", "length_m", "width_m") and not takes
 
 
 def _assert_drawn(got: Any, put: Any, every: int) -> None:
@@ -373,9 +374,9 @@ def test_what_does_not_fit_is_not_put(message: Any, field: str) -> None:
 
 def test_a_place_that_was_never_put_is_refused() -> None:
     bits = _bits(replace(TAKE, action=TaskAction.STAND_ASIDE, start_x_m=2500.0))
-    beyond = bits[:7] + f"{5001:013b}" + bits[20:]
+    beyond = bits[:8] + f"{5001:013b}" + bits[21:]
     with pytest.raises(WireError, match=r"^Task\.start_x_m: 5001 steps are outside 0 to 5000$"):
-        get_message(BitReader(int(beyond + "0" * 7, 2).to_bytes(5, "big")), Task, AROUND)
+        get_message(BitReader(int(beyond + "0" * 6, 2).to_bytes(5, "big")), Task, AROUND)
 
 
 @pytest.mark.parametrize(
@@ -410,9 +411,9 @@ def test_a_state_takes_at_most_64_bits() -> None:
     assert _put(replace(state, mode=Mode.IDLE, works_on=0, expected_end_ms=0)).bits == 60
 
 
-def test_a_task_takes_at_most_80_bits_and_its_status_40() -> None:
-    assert _put(replace(TAKE, strip=2031, length_m=2400.0, width_m=300.0)).bits == 80
-    assert _put(replace(TAKE, strip=47)).bits == 68
+def test_a_task_takes_at_most_81_bits_and_its_status_40() -> None:
+    assert _put(replace(TAKE, strip=2031, length_m=2400.0, width_m=300.0)).bits == 81
+    assert _put(replace(TAKE, strip=47)).bits == 69
     assert _put(TaskStatus(1007, TaskState.UNDER_WAY, 0.4, SENT_MS + 5_500_000, "in words")).bits == 39
 
 
