@@ -159,6 +159,8 @@ ROWS = {
         "a helper is at a strip after all",
         "a helper is at another strip than it was offered",
     ),
+    "over a link: it does not answer": ("a strip that is next is open", "a helper does a strip next after all"),
+    "it goes on to its next strip": ("a helper at its next strip has seen the one before",),
     "it accepts and does not get there": ("a helper does not serve a strip in time", "a task: give_back"),
     "it fails at, gives back unasked": ("a helper is given up: it does not serve what it accepts",),
     "it says done, but has not covered": ("a helper says done, and the map says no",),
