@@ -110,6 +110,7 @@ class Briefing:
             sweeping=record is not None and (record is following or record.state is StripState.UNDER_WAY),
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
             keep_out=vehicle.keep_out,
+            heard_s=vehicle.heard_ms / 1000,
         )
         cannot = frozenset(one.strip.number for one in open_strips if not can_fly(one.strip, helper))
         return replace(helper, refused=helper.refused | cannot) if cannot else helper

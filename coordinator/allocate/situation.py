@@ -35,7 +35,8 @@ class Helper:
     it is not to be offered. `sweeping`: whether it is on its task's strip already, or cannot be turned round otherwise.
     `beside_m`: how far beside the middle of what a leg covers it flies it, on either side; `lead_m`: how much earlier
     than over the ground that it sees. Times are seconds since the mission's start. `keep_out`: what it may not enter;
-    strips that it cannot fly therefore are among those refused.
+    strips that it cannot fly therefore are among those refused. `heard_s`: when it has said what is known of it, which
+    over a slow link may be minutes ago.
     """
 
     vehicle: str
@@ -55,6 +56,7 @@ class Helper:
     lead_m: float = 0.0
     keep_out: KeepOut = NOWHERE
     way_home: WayHome | None = None
+    heard_s: float = 0.0
 
     @property
     def sailing(self) -> Sailing:

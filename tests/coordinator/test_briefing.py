@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
+import numpy as np
 import pytest
 from by_hand import HELPER, PRIMARY, run_info
 from sectors_by_hand import sector, whole
 
 from comms.said.codec import Header
-from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripState
+from coordinator.allocate.service import Service
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Situation
 from coordinator.briefing import Briefing
@@ -18,17 +21,21 @@ from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import Ledger
+from coordinator.vehicles import Offer
+from planner.dubins import Pose
 
 CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30, 400, 0.3, 0.2)
+LEVELS = np.zeros((60, 10), dtype=np.uint8)
+AHEAD = replace(CONFIG, ahead_ms=60_000)
 
 
 class Known:
     """What a coordinator knows of the fleet by hand, and its briefing."""
 
-    def __init__(self) -> None:
-        self.fleet = KnownFleet(run_info(400, 400), CONFIG.lost_after_ms, 0)
+    def __init__(self, config: CoordinatorConfig = CONFIG) -> None:
+        self.fleet = KnownFleet(run_info(400, 400), config.lost_after_ms, 0)
         self.ledger = Ledger()
-        self.briefing = Briefing(CONFIG, self.ledger, self.fleet, 0.7)
+        self.briefing = Briefing(config, self.ledger, self.fleet, 0.7)
         self.sector = whole(self.fleet)
 
     def heard(self, name: str, mode: Mode, works_on: int = 0, end_ms: int = 0, battery: float = 1.0) -> None:
@@ -89,8 +96,37 @@ def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     assert one.risk_m2 == pytest.approx(4200 / 0.7)
     (helper,) = told.helpers
     assert (helper.vehicle, helper.free_s, helper.task, helper.refused) == (HELPER, 60, None, frozenset())
+    assert told.now_s - helper.heard_s == 10
     known.fleet.vehicles[HELPER].refused.add(1)
     assert known.situation(60_000).helpers[0].refused == {1}
+
+
+def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with_a_next_strip_after_that() -> None:
+    known = Known(AHEAD)
+    cuts = [Cut(Window(10, 70, first, first + 10), counts_m2=4200.0, removable_m2=2100.0) for first in (20, 40)]
+    present, then = (
+        known.ledger.open(cut.strip(known.fleet.map.grid, number), cut, 0, "") for number, cut in enumerate(cuts, 1)
+    )
+    vehicle = known.fleet.vehicles[HELPER]
+    for record, ends_s in ((present, 200.0), (then, 400.0)):
+        service = Service(ends_s - 150, ends_s, Pose(record.strip.start[0], 350, 0), ends_s + 5)
+        vehicle.offers[record.strip.number] = Offer(record.strip, record.cut, service, 999_000, LEVELS)
+    known.ledger.move(present, StripState.OFFERED, 0, "", HELPER)
+    known.ledger.move(present, StripState.ACCEPTED, 0, "", HELPER)
+    known.heard(HELPER, Mode.REVISIT, works_on=1, end_ms=200_000)
+    (busy,) = known.situation(139_999).helpers
+    assert (busy.task is not None, busy.free_s) == (True, 200.0)
+    (soon,) = known.situation(140_000).helpers
+    assert (soon.task, soon.free_s, soon.free_at, soon.pose) == (
+        None,
+        200.0,
+        vehicle.offers[1].service.free_at,
+        soon.free_at,
+    )
+    known.ledger.move(then, StripState.NEXT, 140_000, "", HELPER)
+    (later,) = known.situation(140_000).helpers
+    assert later.task is not None
+    assert (later.task.strip.number, later.free_s, later.sweeping) == (2, 405.0, True)
 
 
 def test_a_sector_is_told_of_its_own_strips_and_helpers_alone() -> None:
