@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planner.rounding import rounded
 from planner.types import FloatArray
 
 _FULL_TURN_RAD = 2 * math.pi
@@ -187,8 +188,7 @@ def path_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -
     lean = -side * np.arctan2(y, x) + np.arctan2(2, straight)
     other = _turns(lean + side * alpha) + straight + _turns(lean + side * beta)
     other[straight_squared < -_TOLERANCE] = np.inf
-    lengths: FloatArray = np.minimum(same, other).min(axis=0) * turn_radius_m
-    return lengths
+    return rounded(np.minimum(same, other).min(axis=0) * turn_radius_m)
 
 
 def _turning_circles(

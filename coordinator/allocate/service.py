@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from coordinator.allocate.situation import Helper, OpenStrip
 from planner.dubins import Pose
 from planner.keep_out import NOWHERE, KeepOut
+from planner.rounding import rounded
 from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_over
 from planner.types import FloatArray, Strip
 from planner.ways import way_lengths_m, way_or_direct
@@ -107,8 +108,8 @@ class StripWays:
         self.sonar_on_s: FloatArray = (length_m - 2 * helper.run_in_m) / helper.speed_mps
         if not helper.sailing.is_in_still_water:
             on_s = [_sonar_on_s(one, helper) for way in filled for one in way]
-            self.sonar_on_s = np.array(on_s, dtype=np.float64).reshape(shape)
-        self.run_out_s = helper.run_in_s(self.leave)
+            self.sonar_on_s = rounded(np.array(on_s, dtype=np.float64).reshape(shape))
+        self.run_out_s = rounded(helper.run_in_s(self.leave))
 
     def to_begin_s(self, poses: FloatArray) -> FloatArray:
         """How long it is from poses, shape (n, 3), until the sonar goes on, shape (n, strips, ways)."""
@@ -122,8 +123,7 @@ class StripWays:
         east_m, north_m = (self.entry[:, :, axis] - poses[:, axis, np.newaxis, np.newaxis] for axis in (0, 1))
         x_m, y_m = self.entry[:, :, 0] - east_m / 2, self.entry[:, :, 1] - north_m / 2
         way_s = way_m / sailing.made_good_mps(np.arctan2(east_m, north_m), x_m, y_m)
-        to_begin_s: FloatArray = way_s + helper.run_in_s(self.entry)
-        return to_begin_s
+        return rounded(way_s + helper.run_in_s(self.entry))
 
     def shortest_from(self, poses: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
         """Of each strip the way that is shortest from poses, shape (n, 3), as an agent flies it: how long it is until
@@ -145,7 +145,7 @@ class StripTable:
         self.ways = StripWays(strips, helper) if ways is None else ways
         self.helper = helper
         self.leave, self.sonar_on_s, self.run_out_s = self.ways.leave, self.ways.sonar_on_s, self.ways.run_out_s
-        self.home_s = helper.home_s(self.leave.reshape(-1, 3)).reshape(self.sonar_on_s.shape)
+        self.home_s = rounded(helper.home_s(self.leave.reshape(-1, 3)).reshape(self.sonar_on_s.shape))
         risk_m2 = [0.0 if one.strip.number in helper.refused else one.risk_m2 for one in strips]
         self.worth_m2 = helper.p_detect * np.array(risk_m2, dtype=np.float64)
 

@@ -18,6 +18,7 @@ from coordinator.expect.seabed import Seabed
 from coordinator.expect.tracks import ExpectedTracks
 from coordinator.fleet import KnownFleet
 from planner.risk import HIGHEST_P_DETECT, MOST_LEVELS, NATS_PER_LEVEL, LevelArray
+from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray
 
 
@@ -72,12 +73,12 @@ class ExpectedMap:
         settled = fleet.map.settled_by(fleet.primaries, self._place.cells)
         hot, told_risk = self.hotspots.drawn()
         has_tiles = settled | (primaries + helpers > 0)
-        risk = np.where(hot & ~has_tiles, told_risk, np.exp(-(largest * rho + nats * (1 - rho))))
+        risk = np.where(hot & ~has_tiles, told_risk, rounded(np.exp(-(largest * rho + nats * (1 - rho)))))
         is_seen = settled | hot
         plans_are_known = all(one.plan is not None for one in fleet.primaries.values())
         return Expectation(
             risk=np.where(self._inside & (is_seen | plans_are_known), risk, 0.0),
-            look=-np.expm1(-(more * rho + look_nats * (1 - rho))),
+            look=rounded(-np.expm1(-(more * rho + look_nats * (1 - rho)))),
             is_seen=is_seen,
         )
 
