@@ -85,8 +85,7 @@ def test_without_a_terminal_it_ends_with_the_mission(scenario: str, unwatched: A
     assert json.loads(done.stdout)["digest"] == unwatched.told["digest"]
 
 
-@pytest.mark.parametrize("harm", [signal.SIGSTOP, signal.SIGKILL])
-@pytest.mark.parametrize("whom", ["viewer", "server"])
+@pytest.mark.parametrize(("whom", "harm"), [("viewer", signal.SIGSTOP), ("server", signal.SIGKILL)])
 def test_who_watches_can_stall_or_die_and_the_mission_is_the_same(
     scenario: str, unwatched: Alone, tmp_path: Path, whom: str, harm: signal.Signals
 ) -> None:

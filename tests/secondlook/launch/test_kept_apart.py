@@ -28,9 +28,9 @@ def until(deadline_s: int) -> tuple[str, ...]:
     return "mission.deadline_factor=null", f"mission.deadline_s={deadline_s}"
 
 
-HARD = [("five-helpers", name, ()) for name in ("plan", "cbba")]  # the fleet that is most in its own way
+HARD = [("five-helpers", "plan", ())]  # the fleet that is most in its own way
 # By then each helper has served some.
-IN_SHORT = [("five-helpers", name, until(1500)) for name in ALLOCATORS if name not in ("plan", "cbba", "none")]
+IN_SHORT = [("five-helpers", name, until(1200)) for name in ALLOCATORS if name not in ("plan", "none")]
 OTHERS = [
     ("tellaro", "plan", ()),
     ("two-helpers", "nearest", ()),

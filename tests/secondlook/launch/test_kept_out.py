@@ -131,9 +131,8 @@ def test_what_cannot_be_reached_is_left_out(tmp_path: Path) -> None:
     assert all(one.polygon.centroid.x < 300 for one in flight.strips)
 
 
-@pytest.mark.parametrize("seed", [7, 11])
-def test_in_the_harbour_all_stay_out_and_apart_and_come_home(tmp_path: Path, seed: int) -> None:
-    flight = Fleet("harbour", folder=tmp_path, seed=seed).run()
+def test_in_the_harbour_all_stay_out_and_apart_and_come_home(tmp_path: Path) -> None:
+    flight = Fleet("harbour", folder=tmp_path, seed=7).run()
     assert_kept_out(flight)
     assert_kept_apart(flight)
     assert_home_before_empty(flight, "inspector")

@@ -50,8 +50,8 @@ class TestDigests:
         assert again.result == flown("tellaro", 1).result
 
     def test_other_seeds_and_other_scenarios_give_others(self) -> None:
-        digests = {flown(name, seed, helpers=helpers).result.digest for name, seed, helpers in MISSIONS.values()}
-        assert len(digests) == len(MISSIONS)
+        some = [("tellaro", 1), ("tellaro", 2), ("patchy", 1)]
+        assert len({flown(name, seed).result.digest for name, seed in some}) == len(some)
 
 
 class TestEveryMission:
