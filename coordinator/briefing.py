@@ -89,7 +89,8 @@ class Briefing:
             if state.works_on == record.strip.number and state.expected_end_ms > 0:
                 ends_ms = state.expected_end_ms
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
-            if following is None and free_ms - now_ms <= self._config.ahead_ms and record.state in AT_WORK:
+            is_soon = 0 < self._config.ahead_ms >= free_ms - now_ms
+            if is_soon and following is None and record.state in AT_WORK:
                 record, pose = None, free_at  # it is given its next now
         sees = footprint_of(entry.sonar)
         helper = Helper(

@@ -204,9 +204,9 @@ UNTIL_S = {
     "tellaro": 1200,
     "turns": 1200,
     "two-helpers": 900,
-    "wide": 250,
+    "wide": 300,
 }
-BEYOND_THE_LEAST = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))  # type: ignore[call-overload]
+BEYOND_THE_LEAST = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
 """What numpy makes use of that not every processor has."""
 
 
