@@ -20,7 +20,7 @@ from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
-from coordinator.ledger import Ledger
+from coordinator.ledger import Ledger, StripRecord
 from coordinator.vehicles import Offer
 from planner.dubins import Pose
 
@@ -101,32 +101,42 @@ def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     assert known.situation(60_000).helpers[0].refused == {1}
 
 
-def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with_a_next_strip_after_that() -> None:
-    known = Known(AHEAD)
+def at_work(known: Known) -> StripRecord:
+    """Strip 1 is with the helper until 200 s; returns strip 2, which is open and expected to be served until 400 s."""
     cuts = [Cut(Window(10, 70, first, first + 10), counts_m2=4200.0, removable_m2=2100.0) for first in (20, 40)]
     present, then = (
         known.ledger.open(cut.strip(known.fleet.map.grid, number), cut, 0, "") for number, cut in enumerate(cuts, 1)
     )
-    vehicle = known.fleet.vehicles[HELPER]
     for record, ends_s in ((present, 200.0), (then, 400.0)):
         service = Service(ends_s - 150, ends_s, Pose(record.strip.start[0], 350, 0), ends_s + 5)
-        vehicle.offers[record.strip.number] = Offer(record.strip, record.cut, service, 999_000, LEVELS)
+        offer = Offer(record.strip, record.cut, service, 999_000, LEVELS)
+        known.fleet.vehicles[HELPER].offers[record.strip.number] = offer
     known.ledger.move(present, StripState.OFFERED, 0, "", HELPER)
     known.ledger.move(present, StripState.ACCEPTED, 0, "", HELPER)
     known.heard(HELPER, Mode.REVISIT, works_on=1, end_ms=200_000)
+    return then
+
+
+def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with_a_next_strip_after_that() -> None:
+    known = Known(AHEAD)
+    then = at_work(known)
     (busy,) = known.situation(139_999).helpers
     assert (busy.task is not None, busy.free_s) == (True, 200.0)
     (soon,) = known.situation(140_000).helpers
-    assert (soon.task, soon.free_s, soon.free_at, soon.pose) == (
-        None,
-        200.0,
-        vehicle.offers[1].service.free_at,
-        soon.free_at,
-    )
+    free_at = known.fleet.vehicles[HELPER].offers[1].service.free_at
+    assert (soon.task, soon.free_s, soon.free_at, soon.pose) == (None, 200.0, free_at, free_at)
     known.ledger.move(then, StripState.NEXT, 140_000, "", HELPER)
     (later,) = known.situation(140_000).helpers
     assert later.task is not None
     assert (later.task.strip.number, later.free_s, later.sweeping) == (2, 405.0, True)
+
+
+def test_where_nothing_is_offered_ahead_who_is_late_is_busy() -> None:
+    known = Known()
+    at_work(known)
+    (late,) = known.situation(210_000).helpers
+    assert late.task is not None
+    assert (late.task.strip.number, late.free_s) == (1, 210.0)
 
 
 def test_a_sector_is_told_of_its_own_strips_and_helpers_alone() -> None:
