@@ -18,7 +18,8 @@ class ModemConfig:
     """`platform`: which one it is on. `platforms`: all, in the order in which they speak; the first is the
     coordinator's, with which all others talk, and no two others talk with each other. `vehicles`: those of the fleet in
     the order of the roster, each a platform. `frame_bits`: of one frame, `frames`: the most that one packet has.
-    `slot_ms`: so long one platform has the water, packet and way of sound included. `low_m`, `high_m`: south-west and
+    `slot_ms`: so long one platform has the water, packet and way of sound included. `late_ms`: so much later than its
+    slot begins a modem may begin to speak, by a clock that does not wait for it. `low_m`, `high_m`: south-west and
     north-east corner of the box in which all places lie that are told.
 
     Raises ValueError where these do not go together.
@@ -30,6 +31,7 @@ class ModemConfig:
     frame_bits: int
     frames: int
     slot_ms: int
+    late_ms: int
     low_m: tuple[float, float]
     high_m: tuple[float, float]
 

@@ -42,8 +42,6 @@ log = logging.getLogger("secondlook.modem")
 STRETCH = Crossing(3000, 300)
 STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
-LATE_MS = 100
-"""So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
 
@@ -99,7 +97,7 @@ class Modem:
         """Says what there is to be said, if its slot begins now."""
         publish: list[Publication] = []
         slot_ms = self.config.slot_of(self.config.platform, now_ms)
-        if self._form is not None and now_ms - slot_ms <= LATE_MS and slot_ms > self._spoke_ms:
+        if self._form is not None and now_ms - slot_ms <= self.config.late_ms and slot_ms > self._spoke_ms:
             self._spoke_ms = slot_ms
             if (
                 self._gathering is not None

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-from comms.said.announcement import Role
 from modem.config import ModemConfig
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
@@ -109,6 +108,7 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             frame_bits=times.frame_bits,
             frames=times.frames,
             slot_ms=times.slot_ms,
+            late_ms=times.guard_ms // 2,
             low_m=(min(x_m) - ABOUT_M, min(y_m) - ABOUT_M),
             high_m=(max(x_m) + ABOUT_M, max(y_m) + ABOUT_M),
         )
@@ -116,15 +116,10 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
     }
 
 
-def modem_of(platform: str) -> str:
-    """The id of a platform's modem."""
-    return f"{Role.MODEM.value}-{platform}"
-
-
 def channel_config(scenario: Scenario) -> ChannelConfig | None:
-    """The channel that the world carries packets over; None where everybody hears everybody."""
+    """The channel that the world carries packets over; None where everybody hears everybody, or drivers carry them."""
     link, ship = scenario.link, ship_position(scenario)
-    if link is None:
+    if link is None or link.carried_by == "drivers":
         return None
     return ChannelConfig(
         signal=signal_of(link.modem),

@@ -186,6 +186,8 @@ class Link(Mapping):
     reach_m: Reach | None = None
     """The distance over which slots allow for the sound's way. Left out, the largest between any two of the area's
     corners, the vehicles' starts and homes, and the ship; at most how far the modem is heard."""
+    carried_by: Literal["world", "drivers"] = "world"
+    """What carries frames from modem to modem: the simulated world, or `drivers`, programs of yours, one a platform."""
 
     @field_validator("slot_frames")
     @classmethod
@@ -194,6 +196,14 @@ class Link(Mapping):
         if slot_frames is not None and profile is not None and slot_frames > profile.frames:
             raise refused(f"must be at most the profile's frames, {profile.frames}")
         return slot_frames
+
+    @field_validator("carried_by")
+    @classmethod
+    def _check_carried(cls, carried_by: str, info: ValidationInfo) -> str:
+        simulated = [key for key in ("loss", "outages") if info.data.get(key)]
+        if carried_by == "drivers" and simulated:
+            raise refused(f"must be world with {' and '.join(simulated)}, which the simulated world alone knows of")
+        return carried_by
 
     @model_validator(mode="after")
     def _check_ideal(self) -> Self:

@@ -240,8 +240,12 @@ class Scenario(Mapping):
         ship = coordinator is not None and coordinator.platform in (None, SHIP)
         if ship and SHIP in vehicles:
             raise refused(f"must stand with no vehicle called {SHIP}, as the coordinator is on a ship of that name")
-        if external := [key for key, vehicle in vehicles.items() if vehicle.body == "external"]:
-            raise refused(f"must be left out with an external body, as the world does not know where {external[0]} is")
+        external = [key for key, vehicle in vehicles.items() if vehicle.body == "external"]
+        if external and link.carried_by == "world":
+            raise refused(
+                "must have carried_by: drivers with an external body, as the world does not know where "
+                f"{external[0]} is"
+            )
         platforms = [*([SHIP] if ship else []), *vehicles]
         for number, outage in enumerate(link.outages if vehicles else ()):
             if outage.platform not in (None, *platforms):

@@ -61,6 +61,15 @@ def test_each_speaks_in_its_slots_and_nobody_who_has_nothing_to_say() -> None:
     assert [(at_ms, platform) for at_ms, platform, _ in waters.packets] == [(4000, "alpha"), (8000, "beta")]
 
 
+@pytest.mark.parametrize(("late_ms", "speaks"), [(0, True), (100, True), (101, False)])
+def test_by_a_clock_that_does_not_wait_it_speaks_a_little_late_or_in_its_next_slot(late_ms: int, speaks: bool) -> None:
+    waters = Waters()
+    waters.say("beta", "agent/beta/state", state())
+    step = waters.modems["beta"].on_wake(8000 + late_ms)
+    assert [key for key, _ in step.publish] == ["modem/beta/tx"] * speaks
+    assert step.wake_ms == (None if speaks else 20_000)
+
+
 def test_of_states_the_newest_alone_is_said_and_no_old_one() -> None:
     waters = Waters()
     for place in range(5):

@@ -38,7 +38,7 @@ PLATFORMS = ("ship", "alpha", "beta")
 def config_of(platform: str, *, frame_bits: int = 256, frames: int = 1, slot_ms: int = 4000) -> ModemConfig:
     """A modem's configuration in a fleet of alpha and beta with a ship."""
     return ModemConfig(
-        platform, PLATFORMS, PLATFORMS[1:], frame_bits, frames, slot_ms, (-500.0, -500.0), (900.0, 900.0)
+        platform, PLATFORMS, PLATFORMS[1:], frame_bits, frames, slot_ms, 100, (-500.0, -500.0), (900.0, 900.0)
     )
 
 
