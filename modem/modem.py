@@ -42,6 +42,13 @@ log = logging.getLogger("secondlook.modem")
 STRETCH = Crossing(3000, 300)
 STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
+DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
+    "no frame of this run",
+    "malformed frame",
+    "not its to say",
+    "does not fit the water",
+)
+"""Why frames that have come, or what is in them, are dropped; and last what cannot be said by modem."""
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
 
@@ -52,6 +59,7 @@ class Modem:
     def __init__(self, config: ModemConfig) -> None:
         self.config = config
         self.dropped: Counter[str] = Counter()
+        self._dropped: list[str] = []  # and not yet told
         self._letters = Letters(config)
         self._queue = Queue()
         self._sending: dict[str, Sending] = {}
@@ -108,7 +116,7 @@ class Modem:
             if frames:
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
         step = self._step(now_ms)
-        return Step((*publish, *step.publish), step.wake_ms)
+        return Step((*publish, *step.publish), step.wake_ms, step.dropped)
 
     def _begin(self, run: RunInfo) -> None:
         self._run, self._form = run, FrameForm(self.config, run)
@@ -162,12 +170,13 @@ class Modem:
         try:
             bits = self._letters.pack(topic, said._replace(header=said.header._replace(sequence=place)))
         except WireError as error:
-            self._drop("does not fit the water", f"{said.key}: {error}")
+            self._drop(NO_FIT, f"{said.key}: {error}")
             return
         self._queue.add(Waiting(said.key, platform, crossing, bits, now_ms))
 
     def _drop(self, why: str, detail: str) -> None:
         self.dropped[why] += 1
+        self._dropped.append(why)
         if self.dropped[why] == 1:
             log.warning("modem of %s: %s: %s (said once)", self.config.platform, why, detail)
 
@@ -279,7 +288,7 @@ class Modem:
             opened = self._form.unpack(frame)
             if opened is None or opened[0] not in self.config.others:
                 if opened is None:
-                    self._drop("no frame of this run", f"{len(frame)} bytes")
+                    self._drop(NO_FRAME, f"{len(frame)} bytes")
                 continue
             platform, start, reader = opened
             if start != self._starts.get(platform, start):
@@ -288,7 +297,7 @@ class Modem:
             try:
                 self._read(self._form, platform, reader, now_ms)
             except WireError as error:
-                self._drop("malformed frame", f"{platform}: {error}")
+                self._drop(MALFORMED, f"{platform}: {error}")
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
@@ -338,7 +347,7 @@ class Modem:
         assert self._run is not None
         header, message = said.header, said.message
         if (header.sender == COORDINATOR) != (platform == self.config.hub):
-            self._drop("not its to say", f"{platform}: {said.key}")
+            self._drop(NOT_ITS, f"{platform}: {said.key}")
             return
         if topic is TASK and said.key.split("/")[2] != self.config.platform:
             return
@@ -361,11 +370,12 @@ class Modem:
 
     def _step(self, now_ms: int) -> Step:
         heard, self._heard = tuple(self._heard), []
+        dropped, self._dropped = tuple(self._dropped), []
         if self._form is None or not self._has_anything_to_say():
-            return Step(heard)
+            return Step(heard, None, dropped)
         slot_ms = self.config.slot_of(self.config.platform, now_ms)
         may_speak_now = slot_ms == now_ms and slot_ms > self._spoke_ms
-        return Step(heard, slot_ms if may_speak_now else slot_ms + self.config.cycle_ms)
+        return Step(heard, slot_ms if may_speak_now else slot_ms + self.config.cycle_ms, dropped)
 
     def _has_anything_to_say(self) -> bool:
         return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())

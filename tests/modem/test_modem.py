@@ -139,9 +139,26 @@ def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
     changed = bytearray(frame)
     changed[5] ^= 4
     struck = {"bit": bytes(changed), "short": frame[:-1], "long": frame + b"\0", "empty": b""}[damage]
-    waters.say("world", "modem/ship/rx", Packet((struck,)))
+    stray = waters.say("world", "modem/ship/rx", Packet((struck,)))
+    assert stray.dropped == ("no frame of this run",)
     assert waters.modems["ship"].dropped == {"no frame of this run": 1}
     assert waters.heard == []
+
+
+def test_what_comes_again_by_an_echo_or_late_is_told_once() -> None:
+    waters = Waters()
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.say("coordinator", "coord/task/beta/3", TAKE)
+    waters.run(60_000)
+    for _, sender, packet in list(waters.packets):
+        for platform in ("ship", "alpha", "beta"):
+            waters.say("world", f"modem/{platform}/rx", packet)  # who sent it may hear itself, too
+        waters.run(waters.now_ms + 12_000)
+        assert sender in ("ship", "beta")
+    assert heard(waters, "ship") == [("agent/beta/task_status/1", "TaskStatus")]
+    assert heard(waters, "beta") == [("coord/task/beta/3", "Task")]
+    assert heard(waters, "alpha") == []
+    assert not any(modem.dropped for modem in waters.modems.values())
 
 
 def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:

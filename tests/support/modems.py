@@ -8,7 +8,7 @@ from typing import Any
 
 from fleets import ROSTER, with_modems
 
-from comms.node import Received
+from comms.node import Received, Step
 from comms.runner import Intake, Stamp
 from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.messages import Heard, Packet
@@ -69,10 +69,10 @@ class Waters:
         self._stamps.setdefault("clock", Stamp("clock", self.routing))
         self._tell(platform, "clock", RUN.key(), RUN_INFO)
 
-    def say(self, sender: str, key: str, message: Any) -> None:
-        """A node says something on its platform now."""
+    def say(self, sender: str, key: str, message: Any) -> Step:
+        """A node says something on its platform now; returns what its modem does."""
         platform = self.routing.nodes[sender].platform or self.routing.route(key).vehicle  # type: ignore[union-attr]
-        self._tell(platform, sender, key, message)
+        return self._tell(platform, sender, key, message)
 
     def run(self, until_ms: int) -> None:
         """Lets time pass."""
@@ -90,10 +90,12 @@ class Waters:
                 self._note(name, self.modems[name].on_wake(self.now_ms))
         self.now_ms = until_ms
 
-    def _tell(self, platform: str, sender: str, key: str, message: Any) -> None:
+    def _tell(self, platform: str, sender: str, key: str, message: Any) -> Step:
         stamp = self._stamps.setdefault(sender, Stamp(sender, self.routing))
         received = stamp(key, message, self.now_ms).opened()
-        self._note(platform, self.modems[platform].on_message(received, self.now_ms))
+        step = self.modems[platform].on_message(received, self.now_ms)
+        self._note(platform, step)
+        return step
 
     def _note(self, platform: str, step: Any) -> None:
         self._wakes[platform] = step.wake_ms

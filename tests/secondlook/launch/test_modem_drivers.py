@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import socket
 import subprocess
 import sys
 from collections import Counter
@@ -22,7 +23,7 @@ from secondlook.fleet.nodes import certified_when_spread, hosts_when_spread
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import load_scenario
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "modem"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "modem_driver"
 BAY = EXAMPLE / "bay.yaml"
 PLATFORMS = ("ship", "primary", "helper")
 
@@ -102,6 +103,10 @@ def test_second_looks_are_had_by_what_drivers_carry_between_processes(tmp_path: 
                     drivers.append(subprocess.Popen(command, stdout=out, stderr=out, text=True))
                 ports.append(port_told_in(said))
             fleet.node("recorder")
+            assert until(lambda: "under way" in (tmp_path / "driver-ship.txt").read_text(), 60)
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+                for place in range(20):
+                    stranger.sendto(bytes([place] * 32), ("127.0.0.1", int(ports[0])))
             assert {name: one.ends() for name, one in fleet.started.items()} == dict.fromkeys(fleet.started, 0)
             assert [driver.poll() for driver in drivers] == [None] * len(PLATFORMS)
         finally:
@@ -109,7 +114,9 @@ def test_second_looks_are_had_by_what_drivers_carry_between_processes(tmp_path: 
                 driver.kill()
                 driver.wait()
         summary = fleet.summary
-    assert summary["dropped"] == {}
+    assert summary["dropped"] == summary["link"]["dropped"]
+    assert summary["dropped"].keys() == {"no frame of this run"}  # of a stranger's frames
+    assert 0 < summary["dropped"]["no frame of this run"] <= 20
     assert summary["hotspots"]["revisited"] > 0
     assert summary["risk"]["mean"] < summary["risk_primary_alone"]["mean"]
     link = summary["link"]

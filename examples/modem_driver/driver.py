@@ -31,7 +31,7 @@ STEP_S = 0.02
 
 class Water:
     """Carries frames to the drivers at other ports, and from them. `lost`: the share of frames that do not come
-    through. Whoever says something to it is sent all from then on; an empty datagram says that a driver is there."""
+    through. An empty datagram says that a driver is there: it is sent to from then on."""
 
     def __init__(self, port: int, others: list[int], lost: float) -> None:
         self._lost = lost
@@ -52,8 +52,9 @@ class Water:
         """Tells of every frame that comes through; never returns."""
         while True:
             frame, other = self._socket.recvfrom(LONGEST_FRAME)
-            self._others.add(other)
-            if frame and random.random() >= self._lost:
+            if not frame:
+                self._others.add(other)
+            elif random.random() >= self._lost:
                 hears(frame)
 
 
@@ -84,6 +85,7 @@ def serve(session: zenoh.Session, run: str, platform: str, water: Water, delay_m
                 mission_time.hear(told_ms, factor, now_s)
                 if first:
                     incarnation = mission_time.now_ms(now_s) // 1000  # larger each time it is started
+                    print("the mission is under way", flush=True)
         if not mission_time.known:
             continue
         now_ms = mission_time.now_ms(now_s)
