@@ -14,13 +14,28 @@ START_BITS = 3
 
 
 @dataclass(frozen=True)
+class PollTimes:
+    """What polling is reckoned with. `packet_ms`: how long a packet of 1, 2 ... frames is on the water; `way_ms`: how
+    long it takes to the farthest; `guard_ms`: time to spare."""
+
+    packet_ms: tuple[int, ...]
+    way_ms: int
+    guard_ms: int
+
+    def round_ms(self, frames: int) -> int:
+        """How long a poll of so many frames takes with the longest answer."""
+        return self.packet_ms[frames - 1] + self.packet_ms[-1] + 2 * self.way_ms + self.guard_ms
+
+
+@dataclass(frozen=True)
 class ModemConfig:
     """`platform`: which one it is on. `platforms`: all, in the order in which they speak; the first is the
     coordinator's, with which all others talk, and no two others talk with each other. `vehicles`: those of the fleet in
     the order of the roster, each a platform. `frame_bits`: of one frame, `frames`: the most that one packet has.
     `slot_ms`: so long one platform has the water, packet and way of sound included. `late_ms`: so much later than its
     slot begins a modem may begin to speak, by a clock that does not wait for it. `low_m`, `high_m`: south-west and
-    north-east corner of the box in which all places lie that are told.
+    north-east corner of the box in which all places lie that are told. `polls`: where the coordinator's platform polls
+    the others, instead of slots.
 
     Raises ValueError where these do not go together.
     """
@@ -34,6 +49,7 @@ class ModemConfig:
     late_ms: int
     low_m: tuple[float, float]
     high_m: tuple[float, float]
+    polls: PollTimes | None = None
 
     def __post_init__(self) -> None:
         if not 2 <= len(set(self.platforms)) == len(self.platforms) <= MOST_PLATFORMS:
@@ -91,7 +107,7 @@ class ModemConfig:
     @property
     def room(self) -> int:
         """How many bits a frame has for what is said."""
-        return self.frame_bits - self.tag_bits - self.platform_bits - START_BITS
+        return self.frame_bits - self.tag_bits - (self.polls is not None) - self.platform_bits - START_BITS
 
     @property
     def window(self) -> Window:

@@ -30,14 +30,17 @@ class FrameForm:
         self.size_bits = 0 if self.is_small else self.room.bit_length()
         self._tag_bits, self._platform_bits = config.tag_bits, config.platform_bits
         self._frame_bits = config.frame_bits
-        self._platforms = config.platforms
+        self._platforms, self._hub = config.platforms, config.hub
+        self._polled_bits = 0 if config.polls is None else 1
         self._check = crc_8 if config.is_small else crc_hqx
         self._begin = self._check(f"{version} {run.scenario_sha256} {run.seed}".encode(), 0)
 
-    def pack(self, platform: str, start: int, said: BitWriter) -> bytes:
-        """A frame of a platform. `start`: tells the modem's starts apart. What is said has at most `room` bits."""
+    def pack(self, platform: str, start: int, said: BitWriter, polled: str | None = None) -> bytes:
+        """A frame of a platform. `start`: tells the modem's starts apart. What is said has at most `room` bits.
+        `polled`: whom it polls, where the coordinator's platform says it and polls at all: then that is named alone."""
         writer = BitWriter()
-        writer.write(self._platforms.index(platform), self._platform_bits)
+        writer.write(polled is not None, self._polled_bits)
+        writer.write(self._platforms.index(polled or platform), self._platform_bits)
         writer.write(start, START_BITS)
         writer.write(said.value << self.room - said.bits, self.room)
         whole = BitWriter()
@@ -45,20 +48,24 @@ class FrameForm:
         whole.write(writer.value, writer.bits)
         return whole.to_bytes()
 
-    def unpack(self, frame: bytes) -> tuple[str, int, BitReader] | None:
-        """Platform, start, and what is said; None where it is no frame of this run."""
+    def unpack(self, frame: bytes) -> tuple[str, int, BitReader, str | None] | None:
+        """Platform, start, what is said, and whom it polls; None where it is no frame of this run."""
         if len(frame) != (self._frame_bits + 7) // 8:
             return None
         reader = BitReader(frame)
         tag = reader.read(self._tag_bits)
         content = BitWriter()
-        bits = self._platform_bits + START_BITS + self.room
+        bits = self._polled_bits + self._platform_bits + START_BITS + self.room
         content.write(reader.read(bits), bits)
         if tag != self._tag(content.value, bits) or reader.read(reader.left):
             return None
         reader = BitReader(content.to_bytes())
+        polls = bool(reader.read(self._polled_bits))
         place, start = reader.read(self._platform_bits), reader.read(START_BITS)
-        return (self._platforms[place], start, reader) if place < len(self._platforms) else None
+        if place >= len(self._platforms):
+            return None
+        named = self._platforms[place]
+        return (self._hub, start, reader, named) if polls else (named, start, reader, None)
 
     def _tag(self, content: int, bits: int) -> int:
         return self._check(content.to_bytes((bits + 7) // 8, "big"), self._begin)

@@ -35,6 +35,7 @@ from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up
 from modem.stretches import Gathering, LayerOf, Stretch
+from modem.turns import turns_of
 from modem.waiting import Queue, Waiting, worth
 
 log = logging.getLogger("secondlook.modem")
@@ -66,7 +67,8 @@ class Modem:
         self._receiving: dict[str, Receiving] = {}
         self._starts: dict[str, int] = {}  # of the others, as their frames tell
         self._start = 0
-        self._spoke_ms = -1
+        self._turns = turns_of(config)
+        self._spoke_ms = 0
         self._form: FrameForm | None = None
         self._run: RunInfo | None = None
         self._gathering: Gathering | None = None
@@ -89,11 +91,11 @@ class Modem:
         message = received.message
         if isinstance(message, RunInfo):
             if self._run is None:
-                self._begin(message)
+                self._begin(message, now_ms)
         elif self._form is None:
             pass
         elif isinstance(message, Packet):
-            self._hear(message, now_ms)
+            return self._hear(message, now_ms)
         elif isinstance(message, Look):
             if self._gathering is not None:
                 self._say_stretch(self._gathering.add(message), now_ms)
@@ -102,23 +104,27 @@ class Modem:
         return self._step(now_ms)
 
     def on_wake(self, now_ms: int) -> Step:
-        """Says what there is to be said, if its slot begins now."""
+        """Says what there is to be said, if it is its turn."""
+        return self._speak(now_ms)
+
+    def _speak(self, now_ms: int) -> Step:
         publish: list[Publication] = []
-        slot_ms = self.config.slot_of(self.config.platform, now_ms)
-        if self._form is not None and now_ms - slot_ms <= self.config.late_ms and slot_ms > self._spoke_ms:
-            self._spoke_ms = slot_ms
+        if self._form is not None and self._turns.is_now(now_ms):
+            self._spoke_ms = now_ms
             if (
                 self._gathering is not None
                 and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
             ):
                 self._say_stretch(self._gathering.flush(), now_ms)
-            frames = self._frames(self._form, now_ms)
+            frames = self._frames(self._form, self._turns.names(), now_ms)
+            self._turns.has_spoken(now_ms, len(frames))
             if frames:
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
         step = self._step(now_ms)
         return Step((*publish, *step.publish), step.wake_ms, step.dropped)
 
-    def _begin(self, run: RunInfo) -> None:
+    def _begin(self, run: RunInfo, now_ms: int) -> None:
+        self._turns.begin(now_ms)
         self._run, self._form = run, FrameForm(self.config, run)
         for other in self.config.others:
             self._sending[other] = Sending(self._form.window)
@@ -182,7 +188,7 @@ class Modem:
 
     # What is said.
 
-    def _frames(self, form: FrameForm, now_ms: int) -> tuple[bytes, ...]:
+    def _frames(self, form: FrameForm, polled: str | None, now_ms: int) -> tuple[bytes, ...]:
         self._queue.drop_old(now_ms)
         frames: list[bytes] = []
         said: set[tuple[str, int]] = set()  # pieces that are in this packet already
@@ -193,9 +199,9 @@ class Modem:
                 writer.write(0, 1)
             while not (form.is_small and writer.bits > 1) and self._write_next(form, writer, said, now_ms):
                 pass
-            if not has_acks and writer.bits == 1:
+            if not has_acks and writer.bits == 1 and (frames or not self._turns.must_speak):
                 break
-            frames.append(form.pack(self.config.platform, self._start, writer))
+            frames.append(form.pack(self.config.platform, self._start, writer, polled))
         return tuple(frames)
 
     def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
@@ -282,7 +288,8 @@ class Modem:
 
     # What is heard.
 
-    def _hear(self, packet: Packet, now_ms: int) -> None:
+    def _hear(self, packet: Packet, now_ms: int) -> Step:
+        """Takes what has come of a packet, and answers it if that is its turn."""
         assert self._form is not None
         for frame in packet.frames:
             opened = self._form.unpack(frame)
@@ -290,7 +297,8 @@ class Modem:
                 if opened is None:
                     self._drop(NO_FRAME, f"{len(frame)} bytes")
                 continue
-            platform, start, reader = opened
+            platform, start, reader, polled = opened
+            self._turns.has_heard(platform, polled, now_ms)
             if start != self._starts.get(platform, start):
                 self._receiving[platform] = self._receiver(platform)
             self._starts[platform] = start
@@ -298,6 +306,7 @@ class Modem:
                 self._read(self._form, platform, reader, now_ms)
             except WireError as error:
                 self._drop(MALFORMED, f"{platform}: {error}")
+        return self._speak(now_ms) if self._turns.must_speak else self._step(now_ms)
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
@@ -371,11 +380,8 @@ class Modem:
     def _step(self, now_ms: int) -> Step:
         heard, self._heard = tuple(self._heard), []
         dropped, self._dropped = tuple(self._dropped), []
-        if self._form is None or not self._has_anything_to_say():
-            return Step(heard, None, dropped)
-        slot_ms = self.config.slot_of(self.config.platform, now_ms)
-        may_speak_now = slot_ms == now_ms and slot_ms > self._spoke_ms
-        return Step(heard, slot_ms if may_speak_now else slot_ms + self.config.cycle_ms, dropped)
+        next_ms = None if self._form is None else self._turns.next_ms(now_ms, wants=self._has_anything_to_say())
+        return Step(heard, next_ms, dropped)
 
     def _has_anything_to_say(self) -> bool:
         return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-from modem.config import ModemConfig
+from modem.config import ModemConfig, PollTimes
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
@@ -24,6 +24,7 @@ class LinkTimes:
     `platforms`: that of the coordinator first, then the vehicles in the roster's order. `frame_bits`: of one frame.
     `frames`: the most in a packet that a slot has time for. `packet_ms`: how long a packet of 1, 2 ... `frames` frames
     is on the water. `way_ms`: how long it takes over `reach_m`. `guard_ms`: time to spare.
+    `polled`: whether the coordinator's platform polls the others, instead of slots.
     """
 
     platforms: tuple[str, ...]
@@ -33,6 +34,12 @@ class LinkTimes:
     reach_m: float
     way_ms: int
     guard_ms: int
+    polled: bool = False
+
+    @property
+    def polls(self) -> PollTimes | None:
+        """What polling is reckoned with, where the coordinator's platform polls the others."""
+        return PollTimes(self.packet_ms, self.way_ms, self.guard_ms) if self.polled else None
 
     @property
     def slot_ms(self) -> int:
@@ -41,7 +48,9 @@ class LinkTimes:
 
     @property
     def cycle_ms(self) -> int:
-        """How long it takes until each platform has had a slot."""
+        """How long it takes until each platform has had a slot, or was polled, at most."""
+        if self.polls is not None:
+            return self.polls.round_ms(self.frames) * (len(self.platforms) - 1)
         return self.slot_ms * len(self.platforms)
 
 
@@ -82,6 +91,7 @@ def link_times(scenario: Scenario) -> LinkTimes | None:
         reach_m=reach_m,
         way_ms=math.ceil(reach_m / signal.speed_mps * 1000.0),
         guard_ms=math.ceil(guard_s * 1000.0),
+        polled=link.access == "polled",
     )
 
 
@@ -111,6 +121,7 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             late_ms=times.guard_ms // 2,
             low_m=(min(x_m) - ABOUT_M, min(y_m) - ABOUT_M),
             high_m=(max(x_m) + ABOUT_M, max(y_m) + ABOUT_M),
+            polls=times.polls,
         )
         for platform in times.platforms
     }
