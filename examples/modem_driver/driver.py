@@ -1,6 +1,6 @@
 """A modem's driver, for a scenario that says `link.carried_by: drivers`: it carries frames between platforms by UDP.
 
-It speaks two topics: what its platform's modem publishes as `tx` goes out, a datagram a frame, to the drivers of all
+It speaks two topics: what its platform's modem publishes as `tx` goes out, a datagram a packet, to the drivers of all
 other platforms; what comes from those it publishes as `rx`. A driver of a real modem puts that in the place of `Water`,
 and keeps the rest: what a frame says it need not know.
 """
@@ -22,11 +22,12 @@ import zenoh
 
 from comms.said.codec import Header, decode, encode
 from comms.said.messages import Packet
-from comms.said.wire import LONGEST_FRAME, WireError
+from comms.said.wire import WireError
 from comms.wall.clock import MissionTime
 
 HERE = "127.0.0.1"
 STEP_S = 0.02
+LARGEST_DATAGRAM = 65_535
 
 
 class Water:
@@ -43,19 +44,23 @@ class Water:
             self._socket.sendto(b"", other)
 
     def send(self, frames: tuple[bytes, ...]) -> None:
-        """Sends frames to all others."""
-        for frame in frames:
-            for other in list(self._others):
-                self._socket.sendto(frame, other)
+        """Sends the frames of a packet to all others."""
+        for other in list(self._others):
+            self._socket.sendto(msgpack.packb(frames), other)
 
-    def listen(self, hears: Callable[[bytes], None]) -> None:
-        """Tells of every frame that comes through; never returns."""
+    def listen(self, hears: Callable[[Packet], None]) -> None:
+        """Tells what has come through of each packet, once it is over; never returns."""
         while True:
-            frame, other = self._socket.recvfrom(LONGEST_FRAME)
-            if not frame:
+            datagram, other = self._socket.recvfrom(LARGEST_DATAGRAM)
+            if not datagram:
                 self._others.add(other)
-            elif random.random() >= self._lost:
-                hears(frame)
+                continue
+            try:
+                frames = [frame for frame in msgpack.unpackb(datagram) if random.random() >= self._lost]
+                if frames:
+                    hears(Packet(tuple(map(bytes, frames))))
+            except (ValueError, TypeError):
+                print("what is no packet has come, and is dropped", flush=True)
 
 
 def serve(session: zenoh.Session, run: str, platform: str, water: Water, delay_ms: int) -> None:
@@ -64,12 +69,13 @@ def serve(session: zenoh.Session, run: str, platform: str, water: Water, delay_m
     root = f"secondlook/v1/{run}"
     tx_key, rx_key, time_key = f"{root}/modem/{platform}/tx", f"{root}/modem/{platform}/rx", f"{root}/clock/time"
     inbox: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
+    come: queue.SimpleQueue[Packet] = queue.SimpleQueue()
 
     def enqueue(sample: zenoh.Sample) -> None:
         inbox.put((str(sample.key_expr), sample.payload.to_bytes()))
 
     subscribers = [session.declare_subscriber(key, enqueue) for key in (tx_key, time_key)]
-    threading.Thread(target=water.listen, args=(lambda frame: inbox.put((rx_key, frame)),), daemon=True).start()
+    threading.Thread(target=water.listen, args=(come.put,), daemon=True).start()
     mission_time, under_way, sent = MissionTime(), list[tuple[int, int, Packet]](), count()
     incarnation, sequence = 0, 0
     while subscribers:
@@ -96,8 +102,9 @@ def serve(session: zenoh.Session, run: str, platform: str, water: Water, delay_m
                 continue
             assert isinstance(packet, Packet)
             heapq.heappush(under_way, (header.sent_ms + delay_ms, next(sent), packet))
-        elif key == rx_key:
-            session.put(rx_key, encode(Header(f"driver-{platform}", incarnation, sequence, now_ms), Packet((payload,))))
+        while not come.empty():
+            header = Header(f"driver-{platform}", incarnation, sequence, now_ms)
+            session.put(rx_key, encode(header, come.get()))
             sequence += 1
         while under_way and under_way[0][0] <= now_ms:
             water.send(heapq.heappop(under_way)[2].frames)

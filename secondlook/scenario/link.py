@@ -167,7 +167,7 @@ class Outage(Mapping):
 
 
 class Link(Mapping):
-    """How platforms talk: each has a modem, all share one channel, and speak in turn, each in a slot of its own. A
+    """How platforms talk: each has a modem, all share one channel, and speak in turn. A
     platform is a vehicle, or the ship on which the coordinator is. Without, everybody hears everybody."""
 
     profile: Annotated[Profile | None, BeforeValidator(_profile, json_schema_input_type=Profile | str)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -184,6 +185,6 @@ def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
         ({"slot_ms": 0}, "a slot has at least 1 ms"),
     ],
 )
-def test_what_cannot_be_said_anything_in_is_refused(terms: dict[str, int], told: str) -> None:
+def test_what_cannot_be_said_anything_in_is_refused(terms: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         config_of("ship", **terms)

@@ -14,7 +14,7 @@ from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInf
 from comms.said.messages import Heard, Packet
 from comms.said.routing import Routing
 from comms.said.topics import HEARD, MODEM_RX, MODEM_TX, RUN
-from modem.config import ModemConfig
+from modem.config import ModemConfig, PollTimes
 from modem.modem import Modem
 
 SIDE_M = 400.0
@@ -35,10 +35,12 @@ RUN_INFO = RunInfo(
 PLATFORMS = ("ship", "alpha", "beta")
 
 
-def config_of(platform: str, *, frame_bits: int = 256, frames: int = 1, slot_ms: int = 4000) -> ModemConfig:
+def config_of(
+    platform: str, *, frame_bits: int = 256, frames: int = 1, slot_ms: int = 4000, polls: PollTimes | None = None
+) -> ModemConfig:
     """A modem's configuration in a fleet of alpha and beta with a ship."""
     return ModemConfig(
-        platform, PLATFORMS, PLATFORMS[1:], frame_bits, frames, slot_ms, 100, (-500.0, -500.0), (900.0, 900.0)
+        platform, PLATFORMS, PLATFORMS[1:], frame_bits, frames, slot_ms, 100, (-500.0, -500.0), (900.0, 900.0), polls
     )
 
 
@@ -47,7 +49,7 @@ class Waters:
     `way_ms`: how long it takes."""
 
     def __init__(
-        self, arrives: Callable[[str, str, int], bool] = lambda *_: True, way_ms: int = 3500, **terms: int
+        self, arrives: Callable[[str, str, int], bool] = lambda *_: True, way_ms: int = 3500, **terms: Any
     ) -> None:
         self.routing = Routing(with_modems(ROSTER))
         self.now_ms = 0

@@ -9,6 +9,7 @@ import sys
 from collections import Counter
 from pathlib import Path
 
+import msgpack
 import pytest
 from flights import until
 from spread import PATIENT, loopback_endpoint, spread_fleet
@@ -106,7 +107,7 @@ def test_second_looks_are_had_by_what_drivers_carry_between_processes(tmp_path: 
             assert until(lambda: "under way" in (tmp_path / "driver-ship.txt").read_text(), 60)
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
                 for place in range(20):
-                    stranger.sendto(bytes([place] * 32), ("127.0.0.1", int(ports[0])))
+                    stranger.sendto(msgpack.packb([bytes([place] * 32)]), ("127.0.0.1", int(ports[0])))
             assert {name: one.ends() for name, one in fleet.started.items()} == dict.fromkeys(fleet.started, 0)
             assert [driver.poll() for driver in drivers] == [None] * len(PLATFORMS)
         finally:
