@@ -13,6 +13,19 @@ START_BITS = 3
 """Of the number by which a modem that was started anew is told from its past."""
 
 
+LEAST_PIECE_BITS = 8
+"""A piece of a message with fewer bits is not worth the bits about it."""
+_SMALL, _LARGE = Window(3), Window(5)
+
+
+def least_frame_bits(platforms: int, *, polled: bool = False) -> int:
+    """The fewest bits of a frame in which so many platforms, at most 64, can talk: it holds an acknowledgement of one
+    other, or a piece of a message."""
+    acknowledgement = platforms - 1 + START_BITS + _SMALL.ack_bits
+    piece = 2 + _SMALL.number_bits + (platforms - 2).bit_length() + LEAST_PIECE_BITS
+    return 8 + polled + (platforms - 1).bit_length() + START_BITS + 1 + max(acknowledgement, piece)
+
+
 @dataclass(frozen=True)
 class PollTimes:
     """What polling is reckoned with. `packet_ms`: how long a packet of 1, 2 ... frames is on the water; `way_ms`: how
@@ -58,8 +71,7 @@ class ModemConfig:
             raise ValueError(f"{self.platform} and {', '.join(self.vehicles)} are not all among the platforms")
         if self.slot_ms < 1 or self.frames < 1:
             raise ValueError("a slot has at least 1 ms, a packet at least one frame")
-        acknowledgement = START_BITS + self.window.ack_bits
-        if self.room < 1 + (len(self.platforms) - 1) + acknowledgement:
+        if self.frame_bits < least_frame_bits(len(self.platforms), polled=self.polls is not None):
             raise ValueError(
                 f"link.profile: frames of {self.frame_bits} bits are too small for {len(self.platforms)} platforms; "
                 "must be larger, or the platforms fewer"
@@ -112,4 +124,4 @@ class ModemConfig:
     @property
     def window(self) -> Window:
         """Of the streams of pieces."""
-        return Window(3 if self.is_small else 5)
+        return _SMALL if self.is_small else _LARGE

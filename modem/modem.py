@@ -30,7 +30,7 @@ from comms.said.messages import (
 )
 from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
-from modem.config import START_BITS, ModemConfig
+from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
 from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up
@@ -50,8 +50,6 @@ DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
     "does not fit the water",
 )
 """Why frames that have come, or what is in them, are dropped; and last what cannot be said by modem."""
-LEAST_PIECE_BITS = 8
-"""A piece of a message with fewer bits is not worth the bits about it."""
 
 
 class Modem:

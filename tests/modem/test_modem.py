@@ -25,6 +25,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from modem.config import PollTimes, least_frame_bits
 from modem.letters import with_fewer_corners
 
 TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
@@ -128,6 +129,20 @@ def test_a_modem_that_is_started_anew_is_understood() -> None:
     waters.say("beta", "agent/beta/task_status/6", TaskStatus(6, TaskState.DONE, 1.0, 0, ""))
     waters.run(waters.now_ms + 60_000)
     assert [key for key, _ in heard(waters, "ship")] == [f"agent/beta/task_status/{number}" for number in range(1, 7)]
+
+
+@pytest.mark.parametrize("polls", [None, PollTimes((3000,), 500, 400)])
+def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refused(polls: PollTimes | None) -> None:
+    least = least_frame_bits(3, polled=polls is not None)
+    # Tag, platform, start, whether polled, whether acknowledged; then a piece of 8 bits: first, last, number, to whom.
+    assert least == 8 + 2 + 3 + (polls is not None) + 1 + 8 + 2 + 3 + 1
+    waters = Waters(frame_bits=least, polls=polls)
+    waters.say("coordinator", "coord/task/beta/3", TAKE)
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.run(1_000_000)
+    assert sorted(one.key for _, _, one in waters.heard) == ["agent/beta/task_status/1", "coord/task/beta/3"]
+    with pytest.raises(ValueError, match=f"frames of {least - 1} bits are too small for 3 platforms"):
+        config_of("ship", frame_bits=least - 1, polls=polls)
 
 
 @pytest.mark.parametrize("damage", ["bit", "short", "long", "empty"])
