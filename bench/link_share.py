@@ -3,7 +3,8 @@
 `secondlook sweep SCENARIO --seeds 1001..1020 --vary link.profile=ideal,micromodem-1,... [--vary
 coordinator.platform=ship,primary] --out DIR` flies them; `python -m bench.link_share DIR ...` pools the folders, and
 prints a line for each link: the share kept, mean and least over the seeds of any scenario, bytes a second across the
-water, and how old what the coordinator knew was on average.
+water, and how old what the coordinator knew was on average. Other keys of the link, as link.access, are varied in a
+folder of their own beside one with the ideal link.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ LINK, IDEAL = "link.profile", "ideal"
 
 def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tuple[Row, float]]]:
     """Of each combination of what was varied, by its values as text, the missions with the share that each keeps of
-    what the ideal link's removes; those that failed, and those of which nothing was removed by that, are left out.
+    what the ideal link's removes, whatever else of the link was varied; those that failed, and those of which nothing
+    was removed by that, are left out.
 
     Raises ValueError where the ideal link was not flown.
     """
-    others = [key for key in varied if key != LINK]
+    others = [key for key in varied if not key.startswith("link.")]
     removed = {
-        (row["scenario"], row["seed"], *(row[key] for key in others)): _removed(row)
+        (row["scenario"], row["seed"], *(row.get(key) for key in others)): _removed(row)
         for row in rows
         if row[LINK] == IDEAL and row["failure"] is None
     }
@@ -35,9 +37,9 @@ def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tup
         raise ValueError(f"no mission was flown with {LINK}={IDEAL}, which the others are compared with")
     found = defaultdict[tuple[str, ...], list[tuple[Row, float]]](list)
     for row in rows:
-        ideal = removed.get((row["scenario"], row["seed"], *(row[key] for key in others)), 0.0)
+        ideal = removed.get((row["scenario"], row["seed"], *(row.get(key) for key in others)), 0.0)
         if row["failure"] is None and ideal > 0.0:
-            found[tuple(str(row[key]) for key in varied)].append((row, _removed(row) / ideal))
+            found[tuple(str(row.get(key, "-")) for key in varied)].append((row, _removed(row) / ideal))
     return found
 
 
@@ -54,7 +56,7 @@ def main(folders: list[str]) -> None:
     rows, varied = list[Row](), list[str]()
     for folder in folders:
         sweep = secondlook.load_sweep(folder)
-        varied = list(sweep.vary)
+        varied = list(dict.fromkeys([*varied, *sweep.vary]))
         rows += [{**row, "scenario": sweep.scenario} for row in sweep.table.to_pylist()]
     print(f"| {' | '.join(varied)} | missions | share kept | least | bytes a second | age in s |")
     print(f"|{'---|' * (len(varied) + 5)}")

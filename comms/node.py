@@ -62,11 +62,13 @@ class Step(NamedTuple):
     """What a node wants after it was told something: publications, in order, and its next wake-up.
 
     `wake_ms` replaces the wake-up asked for before; None asks for none. A wake-up lies in the future, except that a
-    node that is told a message may leave the one due now in place.
+    node that is told a message may leave the one due now in place. `dropped`: of what the node did not take, or could
+    not say, the reasons, which are counted.
     """
 
     publish: tuple[Publication, ...] = ()
     wake_ms: int | None = None
+    dropped: tuple[str, ...] = ()
 
 
 class Node(Protocol):

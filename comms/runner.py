@@ -154,6 +154,12 @@ class GuardedNode:
         self.stamp = Stamp(node_id, routing, incarnation)
         self._node = node
         self._routing = routing
+        self._dropped = Counter[str]()
+
+    @property
+    def dropped(self) -> Counter[str]:
+        """How much was dropped here, by reason: by the node, and of what a modem has heard for it."""
+        return self._dropped + self._letters.dropped if "_letters" in vars(self) else self._dropped
 
     @cached_property
     def _letters(self) -> Intake:
@@ -192,6 +198,8 @@ class GuardedNode:
 
     def _note(self, step: Step, published: list[Publication]) -> None:
         self.wake_ms = step.wake_ms
+        if step.dropped:
+            self._dropped.update(step.dropped)
         published.extend(step.publish)
 
 

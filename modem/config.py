@@ -13,14 +13,43 @@ START_BITS = 3
 """Of the number by which a modem that was started anew is told from its past."""
 
 
+LEAST_PIECE_BITS = 8
+"""A piece of a message with fewer bits is not worth the bits about it."""
+_SMALL, _LARGE = Window(3), Window(5)
+
+
+def least_frame_bits(platforms: int, *, polled: bool = False) -> int:
+    """The fewest bits of a frame in which so many platforms, at most 64, can talk: it holds an acknowledgement of one
+    other, or a piece of a message."""
+    acknowledgement = platforms - 1 + START_BITS + _SMALL.ack_bits
+    piece = 2 + _SMALL.number_bits + (platforms - 2).bit_length() + LEAST_PIECE_BITS
+    return 8 + polled + (platforms - 1).bit_length() + START_BITS + 1 + max(acknowledgement, piece)
+
+
+@dataclass(frozen=True)
+class PollTimes:
+    """What polling is reckoned with. `packet_ms`: how long a packet of 1, 2 ... frames is on the water; `way_ms`: how
+    long it takes to the farthest; `guard_ms`: time to spare."""
+
+    packet_ms: tuple[int, ...]
+    way_ms: int
+    guard_ms: int
+
+    def round_ms(self, frames: int) -> int:
+        """How long a poll of so many frames takes with the longest answer."""
+        return self.packet_ms[frames - 1] + self.packet_ms[-1] + 2 * self.way_ms + self.guard_ms
+
+
 @dataclass(frozen=True)
 class ModemConfig:
     """`platform`: which one it is on. `platforms`: all, in the order in which they speak; the first is the
     coordinator's, with which all others talk, and no two others talk with each other. `vehicles`: those of the fleet in
     the order of the roster, each a platform. `frame_bits`: of one frame, `frames`: the most that one packet has.
-    `slot_ms`: so long one platform has the water, packet and way of sound included. `deck_ms`: before this all are on
-    deck, and what is said goes from hand to hand at once, not through the water. `low_m`, `high_m`: south-west and
-    north-east corner of the box in which all places lie that are told.
+    `slot_ms`: so long one platform has the water, packet and way of sound included. `late_ms`: so much later than its
+    slot begins a modem may begin to speak, by a clock that does not wait for it. `low_m`, `high_m`: south-west and
+    north-east corner of the box in which all places lie that are told. `polls`: where the coordinator's platform polls
+    the others, instead of slots. `deck_ms`: before this all are on deck, and what is said goes from hand to hand at
+    once, not through the water.
 
     Raises ValueError where these do not go together.
     """
@@ -31,8 +60,10 @@ class ModemConfig:
     frame_bits: int
     frames: int
     slot_ms: int
+    late_ms: int
     low_m: tuple[float, float]
     high_m: tuple[float, float]
+    polls: PollTimes | None = None
     deck_ms: int = 0
 
     def __post_init__(self) -> None:
@@ -42,8 +73,7 @@ class ModemConfig:
             raise ValueError(f"{self.platform} and {', '.join(self.vehicles)} are not all among the platforms")
         if self.slot_ms < 1 or self.frames < 1:
             raise ValueError("a slot has at least 1 ms, a packet at least one frame")
-        acknowledgement = START_BITS + self.window.ack_bits
-        if self.room < 1 + (len(self.platforms) - 1) + acknowledgement:
+        if self.frame_bits < least_frame_bits(len(self.platforms), polled=self.polls is not None):
             raise ValueError(
                 f"link.profile: frames of {self.frame_bits} bits are too small for {len(self.platforms)} platforms; "
                 "must be larger, or the platforms fewer"
@@ -91,9 +121,9 @@ class ModemConfig:
     @property
     def room(self) -> int:
         """How many bits a frame has for what is said."""
-        return self.frame_bits - self.tag_bits - self.platform_bits - START_BITS
+        return self.frame_bits - self.tag_bits - (self.polls is not None) - self.platform_bits - START_BITS
 
     @property
     def window(self) -> Window:
         """Of the streams of pieces."""
-        return Window(3 if self.is_small else 5)
+        return _SMALL if self.is_small else _LARGE

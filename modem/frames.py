@@ -1,14 +1,15 @@
 """A frame: from whom it is and what is in it, behind a tag by which damage and strangers are noticed.
 
-The tag is a CRC-32 over the run and the frame, cut to 16 bits, or to 8 in small frames: a frame that is damaged, of
-another run or of another version of these words has the right one once in 65,536 times, or in 256. What is said in it
-then rarely reads as anything.
+The tag is a cyclic redundancy check of 16 bits, or of 8 in small frames, that begins with a number made of the run and
+the version of these words. A frame in which two bits are turned over, or any odd number of them, never has the right
+one; one that is damaged otherwise has it once in 65,536 times, or in 256. So rarely two runs have one number, too;
+those that do not never take each other's frames for their own.
 """
 
 from __future__ import annotations
 
 import struct
-import zlib
+from binascii import crc32, crc_hqx
 
 from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
@@ -16,6 +17,8 @@ from modem.config import START_BITS, ModemConfig
 
 VERSION = 1
 """Of what frames hold: modems of another one do not understand each other."""
+CRC_8 = 0x2F
+"""x^8 + x^5 + x^3 + x^2 + x + 1: up to 127 bits with the check, as small frames have, any three bits are noticed."""
 
 
 class FrameForm:
@@ -23,40 +26,47 @@ class FrameForm:
     `is_small`: whether one holds either acknowledgements or a single piece, which then need not tell its size.
     """
 
-    def __init__(self, config: ModemConfig, run: RunInfo) -> None:
+    def __init__(self, config: ModemConfig, run: RunInfo, version: int = VERSION) -> None:
         self.is_small, self.room, self.window = config.is_small, config.room, config.window
         self.size_bits = 0 if self.is_small else self.room.bit_length()
         self._tag_bits, self._platform_bits = config.tag_bits, config.platform_bits
         self._frame_bits = config.frame_bits
-        self._platforms = config.platforms
-        self._salt = f"{VERSION} {run.scenario_sha256} {run.seed}".encode()
+        self._platforms, self._hub = config.platforms, config.hub
+        self._polled_bits = 0 if config.polls is None else 1
+        self._check = crc_8 if config.is_small else crc_hqx
+        self._begin = self._check(f"{version} {run.scenario_sha256} {run.seed}".encode(), 0)
 
-    def pack(self, platform: str, start: int, said: BitWriter) -> bytes:
-        """A frame of a platform. `start`: tells the modem's starts apart. What is said has at most `room` bits."""
+    def pack(self, platform: str, start: int, said: BitWriter, polled: str | None = None) -> bytes:
+        """A frame of a platform. `start`: tells the modem's starts apart. What is said has at most `room` bits.
+        `polled`: whom it polls, where the coordinator's platform says it and polls at all: then that is named alone."""
         writer = BitWriter()
-        writer.write(self._platforms.index(platform), self._platform_bits)
+        writer.write(polled is not None, self._polled_bits)
+        writer.write(self._platforms.index(polled or platform), self._platform_bits)
         writer.write(start, START_BITS)
         writer.write(said.value << self.room - said.bits, self.room)
-        content = writer.to_bytes()
         whole = BitWriter()
-        whole.write(self._tag(content), self._tag_bits)
+        whole.write(self._tag(writer.value, writer.bits), self._tag_bits)
         whole.write(writer.value, writer.bits)
         return whole.to_bytes()
 
-    def unpack(self, frame: bytes) -> tuple[str, int, BitReader] | None:
-        """Platform, start, and what is said; None where it is no frame of this run."""
+    def unpack(self, frame: bytes) -> tuple[str, int, BitReader, str | None] | None:
+        """Platform, start, what is said, and whom it polls; None where it is no frame of this run."""
         if len(frame) != (self._frame_bits + 7) // 8:
             return None
         reader = BitReader(frame)
         tag = reader.read(self._tag_bits)
         content = BitWriter()
-        bits = self._platform_bits + START_BITS + self.room
+        bits = self._polled_bits + self._platform_bits + START_BITS + self.room
         content.write(reader.read(bits), bits)
-        if tag != self._tag(content.to_bytes()) or reader.read(reader.left):
+        if tag != self._tag(content.value, bits) or reader.read(reader.left):
             return None
         reader = BitReader(content.to_bytes())
+        polls = bool(reader.read(self._polled_bits))
         place, start = reader.read(self._platform_bits), reader.read(START_BITS)
-        return (self._platforms[place], start, reader) if place < len(self._platforms) else None
+        if place >= len(self._platforms):
+            return None
+        named = self._platforms[place]
+        return (self._hub, start, reader, named) if polls else (named, start, reader, None)
 
     def pack_on_deck(self, platform: str, start: int, said: BitWriter) -> bytes:
         """A message as it goes from hand to hand on deck: by itself, as long as it is."""
@@ -64,20 +74,31 @@ class FrameForm:
         content.write(self._platforms.index(platform), 8)
         content.write(start, 8)
         content.write(said.value, said.bits)
-        return struct.pack(">I", self._crc(content.to_bytes())) + content.to_bytes()
+        return struct.pack(">I", crc32(content.to_bytes(), self._begin)) + content.to_bytes()
 
-    def unpack_on_deck(self, frame: bytes) -> tuple[str, int, BitReader] | None:
+    def unpack_on_deck(self, frame: bytes) -> tuple[str, int, BitReader, None] | None:
         """See `unpack`; behind the message there may be zeros."""
         tag, content = frame[:4], frame[4:]
-        if len(content) < 2 or tag != struct.pack(">I", self._crc(content)) or content[0] >= len(self._platforms):
+        if (
+            len(content) < 2
+            or tag != struct.pack(">I", crc32(content, self._begin))
+            or content[0] >= len(self._platforms)
+        ):
             return None
-        return self._platforms[content[0]], content[1] % (1 << START_BITS), BitReader(content[2:])
+        return self._platforms[content[0]], content[1] % (1 << START_BITS), BitReader(content[2:]), None
 
-    def _tag(self, content: bytes) -> int:
-        return self._crc(content) & (1 << self._tag_bits) - 1
+    def _tag(self, content: int, bits: int) -> int:
+        return self._check(content.to_bytes((bits + 7) // 8, "big"), self._begin)
 
-    def _crc(self, content: bytes) -> int:
-        return zlib.crc32(content, zlib.crc32(self._salt))
+
+def crc_8(data: bytes, begin: int) -> int:
+    """The check of 8 bits over some bytes, beginning with a number, as `binascii.crc_hqx` is that of 16."""
+    check = begin
+    for byte in data:
+        check ^= byte
+        for _ in range(8):
+            check = (check << 1 ^ (CRC_8 if check & 0x80 else 0)) & 0xFF
+    return check
 
 
 def start_number(now_ms: int) -> int:

@@ -31,11 +31,12 @@ from comms.said.messages import (
 )
 from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
-from modem.config import START_BITS, ModemConfig
+from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
 from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up
 from modem.stretches import Gathering, LayerOf, Stretch
+from modem.turns import turns_of
 from modem.waiting import Queue, Waiting, worth
 
 log = logging.getLogger("secondlook.modem")
@@ -43,12 +44,15 @@ log = logging.getLogger("secondlook.modem")
 STRETCH = Crossing(3000, 300)
 STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
-LATE_MS = 100
-"""So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
 FROM_DECK_MS = 10_000
 """For so long after it has left the deck it may still hear what was said there."""
-LEAST_PIECE_BITS = 8
-"""A piece of a message with fewer bits is not worth the bits about it."""
+DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
+    "no frame of this run",
+    "malformed frame",
+    "not its to say",
+    "does not fit the water",
+)
+"""Why frames that have come, or what is in them, are dropped; and last what cannot be said by modem."""
 
 
 class Modem:
@@ -57,13 +61,15 @@ class Modem:
     def __init__(self, config: ModemConfig) -> None:
         self.config = config
         self.dropped: Counter[str] = Counter()
+        self._dropped: list[str] = []  # and not yet told
         self._letters = Letters(config)
         self._queue = Queue()
         self._sending: dict[str, Sending] = {}
         self._receiving: dict[str, Receiving] = {}
         self._starts: dict[str, int] = {}  # of the others, as their frames tell
         self._start = 0
-        self._spoke_ms = -1
+        self._turns = turns_of(config)
+        self._spoke_ms = 0
         self._form: FrameForm | None = None
         self._run: RunInfo | None = None
         self._gathering: Gathering | None = None
@@ -87,11 +93,11 @@ class Modem:
         message = received.message
         if isinstance(message, RunInfo):
             if self._run is None:
-                self._begin(message)
+                self._begin(message, now_ms)
         elif self._form is None:
             pass
         elif isinstance(message, Packet):
-            self._hear(message, now_ms)
+            return self._hear(message, now_ms)
         elif isinstance(message, Look):
             if self._gathering is not None:
                 self._say_stretch(self._gathering.add(message), now_ms)
@@ -100,25 +106,29 @@ class Modem:
         return self._step(now_ms)
 
     def on_wake(self, now_ms: int) -> Step:
-        """Says what there is to be said, if its slot begins now."""
+        """Says what there is to be said, if it is its turn."""
+        return self._speak(now_ms)
+
+    def _speak(self, now_ms: int) -> Step:
         publish: list[Publication] = []
         if now_ms < self.config.deck_ms:
             return self._step(now_ms)
-        slot_ms = self.config.slot_of(self.config.platform, now_ms)
-        if self._form is not None and now_ms - slot_ms <= LATE_MS and slot_ms > self._spoke_ms:
-            self._spoke_ms = slot_ms
+        if self._form is not None and self._turns.is_now(now_ms):
+            self._spoke_ms = now_ms
             if (
                 self._gathering is not None
                 and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
             ):
                 self._say_stretch(self._gathering.flush(), now_ms)
-            frames = self._frames(self._form, now_ms)
+            frames = self._frames(self._form, self._turns.names(), now_ms)
+            self._turns.has_spoken(now_ms, len(frames))
             if frames:
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
         step = self._step(now_ms)
-        return Step((*publish, *step.publish), step.wake_ms)
+        return Step((*publish, *step.publish), step.wake_ms, step.dropped)
 
-    def _begin(self, run: RunInfo) -> None:
+    def _begin(self, run: RunInfo, now_ms: int) -> None:
+        self._turns.begin(max(now_ms, self.config.deck_ms))
         self._run, self._form = run, FrameForm(self.config, run)
         for other in self.config.others:
             self._sending[other] = Sending(self._form.window)
@@ -170,7 +180,7 @@ class Modem:
         try:
             bits = self._letters.pack(topic, said._replace(header=said.header._replace(sequence=place)))
         except WireError as error:
-            self._drop("does not fit the water", f"{said.key}: {error}")
+            self._drop(NO_FIT, f"{said.key}: {error}")
             return
         if now_ms < self.config.deck_ms and self._form is not None:
             self._on_deck.append(self._form.pack_on_deck(self.config.platform, self._start, bits))
@@ -179,12 +189,13 @@ class Modem:
 
     def _drop(self, why: str, detail: str) -> None:
         self.dropped[why] += 1
+        self._dropped.append(why)
         if self.dropped[why] == 1:
             log.warning("modem of %s: %s: %s (said once)", self.config.platform, why, detail)
 
     # What is said.
 
-    def _frames(self, form: FrameForm, now_ms: int) -> tuple[bytes, ...]:
+    def _frames(self, form: FrameForm, polled: str | None, now_ms: int) -> tuple[bytes, ...]:
         self._queue.drop_old(now_ms)
         frames: list[bytes] = []
         said: set[tuple[str, int]] = set()  # pieces that are in this packet already
@@ -195,9 +206,9 @@ class Modem:
                 writer.write(0, 1)
             while not (form.is_small and writer.bits > 1) and self._write_next(form, writer, said, now_ms):
                 pass
-            if not has_acks and writer.bits == 1:
+            if not has_acks and writer.bits == 1 and (frames or not self._turns.must_speak):
                 break
-            frames.append(form.pack(self.config.platform, self._start, writer))
+            frames.append(form.pack(self.config.platform, self._start, writer, polled))
         return tuple(frames)
 
     def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
@@ -284,7 +295,8 @@ class Modem:
 
     # What is heard.
 
-    def _hear(self, packet: Packet, now_ms: int) -> None:
+    def _hear(self, packet: Packet, now_ms: int) -> Step:
+        """Takes what has come of a packet, and answers it if that is its turn."""
         assert self._form is not None
         may_be_on_deck = now_ms < self.config.deck_ms + FROM_DECK_MS
         for frame in packet.frames:
@@ -292,9 +304,11 @@ class Modem:
             opened = on_deck or self._form.unpack(frame)
             if opened is None or opened[0] not in self.config.others:
                 if opened is None:
-                    self._drop("no frame of this run", f"{len(frame)} bytes")
+                    self._drop(NO_FRAME, f"{len(frame)} bytes")
                 continue
-            platform, start, reader = opened
+            platform, start, reader, polled = opened
+            if on_deck is None:
+                self._turns.has_heard(platform, polled, now_ms)
             if start != self._starts.get(platform, start):
                 self._receiving[platform] = self._receiver(platform)
             self._starts[platform] = start
@@ -304,7 +318,8 @@ class Modem:
                 else:
                     self._read(self._form, platform, reader, now_ms)
             except WireError as error:
-                self._drop("malformed frame", f"{platform}: {error}")
+                self._drop(MALFORMED, f"{platform}: {error}")
+        return self._speak(now_ms) if self._turns.must_speak else self._step(now_ms)
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
@@ -354,7 +369,7 @@ class Modem:
         assert self._run is not None
         header, message = said.header, said.message
         if (header.sender == COORDINATOR) != (platform == self.config.hub):
-            self._drop("not its to say", f"{platform}: {said.key}")
+            self._drop(NOT_ITS, f"{platform}: {said.key}")
             return
         if topic is TASK and said.key.split("/")[2] != self.config.platform:
             return
@@ -381,11 +396,9 @@ class Modem:
         key = MODEM_TX.key(vehicle=self.config.platform)
         for first in range(0, len(on_deck), MOST_FRAMES):
             publish.append(Publication(key, Packet(tuple(on_deck[first : first + MOST_FRAMES]))))
-        if self._form is None or not self._has_anything_to_say():
-            return Step(tuple(publish))
-        slot_ms = self.config.slot_of(self.config.platform, now_ms)
-        may_speak_now = slot_ms == now_ms and slot_ms > self._spoke_ms
-        return Step(tuple(publish), slot_ms if may_speak_now else slot_ms + self.config.cycle_ms)
+        dropped, self._dropped = tuple(self._dropped), []
+        next_ms = None if self._form is None else self._turns.next_ms(now_ms, wants=self._has_anything_to_say())
+        return Step(tuple(publish), None if next_ms is None else max(next_ms, self.config.deck_ms), dropped)
 
     def _has_anything_to_say(self) -> bool:
         return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import bisect
 import contextlib
+from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
 from types import MappingProxyType
 
@@ -96,6 +97,7 @@ class NodeGroup:
         self._stores = stores
         self._asleep: dict[str, LastingNode] = {}
         self._departed: list[SenderDigest] = []
+        self._gone = Counter[str]()  # what those that have left had dropped
         for node_id, node in nodes.items():
             self.join(node_id, node, incarnation)
 
@@ -112,6 +114,7 @@ class NodeGroup:
         """From now on the node is not here any more, and its mail is lost; what it has said counts."""
         runner = self.runners.pop(node_id)
         self._departed.append(runner.digest())
+        self._gone += runner.node.dropped
         if isinstance(runner.node, LastingNode):
             self._asleep[node_id] = runner.node
 
@@ -184,6 +187,10 @@ class NodeGroup:
     def digests(self) -> list[SenderDigest]:
         """What the group's nodes have said so far, those that have left included."""
         return [*self._departed, *(runner.digest() for runner in self.runners.values())]
+
+    def dropped(self) -> dict[str, int]:
+        """How much was dropped on the way to these nodes and by them, by reason."""
+        return dict(sum((runner.node.dropped for runner in self.runners.values()), self.intake.dropped + self._gone))
 
     def _deliver_with_faults(self, runner: LockstepNode, received: Received) -> None:
         deliveries = self._faults.deliveries(runner.node_id, received, self._routing)

@@ -132,7 +132,7 @@ class ServedNodes:
     def last_word(self) -> LastWord:
         """What the nodes have said, what was dropped here, and how long strips waited."""
         latencies = {STRIP_TO_TASK: self._latency.milliseconds}
-        return LastWord(self.group.digests(), dropped=dict(self.group.intake.dropped), latencies_ms=latencies)
+        return LastWord(self.group.digests(), dropped=self.group.dropped(), latencies_ms=latencies)
 
 
 class NodeHost:

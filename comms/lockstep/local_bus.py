@@ -70,7 +70,7 @@ class _Local:
             if len(turn.grants) > 1:
                 sent.sort(key=lambda one: one.route.writer)  # stable: a sender's own messages stay in order
             self._carry(sent)
-        return result_of(self.clock, [LastWord(self.group.digests(), dropped=dict(self.group.intake.dropped))])
+        return result_of(self.clock, [LastWord(self.group.digests(), dropped=self.group.dropped())])
 
     def _announce(self, message: Message) -> Outgoing:
         outgoing = self.announcer(RUN.key(), message, 0)

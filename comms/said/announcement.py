@@ -49,6 +49,7 @@ class Role(enum.Enum):
     OBSERVER = "observer"
     SURVEY_REVISIT = "survey_revisit"
     MODEM = "modem"
+    DRIVER = "driver"
 
     @property
     def is_single(self) -> bool:

@@ -139,7 +139,7 @@ class Routing:
             for node in self.roster
             if known
             and node.role in table
-            and (table[node.role] is Reach.ALL or not topic.has_vehicle or vehicle in _own(node, topic))
+            and (table[node.role] is Reach.ALL or not topic.has_vehicle or vehicle in self._own(node, topic))
         ]
 
     def _named(self, topic: Topic) -> frozenset[str]:
@@ -164,7 +164,7 @@ class Routing:
             if node.platform and topic.crosses_water and not writing:
                 found.extend(self._on_its_platform(node_id, topic))
             elif reach is Reach.OWN and topic.has_vehicle:
-                found.extend(topic.expression(vehicle) for vehicle in _own(node, topic))
+                found.extend(topic.expression(vehicle) for vehicle in self._own(node, topic))
             else:
                 found.append(topic.expression())
         return tuple(found)
@@ -175,7 +175,14 @@ class Routing:
         routes = {name: self._route_of(topic, name) for name in names}
         return [topic.expression(name) for name, route in routes.items() if route and node_id in route.readers]
 
+    def _own(self, node: RosterNode, topic: Topic) -> tuple[str, ...]:
+        """What keys of a topic name as a node's own."""
+        if not topic.has_platform:
+            return node.vehicles
+        return (node.platform,) if node.platform else self._without_driver
 
-def _own(node: RosterNode, topic: Topic) -> tuple[str, ...]:
-    """What keys of a topic name as a node's own."""
-    return (node.platform,) * bool(node.platform) if topic.has_platform else node.vehicles
+    @cached_property
+    def _without_driver(self) -> tuple[str, ...]:
+        """The platforms whose modems have no driver: between these the world carries frames."""
+        driven = {node.platform for node in self.roster if node.role is Role.DRIVER}
+        return tuple(sorted(self._platforms - driven))

@@ -39,7 +39,8 @@ KEY_ROOT = "secondlook/v1"
 
 
 class Reach(enum.Enum):
-    """Whose keys of a topic a role may write or read: its own vehicles' or all."""
+    """Whose keys of a topic a role may write or read: its own vehicles' or all. Of platforms its own is the one that a
+    node is on; of a node that is nowhere, as the world, all that have no driver of a modem."""
 
     OWN = "own"
     ALL = "all"
@@ -146,6 +147,7 @@ _BODIES_OWN = {Role.WORLD: Reach.OWN, Role.BODY: Reach.OWN}
 _COORDINATOR = {Role.COORDINATOR: Reach.ALL}
 _MODEMS = {Role.MODEM: Reach.ALL}  # each for all that is said on its platform, and no other
 _MODEM_OWN = {Role.MODEM: Reach.OWN}
+_CARRIERS = {Role.WORLD: Reach.OWN, Role.DRIVER: Reach.OWN}  # of frames, between modems
 _EVERYONE = dict.fromkeys(Role, Reach.ALL)
 
 RUN = Topic("run", "run", RunInfo, {Role.CLOCK: Reach.ALL}, _EVERYONE, 600_000, 0.01, Keep.LATEST, crosses_water=False)
@@ -208,11 +210,11 @@ MISSION_OVER = Topic(
     crosses_water=True, crossing=Crossing(2000, 60, newest_only=True),
 )  # fmt: skip
 MODEM_TX = Topic(
-    "modem_tx", "modem/{platform}/tx", Packet, {Role.MODEM: Reach.OWN}, {Role.WORLD: Reach.ALL} | _WATCHERS, 300_000,
+    "modem_tx", "modem/{platform}/tx", Packet, _MODEM_OWN, _CARRIERS | _WATCHERS, 300_000,
     10.0, Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 MODEM_RX = Topic(
-    "modem_rx", "modem/{platform}/rx", Packet, {Role.WORLD: Reach.ALL}, {Role.MODEM: Reach.OWN} | _WATCHERS, 300_000,
+    "modem_rx", "modem/{platform}/rx", Packet, _CARRIERS, _MODEM_OWN | _WATCHERS, 300_000,
     100.0, Keep.LATEST, crosses_water=True,
 )  # fmt: skip
 HEARD = Topic(

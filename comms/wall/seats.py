@@ -202,7 +202,8 @@ class NodeSeat:
         """What the nodes have said, and the latencies measured here."""
         latencies = {STRIP_TO_TASK: self._latency.milliseconds}
         said = sum((one.node.said.said for one in self._nodes.values()), Counter[str]())
-        return LastWord(messages=dict(said), dropped=dict(dropped), latencies_ms=latencies)
+        lost = sum((one.node.dropped for one in self._nodes.values()), Counter(dropped))
+        return LastWord(messages=dict(said), dropped=dict(lost), latencies_ms=latencies)
 
     def _noted(self, outgoing: list[Outgoing]) -> list[Outgoing]:
         if self._is_coordinators:

@@ -22,10 +22,19 @@ from secondlook.fleet.link import (
     coordinator_platform,
     link_times,
     modem_configs,
-    modem_of,
     platforms_of,
 )
-from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
+from secondlook.fleet.nodes import (
+    CLOCK,
+    COORDINATOR,
+    OBSERVER,
+    RECORDER,
+    WORLD,
+    NodeSpec,
+    driver_of,
+    modem_of,
+    node_spec,
+)
 from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
 from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
@@ -141,7 +150,9 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
 
 def _roster_of(scenario: Scenario, *, record: bool) -> tuple[RosterNode, ...]:
     """Every node of a scenario's fleet; `record`: with a recorder."""
-    external, by_modem = scenario.external_vehicles, scenario.link is not None
+    external, link = scenario.external_vehicles, scenario.link
+    by_modem = link is not None
+    platforms = platforms_of(scenario) if by_modem else ()
     simulated = tuple(name for name in scenario.vehicles if name not in external)
     return (
         RosterNode(CLOCK, Role.CLOCK),
@@ -154,7 +165,11 @@ def _roster_of(scenario: Scenario, *, record: bool) -> tuple[RosterNode, ...]:
         RosterNode(COORDINATOR, Role.COORDINATOR, (), coordinator_platform(scenario) if by_modem else ""),
         *(
             RosterNode(modem_of(platform), Role.MODEM, (platform,) * (platform in scenario.vehicles), platform)
-            for platform in (platforms_of(scenario) if by_modem else ())
+            for platform in platforms
+        ),
+        *(
+            RosterNode(driver_of(platform), Role.DRIVER, (), platform)
+            for platform in (platforms if link is not None and link.carried_by == "drivers" else ())
         ),
         *([RosterNode(RECORDER, Role.RECORDER)] if record else []),
         RosterNode(OBSERVER, Role.OBSERVER),

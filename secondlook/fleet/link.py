@@ -7,8 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-from comms.said.announcement import Role
-from modem.config import ModemConfig
+from modem.config import ModemConfig, PollTimes
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
@@ -25,7 +24,8 @@ class LinkTimes:
     `platforms`: that of the coordinator first, then the vehicles in the roster's order. `frame_bits`: of one frame.
     `frames`: the most in a packet that a slot has time for. `packet_ms`: how long a packet of 1, 2 ... `frames` frames
     is on the water. `way_ms`: how long it takes over `reach_m`. `guard_ms`: time to spare.
-    `deck_ms`: until when all are on deck, and need no modem.
+    `deck_ms`: until when all are on deck, and need no modem. `polled`: whether the coordinator's platform polls the
+    others, instead of slots.
     """
 
     platforms: tuple[str, ...]
@@ -36,6 +36,12 @@ class LinkTimes:
     way_ms: int
     guard_ms: int
     deck_ms: int
+    polled: bool = False
+
+    @property
+    def polls(self) -> PollTimes | None:
+        """What polling is reckoned with, where the coordinator's platform polls the others."""
+        return PollTimes(self.packet_ms, self.way_ms, self.guard_ms) if self.polled else None
 
     @property
     def slot_ms(self) -> int:
@@ -44,7 +50,9 @@ class LinkTimes:
 
     @property
     def cycle_ms(self) -> int:
-        """How long it takes until each platform has had a slot."""
+        """How long it takes until each platform has had a slot, or was polled, at most."""
+        if self.polls is not None:
+            return self.polls.round_ms(self.frames) * (len(self.platforms) - 1)
         return self.slot_ms * len(self.platforms)
 
 
@@ -86,6 +94,7 @@ def link_times(scenario: Scenario) -> LinkTimes | None:
         way_ms=math.ceil(reach_m / signal.speed_mps * 1000.0),
         guard_ms=math.ceil(guard_s * 1000.0),
         deck_ms=deck_ms_of(link),
+        polled=link.access == "polled",
     )
 
 
@@ -117,23 +126,20 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             frame_bits=times.frame_bits,
             frames=times.frames,
             slot_ms=times.slot_ms,
+            late_ms=times.guard_ms // 2,
             low_m=(min(x_m) - ABOUT_M, min(y_m) - ABOUT_M),
             high_m=(max(x_m) + ABOUT_M, max(y_m) + ABOUT_M),
             deck_ms=times.deck_ms,
+            polls=times.polls,
         )
         for platform in times.platforms
     }
 
 
-def modem_of(platform: str) -> str:
-    """The id of a platform's modem."""
-    return f"{Role.MODEM.value}-{platform}"
-
-
 def channel_config(scenario: Scenario) -> ChannelConfig | None:
-    """The channel that the world carries packets over; None where everybody hears everybody."""
+    """The channel that the world carries packets over; None where everybody hears everybody, or drivers carry them."""
     link, ship = scenario.link, ship_position(scenario)
-    if link is None:
+    if link is None or link.carried_by == "drivers":
         return None
     return ChannelConfig(
         signal=signal_of(link.modem),

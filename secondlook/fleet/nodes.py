@@ -8,7 +8,7 @@ hand. Each child process imports this file: it is to be light.
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
@@ -56,6 +56,7 @@ NODES: Mapping[Role, Row] = {
     Role.SURVEY_REVISIT: Row(Process.OWN, Process.OWN, "vehicle_agent.survey_revisit:SurveyRevisitAgent"),
     Role.COORDINATOR: Row(Process.OWN, Process.OWN, "coordinator.coordinator:Coordinator"),
     Role.MODEM: Row(Process.OWN, Process.OWN, "modem.modem:Modem"),
+    Role.DRIVER: Row(Process.OUTSIDE, Process.OUTSIDE),
     Role.RECORDER: Row(Process.OWN, Process.RECORDER, "viz.recorder:Recorder"),
     Role.OBSERVER: Row(Process.LAUNCHER, Process.RECORDER),
 }
@@ -106,11 +107,7 @@ def hosts_of_run(
     alone = {node_id for spec in apart for node_id in spec.nodes}
     acting = [one for one in roster if not one.listens_only]
     own = [one for one in acting if NODES[one.role].run is Process.OWN and one.node_id not in alone]
-    modems = {one.platform: one.node_id for one in own if one.role is Role.MODEM}
-    beside: dict[str, str] = {}
-    for one in own:
-        if one.role is not Role.MODEM and one.platform in modems:
-            beside[one.node_id] = modems.pop(one.platform)
+    beside = _modems_beside(own)
     others = [one.node_id for one in own if one.node_id not in beside.values()]
     count = len(others) if processes is None else min(processes - 1, len(others))
     groups = [others[index::count] for index in range(count)]
@@ -125,24 +122,48 @@ def hosts_of_run(
 
 
 def hosts_when_spread(roster: tuple[RosterNode, ...]) -> tuple[HostSpec, ...]:
-    """The processes of `secondlook node` that the mission waits for."""
-    own = [one.node_id for one in roster if NODES[one.role].node is Process.OWN]
+    """The processes of `secondlook node` that the mission waits for. A modem is with the first node of its platform."""
+    own = [one for one in roster if NODES[one.role].node is Process.OWN]
+    beside = _modems_beside(own)
     recorded = any(one.role is Role.RECORDER for one in roster)
     recorder = tuple(one.node_id for one in roster if NODES[one.role].node is Process.RECORDER)
     return (
-        *(HostSpec(node_id, (node_id,)) for node_id in own),
+        *(
+            HostSpec(one.node_id, (one.node_id, *([beside[one.node_id]] if one.node_id in beside else [])))
+            for one in own
+            if one.node_id not in beside.values()
+        ),
         *([HostSpec(RECORDER, recorder)] if recorded else []),
     )
 
 
 def certified_when_spread(roster: tuple[RosterNode, ...]) -> tuple[HostSpec, ...]:
-    """Whose certificates the router knows. A body that is not ours has one of its own, or speaks through its agent."""
-    bodies = {one.vehicles[0]: one.node_id for one in roster if NODES[one.role].node is Process.OUTSIDE}
+    """Whose certificates the router knows. What is not ours has one of its own, or speaks through a process on its
+    platform: a body through that of its agent, a modem's driver through that of the modem."""
+    outside = [one for one in roster if NODES[one.role].node is Process.OUTSIDE]
+    through = {one.node_id: modem_of(one.platform) if one.role is Role.DRIVER else one.vehicles[0] for one in outside}
     hosts = tuple(
-        HostSpec(spec.host, (*spec.nodes, bodies[spec.host])) if spec.host in bodies else spec
+        HostSpec(spec.host, (*spec.nodes, *(name for name, node in through.items() if node in spec.nodes)))
         for spec in hosts_when_spread(roster)
     )
-    return (*hosts, *(HostSpec(body, (body,)) for body in bodies.values()))
+    return (*hosts, *(HostSpec(name, (name,)) for name in through))
+
+
+def modem_of(platform: str) -> str:
+    """The id of a platform's modem."""
+    return f"{Role.MODEM.value}-{platform}"
+
+
+def driver_of(platform: str) -> str:
+    """The id of the driver of a platform's modem."""
+    return f"{Role.DRIVER.value}-{platform}"
+
+
+def _modems_beside(own: Iterable[RosterNode]) -> dict[str, str]:
+    """By the first node of each platform its modem, which is in the same process."""
+    modems = {one.platform: one.node_id for one in own if one.role is Role.MODEM}
+    first = {one.platform: one.node_id for one in reversed([*own]) if one.role is not Role.MODEM}
+    return {first[platform]: modem for platform, modem in modems.items() if platform in first}
 
 
 def _name(group: list[str]) -> str:

@@ -170,11 +170,16 @@ def warn_of_batteries(summary: Mapping[str, Any]) -> None:
 
 
 def check_bodies(scenario: Scenario) -> None:
-    """Raises UserError where a vehicle has a body that a run does not start."""
+    """Raises UserError where a vehicle has a body, or a modem a driver, that a run does not start."""
     for vehicle in scenario.external_vehicles:
         raise UserError(
             f"vehicles.{vehicle}.body: external is a program of its own, which secondlook run cannot start; must be "
             "simulated here, or the fleet started with secondlook node"
+        )
+    if scenario.link is not None and scenario.link.carried_by == "drivers":
+        raise UserError(
+            "link.carried_by: drivers are programs of their own, by the wall clock, which secondlook run cannot start; "
+            "must be world here, or the fleet started with secondlook node"
         )
 
 

@@ -105,18 +105,19 @@ def run_router(scenario: Scenario, link: Link, *, factor: float, record: bool) -
 
 
 def run_node(scenario: Scenario, link: Link, node_id: str, state: Path | None = None) -> int:
-    """Runs an acting node of the fleet; returns the exit code. Raises UserError where it cannot take part. `state`: the
-    folder in which it keeps its memory, and by which it goes on where there is one."""
+    """Runs an acting node of the fleet, and the modem of its platform; returns the exit code. Raises UserError where it
+    cannot take part. `state`: the folder in which it keeps its memory, and by which it goes on where there is one."""
     _log_to_stderr()
     end_with_supervisor()
     fleet = build_fleet(scenario, record=True, mode=ClockMode.WALL)
-    if node_id not in fleet.specs:
+    acting = {spec.host: spec.nodes for spec in hosts_when_spread(fleet.roster) if spec.host != RECORDER}
+    if node_id not in acting:
         raise UserError(
-            f"{node_id}: is no node of scenario {scenario.name} that acts here; must be {' or '.join(fleet.specs)}"
+            f"{node_id}: is no node of scenario {scenario.name} that acts here; must be {' or '.join(acting)}"
         )
     try:
-        nodes = make_nodes({node_id: fleet.specs[node_id]})
-        outcome = _run_as_guest(fleet, link, node_id, _seat(nodes, node_id, fleet, link, state))
+        nodes = make_nodes({one: fleet.specs[one] for one in acting[node_id]})
+        outcome = _run_as_guest(fleet, link, node_id, _seat(nodes, fleet, link, state))
     except NodeError as error:
         _say(node_id, str(error))
         return FAILED
@@ -126,17 +127,19 @@ def run_node(scenario: Scenario, link: Link, node_id: str, state: Path | None = 
     return FAILED if failure else 0
 
 
-def _seat(nodes: Mapping[str, Node], node_id: str, fleet: Fleet, link: Link, state: Path | None) -> NodeSeat:
+def _seat(nodes: Mapping[str, Node], fleet: Fleet, link: Link, state: Path | None) -> NodeSeat:
     routing = fleet.routing()
     if state is None:
         return NodeSeat(nodes, routing)
     try:
-        # Durable: a vehicle may lose its power.
-        store = Store(state, node_id, identity_of(node_id, link.run, fleet.run_info), durable=True)
+        stores: dict[str, Store] = {}
         try:
-            return NodeSeat(nodes, routing, {node_id: store})
+            for one in nodes:  # durable: a vehicle may lose its power
+                stores[one] = Store(state, one, identity_of(one, link.run, fleet.run_info), durable=True)
+            return NodeSeat(nodes, routing, stores)
         except BaseException:
-            store.close()
+            for store in stores.values():
+                store.close()
             raise
     except StoreRefusedError as error:
         raise UserError(f"--state {error}") from error

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 from comms.node import Received
 from comms.said.codec import header_of
 from comms.said.messages import AgentState, Heard, Packet
 from comms.said.topics import MODEM_TX, topic_of
+from modem.modem import DROPPED, NO_FRAME
 
 
 @dataclass
@@ -73,9 +76,12 @@ class LinkFigures:
             if isinstance(message, AgentState):
                 self._said.setdefault(received.vehicle, Age()).hear(sent_ms, sent_ms)
 
-    def summary(self, profile: str, platforms: int, hub: str, now_ms: int) -> dict[str, Any]:
+    def summary(
+        self, profile: str, platforms: int, hub: str, now_ms: int, dropped: Mapping[str, int] = MappingProxyType({})
+    ) -> dict[str, Any]:
         """`link` of summary.json. `profile`: its name; `platforms`: how many talk by modems, 0 where nobody does: then
-        all that might have crossed counts as if it had; `hub`: the coordinator's platform."""
+        all that might have crossed counts as if it had; `hub`: the coordinator's platform; `dropped`: in the whole run,
+        of which those of modems are told."""
         ages = {
             name: age if not platforms or name == hub else self._heard.get(name, Age())
             for name, age in self._said.items()
@@ -86,6 +92,7 @@ class LinkFigures:
             "bytes_per_s": round(crossed / now_ms * 1000, 1) if now_ms else None,
             "packets": dict(sorted(self.packets.items())),
             "frames_sent": self.frames_sent,
-            "frames_lost": self.frames_sent * max(0, platforms - 1) - self.frames_heard,
+            "frames_lost": self.frames_sent * max(0, platforms - 1) - self.frames_heard + dropped.get(NO_FRAME, 0),
+            "dropped": {reason: dropped[reason] for reason in DROPPED if reason in dropped},
             "age": {name: age.told(now_ms) for name, age in sorted(ages.items())},
         }

@@ -46,6 +46,7 @@ def summarise(
     again, by host.
     """
     told = observer.metrics.summary()
+    dropped = _dropped(observer, result, factor)
     closest, entered = told.pop("closest"), told.pop("entered")
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
     return {
@@ -69,13 +70,13 @@ def summarise(
             "closest": closest,
         },
         **({"keep_out": {"entered": entered}} if scenario.area.keep_out else {}),
-        "link": _link(scenario, observer, mission_s),
+        "link": _link(scenario, observer, mission_s, dropped),
         "latency_ms": {
             "strip_to_task": _percentiles([] if result is None else result.latencies_ms.get(STRIP_TO_TASK, []))
         },
         "rounds": None if result is None else result.rounds,
         "messages": dict(sorted((observer.messages if result is None else result.messages).items())),
-        "dropped": _dropped(observer, result, factor),
+        "dropped": dropped,
     }
 
 
@@ -99,12 +100,12 @@ def _priorities(scenario: Scenario, metrics: Metrics) -> list[dict[str, float | 
     ]
 
 
-def _link(scenario: Scenario, observer: Observer, mission_s: float) -> dict[str, Any]:
+def _link(scenario: Scenario, observer: Observer, mission_s: float, dropped: Mapping[str, int]) -> dict[str, Any]:
     """What went across the water."""
     link, hub = scenario.link, scenario.coordinator.platform or SHIP
     platforms = {hub, *scenario.vehicles} if link is not None else ()
     profile = IDEAL if link is None else link.modem.name
-    return observer.link.summary(profile, len(platforms), hub, round(mission_s * 1000))
+    return observer.link.summary(profile, len(platforms), hub, round(mission_s * 1000), dropped)
 
 
 def _times(mission_s: float, primary_s: float | None, wall_s: float) -> dict[str, float | None]:

@@ -101,6 +101,10 @@ def _problem(
 ) -> Problem | None:
     kind, context = error["type"], error.get("ctx", {})
     path, holder, value = _locate(error["loc"], data, tags)
+    for step in context.get("within", ()):
+        if not _has(value, step):
+            break
+        path, holder, value = (*path, step), value, value[step]
     if kind in {"union_tag_invalid", "union_tag_not_found"}:
         # The error lies with the key that tells the members of the union apart.
         tag = context["discriminator"].strip("'()")
@@ -124,6 +128,8 @@ def _problem(
         what = _allowed(error)
     if made_from is not None:
         path, value = made_from
+    if not path:
+        return Problem(place_of(path, places), what)  # of the whole file
     text = shown(value)
     if kind == "refused" and made_from is None and isinstance(holder, dict) and path[-1] not in holder:
         text = f"{shown(error['input'])}, the default,"
@@ -136,11 +142,15 @@ def _locate(location: Iterable[str | int], data: dict[str, Value], tags: frozens
     holder: Any = None
     value: Any = data
     for step in location:
-        inside = step in value if isinstance(value, dict) else isinstance(value, list) and step in range(len(value))
+        inside = _has(value, step)
         if inside or not (step in tags or step == _KEY_MARK):
             path = (*path, step)
             holder, value = value, value[step] if inside else None
     return path, holder, value
+
+
+def _has(value: Any, step: str | int) -> bool:
+    return step in value if isinstance(value, dict) else isinstance(value, list) and step in range(len(value))
 
 
 def _allowed(error: ErrorDetails) -> str:

@@ -167,13 +167,16 @@ class Outage(Mapping):
 
 
 class Link(Mapping):
-    """How platforms talk: each has a modem, all share one channel, and speak in turn, each in a slot of its own. A
+    """How platforms talk: each has a modem, all share one channel, and speak in turn. A
     platform is a vehicle, or the ship on which the coordinator is. Without, everybody hears everybody."""
 
     profile: Annotated[Profile | None, BeforeValidator(_profile, json_schema_input_type=Profile | str)]
     """The modem: a bundled profile's name (`ideal`, which is the same as no link, `janus`, `micromodem-0`,
     `micromodem-1`, `micromodem-6`, `radio`, `unet-control`, `unet-data`), a YAML file with the keys below, relative to
     the scenario's, such a mapping, or `package.module:Class` of what makes one as a dict."""
+    access: Literal["slots", "polled"] = "slots"
+    """Who speaks when: each platform in a slot of a cycle, or when the coordinator's platform, which polls one after
+    the other, names it."""
     loss: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """An extra share of frames that is lost, at random, at every range."""
     outages: Annotated[tuple[Outage, ...], Field(strict=False, max_length=1000)] = ()
@@ -189,6 +192,8 @@ class Link(Mapping):
     reach_m: Reach | None = None
     """The distance over which slots allow for the sound's way. Left out, the largest between any two of the area's
     corners, the vehicles' starts and homes, and the ship; at most how far the modem is heard."""
+    carried_by: Literal["world", "drivers"] = "world"
+    """What carries frames from modem to modem: the simulated world, or `drivers`, programs of yours, one a platform."""
 
     @field_validator("slot_frames")
     @classmethod
@@ -197,6 +202,14 @@ class Link(Mapping):
         if slot_frames is not None and profile is not None and slot_frames > profile.frames:
             raise refused(f"must be at most the profile's frames, {profile.frames}")
         return slot_frames
+
+    @field_validator("carried_by")
+    @classmethod
+    def _check_carried(cls, carried_by: str, info: ValidationInfo) -> str:
+        simulated = [key for key in ("loss", "outages") if info.data.get(key)]
+        if carried_by == "drivers" and simulated:
+            raise refused(f"must be world with {' and '.join(simulated)}, which the simulated world alone knows of")
+        return carried_by
 
     @model_validator(mode="after")
     def _check_ideal(self) -> Self:

@@ -162,14 +162,15 @@ def _take_profile(data: dict[str, Value], document: Document, folder: Path) -> l
     if not isinstance(link, dict) or not isinstance(file, str) or Path(file).suffix not in (".yaml", ".yml"):
         return []
     try:
-        found, _ = load_model(folder / file, Profile)
+        found, places = load_model(folder / file, Profile)
     except ScenarioError as error:
         problems = list(error.problems)
     except (UserError, ValueError) as error:  # the latter of a name that no file may have
         place = place_of(("link", "profile"), document.places)
         problems = [Problem(place, f"link.profile: {shown(file)} is not allowed; must be a file: {error}")]
     else:
-        link["profile"] = found.model_dump(mode="json", exclude_none=True)
+        link["profile"] = found.model_dump(mode="json", exclude_none=True, exclude_unset=True)
+        document.places.update({("link", "profile", *path): place for path, place in places.items() if path})
         return []
     del data["link"]
     return problems

@@ -11,6 +11,8 @@ import shapely
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
+from modem.config import MOST_PLATFORMS, least_frame_bits
+from secondlook.fleet.nodes import driver_of, modem_of
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
@@ -226,8 +228,7 @@ class Scenario(Mapping):
     def _check_platform(cls, coordinator: Coordinator, info: ValidationInfo) -> Coordinator:
         vehicles: dict[str, Vehicle] | None = info.data.get("vehicles")
         if vehicles is not None and coordinator.platform not in (None, SHIP, *vehicles):
-            names = _listed([SHIP, *vehicles])
-            raise refused(f"must have as platform {names}, and not {coordinator.platform}")
+            raise refused(f"must be {_listed([SHIP, *vehicles])}", ("platform",))
         return coordinator
 
     @field_validator("link")
@@ -240,14 +241,18 @@ class Scenario(Mapping):
         ship = coordinator is not None and coordinator.platform in (None, SHIP)
         if ship and SHIP in vehicles:
             raise refused(f"must stand with no vehicle called {SHIP}, as the coordinator is on a ship of that name")
-        if external := [key for key, vehicle in vehicles.items() if vehicle.body == "external"]:
-            raise refused(f"must be left out with an external body, as the world does not know where {external[0]} is")
+        external = [key for key, vehicle in vehicles.items() if vehicle.body == "external"]
+        if external and link.carried_by == "world":
+            raise refused(
+                "must have carried_by: drivers with an external body, as the world does not know where "
+                f"{external[0]} is"
+            )
         platforms = [*([SHIP] if ship else []), *vehicles]
         for number, outage in enumerate(link.outages if vehicles else ()):
             if outage.platform not in (None, *platforms):
-                raise refused(
-                    f"must have as outages[{number}].platform {_listed(platforms)}, and not {outage.platform}"
-                )
+                raise refused(f"must be {_listed(platforms)}", ("outages", number, "platform"))
+        if vehicles:
+            _check_modem(link, platforms, info.data.get("mission"))
         return link
 
     @field_validator("current")
@@ -341,6 +346,30 @@ class Scenario(Mapping):
     def to_yaml(self) -> str:
         """This scenario as a file that loads as an equal one, defaults filled in and bundled curves written out."""
         return dump(self.model_dump(mode="json", exclude_none=True))
+
+
+def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> None:
+    """Whether modems of the profile can talk in this fleet."""
+    if not 2 <= len(platforms) <= MOST_PLATFORMS:
+        raise refused(f"must be left out with other than 2 to {MOST_PLATFORMS} platforms; there are {len(platforms)}")
+    for platform in platforms:
+        for node_id in (modem_of(platform), driver_of(platform)):
+            if node_id in platforms:
+                raise refused(f"must stand with no vehicle called {node_id}, as a node on {platform} is")
+    profile, polled = link.modem, link.access == "polled"
+    least = least_frame_bits(len(platforms), polled=polled)
+    if profile.frame_bits < least:
+        raise refused(
+            f"a frame must have {least} bits or more with {len(platforms)} platforms", ("profile", "frame_bits")
+        )
+    frame_s = profile.preamble_s + profile.frame_bits / profile.rate_bps
+    if mission is not None and frame_s * len(platforms) > mission.time_limit_s:
+        most_s = mission.time_limit_s / len(platforms)
+        raise refused(
+            f"a frame must take {most_s:.6g} s or less, and not {frame_s:.6g} s, for each of {len(platforms)} "
+            "platforms to have a turn within mission.time_limit_s",
+            ("profile", "rate_bps"),
+        )
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -35,9 +35,10 @@ PDetect = Annotated[float, Field(ge=0, le=0.999)]
 Noise = Annotated[float, Field(ge=0, le=2)]
 
 
-def refused(allowed: str) -> PydanticCustomError:
-    """The error to raise for a value, in the words that follow `... is not allowed; `."""
-    return PydanticCustomError("refused", "{allowed}", {"allowed": allowed})
+def refused(allowed: str, within: tuple[str | int, ...] = ()) -> PydanticCustomError:
+    """The error to raise for a value, in the words that follow `... is not allowed; `. `within`: where in the value
+    that is checked the one stands that is told, as far as the user has written it apart."""
+    return PydanticCustomError("refused", "{allowed}", {"allowed": allowed, "within": within})
 
 
 def plug_in(kind: PlugInKind) -> AfterValidator:

@@ -29,6 +29,19 @@ def test_and_of_its_own_platform() -> None:
     assert [share for _, share in found["radio", "primary"]] == pytest.approx([1.0])
 
 
+def test_the_ideal_link_has_no_other_keys_that_are_varied_of_links() -> None:
+    rows = [
+        row("ideal", 1, 0.4),
+        *(row("radio", 1, mean) | {"link.access": one} for one, mean in (("slots", 0.5), ("polled", 0.45))),
+    ]
+    found = shares(rows, ["link.profile", "link.access"])
+    assert {key: [share for _, share in one] for key, one in found.items()} == {
+        ("ideal", "-"): [1.0],
+        ("radio", "slots"): pytest.approx([0.5]),
+        ("radio", "polled"): pytest.approx([0.75]),
+    }
+
+
 def test_what_failed_and_where_nothing_was_to_be_removed_is_left_out() -> None:
     failed = row("radio", 1, 0.4) | {"failure": "node died", "risk.mean": None}
     rows = [row("ideal", 1, 0.4), failed, row("ideal", 2, 0.6), row("radio", 2, 0.6)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from modem.config import PollTimes, least_frame_bits
 from modem.letters import with_fewer_corners
 
 TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
@@ -59,6 +61,15 @@ def test_each_speaks_in_its_slots_and_nobody_who_has_nothing_to_say() -> None:
     waters.say("beta", "agent/beta/state", state())
     waters.run(60_000)
     assert [(at_ms, platform) for at_ms, platform, _ in waters.packets] == [(4000, "alpha"), (8000, "beta")]
+
+
+@pytest.mark.parametrize(("late_ms", "speaks"), [(0, True), (100, True), (101, False)])
+def test_by_a_clock_that_does_not_wait_it_speaks_a_little_late_or_in_its_next_slot(late_ms: int, speaks: bool) -> None:
+    waters = Waters()
+    waters.say("beta", "agent/beta/state", state())
+    step = waters.modems["beta"].on_wake(8000 + late_ms)
+    assert [key for key, _ in step.publish] == ["modem/beta/tx"] * speaks
+    assert step.wake_ms == (None if speaks else 20_000)
 
 
 def test_of_states_the_newest_alone_is_said_and_no_old_one() -> None:
@@ -120,6 +131,20 @@ def test_a_modem_that_is_started_anew_is_understood() -> None:
     assert [key for key, _ in heard(waters, "ship")] == [f"agent/beta/task_status/{number}" for number in range(1, 7)]
 
 
+@pytest.mark.parametrize("polls", [None, PollTimes((3000,), 500, 400)])
+def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refused(polls: PollTimes | None) -> None:
+    least = least_frame_bits(3, polled=polls is not None)
+    # Tag, platform, start, whether polled, whether acknowledged; then a piece of 8 bits: first, last, number, to whom.
+    assert least == 8 + 2 + 3 + (polls is not None) + 1 + 8 + 2 + 3 + 1
+    waters = Waters(frame_bits=least, polls=polls)
+    waters.say("coordinator", "coord/task/beta/3", TAKE)
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.run(1_000_000)
+    assert sorted(one.key for _, _, one in waters.heard) == ["agent/beta/task_status/1", "coord/task/beta/3"]
+    with pytest.raises(ValueError, match=f"frames of {least - 1} bits are too small for 3 platforms"):
+        config_of("ship", frame_bits=least - 1, polls=polls)
+
+
 @pytest.mark.parametrize("damage", ["bit", "short", "long", "empty"])
 def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
     waters = Waters()
@@ -130,7 +155,8 @@ def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
     changed = bytearray(frame)
     changed[5] ^= 4
     struck = {"bit": bytes(changed), "short": frame[:-1], "long": frame + b"\0", "empty": b""}[damage]
-    waters.say("world", "modem/ship/rx", Packet((struck,)))
+    stray = waters.say("world", "modem/ship/rx", Packet((struck,)))
+    assert stray.dropped == ("no frame of this run",)
     assert waters.modems["ship"].dropped == {"no frame of this run": 1}
     assert waters.heard == []
 
@@ -169,6 +195,22 @@ def test_a_damaged_word_from_hand_to_hand_is_dropped() -> None:
     assert len(heard(waters, "beta")) == 1
 
 
+def test_what_comes_again_by_an_echo_or_late_is_told_once() -> None:
+    waters = Waters()
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(1, TaskState.ACCEPTED, 0.0, 60_000, ""))
+    waters.say("coordinator", "coord/task/beta/3", TAKE)
+    waters.run(60_000)
+    for _, sender, packet in list(waters.packets):
+        for platform in ("ship", "alpha", "beta"):
+            waters.say("world", f"modem/{platform}/rx", packet)  # who sent it may hear itself, too
+        waters.run(waters.now_ms + 12_000)
+        assert sender in ("ship", "beta")
+    assert heard(waters, "ship") == [("agent/beta/task_status/1", "TaskStatus")]
+    assert heard(waters, "beta") == [("coord/task/beta/3", "Task")]
+    assert heard(waters, "alpha") == []
+    assert not any(modem.dropped for modem in waters.modems.values())
+
+
 def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
     round_about = tuple(
         Vertex(round(200 + 80 * math.cos(angle), 2), round(200 + 40 * math.sin(angle), 2))
@@ -192,6 +234,6 @@ def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
         ({"slot_ms": 0}, "a slot has at least 1 ms"),
     ],
 )
-def test_what_cannot_be_said_anything_in_is_refused(terms: dict[str, int], told: str) -> None:
+def test_what_cannot_be_said_anything_in_is_refused(terms: dict[str, Any], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         config_of("ship", **terms)

@@ -8,13 +8,13 @@ from typing import Any
 
 from fleets import ROSTER, with_modems
 
-from comms.node import Received
+from comms.node import Received, Step
 from comms.runner import Intake, Stamp
 from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
 from comms.said.messages import Heard, Packet
 from comms.said.routing import Routing
 from comms.said.topics import HEARD, MODEM_RX, MODEM_TX, RUN
-from modem.config import ModemConfig
+from modem.config import ModemConfig, PollTimes
 from modem.modem import Modem
 
 SIDE_M = 400.0
@@ -36,11 +36,27 @@ PLATFORMS = ("ship", "alpha", "beta")
 
 
 def config_of(
-    platform: str, *, frame_bits: int = 256, frames: int = 1, slot_ms: int = 4000, deck_ms: int = 0
+    platform: str,
+    *,
+    frame_bits: int = 256,
+    frames: int = 1,
+    slot_ms: int = 4000,
+    polls: PollTimes | None = None,
+    deck_ms: int = 0,
 ) -> ModemConfig:
     """A modem's configuration in a fleet of alpha and beta with a ship."""
     return ModemConfig(
-        platform, PLATFORMS, PLATFORMS[1:], frame_bits, frames, slot_ms, (-500.0, -500.0), (900.0, 900.0), deck_ms
+        platform,
+        PLATFORMS,
+        PLATFORMS[1:],
+        frame_bits,
+        frames,
+        slot_ms,
+        100,
+        (-500.0, -500.0),
+        (900.0, 900.0),
+        polls,
+        deck_ms,
     )
 
 
@@ -49,7 +65,7 @@ class Waters:
     `way_ms`: how long it takes."""
 
     def __init__(
-        self, arrives: Callable[[str, str, int], bool] = lambda *_: True, way_ms: int = 3500, **terms: int
+        self, arrives: Callable[[str, str, int], bool] = lambda *_: True, way_ms: int = 3500, **terms: Any
     ) -> None:
         self.routing = Routing(with_modems(ROSTER))
         self.now_ms = 0
@@ -71,10 +87,10 @@ class Waters:
         self._stamps.setdefault("clock", Stamp("clock", self.routing))
         self._tell(platform, "clock", RUN.key(), RUN_INFO)
 
-    def say(self, sender: str, key: str, message: Any) -> None:
-        """A node says something on its platform now."""
+    def say(self, sender: str, key: str, message: Any) -> Step:
+        """A node says something on its platform now; returns what its modem does."""
         platform = self.routing.nodes[sender].platform or self.routing.route(key).vehicle  # type: ignore[union-attr]
-        self._tell(platform, sender, key, message)
+        return self._tell(platform, sender, key, message)
 
     def run(self, until_ms: int) -> None:
         """Lets time pass."""
@@ -92,10 +108,12 @@ class Waters:
                 self._note(name, self.modems[name].on_wake(self.now_ms))
         self.now_ms = until_ms
 
-    def _tell(self, platform: str, sender: str, key: str, message: Any) -> None:
+    def _tell(self, platform: str, sender: str, key: str, message: Any) -> Step:
         stamp = self._stamps.setdefault(sender, Stamp(sender, self.routing))
         received = stamp(key, message, self.now_ms).opened()
-        self._note(platform, self.modems[platform].on_message(received, self.now_ms))
+        step = self.modems[platform].on_message(received, self.now_ms)
+        self._note(platform, step)
+        return step
 
     def _note(self, platform: str, step: Any) -> None:
         self._wakes[platform] = step.wake_ms

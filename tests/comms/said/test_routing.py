@@ -207,6 +207,17 @@ class TestWithModems:
             assert {*route.readers} == expected
             assert route.watchers in (("recorder", "observer"), ("observer",))
 
+    def test_a_driver_carries_for_its_platform_and_the_world_for_the_others(self) -> None:
+        driven = Routing((*self.routing.roster, RosterNode("driver-beta", Role.DRIVER, (), "beta")))
+        carriers = {"alpha": "world", "beta": "driver-beta", "gamma": "world", "ship": "world"}
+        for platform, carrier in carriers.items():
+            sent, come = (driven.route(f"modem/{platform}/{way}") for way in ("tx", "rx"))
+            assert sent is not None
+            assert come is not None
+            assert (sent.readers, come.writer) == ((carrier,), carrier)
+        assert driven.subscriptions("driver-beta") == ("run", "modem/beta/tx")
+        assert driven.publications("driver-beta") == ("modem/beta/rx",)
+
     @pytest.mark.parametrize("key", ["modem/delta/tx", "modem/world/rx", "modem/*/heard", "modem/beta/tx/1"])
     def test_no_platform_of_the_fleet(self, key: str) -> None:
         assert self.routing.route(key) is None

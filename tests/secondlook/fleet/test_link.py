@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from secondlook.fleet.build import world_config
+from modem.config import PollTimes
+from secondlook.fleet.build import build_fleet, world_config
 from secondlook.fleet.link import LinkTimes, channel_config, link_times, platforms_of, ship_position
 from secondlook.scenario import Scenario, load_scenario
 from sim_world.channel_config import ChannelConfig, Outage
@@ -63,6 +64,20 @@ class TestSlots:
         assert (times.way_ms, times.guard_ms, times.slot_ms) == (2000, 500, 6000)
         assert times.cycle_ms == 18_000
         assert times_of("link.reach_m=3000", "link.guard_s=0.2").slot_ms == 5700
+
+    def test_polled_a_cycle_has_a_packet_to_each_other_platform_and_one_back(self) -> None:
+        times = times_of("link.reach_m=3000", "link.access=polled")
+        assert times.polls == PollTimes((3500,), 2000, 500)
+        assert times.cycle_ms == 2 * (3500 + 2000 + 3500 + 2000 + 500)
+        six = times_of("link.reach_m=1500", "link.access=polled", profile="micromodem-6").polls
+        assert six is not None
+        assert six.round_ms(1) == 792 + 1000 + 3250 + 1000 + 500
+        assert times_of("link.reach_m=3000").polls is None
+
+    def test_the_coordinators_patience_follows_from_the_cycle(self) -> None:
+        scenario = linked("link.reach_m=3000", "link.access=polled")
+        config = build_fleet(scenario, record=False).specs["coordinator"].config
+        assert (config.answer_within_ms, config.lost_after_ms) == (5 * 23_000, 6 * 23_000)
 
     def test_fewer_frames_make_slots_shorter(self) -> None:
         all_six = times_of("link.reach_m=1500", profile="micromodem-6")

@@ -51,9 +51,11 @@ def test_second_looks_are_had_by_any_modem(tmp_path: Path, profile: str, platfor
     assert link["age"]["helper"]["largest_s"] > link["age"]["helper"]["mean_s"] > 0
 
 
-@pytest.mark.parametrize("profile", ["micromodem-6", "janus"])
-def test_it_is_one_mission_on_either_bus_in_any_number_of_processes(tmp_path: Path, profile: str) -> None:
-    settings = (f"link.profile={profile}", "link.loss=0.2")
+@pytest.mark.parametrize(
+    ("profile", "access"), [("micromodem-6", "slots"), ("janus", "slots"), ("micromodem-6", "polled")]
+)
+def test_it_is_one_mission_on_either_bus_in_any_number_of_processes(tmp_path: Path, profile: str, access: str) -> None:
+    settings = (f"link.profile={profile}", f"link.access={access}", "link.loss=0.2")
     local = fly(tmp_path / "local", *settings)
     zenoh = [
         fly(tmp_path / f"zenoh-{processes}", *settings, bus="zenoh", processes=processes) for processes in (None, 2)

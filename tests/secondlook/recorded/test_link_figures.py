@@ -55,6 +55,15 @@ def test_frames_are_counted_at_each_other_platform() -> None:
     assert (told["frames_sent"], told["frames_lost"], told["bytes_per_s"]) == (2, 3, 4.0)
 
 
+def test_frames_that_modems_have_dropped_are_told_and_have_not_come() -> None:
+    figures = LinkFigures()
+    figures.hear(said("modem-beta", "modem/beta/tx", Packet((b"12345678", b"abcdefgh")), 0))
+    figures.hear(said("world", "modem/ship/rx", Packet((b"12345678", b"abcdxxxx", b"a stranger's")), 3000))
+    told = figures.summary("toy", 2, "ship", 4000, {"malformed": 4, "no frame of this run": 2})
+    assert told["dropped"] == {"no frame of this run": 2}
+    assert told["frames_lost"] == 1
+
+
 def test_without_modems_what_might_have_crossed_counts() -> None:
     figures, one = LinkFigures(), said("beta", "agent/beta/state", state(), 0)
     figures.hear(one)
