@@ -40,6 +40,7 @@ from secondlook.scenario import (
     scenario_hash,
 )
 from secondlook.scenario.plug_ins import ALLOCATOR, SONAR, SPACING, made
+from sim_world.channel_config import Outage
 from sim_world.config import (
     CurrentConfig,
     SeabedConfig,
@@ -73,18 +74,21 @@ class Fleet:
         return Routing(self.roster, self.run_info)
 
 
-def build_fleet(scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode.LOCKSTEP) -> Fleet:
+def build_fleet(
+    scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode.LOCKSTEP, outages: tuple[Outage, ...] = ()
+) -> Fleet:
     """The fleet of a scenario; `record`: with a recorder. `mode`: what makes its time go on, as it is announced.
+    `outages`: of the link, beside those of the scenario.
 
     Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
     """
     try:
-        return _build_fleet(scenario, record, mode)
+        return _build_fleet(scenario, record, mode, outages)
     except ValueError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from error
 
 
-def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
+def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode, outages: tuple[Outage, ...]) -> Fleet:
     heading_rad = track_heading_rad(scenario)
     region, cell_m = region_of(scenario), scenario.area.cell_m
     grid = region.about(heading_rad).grid(cell_m)
@@ -135,7 +139,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
     specs |= {modem_of(platform): node_spec(Role.MODEM, config) for platform, config in modem_configs(scenario).items()}
     if any(one.role is Role.WORLD for one in roster):
-        specs = {WORLD: node_spec(Role.WORLD, world_config(scenario)), **specs}
+        specs = {WORLD: node_spec(Role.WORLD, world_config(scenario, outages)), **specs}
     return Fleet(run_info, roster, specs, round(scenario.mission.time_limit_s * 1000))
 
 
@@ -208,8 +212,8 @@ def _agent_spec(scenario: Scenario, name: str, vehicle: SurveyVehicle | RevisitV
     return node_spec(Role.SURVEY, survey, vehicle.agent)
 
 
-def world_config(scenario: Scenario) -> WorldConfig:
-    """The sea, and the vehicles in it whose bodies are simulated."""
+def world_config(scenario: Scenario, outages: tuple[Outage, ...] = ()) -> WorldConfig:
+    """The sea, and the vehicles in it whose bodies are simulated. `outages`: see `build_fleet`."""
     current = scenario.current
     return WorldConfig(
         seed=scenario.seed,
@@ -222,7 +226,7 @@ def world_config(scenario: Scenario) -> WorldConfig:
         seabed=_seabed(scenario.seabed),
         targets=TargetsConfig(scenario.targets.count),
         current=None if current is None else _current(current),
-        channel=channel_config(scenario),
+        channel=channel_config(scenario, outages),
     )
 
 

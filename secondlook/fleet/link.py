@@ -121,8 +121,9 @@ def modem_of(platform: str) -> str:
     return f"{Role.MODEM.value}-{platform}"
 
 
-def channel_config(scenario: Scenario) -> ChannelConfig | None:
-    """The channel that the world carries packets over; None where everybody hears everybody."""
+def channel_config(scenario: Scenario, outages: tuple[Outage, ...] = ()) -> ChannelConfig | None:
+    """The channel that the world carries packets over, with `outages` beside those of the scenario; None where
+    everybody hears everybody."""
     link, ship = scenario.link, ship_position(scenario)
     if link is None:
         return None
@@ -132,9 +133,16 @@ def channel_config(scenario: Scenario) -> ChannelConfig | None:
         still=() if ship is None else ((SHIP, ship),),
         loss=link.loss,
         outages=tuple(
-            Outage(round(one.from_s * 1000), round((one.from_s + one.for_s) * 1000), one.platform)
+            Outage(
+                round(one.from_s * 1000),
+                round((one.from_s + one.for_s) * 1000),
+                one.platform,
+                beyond_m=one.beyond_m,
+                loss=one.loss,
+            )
             for one in link.outages
-        ),
+        )
+        + outages,
     )
 
 

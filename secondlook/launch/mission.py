@@ -36,6 +36,7 @@ from secondlook.recorded.story import Story
 from secondlook.recorded.summary import summarise
 from secondlook.scenario import Scenario
 from secondlook.scenario.area import priority_grounds
+from sim_world.channel_config import Outage
 from viz.recorder_config import RecorderConfig
 
 
@@ -67,7 +68,8 @@ class RunOptions:
     the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
     `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped` it ends
     the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this process,
-    again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up."""
+    again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up. `outages`:
+    of the link, on purpose, beside those of the scenario; there are none without a link."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -79,6 +81,7 @@ class RunOptions:
     watch: Watch | None = None
     made: Made | None = None
     patience_s: float = PATIENCE_S
+    outages: tuple[Outage, ...] = ()
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -91,7 +94,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """
     began_s, begun_utc = time.perf_counter(), datetime.now(UTC)
     check_bodies(scenario)
-    fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode)
+    fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode, outages=options.outages)
     options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
     write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
     with room_kept(options.folder), log_to_file(options.folder / LOGS / "launcher.txt"):

@@ -21,6 +21,7 @@ from secondlook.launch.mission import Bus
 from secondlook.recorded.mission import Mission, chosen_keys
 from secondlook.scenario import Scenario
 from secondlook.testing.inside import Inside
+from sim_world.channel_config import Outage
 
 
 class Heard(Sequence[Received]):
@@ -86,8 +87,9 @@ class Heard(Sequence[Received]):
 @dataclass(frozen=True)
 class Flight(Mission):
     """`heard`: every message but the clock's control words, in the order of sending. `summary`: summary.json's content.
-    `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`: what went
-    wrong on purpose. `inside`: what the nodes held in the end; None over Zenoh, and before a mission's end."""
+    `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`, `outages`:
+    what went wrong on purpose. `inside`: what the nodes held in the end; None over Zenoh, and before a mission's end.
+    """
 
     scenario: Scenario
     bus: Bus
@@ -97,6 +99,7 @@ class Flight(Mission):
     routing: Routing
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
+    outages: tuple[Outage, ...] = ()
     inside: Inside | None = None
 
     @cached_property
