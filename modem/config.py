@@ -9,6 +9,8 @@ from modem.streams import Window
 MOST_PLATFORMS = 64
 SMALL_BITS = 128
 """Frames with fewer hold either acknowledgements or a single piece of a message."""
+LEAST_PIECE_BITS = 8
+"""A piece of a message with fewer bits is not worth the bits about it."""
 START_BITS = 3
 """Of the number by which a modem that was started anew is told from its past."""
 
@@ -40,8 +42,9 @@ class ModemConfig:
             raise ValueError(f"{self.platform} and {', '.join(self.vehicles)} are not all among the platforms")
         if self.slot_ms < 1 or self.frames < 1:
             raise ValueError("a slot has at least 1 ms, a packet at least one frame")
-        acknowledgement = START_BITS + self.window.ack_bits
-        if self.room < 1 + (len(self.platforms) - 1) + acknowledgement:
+        acknowledgement = 1 + (len(self.platforms) - 1) + START_BITS + self.window.ack_bits
+        piece = 1 + self.about_piece_bits + LEAST_PIECE_BITS
+        if self.room < max(acknowledgement, piece):
             raise ValueError(
                 f"link.profile: frames of {self.frame_bits} bits are too small for {len(self.platforms)} platforms; "
                 "must be larger, or the platforms fewer"
@@ -90,6 +93,12 @@ class ModemConfig:
     def room(self) -> int:
         """How many bits a frame has for what is said."""
         return self.frame_bits - self.tag_bits - self.platform_bits - START_BITS
+
+    @property
+    def about_piece_bits(self) -> int:
+        """Bits about a piece of a message, but for its size."""
+        to_bits = (len(self.others) - 1).bit_length()
+        return (2 if self.is_small else 4) + self.window.number_bits + to_bits
 
     @property
     def window(self) -> Window:

@@ -30,7 +30,7 @@ from comms.said.messages import (
 )
 from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
-from modem.config import START_BITS, ModemConfig
+from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
 from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up
@@ -44,8 +44,6 @@ STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
 LATE_MS = 100
 """So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
-LEAST_PIECE_BITS = 8
-"""A piece of a message with fewer bits is not worth the bits about it."""
 
 
 class Modem:
@@ -216,7 +214,7 @@ class Modem:
     def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
         """Writes into a frame what is worth most and has room, if anything is."""
         left = form.room - writer.bits
-        about = self._about_bits(form)
+        about = self.config.about_piece_bits
         pieces = [
             (worth(value, STRETCH.ttl_s, queued_ms, now_ms) / piece.bits, name, number, piece)
             for name, sending in self._sending.items()
@@ -253,10 +251,6 @@ class Modem:
         """Whether there is room in the window for the first piece of another message."""
         sending = self._sending[to]
         return len(sending.unheard) < sending.window.size
-
-    def _about_bits(self, form: FrameForm) -> int:
-        """Bits about a piece, but for its size."""
-        return (2 if form.is_small else 4) + form.window.number_bits + self._to_bits
 
     @property
     def _to_bits(self) -> int:

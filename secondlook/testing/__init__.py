@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from secondlook.testing.checks import (
         check_allocator,
         check_detection_curve,
+        check_modem_profile,
         check_node,
         check_sonar_model,
         check_spacing_planner,
@@ -65,6 +66,7 @@ __all__ = [
     "assert_strips_offered_within",
     "check_allocator",
     "check_detection_curve",
+    "check_modem_profile",
     "check_node",
     "check_sonar_model",
     "check_spacing_planner",
