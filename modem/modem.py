@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from copy import copy
 from typing import Any
 
 from comms.node import Publication, Received, Step
@@ -31,6 +30,7 @@ from comms.said.messages import (
 from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
+from modem.contents import Letter, PieceFor, parts_of
 from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up
@@ -288,46 +288,16 @@ class Modem:
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
-        if reader.read(1):
-            receivers = self.config.who_talks_with(platform)
-            for name in receivers:
-                if len(receivers) == 1 or reader.read(1):
-                    start = reader.read(START_BITS)
-                    is_ours = name == self.config.platform and start == self._start
-                    sending = self._sending[platform] if is_ours else Sending(form.window)
-                    sending.hear(reader)
-            if form.is_small:
-                return
-        elif form.is_small:
-            self._read_piece(form, platform, reader, now_ms)
-            return
-        while reader.left and reader.read(1):
-            if reader.read(1):
-                self._read_piece(form, platform, reader, now_ms)
-            else:
-                self._open(reader, platform, now_ms)
-
-    def _read_piece(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
-        receivers = self.config.who_talks_with(platform)
-        to_bits = (len(receivers) - 1).bit_length()
-        place = reader.read(to_bits)
-        number = reader.read(form.window.number_bits)
-        first, last = bool(reader.read(1)), bool(reader.read(1))
-        if form.is_small:  # behind the last one's end there are zeros
-            size = form.room - 3 - to_bits - form.window.number_bits
-        elif first and last:  # it tells by itself where it ends
-            ahead = copy(reader)
-            self._letters.open(ahead, platform, now_ms)
-            size = reader.left - ahead.left
-        else:
-            size = reader.read(form.size_bits)
-        piece = Piece(reader.read(size), size, first, last)
-        if place < len(receivers) and receivers[place] == self.config.platform:
-            for letter in self._receiving[platform].take(number, piece):
-                self._open(letter, platform, now_ms)
-
-    def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
-        self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
+        for part in parts_of(self.config, form, self._letters, platform, reader, now_ms):
+            if isinstance(part, Letter):
+                self._tell(platform, part.topic, part.said, now_ms)
+            elif part.to != self.config.platform:
+                pass
+            elif isinstance(part, PieceFor):
+                for letter in self._receiving[platform].take(part.number, part.piece):
+                    self._tell(platform, *self._letters.open(letter, platform, now_ms), now_ms)
+            elif part.start == self._start:
+                self._sending[platform].hear(part.missing, part.come)
 
     def _tell(self, platform: str, topic: Topic | None, said: Said, now_ms: int) -> None:
         """Tells what was heard to the nodes here."""
