@@ -25,12 +25,14 @@ from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, passing_folder, room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
+from secondlook.fleet.link import modem_configs
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.launch.run_display import ending_of
 from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
+from secondlook.recorded.link_trace import LinkSeries
 from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
 from secondlook.recorded.story import Story
 from secondlook.recorded.summary import summarise
@@ -44,9 +46,11 @@ def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = Non
     """For a recording at `path`, and a live view behind `live_pipe`."""
     area = scenario.area
     grounds = priority_grounds(shapely.Polygon(area.polygon_m, area.holes_m), area.priorities)
+    modem = next(iter(modem_configs(scenario).values()), None)
     return RecorderConfig(
         path,
         Story,
+        link=None if modem is None else partial(LinkSeries, modem),
         live_pipe=live_pipe,
         thresholds=scenario.thresholds,
         priorities=tuple(grounds),
