@@ -23,6 +23,7 @@ from comms.said.messages import (
     Message,
     Mode,
     Packet,
+    Task,
     TaskAction,
     TaskState,
     TaskStatus,
@@ -136,7 +137,8 @@ class Modem:
             self._incarnation = received.header.incarnation
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
-        if topic.crossing.newest_only and topic.crossing.acknowledged:
+        about = _about(received)
+        if topic.crossing.newest_only and topic.crossing.acknowledged and about == received.key:
             said = (received.header.incarnation, message)
             if _are_same(self._last_said.get(received.key), said):
                 return  # it will arrive
@@ -147,7 +149,8 @@ class Modem:
                 return
             to = (received.vehicle,)
         for platform in to:
-            self._enqueue(topic, topic.crossing, Said(received.key, received.header, message), platform, now_ms)
+            said_here = Said(received.key, received.header, message)
+            self._enqueue(topic, topic.crossing, said_here, platform, now_ms, about)
 
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
         if stretch is not None:
@@ -155,7 +158,9 @@ class Modem:
             said = Said("", header, stretch)
             self._enqueue(None, STRETCH, said, self.config.hub, now_ms)
 
-    def _enqueue(self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int) -> None:
+    def _enqueue(
+        self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int, about: str = ""
+    ) -> None:
         second = said.header.sent_ms // 1000
         place = self._said_at[second]
         self._said_at = Counter({second: place + 1})
@@ -164,7 +169,7 @@ class Modem:
         except WireError as error:
             self._drop("does not fit the water", f"{said.key}: {error}")
             return
-        self._queue.add(Waiting(said.key, platform, crossing, bits, now_ms))
+        self._queue.add(Waiting(about, platform, crossing, bits, now_ms))
 
     def _drop(self, why: str, detail: str) -> None:
         self.dropped[why] += 1
@@ -343,6 +348,16 @@ class Modem:
 
     def _has_more_than_acks(self) -> bool:
         return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+
+
+def _about(received: Received) -> str:
+    """What a message is about: its key tells, but of tasks and answers each has a key of its own."""
+    message = received.message
+    if isinstance(message, Task):
+        return f"{received.vehicle} {message.strip} {message.action.value}"
+    if isinstance(message, TaskStatus):
+        return f"{received.vehicle} {message.strip} {message.state.value}"
+    return received.key
 
 
 def _are_same(before: tuple[int, Any] | None, now: tuple[int, Any]) -> bool:
