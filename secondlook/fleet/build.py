@@ -12,15 +12,16 @@ import shapely
 from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.codec import SCHEMA_VERSION
 from comms.said.routing import RosterNode, Routing
-from coordinator.config import ANSWER_WITHIN_MS, CoordinatorConfig
+from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.link import (
+    answer_within_ms_of,
     channel_config,
     coordinator_platform,
-    link_times,
+    lost_after_ms_of,
     modem_configs,
     modem_of,
     platforms_of,
@@ -52,9 +53,6 @@ from sim_world.config import (
 )
 from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
-LOST_CYCLES, ANSWER_CYCLES = 6, 5
-"""After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
-waits for its slot, and may have to be said again."""
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
 
@@ -301,14 +299,12 @@ def _named(key: str) -> Iterator[None]:
 
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
-    times = link_times(scenario)
-    cycle_ms = 0 if times is None else times.cycle_ms
     return CoordinatorConfig(
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor or math.inf,
         deadline_s=scenario.mission.deadline_s or math.inf,
-        lost_after_ms=max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms),
-        answer_within_ms=max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms),
+        lost_after_ms=lost_after_ms_of(scenario),
+        answer_within_ms=answer_within_ms_of(scenario),
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
         across=scenario.coordinator.across,

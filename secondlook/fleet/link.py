@@ -8,12 +8,16 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from comms.said.announcement import Role
+from coordinator.config import ANSWER_WITHIN_MS
 from modem.config import ModemConfig
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
 from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, SonarEquation
 
+LOST_CYCLES, ANSWER_CYCLES = 6, 5
+"""After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
+waits for its slot, and may have to be said again."""
 ABOUT_M = 1000.0
 """So far beyond all places of the scenario a vehicle may be and still tell where it is."""
 
@@ -84,6 +88,22 @@ def link_times(scenario: Scenario) -> LinkTimes | None:
         way_ms=math.ceil(reach_m / signal.speed_mps * 1000.0),
         guard_ms=math.ceil(guard_s * 1000.0),
     )
+
+
+def cycle_ms_of(scenario: Scenario) -> int:
+    """How long it takes until each platform has had a slot; 0 where everybody hears everybody."""
+    times = link_times(scenario)
+    return 0 if times is None else times.cycle_ms
+
+
+def lost_after_ms_of(scenario: Scenario) -> int:
+    """Age of a vehicle's state from which the coordinator counts it as lost."""
+    return max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms_of(scenario))
+
+
+def answer_within_ms_of(scenario: Scenario) -> int:
+    """Age of an offer from which the coordinator expects no answer any more."""
+    return max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms_of(scenario))
 
 
 def reach_m_of(scenario: Scenario, link: Link) -> float:

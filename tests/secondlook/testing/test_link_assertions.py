@@ -10,9 +10,21 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
-from comms.said.messages import Packet
+from comms.lockstep.faults import FaultKind, Faults, MessageFault
+from comms.said.messages import Packet, Task, TaskAction
 from secondlook.errors import UserError
-from secondlook.testing import Fleet, Flight, Heard, assert_age_at_most, assert_bytes_across_water
+from secondlook.fleet.link import cycle_ms_of, lost_after_ms_of
+from secondlook.testing import (
+    Fleet,
+    Flight,
+    Heard,
+    assert_age_at_most,
+    assert_bytes_across_water,
+    assert_maps_converged,
+    assert_never_assigned_to_lost,
+    assert_no_strip_lost,
+    assert_one_strip_at_a_time,
+)
 
 
 def flown(folder: Path, **overrides: Any) -> Flight:
@@ -118,3 +130,19 @@ def test_what_makes_no_sense_is_refused(ideal: Flight, ask: Callable[[Flight], N
     with pytest.raises(UserError) as refused:
         ask(ideal)
     assert str(refused.value).startswith(sentence)
+
+
+def test_what_must_hold_does_by_modem_too(by_modem: Flight) -> None:
+    assert_never_assigned_to_lost(by_modem)
+    assert_no_strip_lost(by_modem)
+    assert_one_strip_at_a_time(by_modem)
+    with pytest.raises(UserError, match="assert_maps_converged needs a fleet without link"):
+        assert_maps_converged(by_modem)
+
+
+def test_who_is_not_heard_for_6_cycles_is_lost(by_modem: Flight) -> None:
+    assert lost_after_ms_of(by_modem.scenario) == max(30_000, 6 * cycle_ms_of(by_modem.scenario))
+    task = next(one for one in by_modem.said(Task) if one.message.action is TaskAction.TAKE)
+    deaf = Faults(0, (MessageFault(FaultKind.DROP, "modem/ship/heard"),))
+    with pytest.raises(AssertionError, match=f"strip {task.message.strip} was given to helper at .*never heard of"):
+        assert_never_assigned_to_lost(replace(by_modem, faults=deaf))
