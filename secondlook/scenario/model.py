@@ -243,6 +243,8 @@ class Scenario(Mapping):
         if external := [key for key, vehicle in vehicles.items() if vehicle.body == "external"]:
             raise refused(f"must be left out with an external body, as the world does not know where {external[0]} is")
         platforms = [*([SHIP] if ship else []), *vehicles]
+        if len(platforms) == 1:
+            raise refused(f"must be left out, as there is one platform, {platforms[0]}, with the coordinator aboard")
         for number, outage in enumerate(link.outages if vehicles else ()):
             if outage.platform not in (None, *platforms):
                 raise refused(
