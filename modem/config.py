@@ -9,6 +9,8 @@ from modem.streams import Window
 MOST_PLATFORMS = 64
 SMALL_BITS = 128
 """Frames with fewer hold either acknowledgements or a single piece of a message."""
+LEAST_PIECE_BITS = 8
+"""A piece of a message with fewer bits is not worth the bits about it."""
 START_BITS = 3
 """Of the number by which a modem that was started anew is told from its past."""
 
@@ -122,6 +124,12 @@ class ModemConfig:
     def room(self) -> int:
         """How many bits a frame has for what is said."""
         return self.frame_bits - self.tag_bits - (self.polls is not None) - self.platform_bits - START_BITS
+
+    @property
+    def about_piece_bits(self) -> int:
+        """Bits about a piece of a message, but for its size."""
+        to_bits = (len(self.others) - 1).bit_length()
+        return (2 if self.is_small else 4) + self.window.number_bits + to_bits
 
     @property
     def window(self) -> Window:

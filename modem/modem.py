@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from copy import copy
 from typing import Any
 
 from comms.node import Publication, Received, Step
@@ -25,6 +24,7 @@ from comms.said.messages import (
     Message,
     Mode,
     Packet,
+    Task,
     TaskAction,
     TaskState,
     TaskStatus,
@@ -32,6 +32,7 @@ from comms.said.messages import (
 from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
+from modem.contents import Letter, PieceFor, parts_of
 from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
 from modem.streams import Piece, Receiving, Sending, cut_up
@@ -154,7 +155,8 @@ class Modem:
             self._incarnation = received.header.incarnation
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
-        if topic.crossing.newest_only and topic.crossing.acknowledged:
+        about = _about(received)
+        if topic.crossing.newest_only and topic.crossing.acknowledged and about == received.key:
             said = (received.header.incarnation, message)
             if _are_same(self._last_said.get(received.key), said):
                 return  # it will arrive
@@ -165,7 +167,8 @@ class Modem:
                 return
             to = (received.vehicle,)
         for platform in to:
-            self._enqueue(topic, topic.crossing, Said(received.key, received.header, message), platform, now_ms)
+            said_here = Said(received.key, received.header, message)
+            self._enqueue(topic, topic.crossing, said_here, platform, now_ms, about)
 
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
         if stretch is not None:
@@ -173,7 +176,9 @@ class Modem:
             said = Said("", header, stretch)
             self._enqueue(None, STRETCH, said, self.config.hub, now_ms)
 
-    def _enqueue(self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int) -> None:
+    def _enqueue(
+        self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int, about: str = ""
+    ) -> None:
         second = said.header.sent_ms // 1000
         place = self._said_at[second]
         self._said_at = Counter({second: place + 1})
@@ -185,7 +190,7 @@ class Modem:
         if now_ms < self.config.deck_ms and self._form is not None:
             self._on_deck.append(self._form.pack_on_deck(self.config.platform, self._start, bits))
         else:
-            self._queue.add(Waiting(said.key, platform, crossing, bits, now_ms))
+            self._queue.add(Waiting(about, platform, crossing, bits, now_ms))
 
     def _drop(self, why: str, detail: str) -> None:
         self.dropped[why] += 1
@@ -236,7 +241,7 @@ class Modem:
     def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
         """Writes into a frame what is worth most and has room, if anything is."""
         left = form.room - writer.bits
-        about = self._about_bits(form)
+        about = self.config.about_piece_bits
         pieces = [
             (worth(value, STRETCH.ttl_s, queued_ms, now_ms) / piece.bits, name, number, piece)
             for name, sending in self._sending.items()
@@ -274,10 +279,6 @@ class Modem:
         sending = self._sending[to]
         return len(sending.unheard) < sending.window.size
 
-    def _about_bits(self, form: FrameForm) -> int:
-        """Bits about a piece, but for its size."""
-        return (2 if form.is_small else 4) + form.window.number_bits + self._to_bits
-
     @property
     def _to_bits(self) -> int:
         return (len(self.config.others) - 1).bit_length()
@@ -314,7 +315,7 @@ class Modem:
             self._starts[platform] = start
             try:
                 if on_deck is not None:
-                    self._open(reader, platform, now_ms)
+                    self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
                 else:
                     self._read(self._form, platform, reader, now_ms)
             except WireError as error:
@@ -323,46 +324,16 @@ class Modem:
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
-        if reader.read(1):
-            receivers = self.config.who_talks_with(platform)
-            for name in receivers:
-                if len(receivers) == 1 or reader.read(1):
-                    start = reader.read(START_BITS)
-                    is_ours = name == self.config.platform and start == self._start
-                    sending = self._sending[platform] if is_ours else Sending(form.window)
-                    sending.hear(reader)
-            if form.is_small:
-                return
-        elif form.is_small:
-            self._read_piece(form, platform, reader, now_ms)
-            return
-        while reader.left and reader.read(1):
-            if reader.read(1):
-                self._read_piece(form, platform, reader, now_ms)
-            else:
-                self._open(reader, platform, now_ms)
-
-    def _read_piece(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
-        receivers = self.config.who_talks_with(platform)
-        to_bits = (len(receivers) - 1).bit_length()
-        place = reader.read(to_bits)
-        number = reader.read(form.window.number_bits)
-        first, last = bool(reader.read(1)), bool(reader.read(1))
-        if form.is_small:  # behind the last one's end there are zeros
-            size = form.room - 3 - to_bits - form.window.number_bits
-        elif first and last:  # it tells by itself where it ends
-            ahead = copy(reader)
-            self._letters.open(ahead, platform, now_ms)
-            size = reader.left - ahead.left
-        else:
-            size = reader.read(form.size_bits)
-        piece = Piece(reader.read(size), size, first, last)
-        if place < len(receivers) and receivers[place] == self.config.platform:
-            for letter in self._receiving[platform].take(number, piece):
-                self._open(letter, platform, now_ms)
-
-    def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
-        self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
+        for part in parts_of(self.config, form, self._letters, platform, reader, now_ms):
+            if isinstance(part, Letter):
+                self._tell(platform, part.topic, part.said, now_ms)
+            elif part.to != self.config.platform:
+                pass
+            elif isinstance(part, PieceFor):
+                for letter in self._receiving[platform].take(part.number, part.piece):
+                    self._tell(platform, *self._letters.open(letter, platform, now_ms), now_ms)
+            elif part.start == self._start:
+                self._sending[platform].hear(part.missing, part.come)
 
     def _tell(self, platform: str, topic: Topic | None, said: Said, now_ms: int) -> None:
         """Tells what was heard to the nodes here."""
@@ -410,6 +381,16 @@ class Modem:
 
     def _has_more_than_acks(self) -> bool:
         return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+
+
+def _about(received: Received) -> str:
+    """What a message is about: its key tells, but of tasks and answers each has a key of its own."""
+    message = received.message
+    if isinstance(message, Task):
+        return f"{received.vehicle} {message.strip} {message.action.value}"
+    if isinstance(message, TaskStatus):
+        return f"{received.vehicle} {message.strip} {message.state.value}"
+    return received.key
 
 
 def _are_same(before: tuple[int, Any] | None, now: tuple[int, Any]) -> bool:

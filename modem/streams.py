@@ -68,10 +68,10 @@ class Sending:
         low = min(self.unheard, default=self._next)
         return [(number, *one) for number, one in self.unheard.items() if number < low + self.window.size]
 
-    def hear(self, reader: BitReader) -> None:
-        """Reads an acknowledgement; one of pieces that were never said is not heard. Raises WireError."""
+    def hear(self, told: int, come: int) -> None:
+        """Hears an acknowledgement: the last bits of the first missing piece's number, and which behind it have
+        come; one of pieces that were never said is not heard."""
         window = self.window
-        told, come = reader.read(window.number_bits), reader.read(window.size - 1)
         low = min(self.unheard, default=self._next)
         missing = window.near(told, low)
         if missing > self._next:

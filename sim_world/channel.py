@@ -32,15 +32,17 @@ class Arrival(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Reception:
-    """A packet on its way to one platform: which of its sender's it is, and from when until when it is heard there."""
+    """A packet on its way to one platform: which of its sender's it is, over what distance, when it was sent, and from
+    when until when it is heard there."""
 
     ends_ms: int
     begins_ms: int
+    sent_ms: int
     sender: str
     receiver: str
     count: int
     frames: tuple[bytes, ...]
-    share_lost: float
+    range_m: float
 
     @property
     def order(self) -> tuple[int, str, str, int]:
@@ -88,15 +90,15 @@ class Channel:
         if not fitting:
             return
         lasts_ms = signal.packet_ms(len(fitting))
-        if self._is_out(sender, sent_ms, sent_ms + lasts_ms):
-            return
+        if any(one.silences and one.concerns(sender, sent_ms, sent_ms + 1) for one in self._config.outages):
+            return  # one that begins later in the packet garbles it: until then it was on the water
         self._sent[sender].append((sent_ms, sent_ms + lasts_ms))
         for receiver in self._config.platforms:
             range_m = math.dist(places[sender], places[receiver])
             if receiver != sender and range_m <= signal.max_range_m:
                 begins_ms = sent_ms + signal.way_ms(range_m)
                 reception = _Reception(
-                    begins_ms + lasts_ms, begins_ms, sender, receiver, count, fitting, signal.share_lost(range_m)
+                    begins_ms + lasts_ms, begins_ms, sent_ms, sender, receiver, count, fitting, range_m
                 )
                 self._open.append(reception)
                 self._heard[receiver].append(reception)
@@ -119,17 +121,24 @@ class Channel:
             return ()
         if any(one is not reception and one.overlaps(begins_ms, ends_ms) for one in self._heard[receiver]):
             return ()
-        if self._is_out(receiver, begins_ms, ends_ms):
-            return ()
-        lost = 1.0 - (1.0 - reception.share_lost) * (1.0 - self._config.loss)
+        lost = self._share_lost(reception)
         if lost == 0.0:
             return reception.frames
         stream = random_stream(self._seed, "channel", reception.sender, receiver, str(reception.count))
         drawn = stream.random(len(reception.frames))
         return tuple(frame for frame, chance in zip(reception.frames, drawn, strict=True) if chance >= lost)
 
-    def _is_out(self, platform: str, from_ms: int, until_ms: int) -> bool:
-        return any(outage.concerns(platform, from_ms, until_ms) for outage in self._config.outages)
+    def _share_lost(self, reception: _Reception) -> float:
+        """By range, by chance, and by what overlaps it of the outages; each strikes what the others have left."""
+        one, lasts_ms = reception, reception.ends_ms - reception.begins_ms
+        left = (1.0 - self._config.signal.share_lost(one.range_m)) * (1.0 - self._config.loss)
+        for outage in self._config.outages:
+            if one.range_m >= outage.beyond_m and (
+                outage.concerns(one.sender, one.sent_ms, one.sent_ms + lasts_ms)
+                or outage.concerns(one.receiver, one.begins_ms, one.ends_ms)
+            ):
+                left *= 1.0 - outage.loss
+        return 1.0 - left
 
     def _drop(self, sender: str, frames: int) -> None:
         if frames and not self.dropped_frames:

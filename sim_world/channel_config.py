@@ -143,11 +143,24 @@ class Signal:
 
 @dataclass(frozen=True)
 class Outage:
-    """A time in which the modem of a platform, None for all, neither sends nor hears: what overlaps it is lost."""
+    """A time in which frames are lost: of what the modem of a platform, None for all, sends or hears over `beyond_m` or
+    more a share of `loss`, in (0, 1]. With all of them lost at any distance it neither sends nor hears. What overlaps
+    the time, where it is sent or where it is heard, counts as within it."""
 
     from_ms: int
     until_ms: int
     platform: str | None = None
+    beyond_m: float = 0.0
+    loss: float = 1.0
+
+    def __post_init__(self) -> None:
+        _require(0.0 < self.loss <= 1.0, "outages, loss", self.loss, "above 0, to 1")
+        _require(0.0 <= self.beyond_m <= FARTHEST_M, "outages, beyond_m", self.beyond_m, f"0 to {FARTHEST_M:g}")
+
+    @property
+    def silences(self) -> bool:
+        """Whether nothing is sent in it."""
+        return self.loss == 1.0 and self.beyond_m == 0.0
 
     def concerns(self, platform: str, from_ms: int, until_ms: int) -> bool:
         """Whether it falls into such a time of a platform's."""

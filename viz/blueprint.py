@@ -16,18 +16,24 @@ MARGIN = 1.18  # room around the area for turns and the colour scale
 WIDE_VIEW, TALL_VIEW = 3.0, 0.9  # width over height of the map's view in either layout
 
 
-def mission_blueprint(extent: Extent, run: RunInfo) -> rrb.Blueprint:
-    """The blueprint for an area: a wide one lies above the other views, a tall one beside them."""
+def mission_blueprint(extent: Extent, run: RunInfo, *, has_link: bool = False) -> rrb.Blueprint:
+    """The blueprint for an area: a wide one lies above the other views, a tall one beside them. `has_link`: with views
+    of the link, and ranges and P(y) in one place."""
     wide = extent.width_m > 1.5 * extent.height_m
     area = _map_view(extent, [one.vehicle for one in run.vehicles], WIDE_VIEW if wide else TALL_VIEW)
     curves = _curve_views([one.vehicle for one in run.vehicles if one.role.surveys])
+    below: rrb.Container | rrb.View = _ranges_view()
+    beside: rrb.Container | rrb.View = curves
+    if has_link:
+        below = rrb.Tabs(_ranges_view(), curves)
+        beside = rrb.Vertical(_ages_view(), rrb.Tabs(_bytes_view(), _shares_view()), row_shares=[4, 3])
     log = _log_view()
     if wide:
         layout: rrb.Container = rrb.Vertical(
             area,
             rrb.Horizontal(
-                rrb.Vertical(_metrics_view(), _ranges_view(), row_shares=[4, 3]),
-                curves,
+                rrb.Vertical(_metrics_view(), below, row_shares=[4, 3]),
+                beside,
                 rrb.Vertical(_activity_view(), _tasks_view()),
                 log,
                 column_shares=[5, 4, 5, 6],
@@ -35,13 +41,13 @@ def mission_blueprint(extent: Extent, run: RunInfo) -> rrb.Blueprint:
             row_shares=[9, 8],
         )
     else:
-        beside = rrb.Vertical(
-            rrb.Horizontal(rrb.Vertical(_metrics_view(), _ranges_view(), row_shares=[4, 3]), curves),
+        column = rrb.Vertical(
+            rrb.Horizontal(rrb.Vertical(_metrics_view(), below, row_shares=[4, 3]), beside),
             rrb.Horizontal(_activity_view(), _tasks_view()),
             log,
             row_shares=[5, 4, 4],
         )
-        layout = rrb.Horizontal(area, beside, column_shares=[1, 1])
+        layout = rrb.Horizontal(area, column, column_shares=[1, 1])
     return rrb.Blueprint(
         layout,
         rrb.BlueprintPanel(state="collapsed"),
@@ -108,6 +114,36 @@ def _ranges_view() -> rrb.TimeSeriesView:
         origin=paths.RANGES,
         name="Range in metres: r_eff, and what is planned for",
         axis_x=_whole_mission(),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+    )
+
+
+def _ages_view() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=paths.LINK_AGES,
+        name="Age in s of what is known",
+        axis_x=_whole_mission(),
+        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
+    )
+
+
+def _bytes_view() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=paths.LINK,
+        contents=[f"+ {paths.LINK_BYTES}"],
+        name="Bytes a second",
+        axis_x=_whole_mission(),
+        plot_legend=rrb.PlotLegend(visible=False),
+    )
+
+
+def _shares_view() -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=paths.LINK,
+        contents=[f"+ {paths.LINK_LOST}", f"+ {paths.LINK_FULL}"],
+        name="Frames lost, slots full",
+        axis_x=_whole_mission(),
+        axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
         plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
     )
 

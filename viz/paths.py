@@ -29,6 +29,11 @@ RANGES = "/ranges"
 ACTIVITY = "/activity"
 TASKS = "/tasks"
 LOG = "/log"
+LINK = "/link"
+LINK_AGES = f"{LINK}/age"
+LINK_BYTES = f"{LINK}/bytes_per_s"
+LINK_LOST = f"{LINK}/frames_lost"
+LINK_FULL = f"{LINK}/slots_full"
 
 
 def pose(vehicle: str) -> str:
@@ -54,6 +59,11 @@ def r_eff(vehicle: str) -> str:
 def planned_range(vehicle: str) -> str:
     """The range that a vehicle's next tracks are spaced for."""
     return f"{RANGES}/{vehicle}/planned"
+
+
+def age(vehicle: str) -> str:
+    """How old what the coordinator knows of a vehicle is."""
+    return f"{LINK_AGES}/{vehicle}"
 
 
 def mode(vehicle: str) -> str:

@@ -29,6 +29,7 @@ from viz.blueprint import mission_blueprint
 from viz.canvas import Canvas
 from viz.curves import Curves
 from viz.fleet import Fleet
+from viz.link import Link
 from viz.recorder_config import LogLine, RecorderConfig
 from viz.risk_map import RiskMap, put_priorities
 from viz.second_looks import SecondLooks
@@ -78,7 +79,7 @@ class _Mission:
         self._canvas = canvas
         extent = extent_of(run)
         told = rr.AnyValues(scenario=run.scenario, seed=run.seed)
-        canvas.present(run.scenario, mission_blueprint(extent, run), told)
+        canvas.present(run.scenario, mission_blueprint(extent, run, has_link=config.link is not None), told)
         self._map = RiskMap(canvas, run, extent, round(config.draw_every_s * 1000))
         put_priorities(canvas, config.priorities)
         self._story = config.story()
@@ -102,6 +103,10 @@ class _Mission:
             TruthPose: (truth.on_pose,),
         }
         self._draw |= dict.fromkeys(StripBooks.telling, (self._on_strips,))
+        self._link = None if config.link is None else Link(canvas, run, config.link())
+        for one in () if self._link is None else self._link.telling:
+            assert self._link is not None
+            self._draw[one] = (*self._draw.get(one, ()), self._link.on_message)
         for one in self._story.telling:
             self._draw[one] = (*self._draw.get(one, ()), self._tell)
 
@@ -127,6 +132,8 @@ class _Mission:
         self._map.finish()
         self._second_looks.finish()
         self._table.finish()
+        if self._link is not None:
+            self._link.finish(self._time_ms)
         self._put_lines(self._story.rest())
 
     def _on_strips(self, received: Received, message: Message) -> None:

@@ -28,6 +28,25 @@ class Storyteller(Protocol):
         """The lines still held back: all, or those of another time than this."""
 
 
+LinkPoint = tuple[int, str, float]
+"""When, in simulated milliseconds, of which series, and what: `age/VEHICLE` in seconds, `bytes_per_s`, `frames_lost`
+and `slots_full` as shares."""
+
+
+class LinkTeller(Protocol):
+    """Tells how the link goes, as series over time."""
+
+    @property
+    def telling(self) -> tuple[type, ...]:
+        """The messages that it makes use of."""
+
+    def tell(self, received: Received) -> Iterable[LinkPoint]:
+        """The points that are known now that this message has come."""
+
+    def rest(self, now_ms: int) -> Iterable[LinkPoint]:
+        """Those that are left at the end."""
+
+
 @dataclass(frozen=True)
 class RecorderConfig:
     """`path`: the file to write. `story`: makes who tells of the mission in its log.
@@ -36,7 +55,7 @@ class RecorderConfig:
     `live_pipe`: the named pipe of a LiveServer, to show the mission while it runs; None: the file alone.
     `draw_every_s`: the risk map is drawn at most once in so much simulated time, a very large one once a minute.
     `thresholds`: each survey vehicle's P_d from which data is admissible, drawn with its P(y) where it is told.
-    `priorities`: drawn on the map.
+    `priorities`: drawn on the map. `link`: makes who tells how the link goes; None where everybody hears everybody.
     """
 
     path: Path
@@ -46,3 +65,4 @@ class RecorderConfig:
     draw_every_s: float = 10.0
     thresholds: Mapping[str, float] = field(default_factory=dict)
     priorities: tuple[PriorityGround, ...] = ()
+    link: Callable[[], LinkTeller] | None = None

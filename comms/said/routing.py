@@ -37,6 +37,16 @@ class RosterNode:
         return self.role in (Role.RECORDER, Role.OBSERVER)
 
 
+def modem_of(platform: str) -> str:
+    """The id of a platform's modem."""
+    return f"{Role.MODEM.value}-{platform}"
+
+
+def driver_of(platform: str) -> str:
+    """The id of the driver of a platform's modem."""
+    return f"{Role.DRIVER.value}-{platform}"
+
+
 @dataclass(frozen=True, slots=True)
 class Route:
     """What becomes of one key: its topic, the vehicle it names ("" for none), its only writer, and the nodes that read

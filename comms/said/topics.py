@@ -59,9 +59,9 @@ class Crossing:
     first.
 
     `value`: what one is worth beside those of other topics. `ttl_s`: what has waited for so long is worth twice as
-    much; what need not be acknowledged is then said no more. `newest_only`: of a key a newer one takes the place of one
-    that waits. `acknowledged`: it is said again until it is known to have arrived, and not once more where it is told
-    again as it was.
+    much; what need not be acknowledged is then said no more. `newest_only`: a newer one takes the place of one that
+    waits, of the same key; of tasks and answers, of the same strip and action or state. `acknowledged`: it is said
+    again until it is known to have arrived, and of a key not once more where it is told again as it was.
     """
 
     value: float
@@ -198,11 +198,12 @@ STRIP = Topic(
 TASK = Topic(
     # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
     "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _MODEMS | _WATCHERS, 68, 0.1,
-    Keep.EVENTS, crosses_water=True, crossing=Crossing(1000, 60),
+    Keep.EVENTS, crosses_water=True, crossing=Crossing(1000, 60, newest_only=True),
 )  # fmt: skip
 TASK_STATUS = Topic(
     "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
-    _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True, crossing=Crossing(500, 60),
+    _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
+    crossing=Crossing(500, 60, newest_only=True),
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,

@@ -11,16 +11,17 @@ import shapely
 
 from comms.said.announcement import ClockMode, Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.codec import SCHEMA_VERSION
-from comms.said.routing import RosterNode, Routing
-from coordinator.config import ANSWER_WITHIN_MS, CoordinatorConfig
+from comms.said.routing import RosterNode, Routing, driver_of, modem_of
+from coordinator.config import CoordinatorConfig
 from planner.footprints import footprint_of
 from planner.region import Region
 from planner.types import Point, PriorityGround
 from secondlook.errors import UserError
 from secondlook.fleet.link import (
+    answer_within_ms_of,
     channel_config,
     coordinator_platform,
-    link_times,
+    lost_after_ms_of,
     modem_configs,
     platforms_of,
 )
@@ -31,8 +32,6 @@ from secondlook.fleet.nodes import (
     RECORDER,
     WORLD,
     NodeSpec,
-    driver_of,
-    modem_of,
     node_spec,
 )
 from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
@@ -49,6 +48,7 @@ from secondlook.scenario import (
     scenario_hash,
 )
 from secondlook.scenario.plug_ins import ALLOCATOR, SONAR, SPACING, made
+from sim_world.channel_config import Outage
 from sim_world.config import (
     CurrentConfig,
     SeabedConfig,
@@ -60,9 +60,6 @@ from sim_world.config import (
 )
 from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
-LOST_CYCLES, ANSWER_CYCLES = 6, 5
-"""After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
-waits for its slot, and may have to be said again."""
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
 
@@ -82,18 +79,21 @@ class Fleet:
         return Routing(self.roster, self.run_info)
 
 
-def build_fleet(scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode.LOCKSTEP) -> Fleet:
+def build_fleet(
+    scenario: Scenario, *, record: bool, mode: ClockMode = ClockMode.LOCKSTEP, outages: tuple[Outage, ...] = ()
+) -> Fleet:
     """The fleet of a scenario; `record`: with a recorder. `mode`: what makes its time go on, as it is announced.
+    `outages`: of the link, beside those of the scenario.
 
     Raises UserError, in one sentence, where a room refuses what is each by itself allowed in a scenario.
     """
     try:
-        return _build_fleet(scenario, record, mode)
+        return _build_fleet(scenario, record, mode, outages)
     except ValueError as error:
         raise UserError(f"scenario {scenario.name}: {error}") from error
 
 
-def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
+def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode, outages: tuple[Outage, ...]) -> Fleet:
     heading_rad = track_heading_rad(scenario)
     region, cell_m = region_of(scenario), scenario.area.cell_m
     grid = region.about(heading_rad).grid(cell_m)
@@ -144,7 +144,7 @@ def _build_fleet(scenario: Scenario, record: bool, mode: ClockMode) -> Fleet:
     specs[COORDINATOR] = node_spec(Role.COORDINATOR, _coordinator_config(scenario), scenario.coordinator.node)
     specs |= {modem_of(platform): node_spec(Role.MODEM, config) for platform, config in modem_configs(scenario).items()}
     if any(one.role is Role.WORLD for one in roster):
-        specs = {WORLD: node_spec(Role.WORLD, world_config(scenario)), **specs}
+        specs = {WORLD: node_spec(Role.WORLD, world_config(scenario, outages)), **specs}
     return Fleet(run_info, roster, specs, round(scenario.mission.time_limit_s * 1000))
 
 
@@ -223,8 +223,8 @@ def _agent_spec(scenario: Scenario, name: str, vehicle: SurveyVehicle | RevisitV
     return node_spec(Role.SURVEY, survey, vehicle.agent)
 
 
-def world_config(scenario: Scenario) -> WorldConfig:
-    """The sea, and the vehicles in it whose bodies are simulated."""
+def world_config(scenario: Scenario, outages: tuple[Outage, ...] = ()) -> WorldConfig:
+    """The sea, and the vehicles in it whose bodies are simulated. `outages`: see `build_fleet`."""
     current = scenario.current
     return WorldConfig(
         seed=scenario.seed,
@@ -237,7 +237,7 @@ def world_config(scenario: Scenario) -> WorldConfig:
         seabed=_seabed(scenario.seabed),
         targets=TargetsConfig(scenario.targets.count),
         current=None if current is None else _current(current),
-        channel=channel_config(scenario),
+        channel=channel_config(scenario, outages),
     )
 
 
@@ -312,16 +312,13 @@ def _named(key: str) -> Iterator[None]:
 
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
-    times = link_times(scenario)
-    cycle_ms = 0 if times is None else times.cycle_ms
-    answer_within_ms = max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms)
     return CoordinatorConfig(
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor or math.inf,
         deadline_s=scenario.mission.deadline_s or math.inf,
-        lost_after_ms=max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms),
-        answer_within_ms=answer_within_ms,
-        ahead_ms=0 if times is None else answer_within_ms,
+        lost_after_ms=lost_after_ms_of(scenario),
+        answer_within_ms=answer_within_ms_of(scenario),
+        ahead_ms=0 if scenario.link is None else answer_within_ms_of(scenario),
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
         across=scenario.coordinator.across,

@@ -7,12 +7,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
+from coordinator.config import ANSWER_WITHIN_MS
 from modem.config import ModemConfig, PollTimes
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
 from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, SonarEquation
 
+LOST_CYCLES, ANSWER_CYCLES = 6, 5
+"""After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
+waits for its slot, and may have to be said again."""
 ABOUT_M = 1000.0
 """So far beyond all places of the scenario a vehicle may be and still tell where it is."""
 
@@ -103,6 +107,22 @@ def deck_ms_of(link: Link | None) -> int:
     return 0 if link is None else round(link.on_deck_s * 1000)
 
 
+def cycle_ms_of(scenario: Scenario) -> int:
+    """How long it takes until each platform has had a slot; 0 where everybody hears everybody."""
+    times = link_times(scenario)
+    return 0 if times is None else times.cycle_ms
+
+
+def lost_after_ms_of(scenario: Scenario) -> int:
+    """Age of a vehicle's state from which the coordinator counts it as lost."""
+    return max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms_of(scenario))
+
+
+def answer_within_ms_of(scenario: Scenario) -> int:
+    """Age of an offer from which the coordinator expects no answer any more."""
+    return max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms_of(scenario))
+
+
 def reach_m_of(scenario: Scenario, link: Link) -> float:
     """Over what distance slots allow for the sound's way: as given, or the largest between any two places that the
     scenario names, at most as far as the modem is heard."""
@@ -136,8 +156,9 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
     }
 
 
-def channel_config(scenario: Scenario) -> ChannelConfig | None:
-    """The channel that the world carries packets over; None where everybody hears everybody, or drivers carry them."""
+def channel_config(scenario: Scenario, outages: tuple[Outage, ...] = ()) -> ChannelConfig | None:
+    """The channel that the world carries packets over, with `outages` beside those of the scenario; None where
+    everybody hears everybody, or drivers carry them."""
     link, ship = scenario.link, ship_position(scenario)
     if link is None or link.carried_by == "drivers":
         return None
@@ -148,9 +169,16 @@ def channel_config(scenario: Scenario) -> ChannelConfig | None:
         loss=link.loss,
         deck_ms=deck_ms_of(link),
         outages=tuple(
-            Outage(round(one.from_s * 1000), round((one.from_s + one.for_s) * 1000), one.platform)
+            Outage(
+                round(one.from_s * 1000),
+                round((one.from_s + one.for_s) * 1000),
+                one.platform,
+                beyond_m=one.beyond_m,
+                loss=one.loss,
+            )
             for one in link.outages
-        ),
+        )
+        + outages,
     )
 
 

@@ -17,7 +17,7 @@ from comms.errors import NO_FAILURES, NodeError
 from comms.keys import HostSpec
 from comms.runner import failure_of
 from comms.said.announcement import Role
-from comms.said.routing import RosterNode
+from comms.said.routing import RosterNode, modem_of
 
 CLOCK, WORLD, COORDINATOR, RECORDER, OBSERVER = (
     role.value for role in (Role.CLOCK, Role.WORLD, Role.COORDINATOR, Role.RECORDER, Role.OBSERVER)
@@ -147,16 +147,6 @@ def certified_when_spread(roster: tuple[RosterNode, ...]) -> tuple[HostSpec, ...
         for spec in hosts_when_spread(roster)
     )
     return (*hosts, *(HostSpec(name, (name,)) for name in through))
-
-
-def modem_of(platform: str) -> str:
-    """The id of a platform's modem."""
-    return f"{Role.MODEM.value}-{platform}"
-
-
-def driver_of(platform: str) -> str:
-    """The id of the driver of a platform's modem."""
-    return f"{Role.DRIVER.value}-{platform}"
 
 
 def _modems_beside(own: Iterable[RosterNode]) -> dict[str, str]:

@@ -25,18 +25,20 @@ from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, passing_folder, room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
-from secondlook.fleet.link import deck_ms_of
+from secondlook.fleet.link import deck_ms_of, modem_configs
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
 from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.launch.run_display import ending_of
 from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
+from secondlook.recorded.link_trace import LinkSeries
 from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
 from secondlook.recorded.story import Story
 from secondlook.recorded.summary import summarise
 from secondlook.scenario import Scenario
 from secondlook.scenario.area import priority_grounds
+from sim_world.channel_config import Outage
 from viz.recorder_config import RecorderConfig
 
 
@@ -44,9 +46,11 @@ def recorder_config(scenario: Scenario, path: Path, live_pipe: Path | None = Non
     """For a recording at `path`, and a live view behind `live_pipe`."""
     area = scenario.area
     grounds = priority_grounds(shapely.Polygon(area.polygon_m, area.holes_m), area.priorities)
+    modem = next(iter(modem_configs(scenario).values()), None)
     return RecorderConfig(
         path,
         Story,
+        link=None if modem is None else partial(LinkSeries, modem),
         live_pipe=live_pipe,
         thresholds=scenario.thresholds,
         priorities=tuple(grounds),
@@ -68,7 +72,8 @@ class RunOptions:
     the mission goes on. `live_pipe`: where the recorder shows the mission while it runs, see
     `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped` it ends
     the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this process,
-    again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up."""
+    again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up. `outages`:
+    of the link, on purpose, beside those of the scenario; there are none without a link."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -80,6 +85,7 @@ class RunOptions:
     watch: Watch | None = None
     made: Made | None = None
     patience_s: float = PATIENCE_S
+    outages: tuple[Outage, ...] = ()
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -92,7 +98,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     """
     began_s, begun_utc = time.perf_counter(), datetime.now(UTC)
     check_bodies(scenario)
-    fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode)
+    fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode, outages=options.outages)
     options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
     write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
     with room_kept(options.folder), log_to_file(options.folder / LOGS / "launcher.txt"):

@@ -16,11 +16,15 @@ from modem.modem import DROPPED, NO_FRAME
 
 @dataclass
 class Age:
-    """How old the newest word of a vehicle was: between two of them it grows with time."""
+    """How old the newest word of a vehicle was: between two of them it grows with time, from the start on.
+
+    `largest_ms`: how old at most, and `largest_at_ms`: when that was, both until the time that was asked for last.
+    """
 
     said_ms: int = 0
     came_ms: int = 0
     largest_ms: int = 0
+    largest_at_ms: int = 0
     _sum: float = 0.0  # of ages over time, in ms^2
 
     def hear(self, said_ms: int, came_ms: int) -> None:
@@ -29,16 +33,24 @@ class Age:
             self._pass_until(came_ms)
             self.said_ms = said_ms
 
+    def mean_s(self, now_ms: int) -> float | None:
+        """On average until now; None where no time has passed."""
+        self._pass_until(now_ms)
+        return None if now_ms <= 0 else self._sum / now_ms / 1000
+
     def told(self, now_ms: int) -> dict[str, float | None]:
         """Mean and largest until now, in seconds."""
-        self._pass_until(now_ms)
-        mean_s = None if now_ms <= 0 else round(self._sum / now_ms / 1000, 1)
-        return {"mean_s": mean_s, "largest_s": round(self.largest_ms / 1000, 1)}
+        mean_s = self.mean_s(now_ms)
+        return {
+            "mean_s": None if mean_s is None else round(mean_s, 1),
+            "largest_s": round(self.largest_ms / 1000, 1),
+        }
 
     def _pass_until(self, now_ms: int) -> None:
         before_ms, age_ms = self.came_ms - self.said_ms, now_ms - self.said_ms
         self._sum += (age_ms**2 - before_ms**2) / 2
-        self.largest_ms = max(self.largest_ms, age_ms)
+        if age_ms > self.largest_ms:
+            self.largest_ms, self.largest_at_ms = age_ms, now_ms
         self.came_ms = now_ms
 
 
@@ -76,16 +88,21 @@ class LinkFigures:
             if isinstance(message, AgentState):
                 self._said.setdefault(received.vehicle, Age()).hear(sent_ms, sent_ms)
 
+    def ages(self, *, by_modem: bool, hub: str) -> dict[str, Age]:
+        """How old what the coordinator knew was, of each vehicle that has said anything. `by_modem`: whether it hears
+        of those elsewhere by modem; `hub`: its platform."""
+        return {
+            name: age if not by_modem or name == hub else self._heard.get(name, Age())
+            for name, age in self._said.items()
+        }
+
     def summary(
         self, profile: str, platforms: int, hub: str, now_ms: int, dropped: Mapping[str, int] = MappingProxyType({})
     ) -> dict[str, Any]:
         """`link` of summary.json. `profile`: its name; `platforms`: how many talk by modems, 0 where nobody does: then
         all that might have crossed counts as if it had; `hub`: the coordinator's platform; `dropped`: in the whole run,
         of which those of modems are told."""
-        ages = {
-            name: age if not platforms or name == hub else self._heard.get(name, Age())
-            for name, age in self._said.items()
-        }
+        ages = self.ages(by_modem=bool(platforms), hub=hub)
         crossed = self.modem_bytes if platforms else self.said_bytes
         return {
             "profile": profile,

@@ -114,7 +114,7 @@ class Story:
                 return self._homeward(received, state)
             case ManeuverStatus(state=ManeuverState.REFUSED) as status:
                 return f"manoeuvre {status.number} refused{_because(status.reason)}", True
-            case MissionOver() as over:
+            case MissionOver() as over if self._is_news(("over", received.header.incarnation), True):
                 return f"the mission is over{_because(over.reason)}", False
         return None
 

@@ -27,6 +27,7 @@ from secondlook.recorded.ground import risk_in_priorities
 from secondlook.recorded.mission import OnRead
 from secondlook.report.charts import histogram, risk_chart, risk_series, timeline
 from secondlook.report.drawing import LEVELS, Element, data_url, indexed_png, markup, palette
+from secondlook.report.link import link_report
 from secondlook.report.maps import are_many, flown_map, risk_map, strips_on_map, vehicle_classes
 from secondlook.report.words import degrees_by_place, fate, log_lines, moments, place_in_words
 from secondlook.scenario import load_scenario, scenario_hash
@@ -116,6 +117,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
     vehicles = [one.vehicle for one in mission.run.vehicles]
     helped = bool(mission.helpers)
     classes = vehicle_classes(mission)
+    link = link_report(mission)
     fates = [fate(strip, before, after) for strip in mission.strips]
     return {
         "helped": helped,
@@ -131,6 +133,9 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "risk_chart": _at_both_widths(lambda width_px: risk_chart(series.samples, mattered, width_px)),
         "histogram": _at_both_widths(lambda width_px: histogram(before, after if helped else None, width_px)),
         "timeline": _at_both_widths(lambda width_px: timeline(vehicles, mission.helpers, done, width_px, classes)),
+        "link": link,
+        "link_ages": link and _at_both_widths(lambda width_px: link.ages(width_px, classes)),
+        "link_sent": link and _at_both_widths(link.sent),
         "classes": classes,
         "place": partial(place_in_words, mission.origin),
         "degrees": None if mission.origin is None else degrees_by_place(mission.origin, mission.area),

@@ -164,7 +164,7 @@ def _begun_and_done(mission: RecordedMission) -> Iterator[Moment]:
             yield Moment(one.begun_s, f"{one.vehicle} goes home, as its battery lasts for no more")
         if one.mode is Mode.HOME:
             yield Moment(one.begun_s, f"{one.vehicle} is home")
-    for over in mission.said(MissionOver):
+    for over in mission.said(MissionOver)[:1]:  # who has not heard it is told again
         yield Moment(over.t_s, f"the mission is over: {over.message.reason}")
 
 

@@ -156,7 +156,7 @@ def _made(text: str) -> object:
 
 
 class Outage(Mapping):
-    """A time in which a modem neither sends nor hears."""
+    """A time in which a modem neither sends nor hears, or loses much of what it does."""
 
     platform: str | None = None
     """Whose: a vehicle's id, or `ship`. Left out, everybody's."""
@@ -164,6 +164,10 @@ class Outage(Mapping):
     """From when on."""
     for_s: Annotated[float, Field(gt=0, le=1e7)]
     """For how long."""
+    beyond_m: Range = 0.0
+    """Only what goes that far or farther is lost."""
+    loss: Annotated[float, Field(gt=0, le=1)] = 1.0
+    """The share of frames that is lost, at random if that is not all of them."""
 
 
 class Link(Mapping):

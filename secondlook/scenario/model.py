@@ -11,8 +11,8 @@ import shapely
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
+from comms.said.routing import driver_of, modem_of
 from modem.config import MOST_PLATFORMS, least_frame_bits
-from secondlook.fleet.nodes import driver_of, modem_of
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
@@ -248,6 +248,8 @@ class Scenario(Mapping):
                 f"{external[0]} is"
             )
         platforms = [*([SHIP] if ship else []), *vehicles]
+        if len(platforms) == 1:
+            raise refused(f"must be left out, as there is one platform, {platforms[0]}, with the coordinator aboard")
         for number, outage in enumerate(link.outages if vehicles else ()):
             if outage.platform not in (None, *platforms):
                 raise refused(f"must be {_listed(platforms)}", ("outages", number, "platform"))

@@ -14,6 +14,10 @@ from secondlook.scenario.plug_ins import ALLOCATOR, SPACING
 Corners = list[list[float]]
 
 _LONGEST_S = 400.0  # that drawn surveys take, about: a storm is to fly in half a second
+LINK_SHARE = 0.2  # of fleets
+FAST_LINKS = ("radio", "unet-data", "micromodem-6")
+SLOW_LINKS = ("micromodem-0", "micromodem-1", "unet-control")
+MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey; by JANUS nothing is kept at all
 SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
 
 
@@ -21,7 +25,8 @@ def draw_fleet(number: int) -> Scenario:
     """The mission of this number, 0 or more; the same one each time.
 
     Areas of some 100 to 400 m, convex or not, with and without holes; 1 to 4 primaries with shares of it, which may
-    take second looks themselves; 0 to 6 helpers of any kind; every allocator and spacing of ours.
+    take second looks themselves; 0 to 6 helpers of any kind; every allocator and spacing of ours. One fleet in five
+    talks by modems.
     """
     rng = Random(f"fleet {number}")
     primaries = rng.choices((1, 2, 3, 4), (12, 5, 2, 1))[0]
@@ -45,6 +50,7 @@ def draw_fleet(number: int) -> Scenario:
         "coordinator": _coordinator(rng),
         **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
+    drawn |= _link(number, drawn)
     if helpers > 1:
         drawn["coordinator"]["helpers_a_team"] = 1 + number % 3
     _move_apart(vehicles, drawn["mission"].get("separation_m", 0.0))
@@ -120,6 +126,22 @@ def _coordinator(rng: Random) -> dict[str, Any]:
         "objective": rng.choice(("mean", "worst30", "both", "both")),
         "across": rng.random() < 0.7,
     }
+
+
+def _link(number: int, drawn: dict[str, Any]) -> dict[str, Any]:
+    """A modem, how much more it loses, and where the coordinator is; nothing where everybody hears everybody. It has a
+    generator of its own, so that all else of a fleet is as it was before there were links."""
+    rng, vehicles = Random(f"link {number}"), list(drawn["vehicles"])
+    if rng.random() >= LINK_SHARE:
+        return {}
+    profiles = FAST_LINKS if len(vehicles) > MOST_BY_SLOW_LINK else FAST_LINKS + SLOW_LINKS
+    link: dict[str, Any] = {"profile": rng.choice(profiles)}
+    if rng.random() < 0.5:
+        link["loss"] = _m(rng.uniform(0, 0.3))
+    if rng.random() < 0.2:
+        link["slot_frames"] = 1
+    aboard = {"platform": rng.choice(vehicles)} if rng.random() < 0.4 and len(vehicles) > 1 else {}
+    return {"link": link, "coordinator": drawn["coordinator"] | aboard}
 
 
 def _start(rng: Random, width_m: float, height_m: float) -> dict[str, float]:

@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from comms.said.routing import modem_of
 from secondlook.testing.plan import TroublePlan, make_plan
 
 Data = dict[str, Any]
@@ -50,7 +51,13 @@ def leave_out_vehicle(name: str, data: Data) -> None:
 
 
 def _names(entry: Data, vehicle: str) -> bool:
-    return vehicle in (entry.get("node"), entry.get("vehicle"), entry.get("to"), *entry.get("keys", "").split("/"))
+    whom = [entry.get(key, "") for key in ("node", "vehicle", "to", "platform")]
+    return vehicle in (*map(aboard, whom), *entry.get("keys", "").split("/"))
+
+
+def aboard(node: str) -> str:
+    """Whom what befalls a node concerns: of a modem those on its platform, else itself."""
+    return node.removeprefix(modem_of(""))
 
 
 def make_rectangle(data: Data) -> None:
@@ -93,7 +100,7 @@ def without_keys(data: Data) -> Iterator[Edit]:
     yield partial(set_value, ("fault_seed",), 0)
     scenario = data["scenario"]
     paths: list[Path] = [(key,) for key, value in scenario.items() if not isinstance(value, dict)]
-    paths += [("current",), ("seabed",), ("origin",)]
+    paths += [("current",), ("seabed",), ("origin",), ("link",), *(("link", key) for key in scenario.get("link", ()))]
     paths += [(part, key) for part in ("area", "mission", "coordinator") for key in scenario[part]]
     for name, vehicle in scenario["vehicles"].items():
         paths += [("vehicles", name, key) for key in vehicle]

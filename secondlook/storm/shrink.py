@@ -19,11 +19,13 @@ from pydantic import ValidationError
 
 from secondlook.errors import UserError
 from secondlook.launch.mission import Bus
+from secondlook.scenario.link import SHIP
 from secondlook.storm.fly import fly_storm
 from secondlook.storm.plan_edits import (
     Data,
     Edit,
     Path,
+    aboard,
     edited,
     halve,
     holder_of,
@@ -196,7 +198,8 @@ def broken_rules(plan: TroublePlan) -> set[str]:
             last[one.node] = max(last.get(one.node, (0.0, "")), (one.at_s, one.what))
         if not _spares_core(one, plan) and _ends_s(one) > plan.heals_s + _LATE_S:
             broken.add("over")
-    if any(what == "kill" for node, (_, what) in last.items() if node in plan.core or not plan.core):
+    core = (*plan.core, SHIP)
+    if any(what == "kill" for node, (_, what) in last.items() if aboard(node) in core or not plan.core):
         broken.add("started again")
     if plan.core and plan.heals_s > latest_heals_s(plan.scenario):
         broken.add("early")
@@ -206,7 +209,8 @@ def broken_rules(plan: TroublePlan) -> set[str]:
 def _spares_core(one: Any, plan: TroublePlan) -> bool:
     """Whether an entry of a plan's trouble concerns another vehicle, as its reader, sender or victim, or nobody."""
     others = set(plan.scenario.vehicles) - set(plan.core) if plan.core else set()
-    whom = {getattr(one, key, "") for key in ("node", "vehicle", "to")} | set(getattr(one, "keys", "").split("/"))
+    whom = {aboard(getattr(one, key, None) or "") for key in ("node", "vehicle", "to", "platform")}
+    whom |= set(getattr(one, "keys", "").split("/"))
     return bool(whom & others) or one.what == "disk_full"
 
 

@@ -34,6 +34,7 @@ from coordinator.reasons import BEST, BEYOND, NADIR_GAP, RANGE_END
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.storm.witness import NOTED, Witness
 from secondlook.testing.flight import Flight
+from sim_world.channel_config import Outage
 from vehicle_agent.endurance import ON_ITS_WAY_HOME
 from vehicle_agent.revisit import BATTERY_TOO_LOW
 
@@ -66,7 +67,8 @@ class Seen:
     `reasons`: of changes of strips; `whys`: what makes a strip worth a second look; `moves`: from which state to which,
     None where it is new. `answers`, `words`: of helpers on strips, and their reasons. `again`: types of messages that
     were said again as they were. `modes`: of primaries and of helpers. `starts`: what happened to which node before the
-    mission's end. `dropped`: for which reasons messages were, `logged`: sentences.
+    mission's end; `outages`: the kinds of those of the link. `dropped`: for which reasons messages were, `logged`:
+    sentences.
     """
 
     def __init__(self, flight: Flight, witness: Witness) -> None:
@@ -87,6 +89,7 @@ class Seen:
         self.noted = set(witness.noted)
         noted = flight.faults if isinstance(flight.faults, NotedFaults) else NotedFaults(0, (), ())
         self.kinds, self.topics = noted.kinds, noted.topics
+        self.outages = {_kind(one) for one in flight.outages if one.from_ms < flight.heard.now_ms}
         self.events = [one for one in flight.events if one.at_ms < flight.heard.now_ms]
         self.primaries = set(flight.scenario.survey_vehicles)
         self.is_given_up = any(
@@ -242,6 +245,13 @@ _EVENTS: Mapping[str, Callable[[NodeEvent, list[NodeEvent]], bool]] = MappingPro
 )
 
 
+_BLACKOUT, _RANGE_CUT, _JAMMED = "blackout", "range cut", "jammed"
+
+
+def _kind(outage: Outage) -> str:
+    return _BLACKOUT if outage.silences else _RANGE_CUT if outage.beyond_m else _JAMMED
+
+
 def _acts_on(topic: Topic) -> bool:
     """Whether somebody reads a topic who can be struck: those that only listen cannot."""
     return any(role not in UNTOUCHABLE or role is Role.WORLD for role in topic.readers)
@@ -267,6 +277,11 @@ SOMETIMES: Mapping[str, Sign] = MappingProxyType(
         f"something is struck of topic {topic.name}": _holds("topics", topic.name)
         for topic in STRUCK
         if _acts_on(topic)
+    }
+    | {
+        "modems fall silent": _holds("outages", _BLACKOUT),
+        "modems hear nothing from afar": _holds("outages", _RANGE_CUT),
+        "a share of frames is lost": _holds("outages", _JAMMED),
     }
     | {"a message is lost": _holds("dropped", LOST), "a message is malformed": _holds("dropped", "malformed")}
     | {name: _among("reasons", fragment) for name, fragment in REASONS.items()}

@@ -12,8 +12,10 @@ from random import Random
 from typing import Any
 
 from comms.lockstep.faults import STRUCK
+from comms.said.routing import modem_of
 from comms.said.topics import LOOK, MANEUVER, MANEUVER_STATUS, Topic
 from coordinator.fleet import GIVEN_UP_AFTER
+from secondlook.fleet.link import lost_after_ms_of, platforms_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
 from secondlook.storm.fleets import survey_s
@@ -56,23 +58,29 @@ def _plan(scenario: Scenario, number: int, core: tuple[str, ...], heals_s: float
 
 def latest_heals_s(scenario: Scenario) -> float:
     """Until when a core must be healed: later it may have been given up, or is too late for the end."""
-    latest_s = _s(0.9 * GIVEN_UP_AFTER * scenario.coordinator.lost_after_s)
+    latest_s = _s(0.9 * GIVEN_UP_AFTER * lost_after_ms_of(scenario) / 1000)
     deadline_s = scenario.mission.deadline_s
     return latest_s if deadline_s is None else min(latest_s, _s(deadline_s / 2))
 
 
 def limit_s(scenario: Scenario, heals_s: float) -> float:
     """A mission whose core is healed at `heals_s` and that is not over by then never will be."""
-    lost_s = GIVEN_UP_AFTER * scenario.coordinator.lost_after_s
+    lost_s = GIVEN_UP_AFTER * lost_after_ms_of(scenario) / 1000
     # Whoever was started anew surveys from the beginning.
     return 2 * scenario.mission.ends_s(heals_s + 2 * survey_s(scenario) + lost_s) + 600
 
 
 def _core_vehicles(rng: Random, scenario: Scenario) -> list[str]:
-    """One that surveys, and one that helps if there is any."""
+    """One that surveys, and one that helps if there is any; that with the coordinator aboard is one of them."""
     core = [rng.choice(list(scenario.survey_vehicles))]
     helpers = list(scenario.revisit_vehicles)
-    return core + ([rng.choice(helpers)] if helpers else [])
+    core += [rng.choice(helpers)] if helpers else []
+    aboard = scenario.coordinator.platform
+    if aboard in scenario.survey_vehicles:
+        core[0] = aboard
+    elif aboard in helpers:
+        core[1] = aboard
+    return core
 
 
 def _s(seconds: float) -> float:
@@ -88,6 +96,7 @@ class _Swarm:
         self._nodes = [COORDINATOR, *self._vehicles]
         self._revisiting = [name for name, one in scenario.survey_vehicles.items() if one.revisits]
         self._surveyed_s = survey_s(scenario)
+        self._platforms = [] if scenario.link is None else list(platforms_of(scenario))
         self._core = core
         self._heals_s = heals_s
         self._free_s = dict.fromkeys(self._nodes, 0.0)  # from when on something else may happen to the node
@@ -108,6 +117,8 @@ class _Swarm:
             self._bodies,
             *(lambda what=what: self._strikes(what) for what in ("drop", "repeat", "delay", "reorder", "corrupt")),
         )
+        if self._platforms:
+            kinds += (self._blackouts, self._range_cuts, self._jams, self._modems)
         trouble: list[_Entry] = []
         for kind in kinds:
             if self._rng.random() < 0.4:
@@ -231,6 +242,44 @@ class _Swarm:
                 found.append({"what": "drop", "keys": topic.expression(vehicle), "from_s": from_s, "for_s": for_s})
         return found
 
+    def _blackouts(self) -> list[_Entry]:
+        """Modems neither send nor hear, one after another or all at once."""
+        silent: list[str | None] = [one for one in self._platforms if self._rng.random() < 0.5]
+        found: list[_Entry] = []
+        for platform in silent if self._rng.random() < 0.8 else [None]:
+            from_s, for_s = self._span()
+            whose = {} if platform is None else {"platform": platform}
+            found.append({"what": "blackout", **whose, "from_s": from_s, "for_s": for_s})
+        return found
+
+    def _range_cuts(self) -> list[_Entry]:
+        from_s, for_s = self._span()
+        to_m = round(self._rng.uniform(20, 400), 1)
+        return [{"what": "range_cut", "to_m": to_m, "from_s": from_s, "for_s": for_s}]
+
+    def _jams(self) -> list[_Entry]:
+        found: list[_Entry] = []
+        for _ in range(self._rng.randint(1, 3)):
+            from_s, for_s = self._span()
+            loss = round(10 ** self._rng.uniform(-1, 0), 3)
+            found.append({"what": "jammed", "loss": loss, "from_s": from_s, "for_s": for_s})
+        return found
+
+    def _modems(self) -> list[_Entry]:
+        """Modems are started again, anew or as they were, or do nothing for a while."""
+        found: list[_Entry] = []
+        for platform in self._platforms:
+            if self._rng.random() < 0.5:
+                node, at_s = modem_of(platform), self._between(0, self._heals_s)
+                until_s = self._between(at_s, self._heals_s)
+                if self._rng.random() < 0.3:
+                    found.append({"what": "freeze", "node": node, "at_s": at_s, "for_s": _s(until_s - at_s)})
+                    continue
+                memory = {"memory": True} if self._rng.random() < 0.5 else {}
+                found.append({"what": "kill", "node": node, "at_s": at_s})
+                found.append({"what": "join", "node": node, "at_s": until_s, **memory})
+        return found
+
     def _strikes(self, what: str) -> list[_Entry]:
         found: list[_Entry] = []
         for _ in range(self._rng.randint(1, 3)):
@@ -252,13 +301,16 @@ class _Swarm:
         for node in self._vehicles:
             if node in self._core or node in self._gone:
                 continue
-            match self._rng.choice(("killed", "frozen", "cut off", "deaf", "dumb", "lossy", "blind")):
+            ways = ("killed", "frozen", "cut off", "deaf", "dumb", "lossy", "blind")
+            match self._rng.choice((*ways, "silent") if self._platforms else ways):
                 case "killed":
                     found.append({"what": "kill", "node": node, "at_s": at_s})
                 case "frozen":
                     found.append({"what": "freeze", "node": node, "at_s": at_s, "for_s": _FOR_EVER_S})
                 case "cut off":
                     found.append({"what": "cut_off", "vehicle": node, "from_s": at_s, "for_s": _FOR_EVER_S})
+                case "silent":
+                    found.append({"what": "blackout", "platform": node, "from_s": at_s, "for_s": _FOR_EVER_S})
                 case "deaf":
                     found.append({"what": "drop", "keys": "**", "to": node, "from_s": at_s})
                 case "dumb":

@@ -14,6 +14,7 @@ from secondlook.errors import UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.testing.fleet import Condition, Fleet, NotRepeatedError, scenario_from
 from secondlook.testing.flight import Flight, Heard
+from secondlook.testing.link_assertions import assert_age_at_most, assert_bytes_across_water
 from secondlook.testing.map_assertions import assert_maps_converged, assert_risk_at_most
 from secondlook.testing.mission_assertions import (
     assert_all_finished,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from secondlook.testing.checks import (
         check_allocator,
         check_detection_curve,
+        check_modem_profile,
         check_node,
         check_sonar_model,
         check_spacing_planner,
@@ -47,7 +49,9 @@ __all__ = [
     "Heard",
     "NotRepeatedError",
     "RunFailedError",
+    "assert_age_at_most",
     "assert_all_finished",
+    "assert_bytes_across_water",
     "assert_home_before_empty",
     "assert_kept_apart",
     "assert_kept_out",
@@ -62,6 +66,7 @@ __all__ = [
     "assert_strips_offered_within",
     "check_allocator",
     "check_detection_curve",
+    "check_modem_profile",
     "check_node",
     "check_sonar_model",
     "check_spacing_planner",

@@ -216,12 +216,13 @@ class Fleet(Trouble):
                 watch=hear,
                 made=made,
                 patience_s=self._patience_s,
+                outages=self.outages,
             )
             summary = run_mission(self.scenario, options)
         if watch.error is not None:
             raise watch.error
         watch.check_all_repeated()
-        flight = Flight(self.scenario, bus, folder, watch.heard, summary, self.routing, faults, events)
+        flight = Flight(self.scenario, bus, folder, watch.heard, summary, self.routing, faults, events, self.outages)
         if bus == "local" and flight.digest is not None:  # else nodes may have said more than was heard
             flight = replace(flight, inside=Inside(nodes))
         return flight, watch.holds

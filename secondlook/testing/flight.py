@@ -9,18 +9,20 @@ from pathlib import Path
 from typing import Any, overload
 
 from comms.journal import HeardMessages
-from comms.lockstep.clock import LATE_WORDS_MS, WRAP_UP_MS
+from comms.lockstep.clock import LATE_WORDS_BY_MODEM_MS, LATE_WORDS_MS, WRAP_UP_MS
 from comms.lockstep.events import JOINER_DELAY_MS, Freeze, Join, Kill, NodeEvent, absent_at_start
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import JoinerMail
 from comms.node import Received
 from comms.runner import Intake
+from comms.said.messages import Heard as ByModem
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
 from secondlook.launch.mission import Bus
 from secondlook.recorded.mission import Mission, chosen_keys
 from secondlook.scenario import Scenario
 from secondlook.testing.inside import Inside
+from sim_world.channel_config import Outage
 
 
 class Heard(Sequence[Received]):
@@ -86,8 +88,9 @@ class Heard(Sequence[Received]):
 @dataclass(frozen=True)
 class Flight(Mission):
     """`heard`: every message but the clock's control words, in the order of sending. `summary`: summary.json's content.
-    `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`: what went
-    wrong on purpose. `inside`: what the nodes held in the end; None over Zenoh, and before a mission's end."""
+    `folder`: where the files of the run are. `routing`: who writes and who reads what. `faults`, `events`, `outages`:
+    what went wrong on purpose. `inside`: what the nodes held in the end; None over Zenoh, and before a mission's end.
+    """
 
     scenario: Scenario
     bus: Bus
@@ -97,6 +100,7 @@ class Flight(Mission):
     routing: Routing
     faults: Faults = NO_FAULTS
     events: tuple[NodeEvent, ...] = ()
+    outages: tuple[Outage, ...] = ()
     inside: Inside | None = None
 
     @cached_property
@@ -154,11 +158,13 @@ def _end_ms(flight: Flight) -> int:
     """Until when messages are delivered: after the mission's end that of the last words, too."""
     overs_ms = [one.header.sent_ms for one in flight.heard if one.topic is MISSION_OVER]
     now_ms = flight.heard.now_ms
-    return min(now_ms + WRAP_UP_MS, overs_ms[0] + LATE_WORDS_MS) if overs_ms else now_ms
+    late_ms = LATE_WORDS_MS if flight.scenario.link is None else LATE_WORDS_BY_MODEM_MS
+    return min(now_ms + WRAP_UP_MS, overs_ms[0] + late_ms) if overs_ms else now_ms
 
 
 def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Received]]:
-    """The messages that a node was given in one of its lives, each with the time in milliseconds, in that order."""
+    """The messages that a node was given in one of its lives, each with the time in milliseconds, in that order; what
+    its platform's modem has heard for it as what was said."""
     if flight.routing.nodes[node_id].listens_only:  # no trouble strikes what it hears
         return [(one.header.sent_ms, one) for one in flight.heard]
     found: list[tuple[int, Received]] = []
@@ -168,7 +174,12 @@ def reached(flight: Flight, node_id: str, life: Life) -> list[tuple[int, Receive
         for _, one in given:
             handled.add(one)
         found += given
-    return found
+    letters = Intake(flight.routing)
+    opened = [
+        (at_ms, letters.open(one.message.key, one.message.payload) if isinstance(one.message, ByModem) else one)
+        for at_ms, one in found
+    ]
+    return [(at_ms, one) for at_ms, one in opened if one is not None]
 
 
 def _given(

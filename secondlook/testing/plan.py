@@ -10,6 +10,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from secondlook.errors import UserError
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.scenario import Scenario
+from secondlook.scenario.link import FARTHEST_M
 from secondlook.scenario.load import load_model
 from secondlook.scenario.text import Value, dump
 from secondlook.scenario.values import Mapping, Share, refused
@@ -72,6 +73,33 @@ class CutOff(_Planned):
     for_s: Duration
 
 
+class Blackout(_Planned):
+    """A modem, or all of them, neither sends nor hears for a while."""
+
+    what: Literal["blackout"]
+    platform: str | None = None
+    from_s: TimeOrZero
+    for_s: Duration
+
+
+class RangeCut(_Planned):
+    """Modems hear nothing from so far away, or farther, for a while."""
+
+    what: Literal["range_cut"]
+    to_m: Annotated[float, Field(ge=1, le=FARTHEST_M)]
+    from_s: TimeOrZero
+    for_s: Duration
+
+
+class Jammed(_Planned):
+    """A share of all frames is lost for a while."""
+
+    what: Literal["jammed"]
+    loss: Annotated[float, Field(gt=0, le=1)] = 1.0
+    from_s: TimeOrZero
+    for_s: Duration
+
+
 class _Struck(_Planned):
     keys: KeyText
     to: str = ""
@@ -108,9 +136,24 @@ class Reorder(_Struck):
 
 
 AnyTrouble = Annotated[
-    Kill | Join | DiskFull | Freeze | CutOff | DropOrCorrupt | Repeat | Delay | Reorder, Field(discriminator="what")
+    Kill | Join | DiskFull | Freeze | CutOff | Blackout | RangeCut | Jammed | DropOrCorrupt | Repeat | Delay | Reorder,
+    Field(discriminator="what"),
 ]
-KINDS = ("kill", "join", "disk_full", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder")
+KINDS = (
+    "kill",
+    "join",
+    "disk_full",
+    "freeze",
+    "cut_off",
+    "blackout",
+    "range_cut",
+    "jammed",
+    "drop",
+    "corrupt",
+    "repeat",
+    "delay",
+    "reorder",
+)
 
 
 class TroublePlan(Mapping):

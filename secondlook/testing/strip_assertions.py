@@ -19,8 +19,8 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from coordinator.config import ANSWER_WITHIN_MS
 from coordinator.ledger import NUMBERS_A_SECOND, WITH_A_VEHICLE
+from secondlook.fleet.link import answer_within_ms_of, lost_after_ms_of
 from secondlook.testing.flight import Flight, fail_if, lives, reached
 
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
@@ -35,7 +35,8 @@ def assert_no_strip_lost(flight: Flight) -> None:
     Zenoh they are known by what it has said alone.
 
     Open ones are left only where the deadline has ended the mission. A strip that is with a vehicle counts as lost when
-    that vehicle has not said for `coordinator.lost_after_s` and 10 s more that it is at it.
+    that vehicle has not said for `coordinator.lost_after_s` and 10 s more that it is at it; with a link for as many
+    cycles as the coordinator waits, where that is longer.
     """
     __tracebackhide__ = True
     problems = []
@@ -82,7 +83,7 @@ def _lost(flight: Flight, said: Received[StripStatus]) -> str | None:
         if at_it or working:
             signs_ms.append(one.header.sent_ms)
     end_ms = flight.heard.now_ms
-    if signs_ms and end_ms - max(signs_ms) <= _lost_after_ms(flight) + ANSWER_WITHIN_MS:
+    if signs_ms and end_ms - max(signs_ms) <= lost_after_ms_of(flight.scenario) + answer_within_ms_of(flight.scenario):
         return None
     last = f"last said at {max(signs_ms) / 1000:.3f} s that it is" if signs_ms else "never said that it is"
     at_the_end = f"is {status.state.value} with {vehicle} at the end, {end_ms / 1000:.3f} s"
@@ -220,7 +221,7 @@ def assert_one_strip_at_a_time(flight: Flight) -> None:
 
 def assert_never_assigned_to_lost(flight: Flight) -> None:
     """No strip is offered to a vehicle whose newest state that had reached the coordinator by then was as old as
-    `coordinator.lost_after_s` or older."""
+    `coordinator.lost_after_s` or older; with a link as 6 cycles, where that is longer."""
     __tracebackhide__ = True
     problems = []
     for life in lives(flight, "coordinator"):
@@ -232,7 +233,7 @@ def assert_never_assigned_to_lost(flight: Flight) -> None:
             sent_ms = [
                 said.header.sent_ms for due_ms, said in states if said.vehicle == one.vehicle and due_ms <= now_ms
             ]
-            if not sent_ms or now_ms - max(sent_ms) >= _lost_after_ms(flight):
+            if not sent_ms or now_ms - max(sent_ms) >= lost_after_ms_of(flight.scenario):
                 heard = f"had last heard of at {max(sent_ms) / 1000:.3f} s" if sent_ms else "had never heard of"
                 problems.append(
                     f"strip {task.strip} was given to {one.vehicle} at {_s(one)} s, which the coordinator {heard}"
@@ -280,10 +281,6 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
             if isinstance(kill, Kill) and kill.at_ms <= now_ms:
                 idle_since.pop(kill.node_id, None)
     fail_if(problems, "strips wait for a helper that is free")
-
-
-def _lost_after_ms(flight: Flight) -> int:
-    return round(flight.scenario.coordinator.lost_after_s * 1000)
 
 
 def _s(received: Received) -> str:

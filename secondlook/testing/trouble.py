@@ -1,4 +1,5 @@
-"""What is to go wrong in a mission on purpose, and when: nodes killed, frozen, let in late; words lost, late, corrupt.
+"""What is to go wrong in a mission on purpose, and when: nodes killed, frozen, let in late; words lost, late, corrupt;
+modems that fall silent and frames that are lost on the water.
 
 The same trouble strikes alike in every flight and on every bus. Times are simulated seconds.
 """
@@ -9,9 +10,11 @@ import math
 
 from comms.lockstep.events import Freeze, Join, Kill, NodeEvent, absent_at_start, timeline
 from comms.lockstep.faults import STRUCK, CutOff, FaultKind, Faults, MessageFault
+from comms.said.announcement import Role
 from comms.said.routing import Routing
 from secondlook.errors import UserError
 from secondlook.recorded.mission import chosen_keys
+from sim_world.channel_config import FARTHEST_M, Outage
 
 
 class Trouble:
@@ -25,6 +28,7 @@ class Trouble:
         self.routing = routing
         self.events: tuple[NodeEvent, ...] = ()
         self.disk_full_ms: int | None = None
+        self.outages: tuple[Outage, ...] = ()
         self._seed = seed
         self._message_faults: list[MessageFault] = []
         self._cut_offs: list[CutOff] = []
@@ -64,6 +68,23 @@ class Trouble:
             raise UserError(f"cut_off: {vehicle!r} is not allowed; must be one of {', '.join(vehicles)}")
         from_ms = self._time_ms("from_s", from_s)
         self._cut_offs.append(CutOff(vehicle, from_ms, from_ms + _span_ms("for_s", for_s)))
+
+    def blackout(self, platform: str | None = None, *, for_s: float, from_s: float | None = None) -> None:
+        """The modem of a platform, a vehicle or the ship, neither sends nor hears for a while; left out, no modem does.
+        As the two faults that follow it needs a fleet with a `link`, and strikes what is sent or heard in that time."""
+        self._silence("blackout", from_s, for_s, platform=platform)
+
+    def range_cut(self, to_m: float, *, for_s: float, from_s: float | None = None) -> None:
+        """For a while modems hear nothing from `to_m` away or farther."""
+        if not 1 <= to_m <= FARTHEST_M:
+            raise UserError(f"range_cut: to_m: {to_m} is not allowed; must be from 1 to {FARTHEST_M:.0f} m")
+        self._silence("range_cut", from_s, for_s, beyond_m=to_m)
+
+    def jammed(self, *, for_s: float, from_s: float | None = None, loss: float = 1.0) -> None:
+        """For a while a share of all frames is lost; which, if that is not all, the scenario's seed decides."""
+        if not 0 < loss <= 1:
+            raise UserError(f"jammed: loss: {loss} is not allowed; must be above 0, and at most 1")
+        self._silence("jammed", from_s, for_s, loss=loss)
 
     def drop(
         self, keys: str, *, probability: float = 1.0, to: str = "", from_s: float | None = None, for_s: float = math.inf
@@ -120,6 +141,25 @@ class Trouble:
     ) -> None:
         """Messages arrive with one byte changed."""
         self._strike(FaultKind.CORRUPT, keys, probability, to, from_s, for_s)
+
+    def _silence(
+        self,
+        what: str,
+        from_s: float | None,
+        for_s: float,
+        *,
+        platform: str | None = None,
+        beyond_m: float = 0.0,
+        loss: float = 1.0,
+    ) -> None:
+        platforms = [node.platform for node in self.routing.roster if node.role is Role.MODEM]
+        if not platforms:
+            raise UserError(f"{what}: not allowed without link in the scenario, as there are no modems")
+        if platform not in (None, *platforms):
+            raise UserError(f"{what}: {platform!r} is not allowed; must be one of {', '.join(platforms)}, or left out")
+        from_ms = self._time_ms("from_s", from_s)
+        until_ms = from_ms + _span_ms("for_s", for_s)
+        self.outages = (*self.outages, Outage(from_ms, until_ms, platform, beyond_m=beyond_m, loss=loss))
 
     def _strike(
         self,

@@ -176,6 +176,35 @@ class TestLoss:
         everyone.send("c", ONE, 5, PLACES)
         assert heard(everyone) == []
 
+    def test_what_an_outage_befalls_in_mid_packet_was_on_the_water_until_then(self) -> None:
+        # c hears b, told first, from 2236 to 2736, and a, whose modem fails at 400, from 2100 on.
+        broken = Channel(replace(CONFIG, outages=(Outage(400, 9_000, "a"),)), seed=1)
+        broken.send("b", (b"b",), 0, PLACES)
+        broken.send("a", (b"a",), 100, PLACES)
+        assert heard(broken) == []  # b was sent over 1500 m to a, which heard nothing from 400 on
+        silent = Channel(replace(CONFIG, outages=(Outage(100, 9_000, "a"),)), seed=1)
+        silent.send("b", (b"b",), 0, PLACES)
+        silent.send("a", (b"a",), 100, PLACES)
+        assert heard(silent) == [(2736, Arrival("c", (b"b",)))]
+
+    def test_beyond_a_distance_alone(self) -> None:
+        # From a it is 1500 m to b, heard from 1000 to 1500, and 3000 m to c, heard from 2000 to 2500.
+        for from_ms, until_ms, hears in ((0, 1, "b"), (500, 2000, "bc"), (600, 2001, "b"), (2499, 9000, "b")):
+            cut = Channel(replace(CONFIG, outages=(Outage(from_ms, until_ms, beyond_m=1501.0),)), seed=1)
+            cut.send("a", ONE, 0, PLACES)
+            assert "".join(arrival.platform for _, arrival in heard(cut)) == hears, (from_ms, until_ms)
+
+    def test_a_share_of_frames_alone(self) -> None:
+        jammed = Channel(replace(CONFIG, loss=0.2, outages=(Outage(0, 10_000_000, "a", loss=0.5),)), seed=7)
+        counts = {"ab": 0, "bc": 0}
+        for number in range(1000):
+            for begins_ms, pair in ((0, "ab"), (5_000, "bc")):
+                jammed.send(pair[0], TWO, 10_000 * number + begins_ms, PLACES)
+                counts[pair] += sum(len(one.frames) for _, one in heard(jammed) if one.platform == pair[1])
+        # 0.8 * 0.5 of 2000 are 800, give or take 4 times 22; 0.8 of 2000 are 1600, give or take 4 times 18.
+        assert abs(counts["ab"] - 800) < 88
+        assert abs(counts["bc"] - 1600) < 72
+
 
 class TestFrames:
     def test_what_is_no_frame_of_the_profile_is_not_sent_and_told_of_once(
@@ -218,6 +247,10 @@ class TestConfig:
             replace(CONFIG, loss=1.0)
         with pytest.raises(ValueError, match="outages"):
             replace(CONFIG, outages=(Outage(0, 1, "d"),))
+        with pytest.raises(ValueError, match="outages, loss"):
+            Outage(0, 1, loss=0.0)
+        with pytest.raises(ValueError, match="outages, beyond_m"):
+            Outage(0, 1, beyond_m=math.inf)
         with pytest.raises(ValueError, match="range_m"):
             LossTable((2.0, 1.0), (0.0, 0.0))
         with pytest.raises(ValueError, match="rician_k"):
@@ -258,6 +291,29 @@ def test_what_comes_was_sent_and_the_order_of_calls_means_nothing(
         _, begins_ms, frames = queues[sender].pop(0)
         second.send(sender, sent_by(sender, begins_ms, frames), begins_ms, PLACES)
     assert heard(second) == came
+
+
+outages = st.builds(
+    Outage,
+    st.just(3_000),
+    st.integers(3_001, 20_000),
+    st.sampled_from([None, "a", "b", "c"]),
+    st.sampled_from([0.0, 2_000.0]),
+    st.sampled_from([0.3, 1.0]),
+)
+
+
+@given(sends, st.lists(outages, max_size=3), st.integers(0, 2**32 - 1))
+def test_an_outage_changes_nothing_of_what_came_before_it(
+    all_sent: list[tuple[str, int, int]], outages: list[Outage], seed: int
+) -> None:
+    came = []
+    for channel in (Channel(CONFIG, seed), Channel(replace(CONFIG, outages=tuple(outages)), seed)):
+        for sender, begins_ms, frames in sorted(all_sent, key=lambda one: one[1]):
+            channel.send(sender, sent_by(sender, begins_ms, frames), begins_ms, PLACES)
+        came.append(heard(channel))
+    without, with_them = ([one for one in each if one[0] <= 3_000] for each in came)
+    assert with_them == without
 
 
 class TestOnDeck:

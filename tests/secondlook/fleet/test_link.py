@@ -118,7 +118,8 @@ class TestSlots:
 
 def test_extra_loss_and_outages_reach_the_world_in_milliseconds() -> None:
     channel = channel_of(
-        "link.loss=0.25", "link.outages=[{platform: ship, from_s: 1.5, for_s: 2}, {from_s: 9, for_s: 1}]"
+        "link.loss=0.25",
+        "link.outages=[{platform: ship, from_s: 1.5, for_s: 2}, {from_s: 9, for_s: 1, beyond_m: 500, loss: 0.5}]",
     )
     assert channel.loss == 0.25
-    assert channel.outages == (Outage(1500, 3500, "ship"), Outage(9000, 10_000))
+    assert channel.outages == (Outage(1500, 3500, "ship"), Outage(9000, 10_000, beyond_m=500.0, loss=0.5))

@@ -225,3 +225,10 @@ def test_a_strip_that_is_taken_from_a_vehicle_at_the_end_is_left() -> None:
     left = strip(StripState.OPEN, "left when the mission was over: helper has not ended it")
     assert story.tell(left) == line("strip 3 left: helper has not ended it")
     assert story.tell(left) == []
+
+
+def test_that_the_mission_is_over_is_told_once_however_often_it_is_said() -> None:
+    story = Story()
+    over = [said(MISSION_OVER, MissionOver("nothing is left"), time_ms=TIME_MS + 1000 * place) for place in range(3)]
+    told = [line for one in over for line in story.tell(one)]
+    assert [(line.time_ms, line.text) for line in told] == [(TIME_MS, "the mission is over: nothing is left")]

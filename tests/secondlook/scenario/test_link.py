@@ -8,6 +8,7 @@ import pytest
 
 from secondlook.fleet.link import signal_of
 from secondlook.scenario import Profile, Scenario, bundled, load_scenario, make_scenario, scenario_hash
+from secondlook.scenario.errors import ScenarioError
 from secondlook.scenario.text import read
 
 OWN = """\
@@ -102,3 +103,12 @@ class TestProfilesOfOnesOwn:
         made = load_scenario("tellaro", ["link.profile=water_of_ones_own:modem"])
         data = load_scenario("tellaro").model_dump(mode="json", exclude_none=True)
         assert make_scenario({**data, "link": {"profile": keys}}) == made
+
+
+def test_a_single_vehicle_with_the_coordinator_aboard_needs_no_link() -> None:
+    data = load_scenario("tellaro").model_dump(mode="json", exclude_none=True)
+    del data["vehicles"]["helper"]
+    alone = {**data, "coordinator": {"platform": "primary"}, "link": {"profile": "radio"}}
+    with pytest.raises(ScenarioError, match="must be left out, as there is one platform, primary, with the coordinat"):
+        make_scenario(alone)
+    assert make_scenario({**alone, "coordinator": {}}).link is not None

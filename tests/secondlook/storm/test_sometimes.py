@@ -146,6 +146,9 @@ def test_each_kind_of_trouble_is_in_the_table() -> None:
         "join": "a helper comes late",
         "freeze": "a helper is frozen",
         "cut_off": "a message is lost",
+        "blackout": "modems fall silent",
+        "range_cut": "modems hear nothing from afar",
+        "jammed": "a share of frames is lost",
         **{one.value: f"a message is struck: {one.value}" for one in FaultKind},
     }
     assert set(tried) == set(KINDS) - {"disk_full"}  # that mission fails, and nothing is read of it

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import secondlook
 from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.cli import app
+from secondlook.fleet.link import lost_after_ms_of
 from secondlook.scenario import load_scenario
 from secondlook.storm import campaign
 from secondlook.storm.campaign import agreement, flown_again, storm_of, times_reached
@@ -21,7 +22,7 @@ from secondlook.storm.fly import Outcome, Truth, fly_storm
 from secondlook.storm.sometimes import DISK_FULL, SOMETIMES
 from secondlook.storm.witness import Violation
 from secondlook.testing import Fleet
-from secondlook.testing.plan import DiskFull, TroublePlan, load_plan
+from secondlook.testing.plan import KINDS, DiskFull, TroublePlan, load_plan
 
 QUICK = 5
 """A storm that is flown in some tenths of a second."""
@@ -41,16 +42,33 @@ def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time() -> 
         for one in plan.trouble:
             drawn.add(one.what)
             ends_s = getattr(one, "at_s", getattr(one, "from_s", 0.0)) + (getattr(one, "for_s", 0.0) or 0.0)
-            whom = {getattr(one, "node", ""), getattr(one, "vehicle", ""), getattr(one, "to", "")}
+            whom = {getattr(one, key, "") for key in ("node", "vehicle", "to", "platform")}
             if whom & set(plan.core) and one.what != "join":
                 assert ends_s <= plan.heals_s + 0.1, (number, one)
-        assert plan.heals_s <= GIVEN_UP_AFTER * plan.scenario.coordinator.lost_after_s
-    assert drawn == {"kill", "join", "disk_full", "freeze", "cut_off", "drop", "corrupt", "repeat", "delay", "reorder"}
+        assert plan.heals_s <= GIVEN_UP_AFTER * lost_after_ms_of(plan.scenario) / 1000
+    assert drawn == set(KINDS)
     assert 15 <= calm <= 50  # a tenth of 300
 
 
 def test_a_fleet_with_a_hole_that_cuts_a_share_in_two_is_drawn_without_it() -> None:
     assert storm_of(None, 302000039).scenario.area.holes_m == ()
+
+
+def test_one_fleet_in_five_talks_by_modems_with_troubles_of_their_own() -> None:
+    plans = [plan for number in range(300) if (plan := storm_of(None, number)).scenario.link is not None]
+    assert 40 <= len(plans) <= 80  # a fifth of 300
+    profiles = {plan.scenario.link.modem.name for plan in plans if plan.scenario.link is not None}
+    assert profiles == {"radio", "unet-data", "micromodem-6", "micromodem-0", "micromodem-1", "unet-control"}
+    aboard = [plan for plan in plans if plan.scenario.coordinator.platform is not None]
+    assert aboard
+    # The core is left alone, and with it the modem through which it is heard.
+    assert all(plan.scenario.coordinator.platform in plan.core for plan in aboard if plan.core)
+    for plan in plans:
+        core = {"modem-ship", *(f"modem-{name}" for name in plan.core)}
+        struck = [one for one in plan.trouble if getattr(one, "node", "") in core and one.what in ("kill", "freeze")]
+        assert all(getattr(one, "at_s", 0.0) + getattr(one, "for_s", 0.0) <= plan.heals_s for one in struck)
+        everybody = [one for one in plan.trouble if one.what in ("range_cut", "jammed")]
+        assert all(getattr(one, "from_s", 0.0) + getattr(one, "for_s", 0.0) <= plan.heals_s + 0.1 for one in everybody)
 
 
 def test_a_storm_of_a_given_scenario_keeps_its_fleet() -> None:

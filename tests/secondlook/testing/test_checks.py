@@ -8,10 +8,12 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 from comms.node import Publication, Step
 from comms.said.messages import AgentState, Mode
@@ -26,6 +28,7 @@ from secondlook.scenario.plug_ins import ALLOCATOR, SPACING
 from secondlook.testing import (
     check_allocator,
     check_detection_curve,
+    check_modem_profile,
     check_node,
     check_sonar_model,
     check_spacing_planner,
@@ -58,6 +61,10 @@ class TestOurs:
     def test_curves(self, name: str) -> None:
         curve: Any = bundled.curve(name)
         check_detection_curve(DetectionCurve(np.array(curve["range_m"]), np.array(curve["p_detect"])))
+
+    @pytest.mark.parametrize("name", bundled.link_names())
+    def test_modems(self, name: str) -> None:
+        check_modem_profile(name)
 
     @pytest.mark.parametrize(("node_id", "node"), NODES.items())
     def test_nodes(self, node_id: str, node: str) -> None:
@@ -491,6 +498,60 @@ def test_a_curve_that_is_wrong(curve: Any, sentence: str) -> None:
     with pytest.raises(AssertionError) as caught:
         check_detection_curve(curve, patience_s=0.3 if curve is endless else 10.0)
     assert str(caught.value).startswith(sentence)
+
+
+OWN_MODEM: dict[str, Any] = {
+    "name": "own",
+    "frame_bits": 256,
+    "rate_bps": 80,
+    "max_range_m": 2000,
+    "loss": {"range_m": [0, 2000], "share": [0.1, 0.5]},
+}
+
+
+def own_modem() -> dict[str, Any]:
+    """A modem's profile."""
+    return OWN_MODEM
+
+
+def moody_modem() -> dict[str, Any]:
+    """Another rate each time."""
+    moods.append(80 + len(moods))
+    return OWN_MODEM | {"rate_bps": moods[-1]}
+
+
+moods: list[int] = []
+
+
+@pytest.mark.parametrize(
+    ("modem", "sentence"),
+    [
+        (OWN_MODEM | {"loss": {"range_m": [0, 500, 2000], "share": [0.1, 0.5, 0.4]}},
+         "own: of the frames 0.499 are lost at 508 m, and 0.500 at 500 m; must not be less farther off"),
+        (OWN_MODEM | {"loss": {"range_m": [0], "share": [1]}},
+         "own: of the frames 1.000 are lost at 0 m: nothing would ever be heard"),
+        (OWN_MODEM | {"frame_bits": 20},
+         "own: scenario: link.profile.frame_bits: 20 is not allowed; a frame must have 28"),
+        (OWN_MODEM | {"rate_bps": 0.15}, "own: 3 platforms speak once in 51"),
+        (OWN_MODEM | {"rate_bps": 0}, "own: scenario: link.profile.rate_bps: 0 is not allowed; must be at least 0.1"),
+        ("ideal", "ideal: is the ideal link, which has no modems; must be a modem's profile"),
+        ("none.yaml", "none.yaml: "),
+        (no_allocator, "no_allocator must make a profile's keys as a dict, not 7"),
+        (moody_modem, "moody_modem makes another profile each time"),
+        (endless, "endless, being made, has not come back within 0.3 s"),
+        ("nowhere:Modem", "nowhere:Modem: must be importable; ModuleNotFoundError"),
+    ],
+)  # fmt: skip
+def test_a_modem_that_is_wrong(modem: Any, sentence: str) -> None:
+    with pytest.raises(AssertionError) as caught:
+        check_modem_profile(modem, patience_s=0.3 if modem is endless else 10.0)
+    assert str(caught.value).startswith(sentence)
+
+
+def test_modems_that_are_right(tmp_path: Path) -> None:
+    (tmp_path / "own.yaml").write_text(yaml.safe_dump(OWN_MODEM))
+    for modem in (own_modem, OWN_MODEM, tmp_path / "own.yaml", str(tmp_path / "own.yaml")):
+        check_modem_profile(modem)
 
 
 def test_a_curve_that_is_right() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from flights import BRIEF
 
+import comms.said.messages
 import secondlook
 from comms.node import Received
 from comms.said.messages import AgentState
@@ -25,6 +26,7 @@ from secondlook.testing import (
     assert_one_strip_at_a_time,
 )
 from secondlook.testing.flight import lives
+from secondlook.testing.plan import load_plan, make_plan
 
 MakeFleet = Callable[..., Fleet]
 
@@ -223,6 +225,119 @@ class TestInMidMission:
         fleet.kill("helper", at_s=1)  # the next flight begins anew
 
 
+class TestLinks:
+    """Modems of the brief mission that hear nothing, or less, for a while."""
+
+    @pytest.fixture
+    def link(self, tmp_path: Path) -> MakeFleet:
+        """Makes a fleet of the brief mission that talks by modems."""
+        return lambda **options: Fleet(
+            BRIEF, folder=tmp_path / "flown", overrides={"link.profile": "micromodem-6", "link.on_deck_s": 0}, **options
+        )
+
+    def test_a_modem_that_is_out_neither_sends_nor_hears(self, link: MakeFleet) -> None:
+        fleet = link()
+        fleet.blackout("helper", from_s=40, for_s=30)
+        flight = fleet.run()
+        at_s = [one.t_s for one in flight.messages("modem/helper/rx")]
+        assert not any(40 <= one < 70 for one in at_s)
+        assert min(at_s) < 40
+        assert max(at_s) > 70
+        said_s = [one.t_s for one in flight.messages("modem/helper/tx")]
+        assert any(40 <= one < 68 for one in said_s)
+        told_s = [one.t_s for one in flight.messages("modem/ship/heard") if "agent/helper/" in heard_key(one)]
+        assert not any(42 <= one < 70 for one in told_s)
+        assert any(one > 70 for one in told_s)
+        assert max(one.t_s for one in flight.messages("modem/primary/rx") if one.t_s < 70) > 60
+
+    def test_all_of_them_and_who_is_far(self, link: MakeFleet) -> None:
+        fleet = link()
+        fleet.blackout(from_s=20, for_s=30)
+        fleet.range_cut(1, from_s=60, for_s=20)
+        heard_s = [one.t_s for one in fleet.run().messages("modem/*/rx")]
+        assert not any(20 <= one < 50 or 60 <= one < 80 for one in heard_s)
+        assert any(50 <= one < 60 for one in heard_s)
+        assert any(one >= 80 for one in heard_s)
+
+    def test_what_is_far_is_not_heard_and_what_is_near_is(self, link: MakeFleet) -> None:
+        near, far = link(), link()
+        near.range_cut(5000, for_s=1e6)
+        far.range_cut(1, for_s=1e6)
+        assert near.run().digest == link().run().digest
+        assert far.run().messages("modem/*/rx") == []
+
+    def test_a_share_is_lost_and_without_one_all(self, link: MakeFleet) -> None:
+        calm, half, all_of_it = link(), link(), link()
+        half.jammed(loss=0.5, for_s=1e6)
+        all_of_it.jammed(for_s=1e6)
+        shares = []
+        for fleet in (calm, half, all_of_it):
+            told = fleet.run().summary["link"]
+            shares.append(told["frames_lost"] / (2 * told["frames_sent"]))
+        assert shares[0] < 0.1
+        assert 0.35 < shares[1] < 0.65
+        assert shares[2] == 1
+
+    def test_trouble_from_now_on_is_one_mission_on_both_buses(self, link: MakeFleet) -> None:
+        digests = []
+        for bus in ("local", "zenoh"):
+            fleet = link(bus=bus)
+            fleet.run_until(first_task, timeout_s=100)
+            began_s = fleet.now_s
+            fleet.blackout("primary", for_s=15)
+            fleet.jammed(loss=0.3, from_s=began_s + 20, for_s=20)
+            digests.append(fleet.run().digest)  # raises NotRepeatedError where what was is another
+        assert digests[0] == digests[1] != link().run().digest
+
+    def test_a_plan_holds_it(self, link: MakeFleet, tmp_path: Path) -> None:
+        fleet = link()
+        fleet.blackout("ship", from_s=20, for_s=10)
+        fleet.range_cut(100, from_s=40, for_s=20)
+        fleet.jammed(loss=0.5, from_s=70, for_s=20)
+        entries = [
+            {"what": "blackout", "platform": "ship", "from_s": 20, "for_s": 10},
+            {"what": "range_cut", "to_m": 100, "from_s": 40, "for_s": 20},
+            {"what": "jammed", "loss": 0.5, "from_s": 70, "for_s": 20},
+        ]
+        plan = make_plan({"scenario": fleet.scenario, "trouble": entries})
+        (tmp_path / "plan.yaml").write_text(plan.to_yaml())
+        assert load_plan(tmp_path / "plan.yaml") == plan
+        planned = Fleet.of_plan(tmp_path / "plan.yaml", folder=tmp_path / "planned")
+        assert planned.outages == fleet.outages
+        assert planned.run().digest == fleet.run().digest
+
+    @pytest.mark.parametrize(
+        ("schedule", "sentence"),
+        [
+            (
+                lambda fleet: fleet.blackout("boat", for_s=5),
+                "blackout: 'boat' is not allowed; must be one of ship, primary, helper, or left out",
+            ),
+            (lambda fleet: fleet.blackout("ship", for_s=0), "for_s: 0 is not allowed; must be at least 0.001 sim"),
+            (lambda fleet: fleet.blackout(for_s=5, from_s=-1), "from_s: -1 is not allowed; must be simulated seconds"),
+            (lambda fleet: fleet.range_cut(0.5, for_s=5), "range_cut: to_m: 0.5 is not allowed; must be from 1 to 10"),
+            (lambda fleet: fleet.range_cut(2e6, for_s=5), "range_cut: to_m: 2000000.0 is not allowed; must be from 1"),
+            (lambda fleet: fleet.range_cut(float("nan"), for_s=5), "range_cut: to_m: nan is not allowed; must be fr"),
+            (lambda fleet: fleet.jammed(loss=0, for_s=5), "jammed: loss: 0 is not allowed; must be above 0, and at mo"),
+            (lambda fleet: fleet.jammed(loss=1.1, for_s=5), "jammed: loss: 1.1 is not allowed; must be above 0, and"),
+            (lambda fleet: fleet.jammed(for_s=float("inf")), "for_s: inf is not allowed; must be at least 0.001 sim"),
+        ],
+    )
+    def test_what_cannot_be_is_refused_in_one_sentence(
+        self, link: MakeFleet, schedule: Callable[[Fleet], None], sentence: str
+    ) -> None:
+        with pytest.raises(UserError) as refused:
+            schedule(link())
+        assert str(refused.value).startswith(sentence)
+        assert "\n" not in str(refused.value)
+
+
+def heard_key(one: Received) -> str:
+    """The key of what a modem has heard."""
+    assert isinstance(one.message, comms.said.messages.Heard)
+    return one.message.key
+
+
 def times_s_of(heard: Heard, keys: str) -> list[float]:
     """When messages were sent."""
     return [one.header.sent_ms / 1000 for one in heard.messages(keys)]
@@ -247,6 +362,9 @@ def times_s_of(heard: Heard, keys: str) -> list[float]:
             lambda fleet: fleet.cut_off("coordinator", for_s=5),
             "cut_off: 'coordinator' is not allowed; must be one of p",
         ),
+        (lambda fleet: fleet.blackout(for_s=5), "blackout: not allowed without link in the scenario, as there are no"),
+        (lambda fleet: fleet.range_cut(100, for_s=5), "range_cut: not allowed without link in the scenario, as there"),
+        (lambda fleet: fleet.jammed(for_s=5), "jammed: not allowed without link in the scenario, as there are no mod"),
         (lambda fleet: fleet.cut_off("helper", for_s=float("inf")), "for_s: inf is not allowed; must be at least"),
         (
             lambda fleet: fleet.drop("agent/*/hotspots/*"),
