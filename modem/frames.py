@@ -13,7 +13,7 @@ from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
 from modem.config import START_BITS, ModemConfig
 
-VERSION = 1
+VERSION = 2
 """Of what frames hold: modems of another one do not understand each other."""
 
 
