@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modem.streams import Window
+from modem.streams import TURN_BITS, Window
 
 MOST_PLATFORMS = 64
 SMALL_BITS = 128
@@ -129,7 +129,7 @@ class ModemConfig:
     def about_piece_bits(self) -> int:
         """Bits about a piece of a message, but for its size."""
         to_bits = (len(self.others) - 1).bit_length()
-        return (2 if self.is_small else 4) + self.window.number_bits + to_bits
+        return (2 if self.is_small else 4) + TURN_BITS + self.window.number_bits + to_bits
 
     @property
     def window(self) -> Window:

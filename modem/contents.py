@@ -11,7 +11,7 @@ from comms.said.topics import Topic
 from modem.config import START_BITS, ModemConfig
 from modem.frames import FrameForm
 from modem.letters import Letters, Said
-from modem.streams import Piece
+from modem.streams import TURN_BITS, Piece
 
 
 class Acknowledgement(NamedTuple):
@@ -19,6 +19,7 @@ class Acknowledgement(NamedTuple):
 
     to: str
     start: int
+    turn: int
     missing: int
     come: int
     bits: int
@@ -28,6 +29,7 @@ class PieceFor(NamedTuple):
     """A piece of a message for a platform, "" for one that there is not, under the last bits of its number."""
 
     to: str
+    turn: int
     number: int
     piece: Piece
     bits: int
@@ -54,9 +56,9 @@ def parts_of(
         for name in receivers:
             before = reader.left
             if len(receivers) == 1 or reader.read(1):
-                start = reader.read(START_BITS)
+                start, turn = reader.read(START_BITS), reader.read(TURN_BITS)
                 missing, come = reader.read(form.window.number_bits), reader.read(form.window.size - 1)
-                yield Acknowledgement(name, start, missing, come, before - reader.left)
+                yield Acknowledgement(name, start, turn, missing, come, before - reader.left)
         if form.is_small:
             return
     elif form.is_small:
@@ -78,10 +80,10 @@ def _piece(
     receivers = config.who_talks_with(platform)
     to_bits, before = (len(receivers) - 1).bit_length(), reader.left
     place = reader.read(to_bits)
-    number = reader.read(form.window.number_bits)
+    turn, number = reader.read(TURN_BITS), reader.read(form.window.number_bits)
     first, last = bool(reader.read(1)), bool(reader.read(1))
     if form.is_small:  # behind the last one's end there are zeros
-        size = form.room - 3 - to_bits - form.window.number_bits
+        size = form.room - 3 - to_bits - TURN_BITS - form.window.number_bits
     elif first and last:  # it tells by itself where it ends
         ahead = copy(reader)
         letters.open(ahead, platform, now_ms)
@@ -89,4 +91,4 @@ def _piece(
     else:
         size = reader.read(form.size_bits)
     piece = Piece(reader.read(size), size, first, last)
-    return PieceFor(receivers[place] if place < len(receivers) else "", number, piece, before - reader.left)
+    return PieceFor(receivers[place] if place < len(receivers) else "", turn, number, piece, before - reader.left)

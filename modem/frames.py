@@ -15,7 +15,7 @@ from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
 from modem.config import START_BITS, ModemConfig
 
-VERSION = 1
+VERSION = 2
 """Of what frames hold: modems of another one do not understand each other."""
 CRC_8 = 0x2F
 """x^8 + x^5 + x^3 + x^2 + x + 1: up to 127 bits with the check, as small frames have, any three bits are noticed."""

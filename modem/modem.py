@@ -35,7 +35,7 @@ from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
 from modem.frames import FrameForm, start_number
 from modem.letters import COORDINATOR, Letters, Said
-from modem.streams import Piece, Receiving, Sending, cut_up
+from modem.streams import TURN_BITS, Piece, Receiving, Sending, cut_up
 from modem.stretches import Gathering, LayerOf, Stretch
 from modem.turns import turns_of
 from modem.waiting import Queue, Waiting, worth
@@ -287,6 +287,7 @@ class Modem:
         if not form.is_small:
             writer.write(0b11, 2)
         writer.write(self.config.others.index(name), self._to_bits)
+        writer.write(self._sending[name].turn, TURN_BITS)
         writer.write(number % (1 << form.window.number_bits), form.window.number_bits)
         writer.write(piece.first, 1)
         writer.write(piece.last, 1)
@@ -310,8 +311,9 @@ class Modem:
             platform, start, reader, polled = opened
             if on_deck is None:
                 self._turns.has_heard(platform, polled, now_ms)
-            if start != self._starts.get(platform, start):
+            if start != self._starts.get(platform, 0):  # it has forgotten what it has said and heard
                 self._receiving[platform] = self._receiver(platform)
+                self._sending[platform].begin_again()
             self._starts[platform] = start
             try:
                 if on_deck is not None:
@@ -330,10 +332,10 @@ class Modem:
             elif part.to != self.config.platform:
                 pass
             elif isinstance(part, PieceFor):
-                for letter in self._receiving[platform].take(part.number, part.piece):
+                for letter in self._receiving[platform].take(part.turn, part.number, part.piece):
                     self._tell(platform, *self._letters.open(letter, platform, now_ms), now_ms)
             elif part.start == self._start:
-                self._sending[platform].hear(part.missing, part.come)
+                self._sending[platform].hear(part.turn, part.missing, part.come)
 
     def _tell(self, platform: str, topic: Topic | None, said: Said, now_ms: int) -> None:
         """Tells what was heard to the nodes here."""

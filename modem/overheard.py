@@ -68,7 +68,8 @@ class Eavesdropper:
     def __init__(self, config: ModemConfig, run: RunInfo) -> None:
         self._config = config
         self._form, self._letters = FrameForm(config, run), Letters(config)
-        self._pieces: dict[tuple[str, str], dict[int, _Heard]] = {}  # by sender and receiver, by their numbers
+        # By sender and receiver: the turn, and the pieces by their numbers.
+        self._pieces: dict[tuple[str, str], tuple[int, dict[int, _Heard]]] = {}
         self._starts: dict[str, int] = {}
 
     def open(self, packet: Packet, now_ms: int) -> Contents:
@@ -109,7 +110,10 @@ class Eavesdropper:
     def _hear(self, platform: str, part: PieceFor, bits: int) -> tuple[_Heard, bool]:
         """A piece, which takes so many bits, and whether it was said before. What its message is about its first piece
         tells, which may come later."""
-        pieces = self._pieces.setdefault((platform, part.to), {})
+        turn, pieces = self._pieces.get((platform, part.to), (part.turn, {}))
+        if turn != part.turn:
+            pieces = {}
+        self._pieces[platform, part.to] = part.turn, pieces
         number = self._number(pieces, part.number)
         if number in pieces:
             return pieces[number], True

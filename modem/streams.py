@@ -2,7 +2,8 @@
 
 A sender numbers the pieces for one receiver from 0 on, and tells the last bits of a number alone; of all that may be
 under way no two have the same. An acknowledgement names the first piece that is missing, and which of those behind it
-have come.
+have come. Where a receiver has forgotten all, as its modem was started anew, the sender begins again: its pieces then
+are numbered from 0, in another turn, of which pieces and acknowledgements tell.
 """
 
 from __future__ import annotations
@@ -11,6 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from comms.said.bits import BitReader, BitWriter
+
+TURN_BITS = 2
+"""Of the turn of a stream: so many are told apart from those just before."""
+TURNS = 1 << TURN_BITS
 
 
 class Piece(NamedTuple):
@@ -41,7 +46,7 @@ class Window:
     @property
     def ack_bits(self) -> int:
         """Of an acknowledgement."""
-        return self.number_bits + self.size - 1
+        return TURN_BITS + self.number_bits + self.size - 1
 
     def near(self, told: int, low: int) -> int:
         """The number with these last bits that is `low` or the next above."""
@@ -53,8 +58,24 @@ class Sending:
 
     def __init__(self, window: Window) -> None:
         self.window = window
+        self.turn = 0
         self.unheard: dict[int, tuple[Piece, float, int]] = {}
         self._next = 0
+
+    def begin_again(self) -> None:
+        """The receiver knows of nothing any more: what it has not acknowledged is said in another turn, but for
+        messages of which it had acknowledged a part."""
+        messages: list[list[tuple[Piece, float, int]]] = []
+        last = -1
+        for number, one in sorted(self.unheard.items()):
+            if one[0].first:
+                messages.append([one])
+            elif messages and number == last + 1:
+                messages[-1].append(one)
+            last = number
+        left = [one for message in messages if message[-1][0].last for one in message]
+        self.turn = (self.turn + 1) % TURNS
+        self.unheard, self._next = dict(enumerate(left)), len(left)
 
     def add(self, pieces: list[Piece], value: float, queued_ms: int) -> None:
         """Takes the pieces of one message, to be said in order. `value`: what they are worth beside others;
@@ -68,10 +89,12 @@ class Sending:
         low = min(self.unheard, default=self._next)
         return [(number, *one) for number, one in self.unheard.items() if number < low + self.window.size]
 
-    def hear(self, told: int, come: int) -> None:
+    def hear(self, turn: int, told: int, come: int) -> None:
         """Hears an acknowledgement: the last bits of the first missing piece's number, and which behind it have
-        come; one of pieces that were never said is not heard."""
+        come; one of pieces that were never said, or of another turn, is not heard."""
         window = self.window
+        if turn != self.turn:
+            return
         low = min(self.unheard, default=self._next)
         missing = window.near(told, low)
         if missing > self._next:
@@ -89,13 +112,23 @@ class Receiving:
         self.window = window
         self.owes = False
         self._in_order = in_order
+        self._turn: int | None = None
+        self._begin(None)
+
+    def _begin(self, turn: int | None) -> None:
+        self._turn = turn
         self._missing = 0
         self._come: set[int] = set()
         self._parts: dict[int, Piece] = {}
         self._wait: dict[int, BitWriter] = {}  # messages, by the number of their last piece
 
-    def take(self, told: int, piece: Piece) -> list[BitReader]:
-        """Takes a piece under the last bits of its number; returns the messages that are to be told now."""
+    def take(self, turn: int, told: int, piece: Piece) -> list[BitReader]:
+        """Takes a piece under the last bits of its number; returns the messages that are to be told now. One of the
+        turn before, which comes late, is none."""
+        if turn != self._turn:
+            if self._turn is not None and (turn + 1) % TURNS == self._turn:
+                return []
+            self._begin(turn)
         self.owes = True
         number = self.window.near(told, self._missing)
         if number >= self._missing + self.window.size or number in self._come:
@@ -125,6 +158,7 @@ class Receiving:
 
     def acknowledge(self, writer: BitWriter) -> None:
         """Writes what has come and what has not."""
+        writer.write(self._turn or 0, TURN_BITS)
         writer.write(self._missing % (1 << self.window.number_bits), self.window.number_bits)
         come = sum(1 << place for place in range(self.window.size - 1) if self._missing + 1 + place in self._come)
         writer.write(come, self.window.size - 1)

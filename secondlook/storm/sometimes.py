@@ -92,6 +92,7 @@ class Seen:
         self.outages = {_kind(one) for one in flight.outages if one.from_ms < flight.heard.now_ms}
         self.events = [one for one in flight.events if one.at_ms < flight.heard.now_ms]
         self.primaries = set(flight.scenario.survey_vehicles)
+        self._modems = {one.node_id for one in flight.routing.roster if one.role is Role.MODEM}
         self.is_given_up = any(
             one.finished_ms is not None and not one.is_finished
             for beside in witness.coordinators
@@ -105,11 +106,12 @@ class Seen:
             self._hear(one)
 
     def happened(self, who: str, kind: Callable[[NodeEvent, list[NodeEvent]], bool]) -> bool:
-        """Whether something of a kind has happened to the coordinator, a primary or a helper; `kind` is asked of an
-        event and of those of its node."""
+        """Whether something of a kind has happened to the coordinator, a primary, a helper or a modem; `kind` is asked
+        of an event and of those of its node."""
         for one in self.events:
             role = "a primary" if one.node_id in self.primaries else "a helper"
             role = "the coordinator" if one.node_id == COORDINATOR else role
+            role = "a modem" if one.node_id in self._modems else role
             if role == who and kind(one, [other for other in self.events if other.node_id == one.node_id]):
                 return True
         return False
@@ -271,6 +273,10 @@ SOMETIMES: Mapping[str, Sign] = MappingProxyType(
         for who in ("the coordinator", "a primary", "a helper")
         for kind in _EVENTS
         if (who, kind) != ("the coordinator", "is killed for good")  # somebody has to end the mission
+    }
+    | {
+        f"a modem {kind}": _happens("a modem", kind)
+        for kind in ("is frozen", "is started anew", "goes on by its memory")
     }
     | {f"a message is struck: {kind.value}": _holds("kinds", kind) for kind in FaultKind}
     | {

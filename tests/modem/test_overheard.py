@@ -35,7 +35,7 @@ def test_a_task_and_its_acknowledgement_by_hand() -> None:
     assert (task.again, task.acknowledgements, task.about) == ({}, 0, 16 + 2 + 3 + 1 + 1)
     assert task.unused == 256 - bits - 23 - 0
     assert acknowledgement.said == {}
-    assert acknowledgement.acknowledgements == 3 + 5 + 15  # start, first that is missing, which behind that have come
+    assert acknowledgement.acknowledgements == 3 + 2 + 5 + 15  # start, turn, first missing, which behind that have come
 
 
 @pytest.mark.parametrize("frame_bits", [34, 128, 256])

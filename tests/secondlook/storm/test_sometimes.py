@@ -180,6 +180,12 @@ ROWS = {
     "an agent's answer or a tile is lost": ("a helper's word that it is done is lost", "a tile is said again"),
     "a node is killed and goes on by its memory": ("a primary goes on by its memory",),
     "the coordinator is killed and started anew": ("a strip of a coordinator that is gone is given back",),
+    "a modem is silent, or frames are lost": (
+        "modems fall silent",
+        "modems hear nothing from afar",
+        "a share of frames is lost",
+    ),
+    "a modem is killed and started anew": ("a modem is started anew",),
     "a file cannot be written, as the disk is full": (DISK_FULL,),
     "a helper hears late that the mission is over": ("a helper at a strip hears that the mission is over",),
 }
