@@ -24,7 +24,7 @@ def least_frame_bits(platforms: int, *, polled: bool = False) -> int:
     """The fewest bits of a frame in which so many platforms, at most 64, can talk: it holds an acknowledgement of one
     other, or a piece of a message."""
     acknowledgement = platforms - 1 + START_BITS + _SMALL.ack_bits
-    piece = 2 + _SMALL.number_bits + (platforms - 2).bit_length() + LEAST_PIECE_BITS
+    piece = 2 + TURN_BITS + _SMALL.number_bits + (platforms - 2).bit_length() + LEAST_PIECE_BITS
     return 8 + polled + (platforms - 1).bit_length() + START_BITS + 1 + max(acknowledgement, piece)
 
 

@@ -311,7 +311,8 @@ class Modem:
             platform, start, reader, polled = opened
             if on_deck is None:
                 self._turns.has_heard(platform, polled, now_ms)
-            if start != self._starts.get(platform, 0):  # it has forgotten what it has said and heard
+            known = 0 if self._start == 0 else start  # who is there from the beginning has begun with all others
+            if start != self._starts.get(platform, known):  # it has forgotten what it has said and heard
                 self._receiving[platform] = self._receiver(platform)
                 self._sending[platform].begin_again()
             self._starts[platform] = start

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from modems import PLATFORMS, RUN_INFO, config_of
 
 from comms.said.bits import BitWriter
-from modem.frames import FrameForm, crc_8
+from modem.frames import VERSION, FrameForm, crc_8
 
 SAID = BitWriter()
 SAID.write(0b1011, 4)
@@ -55,7 +55,7 @@ def test_frames_of_another_run_or_version_are_none_of_this_one(frame_bits: int) 
     others = {
         "seed": FrameForm(config, replace(RUN_INFO, seed=2)),
         "scenario": FrameForm(config, replace(RUN_INFO, scenario_sha256="1" * 64)),
-        "version": FrameForm(config, RUN_INFO, version=2),
+        "version": FrameForm(config, RUN_INFO, version=VERSION + 1),
     }
     for name, other in others.items():
         for start in range(8):

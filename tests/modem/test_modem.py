@@ -151,8 +151,8 @@ def test_a_modem_that_is_started_anew_is_understood() -> None:
 @pytest.mark.parametrize("polls", [None, PollTimes((3000,), 500, 400)])
 def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refused(polls: PollTimes | None) -> None:
     least = least_frame_bits(3, polled=polls is not None)
-    # Tag, platform, start, whether polled, whether acknowledged; then a piece of 8 bits: first, last, number, to whom.
-    assert least == 8 + 2 + 3 + (polls is not None) + 1 + 8 + 2 + 3 + 1
+    # Tag, platform, start, whether polled, whether acknowledged; a piece of 8 bits: first, last, turn, number, to whom.
+    assert least == 8 + 2 + 3 + (polls is not None) + 1 + 8 + 2 + 2 + 3 + 1
     waters = Waters(frame_bits=least, polls=polls)
     waters.say("coordinator", "coord/task/beta/3", TAKE)
     waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
