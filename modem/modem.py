@@ -196,14 +196,16 @@ class Modem:
 
     def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
         """What has come of the others, where that is owed, and as far as it has room: in a packet's first frame. Where
-        it leaves little room for anything else it is left out every other time."""
+        it leaves little room for anything else, or too little for a piece that waits, it is left out every other time.
+        """
         a_frame = (form.room - 1 - len(self.config.others)) // (START_BITS + form.window.ack_bits)
         owed = sorted(
             (name for name in self.config.others if self._receiving[name].owes),
             key=lambda name: self._acked.get(name, 0),
         )[:a_frame]
         left = form.room - 1 - len(owed) * (1 + START_BITS + form.window.ack_bits)
-        if owed and left < form.room // 2 and not self._left_out and self._has_more_than_acks():
+        is_tight = left < max(form.room // 2, self._largest_piece_bits(form))
+        if owed and is_tight and not self._left_out and self._has_more_than_acks():
             owed = []
         self._left_out = not owed
         writer.write(bool(owed), 1)
@@ -215,6 +217,12 @@ class Modem:
                 writer.write(self._starts.get(name, 0), START_BITS)
                 self._receiving[name].acknowledge(writer)
         return bool(owed)
+
+    def _largest_piece_bits(self, form: FrameForm) -> int:
+        """That a piece which may be said takes, with all about it."""
+        pieces = (piece for sending in self._sending.values() for _, piece, _, _ in sending.may_be_said())
+        sizes = (one.bits + form.size_bits * (not one.is_whole) for one in pieces)
+        return max(sizes, default=0) + self.config.about_piece_bits
 
     def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
         """Writes into a frame what is worth most and has room, if anything is."""
@@ -249,6 +257,7 @@ class Modem:
             return False
         _, name, number, piece = best
         said.add((name, number))
+        self._sending[name].note_said(number)
         self._write_piece(form, writer, name, number, piece)
         return True
 
