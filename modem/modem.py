@@ -14,7 +14,7 @@ from typing import Any
 from comms.node import Publication, Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
-from comms.said.codec import Header, body_of, packed
+from comms.said.codec import LARGEST_INCARNATION, Header, body_of, packed
 from comms.said.messages import (
     AgentState,
     Curve,
@@ -43,6 +43,8 @@ log = logging.getLogger("secondlook.modem")
 STRETCH = Crossing(3000, 300)
 STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
+MOST_BESIDE = 1024
+"""So many starts of a vehicle are told apart by a coordinator's modem that was started anew."""
 LATE_MS = 100
 """So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
 
@@ -335,7 +337,8 @@ class Modem:
             for name, tile in told:
                 self._told += 1
                 key = COVERAGE.key(vehicle=platform, tile=name)
-                self._say_here(key, header._replace(sequence=self._told), tile)
+                told_by = layer_start(header.incarnation, self._start)
+                self._say_here(key, header._replace(incarnation=told_by, sequence=self._told), tile)
 
     def _say_here(self, key: str, header: Header, message: Any) -> None:
         heard = Heard(key, packed(header, body_of(message)))
@@ -359,6 +362,19 @@ class Modem:
 
     def _has_more_than_acks(self) -> bool:
         return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+
+
+def layer_start(incarnation: int, start: int) -> int:
+    """Under which of a vehicle's starts a layer is told that is put together by a start of the coordinator's modem.
+
+    One that was started anew knows nothing of what it has told before: what it tells from then on counts beside that,
+    as that of a vehicle that was started anew does.
+    """
+    return (
+        incarnation
+        if start == 0
+        else LARGEST_INCARNATION - (MOST_BESIDE << START_BITS) + (incarnation % MOST_BESIDE << START_BITS) + start
+    )
 
 
 def _about(received: Received) -> str:
