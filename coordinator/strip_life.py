@@ -52,6 +52,7 @@ class StripLife:
         self._sectors = sectors
         self._outbox = outbox
         self._answer_within_ms = answer_within_ms
+        self._late_ms = LATE_MS + answer_within_ms - ANSWER_WITHIN_MS  # words that wait for slots are no delay of work
 
     def open(self, cut: Cut, now_ms: int, why: str) -> None:
         """Opens a new strip where it is cut. `why`: what makes it worth a second look."""
@@ -84,7 +85,7 @@ class StripLife:
         self._outbox.add_task(TaskAction.TAKE_NEXT if as_next else TaskAction.TAKE, name, record.strip)
         vehicle.asked_back = 0
         ends_ms = round(expected.ends_s * 1000)
-        due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + LATE_MS
+        due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + self._late_ms
         levels = self._fleet.levels(name, record.window)
         vehicle.offers[number] = Offer(record.strip, record.cut, expected, due_ms, levels)
         if as_next:
@@ -230,7 +231,7 @@ class StripLife:
                 self.ledger.revise(record, offer.strip, offer.cut)
                 self._outbox.add_strip(record)
                 self._sectors.cut_by(now_ms, [record.window])
-            vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + LATE_MS))
+            vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + self._late_ms))
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
         if record.vehicle != name or record.state not in TAKEN:
             self.ask_back(record.strip, vehicle, now_ms)

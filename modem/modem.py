@@ -14,7 +14,7 @@ from typing import Any
 from comms.node import Publication, Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
-from comms.said.codec import Header, body_of, packed
+from comms.said.codec import LARGEST_INCARNATION, Header, body_of, packed
 from comms.said.messages import (
     MOST_FRAMES,
     AgentState,
@@ -54,6 +54,8 @@ DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
     "does not fit the water",
 )
 """Why frames that have come, or what is in them, are dropped; and last what cannot be said by modem."""
+MOST_BESIDE = 1024
+"""So many starts of a vehicle are told apart by a coordinator's modem that was started anew."""
 
 
 class Modem:
@@ -218,14 +220,16 @@ class Modem:
 
     def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
         """What has come of the others, where that is owed, and as far as it has room: in a packet's first frame. Where
-        it leaves little room for anything else it is left out every other time."""
+        it leaves little room for anything else, or too little for a piece that waits, it is left out every other time.
+        """
         a_frame = (form.room - 1 - len(self.config.others)) // (START_BITS + form.window.ack_bits)
         owed = sorted(
             (name for name in self.config.others if self._receiving[name].owes),
             key=lambda name: self._acked.get(name, 0),
         )[:a_frame]
         left = form.room - 1 - len(owed) * (1 + START_BITS + form.window.ack_bits)
-        if owed and left < form.room // 2 and not self._left_out and self._has_more_than_acks():
+        is_tight = left < max(form.room // 2, self._largest_piece_bits(form))
+        if owed and is_tight and not self._left_out and self._has_more_than_acks():
             owed = []
         self._left_out = not owed
         writer.write(bool(owed), 1)
@@ -237,6 +241,12 @@ class Modem:
                 writer.write(self._starts.get(name, 0), START_BITS)
                 self._receiving[name].acknowledge(writer)
         return bool(owed)
+
+    def _largest_piece_bits(self, form: FrameForm) -> int:
+        """That a piece which may be said takes, with all about it."""
+        pieces = (piece for sending in self._sending.values() for _, piece, _, _ in sending.may_be_said())
+        sizes = (one.bits + form.size_bits * (not one.is_whole) for one in pieces)
+        return max(sizes, default=0) + self.config.about_piece_bits
 
     def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
         """Writes into a frame what is worth most and has room, if anything is."""
@@ -271,6 +281,7 @@ class Modem:
             return False
         _, name, number, piece = best
         said.add((name, number))
+        self._sending[name].note_said(number)
         self._write_piece(form, writer, name, number, piece)
         return True
 
@@ -358,7 +369,8 @@ class Modem:
             for name, tile in told:
                 self._told += 1
                 key = COVERAGE.key(vehicle=platform, tile=name)
-                self._say_here(key, header._replace(sequence=self._told), tile)
+                told_by = layer_start(header.incarnation, self._start)
+                self._say_here(key, header._replace(incarnation=told_by, sequence=self._told), tile)
 
     def _say_here(self, key: str, header: Header, message: Any) -> None:
         heard = Heard(key, packed(header, body_of(message)))
@@ -384,6 +396,19 @@ class Modem:
 
     def _has_more_than_acks(self) -> bool:
         return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+
+
+def layer_start(incarnation: int, start: int) -> int:
+    """Under which of a vehicle's starts a layer is told that is put together by a start of the coordinator's modem.
+
+    One that was started anew knows nothing of what it has told before: what it tells from then on counts beside that,
+    as that of a vehicle that was started anew does.
+    """
+    return (
+        incarnation
+        if start == 0
+        else LARGEST_INCARNATION - (MOST_BESIDE << START_BITS) + (incarnation % MOST_BESIDE << START_BITS) + start
+    )
 
 
 def _about(received: Received) -> str:

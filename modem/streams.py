@@ -8,6 +8,7 @@ are numbered from 0, in another turn, of which pieces and acknowledgements tell.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -61,6 +62,7 @@ class Sending:
         self.turn = 0
         self.unheard: dict[int, tuple[Piece, float, int]] = {}
         self._next = 0
+        self._times = Counter[int]()  # how often each was said since the receiver has answered
 
     def begin_again(self) -> None:
         """The receiver knows of nothing any more: what it has not acknowledged is said in another turn, but for
@@ -76,6 +78,7 @@ class Sending:
         left = [one for message in messages if message[-1][0].last for one in message]
         self.turn = (self.turn + 1) % TURNS
         self.unheard, self._next = dict(enumerate(left)), len(left)
+        self._times.clear()
 
     def add(self, pieces: list[Piece], value: float, queued_ms: int) -> None:
         """Takes the pieces of one message, to be said in order. `value`: what they are worth beside others;
@@ -87,7 +90,16 @@ class Sending:
     def may_be_said(self) -> list[tuple[int, Piece, float, int]]:
         """Number, piece, worth, and since when it waits, of those that may be under way now."""
         low = min(self.unheard, default=self._next)
-        return [(number, *one) for number, one in self.unheard.items() if number < low + self.window.size]
+        return [
+            (number, piece, value / (1 + self._times[number]), queued_ms)
+            for number, (piece, value, queued_ms) in self.unheard.items()
+            if number < low + self.window.size
+        ]
+
+    def note_said(self, number: int) -> None:
+        """A piece is said: it is worth less each time, until the receiver answers, as else one that is out of reach
+        would have all the water."""
+        self._times[number] += 1
 
     def hear(self, turn: int, told: int, come: int) -> None:
         """Hears an acknowledgement: the last bits of the first missing piece's number, and which behind it have
@@ -95,6 +107,7 @@ class Sending:
         window = self.window
         if turn != self.turn:
             return
+        self._times.clear()
         low = min(self.unheard, default=self._next)
         missing = window.near(told, low)
         if missing > self._next:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -128,7 +129,8 @@ def holder_of(data: Data, path: Path) -> Any:
 
 
 def _pop(path: Path, data: Data) -> None:
-    holder_of(data, path).pop(path[-1], None)
+    with suppress(KeyError):  # what holds it is left out already
+        holder_of(data, path).pop(path[-1], None)
 
 
 def set_value(path: Path, value: float, data: Data) -> None:

@@ -162,6 +162,28 @@ def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refuse
         config_of("ship", frame_bits=least - 1, polls=polls)
 
 
+def test_who_is_out_of_reach_does_not_keep_the_water_from_others() -> None:
+    waters = Waters(arrives=lambda platform, to, _: "alpha" not in (platform, to), frame_bits=128)
+    for number in range(1, 9):
+        waters.say("coordinator", f"coord/task/alpha/{number}", replace(TAKE, strip=number))
+    waters.run(120_000)
+    waters.say("coordinator", "coord/task/beta/9", TAKE)
+    waters.say("coordinator", "coord/mission_over", MissionOver("nothing is left"))
+    waters.run(300_000)
+    assert {key for key, _ in heard(waters, "beta")} == {"coord/task/beta/9", "coord/mission_over"}
+
+
+def test_large_pieces_are_said_though_something_is_to_be_acknowledged_each_time() -> None:
+    deaf = {"alpha"}
+    waters = Waters(arrives=lambda platform, to, _: to not in deaf, frame_bits=128)
+    waters.say("alpha", "agent/alpha/hotspot/1", FOUND)  # again and again, as no acknowledgement is heard
+    waters.run(60_000)
+    for number in range(1, 6):
+        waters.say("coordinator", f"coord/task/beta/{number}", replace(TAKE, strip=number))
+    waters.run(1_200_000)
+    assert [key for key, _ in heard(waters, "beta")] == [f"coord/task/beta/{number}" for number in range(1, 6)]
+
+
 @pytest.mark.parametrize("frame_bits", [48, 128, 256])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) -> None:

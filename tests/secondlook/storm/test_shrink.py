@@ -16,6 +16,7 @@ from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 from secondlook.storm.campaign import storm_of
 from secondlook.storm.fly import fly_storm
+from secondlook.storm.plan_edits import edited, leave_out_vehicle, plain, without_keys
 from secondlook.storm.shrink import broken_rules, fewest, is_alike, shrink, violations_of
 from secondlook.storm.witness import Violation
 from secondlook.testing.plan import TroublePlan, load_plan, make_plan
@@ -218,3 +219,21 @@ def test_many_storms_are_not_shrunk() -> None:
     refused = CliRunner().invoke(app, ["storm", "--shrink"])
     assert isinstance(refused.exception, UserError)
     assert str(refused.exception) == "--shrink: not allowed without --seed or --plan; it shrinks a single storm"
+
+
+def test_a_link_goes_whole_or_key_by_key_and_modems_with_their_vehicles() -> None:
+    link = {"profile": "radio", "loss": 0.1, "slot_frames": 1}
+    trouble = [
+        {"what": "blackout", "platform": "helper", "from_s": 1, "for_s": 9},
+        {"what": "kill", "node": "modem-helper", "at_s": 3},
+        {"what": "blackout", "from_s": 1, "for_s": 9},
+    ]
+    scenario = BRIEF.model_dump(mode="json", exclude_none=True) | {"link": link}
+    data = plain(make_plan({"scenario": scenario, "trouble": trouble}))
+    edits = list(without_keys(data))
+    assert "link" not in edited(data, edits)["scenario"]
+    links = [edited(data, [edit])["scenario"].get("link") for edit in edits]
+    assert None in links
+    assert any(one is not None and "loss" not in one for one in links)
+    leave_out_vehicle("helper", data)
+    assert [one["what"] for one in data["trouble"]] == ["blackout"]
