@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modem.streams import Window
+from modem.streams import STREAMS, Window
 
 MOST_PLATFORMS = 64
-SMALL_BITS = 128
-"""Frames with fewer hold either acknowledgements or a single piece of a message."""
-START_BITS = 3
-"""Of the number by which a modem that was started anew is told from its past."""
+SMALL_BITS, TINY_BITS = 128, 64
+"""Frames with fewer hold acknowledgements or a single piece of a message, whose words are short; in those with fewer
+than the second the tag is, too."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,8 @@ class ModemConfig:
             raise ValueError(f"{self.platform} and {', '.join(self.vehicles)} are not all among the platforms")
         if self.slot_ms < 1 or self.frames < 1:
             raise ValueError("a slot has at least 1 ms, a packet at least one frame")
-        acknowledgement = START_BITS + self.window.ack_bits
-        if self.room < 1 + (len(self.platforms) - 1) + acknowledgement:
+        acknowledgement = self.start_bits + self.window.ack_bits
+        if self.room < 1 + STREAMS * (len(self.platforms) - 1) + acknowledgement:
             raise ValueError(
                 f"link.profile: frames of {self.frame_bits} bits are too small for {len(self.platforms)} platforms; "
                 "must be larger, or the platforms fewer"
@@ -73,13 +72,20 @@ class ModemConfig:
 
     @property
     def is_small(self) -> bool:
-        """Whether a frame holds either acknowledgements or a single piece."""
+        """Whether a frame holds acknowledgements or a single piece, and words are to be short."""
         return self.frame_bits < SMALL_BITS
 
     @property
     def tag_bits(self) -> int:
         """Of the tag by which damage and strangers are noticed."""
+        if self.frame_bits < TINY_BITS:
+            return 4
         return 8 if self.is_small else 16
+
+    @property
+    def start_bits(self) -> int:
+        """Of the number by which a modem that was started anew is told from its past."""
+        return 2 if self.is_small else 3
 
     @property
     def platform_bits(self) -> int:
@@ -89,9 +95,9 @@ class ModemConfig:
     @property
     def room(self) -> int:
         """How many bits a frame has for what is said."""
-        return self.frame_bits - self.tag_bits - self.platform_bits - START_BITS
+        return self.frame_bits - self.tag_bits - self.platform_bits - self.start_bits
 
     @property
     def window(self) -> Window:
         """Of the streams of pieces."""
-        return Window(3 if self.is_small else 5)
+        return Window(3, tells_behind=False) if self.is_small else Window(5)

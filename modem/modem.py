@@ -14,7 +14,7 @@ from typing import Any
 
 from comms.node import Publication, Received, Step
 from comms.said.announcement import RunInfo
-from comms.said.bits import BitReader, BitWriter
+from comms.said.bits import BitReader
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import (
     AgentState,
@@ -28,24 +28,25 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
+from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, Crossing, Topic
 from comms.said.wire import WireError
-from modem.config import START_BITS, ModemConfig
+from modem.config import ModemConfig
 from modem.frames import FrameForm, start_number
-from modem.letters import COORDINATOR, Letters, Said
-from modem.streams import Piece, Receiving, Sending, cut_up
+from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
+from modem.packets import STRETCH, Packets, Stream
+from modem.presence import REPORT_MS, Presence, seldom_ms
+from modem.streams import STREAMS, Piece, Receiving, Sending
 from modem.stretches import Gathering, LayerOf, Stretch
-from modem.waiting import Queue, Waiting, worth
+from modem.waiting import Queue, Waiting
 
 log = logging.getLogger("secondlook.modem")
 
-STRETCH = Crossing(3000, 300)
 STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
 LATE_MS = 100
 """So much later than its slot a modem may begin to speak, by a clock that does not wait for it."""
-LEAST_PIECE_BITS = 8
-"""A piece of a message with fewer bits is not worth the bits about it."""
+SILENT_CYCLES = 3
+"""For so long a vehicle is silent at most while its agent says states, if these tell nothing new."""
 
 
 class Modem:
@@ -56,8 +57,8 @@ class Modem:
         self.dropped: Counter[str] = Counter()
         self._letters = Letters(config)
         self._queue = Queue()
-        self._sending: dict[str, Sending] = {}
-        self._receiving: dict[str, Receiving] = {}
+        self._sending: dict[Stream, Sending] = {}
+        self._receiving: dict[Stream, Receiving] = {}
         self._starts: dict[str, int] = {}  # of the others, as their frames tell
         self._start = 0
         self._spoke_ms = -1
@@ -68,14 +69,18 @@ class Modem:
         self._heard: list[Publication] = []
         self._told = 0
         self._last_said: dict[str, tuple[int, Any]] = {}
-        self._acked: dict[str, int] = {}  # when each was acknowledged last
-        self._left_out = False  # whether the last packet had no acknowledgement
         self._said_at: Counter[int] = Counter()
+        self._opened_at: Counter[int] = Counter()
+        self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
+        self._state_orders: dict[str, tuple[int, int, int]] = {}  # of the last states told here
+        self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
+        self._last_frames_ms = 0
+        self._is_alive = False  # whether its agent has said a state since it spoke
         self._incarnation = 0
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
-        self._start = start_number(now_ms)
+        self._start = start_number(now_ms, self.config.start_bits)
         return Step()
 
     def on_message(self, received: Received, now_ms: int) -> Step:
@@ -106,8 +111,11 @@ class Modem:
                 and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
             ):
                 self._say_stretch(self._gathering.flush(), now_ms)
-            frames = self._frames(self._form, now_ms)
+            silent_ms = self.config.cycle_ms * SILENT_CYCLES
+            is_alive = self._is_alive and now_ms - self._last_frames_ms >= silent_ms
+            frames = self._packets.next(self._start, now_ms, is_alive=is_alive)
             if frames:
+                self._last_frames_ms, self._is_alive = now_ms, False
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
         step = self._step(now_ms)
         return Step((*publish, *step.publish), step.wake_ms)
@@ -115,16 +123,24 @@ class Modem:
     def _begin(self, run: RunInfo) -> None:
         self._run, self._form = run, FrameForm(self.config, run)
         for other in self.config.others:
-            self._sending[other] = Sending(self._form.window)
-            self._receiving[other] = self._receiver(other)
+            self._sending |= {(other, number): Sending(self._form.window) for number in range(STREAMS)}
+            self._receive_anew(other)
+        self._letters = Letters(self.config, run.grid.heading_rad)
+        self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
+        is_hub = self.config.platform == self.config.hub
+        known = self.config.others if is_hub else (self.config.platform,)
+        self._presences = {one.vehicle: Presence(one) for one in run.vehicles if one.vehicle in known}
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         if entry is not None and self.config.platform != self.config.hub:
             self._gathering = Gathering(entry)
 
-    def _receiver(self, other: str) -> Receiving:
-        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said."""
+    def _receive_anew(self, other: str) -> None:
+        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is what
+        does not tell when it was said."""
         assert self._form is not None
-        return Receiving(self._form.window, in_order=other == self.config.hub)
+        in_order = other == self.config.hub or self._form.is_small
+        for number in range(STREAMS):
+            self._receiving[other, number] = Receiving(self._form.window, in_order=in_order)
 
     def _take(self, received: Received, now_ms: int) -> None:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
@@ -136,6 +152,8 @@ class Modem:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
         if not is_hub:
             self._incarnation = received.header.incarnation
+        if not is_hub and not self._is_news(received, now_ms):
+            return
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
         if topic.crossing.newest_only and topic.crossing.acknowledged:
@@ -150,6 +168,24 @@ class Modem:
             to = (received.vehicle,)
         for platform in to:
             self._enqueue(topic, topic.crossing, Said(received.key, received.header, message), platform, now_ms)
+
+    def _is_news(self, received: Received, now_ms: int) -> bool:
+        """Whether what an agent says of itself and its work is not known at the coordinator's, or will not be."""
+        message, incarnation = received.message, received.header.incarnation
+        presence = self._presences.get(self.config.platform)
+        if isinstance(message, TaskStatus):
+            said = incarnation, message.strip, message.state
+            if said == self._last_status:
+                return False
+            self._last_status = said
+            if presence is not None:
+                presence.hear_status(message, now_ms)
+        elif isinstance(message, AgentState) and presence is not None:
+            if not presence.is_news(message, incarnation, now_ms, seldom_ms(self.config)):
+                self._is_alive = True
+                return False
+            presence.hear_state(message, incarnation, now_ms)
+        return True
 
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
         if stretch is not None:
@@ -173,110 +209,11 @@ class Modem:
         if self.dropped[why] == 1:
             log.warning("modem of %s: %s: %s (said once)", self.config.platform, why, detail)
 
-    # What is said.
-
-    def _frames(self, form: FrameForm, now_ms: int) -> tuple[bytes, ...]:
-        self._queue.drop_old(now_ms)
-        frames: list[bytes] = []
-        said: set[tuple[str, int]] = set()  # pieces that are in this packet already
-        while len(frames) < self.config.frames:
-            writer = BitWriter()
-            has_acks = not frames and self._write_acks(form, writer)
-            if frames:
-                writer.write(0, 1)
-            while not (form.is_small and writer.bits > 1) and self._write_next(form, writer, said, now_ms):
-                pass
-            if not has_acks and writer.bits == 1:
-                break
-            frames.append(form.pack(self.config.platform, self._start, writer))
-        return tuple(frames)
-
-    def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
-        """What has come of the others, where that is owed, and as far as it has room: in a packet's first frame. Where
-        it leaves little room for anything else it is left out every other time."""
-        a_frame = (form.room - 1 - len(self.config.others)) // (START_BITS + form.window.ack_bits)
-        owed = sorted(
-            (name for name in self.config.others if self._receiving[name].owes),
-            key=lambda name: self._acked.get(name, 0),
-        )[:a_frame]
-        left = form.room - 1 - len(owed) * (1 + START_BITS + form.window.ack_bits)
-        if owed and left < form.room // 2 and not self._left_out and self._has_more_than_acks():
-            owed = []
-        self._left_out = not owed
-        writer.write(bool(owed), 1)
-        for name in self.config.others if owed else ():
-            if len(self.config.others) > 1:
-                writer.write(name in owed, 1)
-            if name in owed:
-                self._acked[name] = self._spoke_ms
-                writer.write(self._starts.get(name, 0), START_BITS)
-                self._receiving[name].acknowledge(writer)
-        return bool(owed)
-
-    def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
-        """Writes into a frame what is worth most and has room, if anything is."""
-        left = form.room - writer.bits
-        about = self._about_bits(form)
-        pieces = [
-            (worth(value, STRETCH.ttl_s, queued_ms, now_ms) / piece.bits, name, number, piece)
-            for name, sending in self._sending.items()
-            for number, piece, value, queued_ms in sending.may_be_said()
-            if (name, number) not in said and piece.bits + about + form.size_bits * (not piece.is_whole) <= left
-        ]
-        best = max(pieces, key=lambda one: one[0], default=None)
-        for one in self._queue.best_first(now_ms):
-            if best is not None and best[0] >= one.worth(now_ms):
-                break
-            if one.crossing.acknowledged or form.is_small or one.said.bits + 2 > form.room - 1:
-                room = left - about
-                if one.said.bits > room:
-                    room -= form.size_bits
-                if room < min(LEAST_PIECE_BITS, one.said.bits) or not self._may_begin(one.to):
-                    continue
-                most = form.room - 1 - about - form.size_bits
-                self._queue.remove(one)
-                self._sending[one.to].add(cut_up(one.said, room, most), one.crossing.value, one.queued_ms)
-                return self._write_next(form, writer, said, now_ms)
-            if one.said.bits + 2 <= left:
-                self._queue.remove(one)
-                writer.write(0b10, 2)
-                writer.write(one.said.value, one.said.bits)
-                return True
-        if best is None:
-            return False
-        _, name, number, piece = best
-        said.add((name, number))
-        self._write_piece(form, writer, name, number, piece)
-        return True
-
-    def _may_begin(self, to: str) -> bool:
-        """Whether there is room in the window for the first piece of another message."""
-        sending = self._sending[to]
-        return len(sending.unheard) < sending.window.size
-
-    def _about_bits(self, form: FrameForm) -> int:
-        """Bits about a piece, but for its size."""
-        return (2 if form.is_small else 4) + form.window.number_bits + self._to_bits
-
-    @property
-    def _to_bits(self) -> int:
-        return (len(self.config.others) - 1).bit_length()
-
-    def _write_piece(self, form: FrameForm, writer: BitWriter, name: str, number: int, piece: Piece) -> None:
-        if not form.is_small:
-            writer.write(0b11, 2)
-        writer.write(self.config.others.index(name), self._to_bits)
-        writer.write(number % (1 << form.window.number_bits), form.window.number_bits)
-        writer.write(piece.first, 1)
-        writer.write(piece.last, 1)
-        if not form.is_small and not piece.is_whole:
-            writer.write(piece.bits, form.size_bits)
-        writer.write(piece.value, piece.bits)
-
     # What is heard.
 
     def _hear(self, packet: Packet, now_ms: int) -> None:
         assert self._form is not None
+        heard: set[str] = set()
         for frame in packet.frames:
             opened = self._form.unpack(frame)
             if opened is None or opened[0] not in self.config.others:
@@ -285,27 +222,29 @@ class Modem:
                 continue
             platform, start, reader = opened
             if start != self._starts.get(platform, start):
-                self._receiving[platform] = self._receiver(platform)
+                self._receive_anew(platform)
             self._starts[platform] = start
+            heard.add(platform)
             try:
                 self._read(self._form, platform, reader, now_ms)
             except WireError as error:
                 self._drop("malformed frame", f"{platform}: {error}")
+        for platform in sorted(heard):
+            self._tell_by_reckoning(platform, now_ms)
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         """Reads a frame; raises WireError where the rest of it is none."""
-        if reader.read(1):
-            receivers = self.config.who_talks_with(platform)
-            for name in receivers:
-                if len(receivers) == 1 or reader.read(1):
-                    start = reader.read(START_BITS)
-                    is_ours = name == self.config.platform and start == self._start
-                    sending = self._sending[platform] if is_ours else Sending(form.window)
-                    sending.hear(reader)
-            if form.is_small:
-                return
-        elif form.is_small:
-            self._read_piece(form, platform, reader, now_ms)
+        has_acks = reader.read(1)
+        if has_acks:
+            for name in self.config.who_talks_with(platform):
+                for number in range(STREAMS):
+                    if reader.read(1):
+                        is_ours = reader.read(form.start_bits) == self._start and name == self.config.platform
+                        sending = self._sending[platform, number] if is_ours else Sending(form.window)
+                        sending.hear(reader)
+        if form.is_small:
+            if not has_acks or reader.read(1):
+                self._read_piece(form, platform, reader, now_ms)
             return
         while reader.left and reader.read(1):
             if reader.read(1):
@@ -315,25 +254,28 @@ class Modem:
 
     def _read_piece(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
         receivers = self.config.who_talks_with(platform)
-        to_bits = (len(receivers) - 1).bit_length()
-        place = reader.read(to_bits)
-        number = reader.read(form.window.number_bits)
-        first, last = bool(reader.read(1)), bool(reader.read(1))
+        place = reader.read((len(receivers) - 1).bit_length())
+        stream, number = reader.read((STREAMS - 1).bit_length()), reader.read(form.window.number_bits)
+        is_whole = not form.is_small and bool(reader.read(1))
+        last = is_whole or bool(reader.read(1))
         if form.is_small:  # behind the last one's end there are zeros
-            size = form.room - 3 - to_bits - form.window.number_bits
-        elif first and last:  # it tells by itself where it ends
+            size = reader.left - form.padding_bits
+        elif is_whole:  # it tells by itself where it ends
             ahead = copy(reader)
             self._letters.open(ahead, platform, now_ms)
             size = reader.left - ahead.left
         else:
             size = reader.read(form.size_bits)
-        piece = Piece(reader.read(size), size, first, last)
+        piece = Piece(reader.read(size), size, last)
         if place < len(receivers) and receivers[place] == self.config.platform:
-            for letter in self._receiving[platform].take(number, piece):
+            for letter in self._receiving[platform, stream].take(number, piece):
                 self._open(letter, platform, now_ms)
 
     def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
-        self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
+        second = now_ms // 1000
+        topic, said = self._letters.open(reader, platform, now_ms, self._opened_at[second])
+        self._opened_at = Counter({second: self._opened_at[second] + 1})
+        self._tell(platform, topic, said, now_ms)
 
     def _tell(self, platform: str, topic: Topic | None, said: Said, now_ms: int) -> None:
         """Tells what was heard to the nodes here."""
@@ -342,8 +284,13 @@ class Modem:
         if (header.sender == COORDINATOR) != (platform == self.config.hub):
             self._drop("not its to say", f"{platform}: {said.key}")
             return
-        if topic is TASK and said.key.split("/")[2] != self.config.platform:
-            return
+        if topic is TASK:
+            self._last_status = None  # whoever says it again has not heard the answer
+        if isinstance(message, AgentState):
+            header = self._in_order(platform, header)
+            self._presences[platform].hear_state(message, header.incarnation, header.sent_ms)
+        elif isinstance(message, TaskStatus):
+            self._presences[platform].hear_status(message, now_ms)
         if topic is not None:
             self._say_here(said.key, header, message)
         if isinstance(message, Curve | Stretch) and platform != self.config.hub:
@@ -356,6 +303,27 @@ class Modem:
                 self._told += 1
                 key = COVERAGE.key(vehicle=platform, tile=name)
                 self._say_here(key, header._replace(sequence=self._told), tile)
+
+    def _tell_by_reckoning(self, platform: str, now_ms: int) -> None:
+        """Who is heard is there: its state as it is by now, where it was not told for a while."""
+        presence = self._presences.get(platform) if self.config.platform == self.config.hub else None
+        state = None if presence is None else presence.at(now_ms)
+        incarnation, sequence, sent_ms = self._state_orders.get(platform, (0, -1, 0))
+        if state is None or sequence < 0 or now_ms - sent_ms < REPORT_MS:
+            return
+        header = Header(platform, incarnation, now_ms // 1000 * MOST_A_SECOND, now_ms)
+        self._say_here(STATE.key(vehicle=platform), self._in_order(platform, header), state)
+
+    def _in_order(self, platform: str, header: Header) -> Header:
+        """A state's header as it is told here: one that was reckoned before does not make it an old one."""
+        before = self._state_orders.get(platform, (0, -1, 0))
+        if header.incarnation == before[0]:
+            header = header._replace(
+                sequence=max(header.sequence, before[1] + 1), sent_ms=max(header.sent_ms, before[2])
+            )
+        if header.incarnation >= before[0]:
+            self._state_orders[platform] = header.incarnation, header.sequence, header.sent_ms
+        return header
 
     def _say_here(self, key: str, header: Header, message: Any) -> None:
         heard = Heard(key, packed(header, body_of(message)))
@@ -370,15 +338,18 @@ class Modem:
         return Step(heard, slot_ms if may_speak_now else slot_ms + self.config.cycle_ms)
 
     def _has_anything_to_say(self) -> bool:
-        return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())
+        is_owed = any(one.owes for one in self._receiving.values())
+        return (
+            self._is_alive
+            or is_owed
+            or bool(len(self._queue))
+            or not all(one.is_quiet for one in self._sending.values())
+        )
 
     def _bits_to_say(self) -> int:
         """Bits of what waits, but for what is about it."""
-        pieces = (piece.bits for sending in self._sending.values() for _, piece, _, _ in sending.may_be_said())
-        return self._queue.bits + sum(pieces)
-
-    def _has_more_than_acks(self) -> bool:
-        return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+        pieces = (one.piece.bits for sending in self._sending.values() for one in sending.unheard.values())
+        return self._queue.bits + sum(pieces) + sum(sending.rest.bits for sending in self._sending.values())
 
 
 def _are_same(before: tuple[int, Any] | None, now: tuple[int, Any]) -> bool:

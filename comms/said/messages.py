@@ -18,6 +18,7 @@ import numpy as np
 from comms.said.announcement import RunInfo, Vertex
 from comms.said.over_water import (
     Counted,
+    Fine,
     Follows,
     Heading,
     Length,
@@ -261,7 +262,7 @@ class Curve:
     track: Count
     range_bin_m: Annotated[Metres, Near(1.0, 0.01)]
     p_detect: Annotated[ProbabilityCurve, Profile()]
-    r_eff_m: Annotated[Count, Counted(6)]
+    r_eff_m: Annotated[Count, Counted(6), Fine(0)]
 
     @property
     def detection_curve(self) -> DetectionCurve | None:
@@ -386,7 +387,7 @@ class Task:
     start_y_m: Annotated[PlaceY, _WITH_A_PLACE]
     heading_rad: Annotated[Radians, Heading(13), _WITH_A_STRIP]
     length_m: Annotated[Metres, Length(), _WITH_A_STRIP]
-    width_m: Annotated[Metres, Counted(7, 1.0), _WITH_A_STRIP]
+    width_m: Annotated[Metres, Counted(7, 1.0, coarse=(5, 2.0)), _WITH_A_STRIP]
 
     @property
     def as_strip(self) -> Strip:
@@ -411,8 +412,8 @@ class TaskStatus:
 
     strip: Count
     state: TaskState
-    progress: Probability
-    ends_ms: Annotated[Milliseconds, Moment()]
+    progress: Annotated[Probability, Fine(0.0)]
+    ends_ms: Annotated[Milliseconds, Moment(), Fine(0)]
     reason: Annotated[Text, NotOverWater("")]
 
 
