@@ -13,7 +13,7 @@ from copy import copy
 from typing import Any
 
 from comms.node import Publication, Received, Step
-from comms.said.announcement import RunInfo
+from comms.said.announcement import RosterVehicle, RunInfo
 from comms.said.bits import BitReader
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import (
@@ -36,8 +36,10 @@ from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
 from modem.packets import STRETCH, Packets, Stream
 from modem.presence import REPORT_MS, Presence, seldom_ms
 from modem.streams import STREAMS, Piece, Receiving, Sending
-from modem.stretches import Gathering, LayerOf, Stretch
+from modem.stretches import Gathering, LayerOf, Stretch, Told
+from modem.swept import stretches_over, tells_by_strips
 from modem.waiting import Queue, Waiting
+from planner.types import Strip
 
 log = logging.getLogger("secondlook.modem")
 
@@ -72,6 +74,9 @@ class Modem:
         self._said_at: Counter[int] = Counter()
         self._opened_at: Counter[int] = Counter()
         self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
+        self._strips: dict[tuple[str, int], Strip] = {}  # by vehicle and number, as they were given
+        self._by_strips = False  # whether strips that are done tell what was seen, and the rest need not be said
+        self._held: list[Stretch] = []  # of the strip under way, which may be done yet
         self._state_orders: dict[str, tuple[int, int, int]] = {}  # of the last states told here
         self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
         self._last_frames_ms = 0
@@ -133,6 +138,7 @@ class Modem:
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         if entry is not None and self.config.platform != self.config.hub:
             self._gathering = Gathering(entry)
+            self._by_strips = tells_by_strips(self.config, entry)
 
     def _receive_anew(self, other: str) -> None:
         """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is what
@@ -156,6 +162,8 @@ class Modem:
             return
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
+            if isinstance(message, TaskStatus):
+                self._end_strip(message.state, now_ms)
         if topic.crossing.newest_only and topic.crossing.acknowledged:
             said = (received.header.incarnation, message)
             if _are_same(self._last_said.get(received.key), said):
@@ -166,6 +174,9 @@ class Modem:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
                 return
             to = (received.vehicle,)
+            if message.length_m > 0:  # type: ignore[union-attr]
+                strip: Any = message.as_strip  # type: ignore[union-attr]
+                self._strips[received.vehicle, strip.number] = strip
         for platform in to:
             self._enqueue(topic, topic.crossing, Said(received.key, received.header, message), platform, now_ms)
 
@@ -187,8 +198,19 @@ class Modem:
             presence.hear_state(message, incarnation, now_ms)
         return True
 
+    def _end_strip(self, state: TaskState, now_ms: int) -> None:
+        """What was seen of a strip is said where it is not done."""
+        held, self._held = self._held, []
+        if state is not TaskState.DONE:
+            by_strips, self._by_strips = self._by_strips, False
+            for stretch in held:
+                self._say_stretch(stretch, now_ms)
+            self._by_strips = by_strips
+
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
-        if stretch is not None:
+        if stretch is not None and self._by_strips:
+            self._held.append(stretch)
+        elif stretch is not None:
             header = Header(self.config.platform, self._incarnation, 0, now_ms)
             said = Said("", header, stretch)
             self._enqueue(None, STRETCH, said, self.config.hub, now_ms)
@@ -291,18 +313,37 @@ class Modem:
             self._presences[platform].hear_state(message, header.incarnation, header.sent_ms)
         elif isinstance(message, TaskStatus):
             self._presences[platform].hear_status(message, now_ms)
+            self._tell_strip(platform, header, message)
         if topic is not None:
             self._say_here(said.key, header, message)
         if isinstance(message, Curve | Stretch) and platform != self.config.hub:
-            layer = self._layers.get((platform, header.incarnation))
-            if layer is None:
-                entry = next(one for one in self._run.vehicles if one.vehicle == platform)
-                layer = self._layers[platform, header.incarnation] = LayerOf(entry, self._run.grid.spec)
+            layer = self._layer(platform, header)
             told = layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
-            for name, tile in told:
-                self._told += 1
-                key = COVERAGE.key(vehicle=platform, tile=name)
-                self._say_here(key, header._replace(sequence=self._told), tile)
+            self._tell_tiles(platform, header, told)
+
+    def _tell_strip(self, platform: str, header: Header, status: TaskStatus) -> None:
+        """Of a strip that is done the map is told before the word."""
+        strip, entry = self._strips.get((platform, status.strip)), self._entry(platform)
+        if status.state is TaskState.DONE and strip is not None and tells_by_strips(self.config, entry):
+            for stretch in stretches_over(entry, strip):
+                self._tell_tiles(platform, header, self._layer(platform, header).hear(stretch))
+
+    def _entry(self, platform: str) -> RosterVehicle:
+        assert self._run is not None
+        return next(one for one in self._run.vehicles if one.vehicle == platform)
+
+    def _layer(self, platform: str, header: Header) -> LayerOf:
+        """That which is put together of one start of a vehicle."""
+        assert self._run is not None
+        if (platform, header.incarnation) not in self._layers:
+            layer = LayerOf(self._entry(platform), self._run.grid.spec)
+            self._layers[platform, header.incarnation] = layer
+        return self._layers[platform, header.incarnation]
+
+    def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:
+        for name, tile in told:
+            self._told += 1
+            self._say_here(COVERAGE.key(vehicle=platform, tile=name), header._replace(sequence=self._told), tile)
 
     def _tell_by_reckoning(self, platform: str, now_ms: int) -> None:
         """Who is heard is there: its state as it is by now, where it was not told for a while."""
