@@ -229,10 +229,10 @@ class PlannedTrack:
 
     number: Annotated[Count, Follows(0, as_two_before=True)]
     across_m: Annotated[Metres, Length(0.5, signed=True), Follows(3, as_two_before=True)]
-    start_x_m: Annotated[PlaceX, Follows(3, "end_x_m", as_two_before=True)]
-    start_y_m: Annotated[PlaceY, Follows(3, "end_y_m", as_two_before=True)]
-    end_x_m: Annotated[PlaceX, Follows(3, "start_x_m", as_two_before=True)]
-    end_y_m: Annotated[PlaceY, Follows(3, "start_y_m", as_two_before=True)]
+    start_x_m: Annotated[PlaceX, Follows(1, "end_x_m", as_two_before=True, aside=("across_m", "x"))]
+    start_y_m: Annotated[PlaceY, Follows(1, "end_y_m", as_two_before=True, aside=("across_m", "y"))]
+    end_x_m: Annotated[PlaceX, Follows(1, "start_x_m", as_two_before=True, aside=("across_m", "x"))]
+    end_y_m: Annotated[PlaceY, Follows(1, "start_y_m", as_two_before=True, aside=("across_m", "y"))]
     flown: YesNo
 
 

@@ -297,22 +297,34 @@ class Follows:
     They lead to the field `field` of the one before, or the same field where none is named. `as_two_before`: and on
     from there as far as it went two entries before. So with tracks that are flown to and fro and spaced in pairs: one
     is expected to begin beside where the one before ended, as far from it as two tracks before, along the same edge.
+    `aside`: and so much farther across the tracks, as a place east, "x", or north, "y", as another field, before it, is
+    than was expected of that.
     """
 
     order: int
     field: str = ""
     as_two_before: bool = False
+    aside: tuple[str, str] | None = None
 
     def order_in(self, around: Around) -> int:
         """Of the code."""
         return max(0, self.order - 3) if around.coarse else self.order
 
-    def expected(self, name: str, earlier: list[dict[str, int]]) -> int:
-        """The steps to be expected of a field by those of the entries before, at least one."""
+    def expected(self, name: str, earlier: list[dict[str, int]], off: Mapping[str, int], around: Around) -> int:
+        """The steps to be expected of a field by those of the entries before, at least one, and by how far those of this
+        one's fields were `off` from what was expected of them."""
         field = self.field or name
+        expected = earlier[-1][field]
         if self.as_two_before and len(earlier) > 2:
-            return earlier[-1][field] + earlier[-2][name] - earlier[-3][field]
-        return earlier[-1][field]
+            expected += earlier[-2][name] - earlier[-3][field]
+        if self.aside is not None:
+            by, axis = self.aside
+            expected += round(off[by] * (math.cos if axis == "x" else _minus_sin)(around.heading_rad))
+        return expected
+
+
+def _minus_sin(heading_rad: float) -> float:
+    return -math.sin(heading_rad)
 
 
 @dataclass(frozen=True)

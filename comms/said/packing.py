@@ -37,7 +37,7 @@ class _Packing:
 
     def put(self, writer: BitWriter, said: Mapping[str, Any], around: Around, earlier: list[dict[str, int]]) -> None:
         """Writes fields by their names; `earlier`: the steps of the entries before, to which these are added."""
-        all_steps: dict[str, int] = {}
+        all_steps, off = dict[str, int](), dict[str, int]()
         for name, where, note, only_when, follows, fine in self.fields:
             if only_when is not None and said[only_when.field] not in only_when.values:
                 continue
@@ -49,7 +49,8 @@ class _Packing:
                     continue
                 steps = all_steps[name] = note.checked(note.steps(said[name], around), around)
                 if follows is not None and earlier:
-                    writer.write_signed(steps - follows.expected(name, earlier), follows.order_in(around))
+                    off[name] = steps - follows.expected(name, earlier, off, around)
+                    writer.write_signed(off[name], follows.order_in(around))
                 elif (most := note.most(around)) is None:
                     writer.write_count(steps, note.order(around))
                 else:
@@ -61,7 +62,7 @@ class _Packing:
     def get(self, reader: BitReader, around: Around, earlier: list[dict[str, int]]) -> dict[str, Any]:
         """The fields that `put` has written."""
         said: dict[str, Any] = {}
-        all_steps: dict[str, int] = {}
+        all_steps, off = dict[str, int](), dict[str, int]()
         for name, where, note, only_when, follows, fine in self.fields:
             if only_when is not None and said[only_when.field] not in only_when.values:
                 said[name] = 0
@@ -74,7 +75,8 @@ class _Packing:
                     said[name] = note.get(reader, around, said)
                     continue
                 if follows is not None and earlier:
-                    steps = follows.expected(name, earlier) + reader.read_signed(follows.order_in(around))
+                    off[name] = reader.read_signed(follows.order_in(around))
+                    steps = follows.expected(name, earlier, off, around) + off[name]
                 elif (most := note.most(around)) is None:
                     steps = reader.read_count(note.order(around))
                 else:
