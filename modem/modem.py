@@ -154,6 +154,8 @@ class Modem:
         is_hub = self.config.platform == self.config.hub
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
+        if topic.crossing.is_fine and self.config.is_small:
+            return
         if isinstance(message, Curve) and self._gathering is not None:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
         if not is_hub:

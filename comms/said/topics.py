@@ -60,7 +60,8 @@ class Crossing:
     `value`: what one is worth beside those of other topics. `ttl_s`: what has waited for so long is worth twice as
     much; what need not be acknowledged is then said no more. `newest_only`: of a key a newer one takes the place of one
     that waits. `acknowledged`: it is said again until it is known to have arrived, and not once more where it is told
-    again as it was. `is_long`: it takes many bits, and what does not need not wait for it.
+    again as it was. `is_long`: it takes many bits, and what does not need not wait for it. `is_fine`:
+    it is not said where words are to be short, as what else is said tells as much.
     """
 
     value: float
@@ -68,6 +69,7 @@ class Crossing:
     newest_only: bool = False
     acknowledged: bool = True
     is_long: bool = False
+    is_fine: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,7 +190,7 @@ CONTACT = Topic(
 )  # fmt: skip
 HOTSPOT = Topic(
     "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
-    0.5, Keep.LATEST, crosses_water=True, crossing=Crossing(15, 300, newest_only=True, is_long=True),
+    0.5, Keep.LATEST, crosses_water=True, crossing=Crossing(15, 300, newest_only=True, is_long=True, is_fine=True),
 )  # fmt: skip
 STRIP = Topic(
     "strip", "coord/strip/{number}", StripStatus, _COORDINATOR, _WATCHERS, 1_000, 1.0, Keep.LATEST,
