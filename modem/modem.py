@@ -24,6 +24,7 @@ from comms.said.messages import (
     Message,
     Mode,
     Packet,
+    Task,
     TaskAction,
     TaskState,
     TaskStatus,
@@ -39,7 +40,7 @@ from modem.streams import STREAMS, Piece, Receiving, Sending
 from modem.stretches import Gathering, LayerOf, Stretch, Told
 from modem.swept import stretches_over, tells_by_strips
 from modem.waiting import Queue, Waiting
-from planner.types import Strip
+from planner.keep_out import KeepOut
 
 log = logging.getLogger("secondlook.modem")
 
@@ -74,7 +75,6 @@ class Modem:
         self._said_at: Counter[int] = Counter()
         self._opened_at: Counter[int] = Counter()
         self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
-        self._strips: dict[tuple[str, int], Strip] = {}  # by vehicle and number, as they were given
         self._by_strips = False  # whether strips that are done tell what was seen, and the rest need not be said
         self._held: list[Stretch] = []  # of the strip under way, which may be done yet
         self._state_orders: dict[str, tuple[int, int, int]] = {}  # of the last states told here
@@ -133,8 +133,9 @@ class Modem:
         self._letters = Letters(self.config, run.grid.heading_rad)
         self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
         is_hub = self.config.platform == self.config.hub
+        keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
         known = self.config.others if is_hub else (self.config.platform,)
-        self._presences = {one.vehicle: Presence(one) for one in run.vehicles if one.vehicle in known}
+        self._presences = {one.vehicle: Presence(one, keep_out) for one in run.vehicles if one.vehicle in known}
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         if entry is not None and self.config.platform != self.config.hub:
             self._gathering = Gathering(entry)
@@ -176,9 +177,7 @@ class Modem:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
                 return
             to = (received.vehicle,)
-            if message.length_m > 0:  # type: ignore[union-attr]
-                strip: Any = message.as_strip  # type: ignore[union-attr]
-                self._strips[received.vehicle, strip.number] = strip
+            self._note_strip(received.vehicle, message)  # type: ignore[arg-type]
         for platform in to:
             self._enqueue(topic, topic.crossing, Said(received.key, received.header, message), platform, now_ms)
 
@@ -199,6 +198,10 @@ class Modem:
                 return False
             presence.hear_state(message, incarnation, now_ms)
         return True
+
+    def _note_strip(self, vehicle: str, task: Task) -> None:
+        if task.length_m > 0 and vehicle in self._presences:
+            self._presences[vehicle].strips[task.strip] = task.as_strip
 
     def _end_strip(self, state: TaskState, now_ms: int) -> None:
         """What was seen of a strip is said where it is not done."""
@@ -308,8 +311,9 @@ class Modem:
         if (header.sender == COORDINATOR) != (platform == self.config.hub):
             self._drop("not its to say", f"{platform}: {said.key}")
             return
-        if topic is TASK:
+        if isinstance(message, Task):
             self._last_status = None  # whoever says it again has not heard the answer
+            self._note_strip(self.config.platform, message)
         if isinstance(message, AgentState):
             header = self._in_order(platform, header)
             self._presences[platform].hear_state(message, header.incarnation, header.sent_ms)
@@ -325,7 +329,7 @@ class Modem:
 
     def _tell_strip(self, platform: str, header: Header, status: TaskStatus) -> None:
         """Of a strip that is done the map is told before the word."""
-        strip, entry = self._strips.get((platform, status.strip)), self._entry(platform)
+        strip, entry = self._presences[platform].strips.get(status.strip), self._entry(platform)
         if status.state is TaskState.DONE and strip is not None and tells_by_strips(self.config, entry):
             for stretch in stretches_over(entry, strip):
                 self._tell_tiles(platform, header, self._layer(platform, header).hear(stretch))

@@ -53,7 +53,7 @@ from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevi
 
 LOST_CYCLES, ANSWER_CYCLES = 6, 5
 """After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
-waits for its slot, and may have to be said again."""
+waits for its slot, and may have to be said again. As many times as many where a word takes that many packets."""
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
 
@@ -298,13 +298,13 @@ def _named(key: str) -> Iterator[None]:
 
 def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
     times = link_times(scenario)
-    cycle_ms = 0 if times is None else times.cycle_ms
+    word_ms = 0 if times is None else times.cycle_ms * times.packets_a_word
     return CoordinatorConfig(
         allocator=made(ALLOCATOR, scenario.coordinator.allocator),
         deadline_factor=scenario.mission.deadline_factor or math.inf,
         deadline_s=scenario.mission.deadline_s or math.inf,
-        lost_after_ms=max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms),
-        answer_within_ms=max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms),
+        lost_after_ms=max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * word_ms),
+        answer_within_ms=max(ANSWER_WITHIN_MS, ANSWER_CYCLES * word_ms),
         min_strip_m=scenario.coordinator.min_strip_m,
         max_strip_m=scenario.coordinator.max_strip_m,
         across=scenario.coordinator.across,

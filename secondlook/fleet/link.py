@@ -16,6 +16,8 @@ from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, S
 
 ABOUT_M = 1000.0
 """So far beyond all places of the scenario a vehicle may be and still tell where it is."""
+WORD_BITS = 80
+"""Of a task to take a strip, with what is about it."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,11 @@ class LinkTimes:
     def cycle_ms(self) -> int:
         """How long it takes until each platform has had a slot."""
         return self.slot_ms * len(self.platforms)
+
+    @property
+    def packets_a_word(self) -> int:
+        """How many packets a task takes, the longest word that somebody waits for."""
+        return math.ceil(WORD_BITS / (self.frames * self.frame_bits))
 
 
 def coordinator_platform(scenario: Scenario) -> str:
