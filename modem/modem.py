@@ -77,7 +77,9 @@ class Modem:
         self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
         self._by_strips = False  # whether strips that are done tell what was seen, and the rest need not be said
         self._held: list[Stretch] = []  # of the strip under way, which may be done yet
-        self._state_orders: dict[str, tuple[int, int, int]] = {}  # of the last states told here
+        self._held_of = 0  # and its number
+        self._state_headers: dict[str, Header] = {}  # of the last states told here
+        self._state_told: dict[str, int] = {}  # and when that was
         self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
         self._last_frames_ms = 0
         self._is_alive = False  # whether its agent has said a state since it spoke
@@ -165,8 +167,8 @@ class Modem:
             return
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
-            if isinstance(message, TaskStatus):
-                self._end_strip(message.state, now_ms)
+        if isinstance(message, TaskStatus):
+            self._note_held(message, now_ms)
         if topic.crossing.newest_only and topic.crossing.acknowledged:
             said = (received.header.incarnation, message)
             if _are_same(self._last_said.get(received.key), said):
@@ -203,22 +205,24 @@ class Modem:
         if task.length_m > 0 and vehicle in self._presences:
             self._presences[vehicle].strips[task.strip] = task.as_strip
 
-    def _end_strip(self, state: TaskState, now_ms: int) -> None:
-        """What was seen of a strip is said where it is not done."""
-        held, self._held = self._held, []
-        if state is not TaskState.DONE:
-            by_strips, self._by_strips = self._by_strips, False
-            for stretch in held:
-                self._say_stretch(stretch, now_ms)
-            self._by_strips = by_strips
+    def _note_held(self, status: TaskStatus, now_ms: int) -> None:
+        """What was seen of the strip under way is said where that ends and is not done."""
+        if not _ends_a_stretch(status):
+            self._held_of = status.strip
+        elif status.strip == self._held_of and self._by_strips:
+            held, self._held = self._held, []
+            for stretch in held if status.state is not TaskState.DONE else ():
+                self._enqueue_stretch(stretch, now_ms)
 
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
         if stretch is not None and self._by_strips:
             self._held.append(stretch)
         elif stretch is not None:
-            header = Header(self.config.platform, self._incarnation, 0, now_ms)
-            said = Said("", header, stretch)
-            self._enqueue(None, STRETCH, said, self.config.hub, now_ms)
+            self._enqueue_stretch(stretch, now_ms)
+
+    def _enqueue_stretch(self, stretch: Stretch, now_ms: int) -> None:
+        header = Header(self.config.platform, self._incarnation, 0, now_ms)
+        self._enqueue(None, STRETCH, Said("", header, stretch), self.config.hub, now_ms)
 
     def _enqueue(self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int) -> None:
         second = said.header.sent_ms // 1000
@@ -315,8 +319,8 @@ class Modem:
             self._last_status = None  # whoever says it again has not heard the answer
             self._note_strip(self.config.platform, message)
         if isinstance(message, AgentState):
-            header = self._in_order(platform, header)
-            self._presences[platform].hear_state(message, header.incarnation, header.sent_ms)
+            header = self._in_order(platform, header, now_ms)
+            self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
             self._presences[platform].hear_status(message, now_ms)
             self._tell_strip(platform, header, message)
@@ -353,23 +357,21 @@ class Modem:
 
     def _tell_by_reckoning(self, platform: str, now_ms: int) -> None:
         """Who is heard is there: its state as it is by now, where it was not told for a while."""
-        presence = self._presences.get(platform) if self.config.platform == self.config.hub else None
-        state = None if presence is None else presence.at(now_ms)
-        incarnation, sequence, sent_ms = self._state_orders.get(platform, (0, -1, 0))
-        if state is None or sequence < 0 or now_ms - sent_ms < REPORT_MS:
+        before = self._state_headers.get(platform)
+        if before is None or now_ms - self._state_told[platform] < REPORT_MS:
             return
-        header = Header(platform, incarnation, now_ms // 1000 * MOST_A_SECOND, now_ms)
-        self._say_here(STATE.key(vehicle=platform), self._in_order(platform, header), state)
+        state = self._presences[platform].at(now_ms)
+        header = before._replace(sequence=now_ms // 1000 * MOST_A_SECOND, sent_ms=now_ms)
+        self._say_here(STATE.key(vehicle=platform), self._in_order(platform, header, now_ms), state)
 
-    def _in_order(self, platform: str, header: Header) -> Header:
+    def _in_order(self, platform: str, header: Header, now_ms: int) -> Header:
         """A state's header as it is told here: one that was reckoned before does not make it an old one."""
-        before = self._state_orders.get(platform, (0, -1, 0))
-        if header.incarnation == before[0]:
-            header = header._replace(
-                sequence=max(header.sequence, before[1] + 1), sent_ms=max(header.sent_ms, before[2])
-            )
-        if header.incarnation >= before[0]:
-            self._state_orders[platform] = header.incarnation, header.sequence, header.sent_ms
+        before = self._state_headers.get(platform, header)
+        if header.incarnation == before.incarnation:
+            sequence = header.sequence if before is header else max(header.sequence, before.sequence + 1)
+            header = header._replace(sequence=sequence, sent_ms=max(header.sent_ms, before.sent_ms))
+        if header.incarnation >= before.incarnation:
+            self._state_headers[platform], self._state_told[platform] = header, now_ms
         return header
 
     def _say_here(self, key: str, header: Header, message: Any) -> None:

@@ -43,13 +43,15 @@ class Presence:
         self._entry, self._keep_out = entry, keep_out
         self._state: AgentState | None = None
         self._incarnation = 0
+        self._said_ms = 0
         self._sweep: Sweep | None = None  # as it is taken to fly the strip that it works on
 
     def hear_state(self, state: AgentState, incarnation: int, said_ms: int) -> None:
         """It says its state."""
         if self._state is None or state.works_on != self._state.works_on:
             self._sweep = None
-        self._state, self._incarnation, self.told_ms = state, incarnation, said_ms
+        self._state, self._incarnation = state, incarnation
+        self.told_ms = self._said_ms = said_ms
 
     def hear_status(self, status: TaskStatus, now_ms: int) -> None:
         """What it says of a task tells of its work, too."""
@@ -89,7 +91,9 @@ class Presence:
     def is_news(self, state: AgentState, incarnation: int, now_ms: int, seldom_ms: int) -> bool:
         """Whether its state tells what is not known, or was not told for so long."""
         known = self.at(now_ms)
-        if known is None or incarnation != self._incarnation or now_ms - self.told_ms >= seldom_ms:
+        if known is None or incarnation != self._incarnation:
+            return True
+        if seldom_ms <= REPORT_MS or now_ms - self._said_ms >= seldom_ms:
             return True
         if (known.mode, known.works_on) != (state.mode, state.works_on):
             return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from modems import Waters, config_of
 from comms.said.announcement import Vertex
 from comms.said.messages import (
     AgentState,
+    Curve,
     Hotspot,
     HotspotState,
     MissionOver,
@@ -28,6 +30,7 @@ from modem.letters import with_fewer_corners
 
 TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
 OUTLINE = tuple(Vertex(100.0 + 10 * place, 50.0 + 5 * (place % 3)) for place in range(12))
+CURVE = Curve(1, 1.0, np.linspace(0.0, 0.9, 40), 30)
 FOUND = Hotspot(1, HotspotState.ACTIVE, OUTLINE, 0.6, 40, True, 0)
 
 
@@ -95,16 +98,22 @@ def test_whatever_the_frames_and_whatever_is_lost_all_that_is_acknowledged_arriv
 ) -> None:
     lost = random.Random(f"{seed} {frame_bits}")
     waters = Waters(arrives=lambda *_: lost.random() < 0.7, frame_bits=frame_bits, frames=frames)
-    expected = []
+    expected: list[tuple[str, int]] = []
     for number in range(1, 13):
-        waters.say("alpha", f"agent/alpha/hotspot/{number}", FOUND)
+        waters.say("alpha", "agent/alpha/curve", replace(CURVE, track=number))
         waters.say("beta", f"agent/beta/task_status/{number}", TaskStatus(number, TaskState.REFUSED, 0.5, 0, ""))
-        waters.say("coordinator", f"coord/task/{('alpha', 'beta')[number % 2]}/{number}", TAKE)
-        expected += [f"agent/alpha/hotspot/{number}", f"agent/beta/task_status/{number}"]
+        task = replace(TAKE, strip=number)
+        waters.say("coordinator", f"coord/task/{('alpha', 'beta')[number % 2]}/{number}", task)
+        expected.append(("TaskStatus", number))
         waters.run(waters.now_ms + 9000)
     waters.run(waters.now_ms + 6_000_000)
-    assert sorted(key for key, _ in heard(waters, "ship")) == sorted(expected)
-    assert [key for key, _ in heard(waters, "beta")] == [f"coord/task/beta/{number}" for number in range(1, 13, 2)]
+    told = [(platform, one.message) for _, platform, one in waters.heard]
+    ships = [one for platform, one in told if platform == "ship"]
+    assert sorted(("TaskStatus", one.strip) for one in ships if isinstance(one, TaskStatus)) == expected
+    tracks = [one.track for one in ships if isinstance(one, Curve)]
+    assert len({*tracks}) == len(tracks)
+    assert 12 in tracks  # of a vehicle's curves a newer one takes the place of one that waits
+    assert [one.strip for platform, one in told if platform == "beta" and isinstance(one, Task)] == [*range(1, 13, 2)]
     assert not any(modem.dropped for modem in waters.modems.values())
     assert waters.packets[-1][0] < waters.now_ms - 100_000  # then all is quiet
 
@@ -153,7 +162,7 @@ def test_a_hotspot_is_told_with_ten_of_its_own_corners_at_most() -> None:
 @pytest.mark.parametrize(
     ("terms", "told"),
     [
-        ({"frame_bits": 20}, "link.profile: frames of 20 bits are too small for 3 platforms"),
+        ({"frame_bits": 16}, "link.profile: frames of 16 bits are too small for 3 platforms"),
         ({"frames": 0}, "a packet at least one frame"),
         ({"slot_ms": 0}, "a slot has at least 1 ms"),
     ],
