@@ -19,8 +19,8 @@ VERSION = 2
 
 class FrameForm:
     """How frames of a run are made. `room`: the bits that one has for what is said. `window`: of the streams in them.
-    `is_small`: whether one holds acknowledgements or a single piece, which then need not tell its size. `start_bits`: of
-    the number that tells a modem's starts apart. `padding_bits`: behind what `unpack` returns.
+    `is_small`: whether one holds acknowledgements or a single piece, which then need not tell its size.
+    `start_bits`: of the number that tells a modem's starts apart. `padding_bits`: behind what `unpack` returns.
     """
 
     def __init__(self, config: ModemConfig, run: RunInfo) -> None:

@@ -3,8 +3,8 @@
 Of the time a message was said the last 12 bits of its second cross, so that one is taken to be at most 68 minutes old.
 Its sequence number is made of that second and its place within it: messages of one sender stay in order.
 
-Where words are to be short, as frames are small, that does not cross: messages come in the order in which they were said,
-and count as said when they have come. Nor does the number of a key that only counts messages.
+Where words are to be short, as frames are small, that does not cross: messages come in the order in which they were
+said, and count as said when they have come. Nor does the number of a key that only counts messages.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from copy import copy
 from typing import Any
 
 from comms.node import Publication, Received, Step
-from comms.said.announcement import RosterVehicle, RunInfo
+from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import (
@@ -33,12 +33,12 @@ from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, Crossing, 
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.frames import FrameForm, start_number
+from modem.layers import Layers
 from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
 from modem.packets import STRETCH, Packets, Stream
 from modem.presence import REPORT_MS, Presence, seldom_ms
 from modem.streams import STREAMS, Piece, Receiving, Sending
-from modem.stretches import Gathering, LayerOf, Stretch, Told
-from modem.swept import stretches_over, tells_by_strips
+from modem.stretches import Gathering, Stretch, Told
 from modem.waiting import Queue, Waiting
 from planner.keep_out import KeepOut
 
@@ -65,17 +65,15 @@ class Modem:
         self._starts: dict[str, int] = {}  # of the others, as their frames tell
         self._start = 0
         self._spoke_ms = -1
-        self._form: FrameForm | None = None
+        self._form: FrameForm | None = None  # this and what follows: since the run's announcement
         self._run: RunInfo | None = None
         self._gathering: Gathering | None = None
-        self._layers: dict[tuple[str, int], LayerOf] = {}
         self._heard: list[Publication] = []
         self._told = 0
         self._last_said: dict[str, tuple[int, Any]] = {}
         self._said_at: Counter[int] = Counter()
         self._opened_at: Counter[int] = Counter()
         self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
-        self._by_strips = False  # whether strips that are done tell what was seen, and the rest need not be said
         self._held: list[Stretch] = []  # of the strip under way, which may be done yet
         self._held_of = 0  # and its number
         self._state_headers: dict[str, Header] = {}  # of the last states told here
@@ -133,6 +131,7 @@ class Modem:
             self._sending |= {(other, number): Sending(self._form.window) for number in range(STREAMS)}
             self._receive_anew(other)
         self._letters = Letters(self.config, run.grid.heading_rad)
+        self._layers = Layers(self.config, run)
         self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
         is_hub = self.config.platform == self.config.hub
         keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
@@ -141,11 +140,10 @@ class Modem:
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         if entry is not None and self.config.platform != self.config.hub:
             self._gathering = Gathering(entry)
-            self._by_strips = tells_by_strips(self.config, entry)
 
     def _receive_anew(self, other: str) -> None:
-        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is what
-        does not tell when it was said."""
+        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is
+        what does not tell when it was said."""
         assert self._form is not None
         in_order = other == self.config.hub or self._form.is_small
         for number in range(STREAMS):
@@ -209,13 +207,13 @@ class Modem:
         """What was seen of the strip under way is said where that ends and is not done."""
         if not _ends_a_stretch(status):
             self._held_of = status.strip
-        elif status.strip == self._held_of and self._by_strips:
+        elif status.strip == self._held_of:
             held, self._held = self._held, []
             for stretch in held if status.state is not TaskState.DONE else ():
                 self._enqueue_stretch(stretch, now_ms)
 
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
-        if stretch is not None and self._by_strips:
+        if stretch is not None and self.config.platform in self._layers.by_strips:
             self._held.append(stretch)
         elif stretch is not None:
             self._enqueue_stretch(stretch, now_ms)
@@ -312,7 +310,10 @@ class Modem:
         """Tells what was heard to the nodes here."""
         assert self._run is not None
         header, message = said.header, said.message
-        if (header.sender == COORDINATOR) != (platform == self.config.hub):
+        by_hub = platform == self.config.hub
+        by_whom = None if by_hub else next(one.role for one in self._run.vehicles if one.vehicle == platform)
+        is_its = topic is None or by_whom is None or by_whom in topic.writers
+        if (header.sender == COORDINATOR) != by_hub or not is_its:
             self._drop("not its to say", f"{platform}: {said.key}")
             return
         if isinstance(message, Task):
@@ -323,32 +324,13 @@ class Modem:
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
             self._presences[platform].hear_status(message, now_ms)
-            self._tell_strip(platform, header, message)
+            strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
+            # The map is told before the word.
+            self._tell_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
         if topic is not None:
             self._say_here(said.key, header, message)
         if isinstance(message, Curve | Stretch) and platform != self.config.hub:
-            layer = self._layer(platform, header)
-            told = layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
-            self._tell_tiles(platform, header, told)
-
-    def _tell_strip(self, platform: str, header: Header, status: TaskStatus) -> None:
-        """Of a strip that is done the map is told before the word."""
-        strip, entry = self._presences[platform].strips.get(status.strip), self._entry(platform)
-        if status.state is TaskState.DONE and strip is not None and tells_by_strips(self.config, entry):
-            for stretch in stretches_over(entry, strip):
-                self._tell_tiles(platform, header, self._layer(platform, header).hear(stretch))
-
-    def _entry(self, platform: str) -> RosterVehicle:
-        assert self._run is not None
-        return next(one for one in self._run.vehicles if one.vehicle == platform)
-
-    def _layer(self, platform: str, header: Header) -> LayerOf:
-        """That which is put together of one start of a vehicle."""
-        assert self._run is not None
-        if (platform, header.incarnation) not in self._layers:
-            layer = LayerOf(self._entry(platform), self._run.grid.spec)
-            self._layers[platform, header.incarnation] = layer
-        return self._layers[platform, header.incarnation]
+            self._tell_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
 
     def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:
         for name, tile in told:
@@ -388,12 +370,8 @@ class Modem:
 
     def _has_anything_to_say(self) -> bool:
         is_owed = any(one.owes for one in self._receiving.values())
-        return (
-            self._is_alive
-            or is_owed
-            or bool(len(self._queue))
-            or not all(one.is_quiet for one in self._sending.values())
-        )
+        is_quiet = not len(self._queue) and all(one.is_quiet for one in self._sending.values())
+        return self._is_alive or is_owed or not is_quiet
 
     def _bits_to_say(self) -> int:
         """Bits of what waits, but for what is about it."""

@@ -1,5 +1,5 @@
-"""What goes into a packet: acknowledgements that are owed, then messages and pieces of messages, what is worth most a bit
-first.
+"""What goes into a packet: acknowledgements that are owed, then messages and pieces of messages, what is worth most a
+bit first.
 
 A frame begins with a bit that tells whether it holds acknowledgements. In a small one these are followed by a bit that
 tells whether the end of a message follows; without them it holds a piece of a message and nothing else. In others there

@@ -6,10 +6,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.messages import FARTHEST_M, AgentState, Mode, TaskState, TaskStatus
 from modem.config import ModemConfig
+from modem.layers import MOST_LEGS
 from planner.dubins import Pose
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
@@ -34,8 +36,8 @@ def seldom_ms(config: ModemConfig) -> int:
 
 
 class Presence:
-    """A vehicle as it is reckoned with. `entry`: as it was announced. `told_ms`: when its last state was said, or a word
-    on a task that tells as much. `strips`: those that it was given, by number."""
+    """A vehicle as it is reckoned with. `entry`: as it was announced; `keep_out`: what it may not enter. `told_ms`:
+    when its last state was said, or a word on a task that tells as much. `strips`: those it was given, by number."""
 
     def __init__(self, entry: RosterVehicle, keep_out: KeepOut = NOWHERE) -> None:
         self.told_ms = 0
@@ -104,9 +106,10 @@ class Presence:
         """It goes to a strip, the shortest way from where it is."""
         entry, strip = self._entry, self.strips.get(number)
         self._sweep, ends_ms = None, 0
-        if strip is not None and strip.length_m > 0 and strip.width_m > 0:
+        sees = footprint_of(entry.sonar)
+        if strip is not None and strip.length_m > 0 and 0 < strip.width_m <= MOST_LEGS * sees.reach.strip_width_m:
             radius_m, pose = entry.turn_radius_m, Pose(state.x_m, state.y_m, state.heading_rad)
-            ways = sweeps_by(footprint_of(entry.sonar), strip, radius_m, entry.run_in_m, self._keep_out)
+            ways = sweeps_by(sees, strip, radius_m, entry.run_in_m, self._keep_out)
             try:
                 self._sweep, way_m = shortest_sweep(ways, pose, radius_m, self._keep_out)
                 ends_ms = now_ms + round((way_m + self._sweep.length_m) / entry.speed_mps * 1000)
@@ -118,7 +121,7 @@ class Presence:
         """So far behind where it was told, which lies on the first leg."""
         ends = [(state.x_m, state.y_m), sweep.legs[0].end]
         ends += [end for leg in sweep.legs[1:] for end in (leg.start, leg.end)]
-        for begin, end in zip(ends, ends[1:], strict=False):
+        for begin, end in pairwise(ends):
             length_m = math.dist(begin, end)
             if length_m > way_m:
                 heading_rad = math.atan2(end[0] - begin[0], end[1] - begin[1]) % math.tau

@@ -93,8 +93,8 @@ class Sending:
         return self._bit_value, self._queued_ms
 
     def begin(self, said: BitWriter, value: float, queued_ms: int) -> None:
-        """Takes a message, where none is being said. `value`: what it is worth beside others; `queued_ms`: since when it
-        waits."""
+        """Takes a message, where none is being said. `value`: what it is worth beside others; `queued_ms`: since when
+        it waits."""
         self.rest.write(said.value, said.bits)
         self._bit_value, self._queued_ms = value / said.bits, queued_ms
 

@@ -311,8 +311,8 @@ class Follows:
         return max(0, self.order - 3) if around.coarse else self.order
 
     def expected(self, name: str, earlier: list[dict[str, int]], off: Mapping[str, int], around: Around) -> int:
-        """The steps to be expected of a field by those of the entries before, at least one, and by how far those of this
-        one's fields were `off` from what was expected of them."""
+        """The steps to be expected of a field by those of the entries before, at least one, and by how far fields of
+        this one were `off` from what was expected of them."""
         field = self.field or name
         expected = earlier[-1][field]
         if self.as_two_before and len(earlier) > 2:
