@@ -205,7 +205,7 @@ class Modem:
 
     def _note_held(self, status: TaskStatus, now_ms: int) -> None:
         """What was seen of the strip under way is said where that ends and is not done."""
-        if not _ends_a_stretch(status):
+        if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
             self._held_of = status.strip
         elif status.strip == self._held_of:
             held, self._held = self._held, []
