@@ -64,7 +64,7 @@ class Said(NamedTuple):
 
 @dataclass(frozen=True)
 class Letters:
-    """Packs and opens messages for one fleet. `config`: of the modem that does. `heading_rad`: of the tracks."""
+    """Packs and opens messages for one fleet. `config`: of any of its modems. `heading_rad`: of the tracks."""
 
     config: ModemConfig
     heading_rad: float = 0.0
@@ -84,6 +84,9 @@ class Letters:
         if not is_short:
             writer.write(header.sent_ms // 1000 % (1 << SECOND_BITS), SECOND_BITS)
             writer.write_count(min(header.sequence, MOST_A_SECOND - 1), 1)
+        if topic is not None and header.sender == COORDINATOR and topic.has_vehicle:
+            vehicles = self.config.vehicles
+            writer.write(vehicles.index(topic.vehicle_of(said.key)), (len(vehicles) - 1).bit_length())
         if topic is not None and self._has_its_number(topic):
             writer.write_count(number_of(said.key), 4)
         message = said.message
@@ -111,13 +114,18 @@ class Letters:
             place = reader.read_count(1)
         if sent_s < 0 or place >= MOST_A_SECOND:
             raise WireError("a message from before the mission, or more in a second than there may be")
+        by_coordinator = topic is not None and any(role.value == COORDINATOR for role in topic.writers)
+        vehicle = platform
+        if by_coordinator and topic is not None and topic.has_vehicle:
+            its_place = reader.read((len(self.config.vehicles) - 1).bit_length())
+            if its_place >= len(self.config.vehicles):
+                raise WireError("no vehicle of the fleet")
+            vehicle = self.config.vehicles[its_place]
         sequence = sent_s * MOST_A_SECOND + place
         number = sequence % (LARGEST_NUMBER + 1)
         if topic is not None and self._has_its_number(topic) and (number := reader.read_count(4)) > LARGEST_NUMBER:
             raise WireError(f"{number} is no number of a key")
         message = get_message(reader, Stretch if topic is None else topic.message, self._around(sent_s * 1000))
-        by_coordinator = topic is not None and any(role.value == COORDINATOR for role in topic.writers)
-        vehicle = self.config.platform if by_coordinator else platform
         key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
         return topic, Said(
             key, Header(COORDINATOR if by_coordinator else vehicle, incarnation, sequence, sent_s * 1000), message

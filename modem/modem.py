@@ -316,6 +316,8 @@ class Modem:
         if (header.sender == COORDINATOR) != by_hub or not is_its:
             self._drop("not its to say", f"{platform}: {said.key}")
             return
+        if topic is TASK and said.key.split("/")[2] != self.config.platform:
+            return
         if isinstance(message, Task):
             self._last_status = None  # whoever says it again has not heard the answer
             self._note_strip(self.config.platform, message)

@@ -373,6 +373,7 @@ class TaskAction(enum.Enum):
     TELL_AGAIN = "tell_again"
 
 
+StripNumber = Annotated[Count, Counted(4, coarse=(5, 1))]
 _WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.STAND_ASIDE))
 _WITH_A_STRIP = OnlyWhen("action", (TaskAction.TAKE,))
 
@@ -382,7 +383,7 @@ class Task:
     """The coordinator's word to one vehicle. It suffices by itself."""
 
     action: TaskAction
-    strip: Count
+    strip: StripNumber
     start_x_m: Annotated[PlaceX, _WITH_A_PLACE]
     start_y_m: Annotated[PlaceY, _WITH_A_PLACE]
     heading_rad: Annotated[Radians, Heading(13), _WITH_A_STRIP]
@@ -410,7 +411,7 @@ class TaskState(enum.Enum):
 class TaskStatus:
     """How a task stands. `progress`: share of the strip's length swept; `ends_ms`: when it expects to be done."""
 
-    strip: Count
+    strip: StripNumber
     state: TaskState
     progress: Annotated[Probability, Fine(0.0)]
     ends_ms: Annotated[Milliseconds, Moment(), Fine(0)]

@@ -176,7 +176,7 @@ class Heading(Number):
         return 2
 
     def checked(self, steps: int, around: Around) -> int:
-        if around.coarse and steps > (4 << self._coarse_bits - 2):
+        if around.coarse and steps > (4 << self._coarse_bits - 2) + 3:
             raise WireError(f"{steps} steps are no heading")
         return super().checked(steps, around)
 
