@@ -236,6 +236,7 @@ class PlannedTrack:
     flown: YesNo
 
 
+StripNumber = Annotated[Count, Counted(4, coarse=(5, 1))]
 RangeBeside = Annotated[Count, Counted(6), Follows(3)]
 """A range in whole metres, beside others that are much the same."""
 
@@ -373,7 +374,6 @@ class TaskAction(enum.Enum):
     TELL_AGAIN = "tell_again"
 
 
-StripNumber = Annotated[Count, Counted(4, coarse=(5, 1))]
 _WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.STAND_ASIDE))
 _WITH_A_STRIP = OnlyWhen("action", (TaskAction.TAKE,))
 
