@@ -42,8 +42,8 @@ class Queue:
 
     @property
     def bits(self) -> int:
-        """Of all of them."""
-        return sum(one.said.bits for one in self._waiting.values())
+        """Of all of them, but for what may as well be left out."""
+        return sum(one.said.bits for one in self._waiting.values() if not one.crossing.is_fine)
 
     def add(self, one: Waiting) -> None:
         """Takes a message."""
