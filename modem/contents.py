@@ -15,7 +15,7 @@ from modem.streams import STREAM_BITS, STREAMS, Piece
 
 
 class Acknowledgement(NamedTuple):
-    """What has come of the pieces that `to` has said in a stream since its `start`: see `modem.streams.Sending.hear`."""
+    """What has come of what `to` has said in a stream since its `start`: see `modem.streams.Sending.hear`."""
 
     to: str
     stream: int

@@ -207,7 +207,7 @@ class Modem:
         presence = self._presences.get(self.config.platform)
         if isinstance(message, TaskStatus):
             said = incarnation, message.strip, message.state
-            if said == self._last_status:
+            if said == self._last_status and not self._queue.holds(_about(received)):
                 return False
             self._last_status = said
             if presence is not None:
@@ -281,7 +281,8 @@ class Modem:
             platform, start, reader, polled = opened
             if on_deck is None:
                 self._turns.has_heard(platform, polled, now_ms)
-            if start != self._starts.get(platform, 0):  # it has forgotten what it has said and heard
+            # Who is there from the beginning knows that the others were, too; who was started anew does not.
+            if start != self._starts.get(platform, start if self._start else 0):  # it has forgotten all
                 self._receive_anew(platform)
                 for number in range(STREAMS):
                     self._sending[platform, number].begin_again()

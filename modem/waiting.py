@@ -54,6 +54,10 @@ class Queue:
         self._waiting[self._count] = one
         self._count += 1
 
+    def holds(self, key: str) -> bool:
+        """Whether a message about something waits."""
+        return any(one.key == key for one in self._waiting.values())
+
     def remove(self, one: Waiting) -> None:
         """It is said now."""
         number = next(number for number, other in self._waiting.items() if other is one)

@@ -165,12 +165,14 @@ def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refuse
     waters.say("coordinator", "coord/task/beta/3", TAKE)
     waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.ACCEPTED, 0.0, 60_000, ""))
     waters.run(1_000_000)
-    assert sorted(one.key for _, _, one in waters.heard) == ["agent/beta/task_status/1", "coord/task/beta/3"]
+    assert sorted((to, type(one.message).__name__) for _, to, one in waters.heard) == [
+        ("beta", "Task"), ("ship", "TaskStatus"),
+    ]  # fmt: skip
     with pytest.raises(ValueError, match=f"frames of {least - 1} bits are too small for 3 platforms"):
         config_of("ship", frame_bits=least - 1, polls=polls)
 
 
-@pytest.mark.parametrize("frame_bits", [48, 128, 256])
+@pytest.mark.parametrize("frame_bits", [48, 64, 128, 256])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) -> None:
     lost = random.Random(f"{seed} {frame_bits}")
@@ -184,7 +186,8 @@ def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) ->
             waters.start("beta")
             before = len(heard(waters, "beta"))
     waters.run(waters.now_ms + 6_000_000)
-    numbers = [int(key.rpartition("/")[2]) for key, _ in heard(waters, "beta")[before:]]
+    told = [one.message for _, to, one in waters.heard if to == "beta"][before:]
+    numbers = [one.strip for one in told if isinstance(one, Task)]
     assert set(range(27, 41)) <= {*numbers}
     assert numbers == sorted(numbers)
     assert not any(modem.dropped for modem in waters.modems.values())
@@ -215,7 +218,7 @@ def test_on_deck_all_is_told_at_once_and_whole_and_from_then_on_by_frames(frame_
     waters.run(0)
     tracks = [one.message.track for _, to, one in waters.heard if to == "ship"]  # type: ignore[union-attr]
     assert tracks == [*range(1, 80)]
-    assert heard(waters, "beta") == [("coord/task/beta/1", "Task")]
+    assert len(heard(waters, "beta")) == 1
     told = next(one.message for _, to, one in waters.heard if to == "beta")
     assert (told.action, told.strip) == (TaskAction.TAKE, 7)  # type: ignore[union-attr]
     waters.run(1000)
@@ -223,7 +226,7 @@ def test_on_deck_all_is_told_at_once_and_whole_and_from_then_on_by_frames(frame_
     waters.run(1001)
     assert len(heard(waters, "beta")) == 1
     waters.run(400_000)
-    assert heard(waters, "beta") == [("coord/task/beta/1", "Task"), ("coord/task/beta/2", "Task")]
+    assert [kind for _, kind in heard(waters, "beta")] == ["Task", "Task"]
     assert not any(modem.dropped for modem in waters.modems.values())
 
 
