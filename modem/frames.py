@@ -19,7 +19,7 @@ from modem.config import ModemConfig
 VERSION = 3
 """Of what frames hold: modems of another one do not understand each other."""
 CRC_4 = 0xD
-"""x^4 + x^3 + x^2 + 1, of which x + 1 is a part: any odd number of bits is noticed, and up to four in a row."""
+"""x^4 + x^3 + x^2 + 1, of which x + 1 is a part: any odd number of bits is noticed."""
 CRC_8 = 0x2F
 """x^8 + x^5 + x^3 + x^2 + x + 1: up to 127 bits with the check, as small frames have, any three bits are noticed."""
 

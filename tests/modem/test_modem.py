@@ -182,7 +182,7 @@ def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) ->
         waters.say("beta", "agent/beta/state", state())
         waters.run(waters.now_ms + 12_000)
         if number in (10, 17, 25):  # the second and third time while something is under way
-            waters.run(waters.now_ms + (400_000 if number == 10 else 0))
+            waters.run(waters.now_ms + (400_000 if number == 10 else 1000))  # its starts have other numbers
             waters.start("beta")
             before = len(heard(waters, "beta"))
     waters.run(waters.now_ms + 6_000_000)
