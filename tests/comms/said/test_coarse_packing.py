@@ -53,7 +53,7 @@ def _got(message: Any, around: Around = AROUND, heard: Around | None = None) -> 
 def test_a_task_to_take_a_strip() -> None:
     assert _bits(TAKE) == "".join(
         [
-            "00",
+            "000",
             "100101",  # strip 5: 32 + 5
             "0000011001",  # 25 times 4 m east
             "0000110010",  # 50.25 times 4 m north
@@ -144,7 +144,7 @@ def test_a_moment_too_far_ahead_is_told_as_the_farthest() -> None:
 
 def test_a_heading_that_was_never_put_is_refused() -> None:
     task = BitWriter()
-    for value, bits in ((0, 2), (0b100101, 6), (0, 20)):
+    for value, bits in ((0, 3), (0b100101, 6), (0, 20)):
         task.write(value, bits)
     task.write_count(516, 2)
     task.write(0, 40)
