@@ -114,14 +114,9 @@ def deck_ms_of(link: Link | None) -> int:
     return 0 if link is None else round(link.on_deck_s * 1000)
 
 
-def cycle_ms_of(scenario: Scenario) -> int:
-    """How long it takes until each platform has had a slot; 0 where everybody hears everybody."""
-    times = link_times(scenario)
-    return 0 if times is None else times.cycle_ms
-
-
 def word_ms_of(scenario: Scenario) -> int:
-    """How long a task takes to be said, in cycles; 0 where everybody hears everybody."""
+    """How long it takes until each platform has had as many slots, or was polled as often, as a task takes packets; 0
+    where everybody hears everybody."""
     times = link_times(scenario)
     return 0 if times is None else times.cycle_ms * times.packets_a_word
 
