@@ -4,28 +4,57 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from modem.streams import TURN_BITS, Window
+from modem.streams import STREAM_BITS, STREAMS, TURN_BITS, Window
 
 MOST_PLATFORMS = 64
-SMALL_BITS = 128
-"""Frames with fewer hold either acknowledgements or a single piece of a message."""
-LEAST_PIECE_BITS = 8
-"""A piece of a message with fewer bits is not worth the bits about it."""
-START_BITS = 3
-"""Of the number by which a modem that was started anew is told from its past."""
+SMALL_BITS, TINY_BITS = 128, 64
+"""Frames with fewer hold acknowledgements or a single piece of a message, whose words are short; in those with fewer
+than the second the tag is, too, and nothing tells of turns."""
 
 
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
-_SMALL, _LARGE = Window(3), Window(5)
+LARGEST_LEAST_BITS = 256
+"""In frames of so many bits all platforms can talk that there may be."""
 
 
 def least_frame_bits(platforms: int, *, polled: bool = False) -> int:
     """The fewest bits of a frame in which so many platforms, at most 64, can talk: it holds an acknowledgement of one
-    other, or a piece of a message."""
-    acknowledgement = platforms - 1 + START_BITS + _SMALL.ack_bits
-    piece = 2 + TURN_BITS + _SMALL.number_bits + (platforms - 2).bit_length() + LEAST_PIECE_BITS
-    return 8 + polled + (platforms - 1).bit_length() + START_BITS + 1 + max(acknowledgement, piece)
+    other, or a piece of a message, as all larger ones do."""
+    least = LARGEST_LEAST_BITS
+    while _room(least - 1, platforms, polled=polled) >= _least_room(least - 1, platforms):
+        least -= 1
+    return least
+
+
+def _room(frame_bits: int, platforms: int, *, polled: bool) -> int:
+    return frame_bits - _tag_bits(frame_bits) - polled - (platforms - 1).bit_length() - _start_bits(frame_bits)
+
+
+def _least_room(frame_bits: int, platforms: int) -> int:
+    """Whether there are acknowledgements, and one of them, or a piece."""
+    window, is_small = _window(frame_bits), frame_bits < SMALL_BITS
+    acknowledgement = STREAMS * (platforms - 1) + _start_bits(frame_bits) + window.ack_bits + is_small
+    about_bits = (platforms - 2).bit_length() + STREAM_BITS + window.turn_bits + window.number_bits + 1
+    if not is_small:
+        about_bits += 3 + frame_bits.bit_length()
+    return 1 + max(acknowledgement, about_bits + LEAST_PIECE_BITS)
+
+
+def _tag_bits(frame_bits: int) -> int:
+    if frame_bits < TINY_BITS:
+        return 4
+    return 8 if frame_bits < SMALL_BITS else 16
+
+
+def _start_bits(frame_bits: int) -> int:
+    return 2 if frame_bits < SMALL_BITS else 3
+
+
+def _window(frame_bits: int) -> Window:
+    if frame_bits < SMALL_BITS:
+        return Window(3, turn_bits=0 if frame_bits < TINY_BITS else TURN_BITS, tells_behind=False)
+    return Window(5)
 
 
 @dataclass(frozen=True)
@@ -107,13 +136,18 @@ class ModemConfig:
 
     @property
     def is_small(self) -> bool:
-        """Whether a frame holds either acknowledgements or a single piece."""
+        """Whether a frame holds acknowledgements or a single piece, and words are to be short."""
         return self.frame_bits < SMALL_BITS
 
     @property
     def tag_bits(self) -> int:
         """Of the tag by which damage and strangers are noticed."""
-        return 8 if self.is_small else 16
+        return _tag_bits(self.frame_bits)
+
+    @property
+    def start_bits(self) -> int:
+        """Of the number by which a modem that was started anew is told from its past."""
+        return _start_bits(self.frame_bits)
 
     @property
     def platform_bits(self) -> int:
@@ -123,15 +157,9 @@ class ModemConfig:
     @property
     def room(self) -> int:
         """How many bits a frame has for what is said."""
-        return self.frame_bits - self.tag_bits - (self.polls is not None) - self.platform_bits - START_BITS
-
-    @property
-    def about_piece_bits(self) -> int:
-        """Bits about a piece of a message, but for its size."""
-        to_bits = (len(self.others) - 1).bit_length()
-        return (2 if self.is_small else 4) + TURN_BITS + self.window.number_bits + to_bits
+        return _room(self.frame_bits, len(self.platforms), polled=self.polls is not None)
 
     @property
     def window(self) -> Window:
         """Of the streams of pieces."""
-        return _SMALL if self.is_small else _LARGE
+        return _window(self.frame_bits)

@@ -8,16 +8,17 @@ from typing import NamedTuple
 
 from comms.said.bits import BitReader
 from comms.said.topics import Topic
-from modem.config import START_BITS, ModemConfig
+from modem.config import ModemConfig
 from modem.frames import FrameForm
 from modem.letters import Letters, Said
-from modem.streams import TURN_BITS, Piece
+from modem.streams import STREAM_BITS, STREAMS, Piece
 
 
 class Acknowledgement(NamedTuple):
-    """What has come of the pieces that `to` has said since its `start`: see `modem.streams.Sending.hear`."""
+    """What has come of what `to` has said in a stream since its `start`: see `modem.streams.Sending.hear`."""
 
     to: str
+    stream: int
     start: int
     turn: int
     missing: int
@@ -29,6 +30,7 @@ class PieceFor(NamedTuple):
     """A piece of a message for a platform, "" for one that there is not, under the last bits of its number."""
 
     to: str
+    stream: int
     turn: int
     number: int
     piece: Piece
@@ -51,18 +53,17 @@ def parts_of(
 ) -> Iterator[Part]:
     """The parts of a frame of a platform, as far as they are asked for; `reader` then is behind the last of them.
     `bits` counts all about a part, too. Raises WireError where what follows is no part."""
-    receivers = config.who_talks_with(platform)
-    if reader.read(1):
-        for name in receivers:
+    window, has_acks = form.window, reader.read(1)
+    for name in config.who_talks_with(platform) if has_acks else ():
+        for stream in range(STREAMS):
             before = reader.left
-            if len(receivers) == 1 or reader.read(1):
-                start, turn = reader.read(START_BITS), reader.read(TURN_BITS)
-                missing, come = reader.read(form.window.number_bits), reader.read(form.window.size - 1)
-                yield Acknowledgement(name, start, turn, missing, come, before - reader.left)
-        if form.is_small:
-            return
-    elif form.is_small:
-        yield _piece(config, form, letters, platform, reader, now_ms)
+            if reader.read(1):
+                start, turn = reader.read(form.start_bits), reader.read(window.turn_bits)
+                missing, come = reader.read(window.number_bits), reader.read(window.behind_bits)
+                yield Acknowledgement(name, stream, start, turn, missing, come, before - reader.left)
+    if form.is_small:
+        if not has_acks or reader.read(1):
+            yield _piece(config, form, letters, platform, reader, now_ms)
         return
     while reader.left and reader.read(1):
         before = reader.left + 1
@@ -77,18 +78,20 @@ def parts_of(
 def _piece(
     config: ModemConfig, form: FrameForm, letters: Letters, platform: str, reader: BitReader, now_ms: int
 ) -> PieceFor:
-    receivers = config.who_talks_with(platform)
-    to_bits, before = (len(receivers) - 1).bit_length(), reader.left
-    place = reader.read(to_bits)
-    turn, number = reader.read(TURN_BITS), reader.read(form.window.number_bits)
-    first, last = bool(reader.read(1)), bool(reader.read(1))
+    receivers, before = config.who_talks_with(platform), reader.left
+    place = reader.read((len(receivers) - 1).bit_length())
+    stream, turn = reader.read(STREAM_BITS), reader.read(form.window.turn_bits)
+    number = reader.read(form.window.number_bits)
+    is_whole = not form.is_small and bool(reader.read(1))
+    last = is_whole or bool(reader.read(1))
     if form.is_small:  # behind the last one's end there are zeros
-        size = form.room - 3 - to_bits - TURN_BITS - form.window.number_bits
-    elif first and last:  # it tells by itself where it ends
+        size = reader.left - form.padding_bits
+    elif is_whole:  # it tells by itself where it ends
         ahead = copy(reader)
         letters.open(ahead, platform, now_ms)
         size = reader.left - ahead.left
     else:
         size = reader.read(form.size_bits)
-    piece = Piece(reader.read(size), size, first, last)
-    return PieceFor(receivers[place] if place < len(receivers) else "", turn, number, piece, before - reader.left)
+    piece = Piece(reader.read(size), size, last, is_whole)
+    to = receivers[place] if place < len(receivers) else ""
+    return PieceFor(to, stream, turn, number, piece, before - reader.left)

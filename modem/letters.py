@@ -2,6 +2,9 @@
 
 Of the time a message was said the last 12 bits of its second cross, so that one is taken to be at most 68 minutes old.
 Its sequence number is made of that second and its place within it: messages of one sender stay in order.
+
+Where words are to be short, as frames are small, that does not cross: messages come in the order in which they were
+said, and count as said when they have come. Nor does the number of a key that only counts messages.
 """
 
 from __future__ import annotations
@@ -14,10 +17,22 @@ import shapely
 from comms.said.announcement import Vertex
 from comms.said.bits import BitReader, BitWriter
 from comms.said.codec import LARGEST_INCARNATION, Header
-from comms.said.messages import Hotspot
+from comms.said.messages import Hotspot, Plan
 from comms.said.over_water import Around
 from comms.said.packing import get_message, put_message
-from comms.said.topics import TOPICS, Topic, number_of
+from comms.said.topics import (
+    CURVE,
+    HOTSPOT,
+    MISSION_OVER,
+    PLAN,
+    STATE,
+    TASK,
+    TASK_STATUS,
+    TOPICS,
+    Keep,
+    Topic,
+    number_of,
+)
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.stretches import Stretch
@@ -25,6 +40,9 @@ from modem.stretches import Stretch
 CROSSING: tuple[Topic | None, ...] = (*(topic for topic in TOPICS if topic.crossing is not None), None)
 """What may be said; None for a stretch."""
 KIND_BITS = (len(CROSSING) - 1).bit_length()
+BY_COORDINATOR = (TASK, MISSION_OVER)
+BY_VEHICLES: tuple[Topic | None, ...] = (TASK_STATUS, STATE, None, CURVE, PLAN, HOTSPOT)
+"""In short words, with what is said often first."""
 SECOND_BITS = 12
 MOST_A_SECOND = 64
 """Messages of a sender that are told apart within a second."""
@@ -46,60 +64,84 @@ class Said(NamedTuple):
 
 @dataclass(frozen=True)
 class Letters:
-    """Packs and opens messages for one fleet. `config`: of any of its modems."""
+    """Packs and opens messages for one fleet. `config`: of any of its modems. `heading_rad`: of the tracks."""
 
     config: ModemConfig
+    heading_rad: float = 0.0
 
     def pack(self, topic: Topic | None, said: Said) -> BitWriter:
         """The bits of a message. `said.header.sequence`: its place among those that were said in the same second.
 
         Raises WireError where it does not fit, as a place outside the mission's box.
         """
-        writer, header = BitWriter(), said.header
-        writer.write(CROSSING.index(topic), KIND_BITS)
+        writer, header, is_short = BitWriter(), said.header, self.config.is_small
+        if is_short:
+            kinds = BY_COORDINATOR if topic in BY_COORDINATOR else BY_VEHICLES
+            writer.write_count(kinds.index(topic), 0)
+        else:
+            writer.write(CROSSING.index(topic), KIND_BITS)
         writer.write_count(header.incarnation, 0)
-        writer.write(header.sent_ms // 1000 % (1 << SECOND_BITS), SECOND_BITS)
-        writer.write_count(min(header.sequence, MOST_A_SECOND - 1), 1)
+        if not is_short:
+            writer.write(header.sent_ms // 1000 % (1 << SECOND_BITS), SECOND_BITS)
+            writer.write_count(min(header.sequence, MOST_A_SECOND - 1), 1)
         if topic is not None and header.sender == COORDINATOR and topic.has_vehicle:
             vehicles = self.config.vehicles
             writer.write(vehicles.index(topic.vehicle_of(said.key)), (len(vehicles) - 1).bit_length())
-        if topic is not None and "{number}" in topic.pattern:
+        if topic is not None and self._has_its_number(topic):
             writer.write_count(number_of(said.key), 4)
         message = said.message
         if isinstance(message, Hotspot):
             message = replace(message, outline=with_fewer_corners(message.outline))
+        elif isinstance(message, Plan) and is_short:  # the farthest range alone counts
+            message = replace(message, r_adpt_m=message.r_adpt_m and (max(message.r_adpt_m),), r_eff_m=())
         put_message(writer, message, self._around(header.sent_ms // 1000 * 1000))
         return writer
 
-    def open(self, reader: BitReader, platform: str, now_ms: int) -> tuple[Topic | None, Said]:
-        """Topic and message of a letter from a platform. Raises WireError where it is none."""
-        kind = reader.read(KIND_BITS)
-        if kind >= len(CROSSING):
-            raise WireError("not a kind of message")
-        topic, incarnation = CROSSING[kind], reader.read_count(0)
+    def open(self, reader: BitReader, platform: str, now_ms: int, count: int = 0) -> tuple[Topic | None, Said]:
+        """Topic and message of a letter from a platform. `count`: of the letters of the same second that were opened
+        before. Raises WireError where it is none."""
+        is_short = self.config.is_small
+        topic, incarnation = self.topic_of(reader, platform), reader.read_count(0)
         if incarnation > LARGEST_INCARNATION:
             raise WireError("not an incarnation")
-        sent_s = now_ms // 1000 - (now_ms // 1000 - reader.read(SECOND_BITS)) % (1 << SECOND_BITS)
-        place = reader.read_count(1)
+        sent_s, place = now_ms // 1000, min(count, MOST_A_SECOND - 1)
+        if not is_short:
+            sent_s -= (sent_s - reader.read(SECOND_BITS)) % (1 << SECOND_BITS)
+            place = reader.read_count(1)
         if sent_s < 0 or place >= MOST_A_SECOND:
             raise WireError("a message from before the mission, or more in a second than there may be")
         by_coordinator = topic is not None and any(role.value == COORDINATOR for role in topic.writers)
         vehicle = platform
         if by_coordinator and topic is not None and topic.has_vehicle:
-            number = reader.read((len(self.config.vehicles) - 1).bit_length())
-            if number >= len(self.config.vehicles):
+            its_place = reader.read((len(self.config.vehicles) - 1).bit_length())
+            if its_place >= len(self.config.vehicles):
                 raise WireError("no vehicle of the fleet")
-            vehicle = self.config.vehicles[number]
-        number = reader.read_count(4) if topic is not None and "{number}" in topic.pattern else 0
-        if number > LARGEST_NUMBER:
+            vehicle = self.config.vehicles[its_place]
+        sequence = sent_s * MOST_A_SECOND + place
+        number = sequence % (LARGEST_NUMBER + 1)
+        if topic is not None and self._has_its_number(topic) and (number := reader.read_count(4)) > LARGEST_NUMBER:
             raise WireError(f"{number} is no number of a key")
         message = get_message(reader, Stretch if topic is None else topic.message, self._around(sent_s * 1000))
         key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
-        sender = COORDINATOR if by_coordinator else vehicle
-        return topic, Said(key, Header(sender, incarnation, sent_s * MOST_A_SECOND + place, sent_s * 1000), message)
+        return topic, Said(
+            key, Header(COORDINATOR if by_coordinator else vehicle, incarnation, sequence, sent_s * 1000), message
+        )
+
+    def topic_of(self, reader: BitReader, platform: str) -> Topic | None:
+        """The topic of a letter from a platform, of which no more is read. Raises WireError where it is none."""
+        is_short, by_hub = self.config.is_small, platform == self.config.hub
+        kinds = CROSSING if not is_short else BY_COORDINATOR if by_hub else BY_VEHICLES
+        kind = reader.read_count(0) if is_short else reader.read(KIND_BITS)
+        if kind >= len(kinds):
+            raise WireError("not a kind of message")
+        return kinds[kind]
+
+    def _has_its_number(self, topic: Topic) -> bool:
+        """Whether the number of a topic's keys crosses: where words are short, only if it is that of a thing."""
+        return "{number}" in topic.pattern and not (self.config.is_small and topic.keep is Keep.EVENTS)
 
     def _around(self, sent_ms: int) -> Around:
-        return Around(*self.config.low_m, *self.config.high_m, sent_ms)
+        return Around(*self.config.low_m, *self.config.high_m, sent_ms, self.config.is_small, self.heading_rad)
 
 
 def with_fewer_corners(outline: tuple[Vertex, ...]) -> tuple[Vertex, ...]:

@@ -13,7 +13,7 @@ from typing import Any
 
 from comms.node import Publication, Received, Step
 from comms.said.announcement import RunInfo
-from comms.said.bits import BitReader, BitWriter
+from comms.said.bits import BitReader
 from comms.said.codec import LARGEST_INCARNATION, Header, body_of, packed
 from comms.said.messages import (
     MOST_FRAMES,
@@ -29,24 +29,29 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.said.topics import COVERAGE, HEARD, MODEM_TX, TASK, Crossing, Topic
+from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, Crossing, Topic
 from comms.said.wire import WireError
-from modem.config import LEAST_PIECE_BITS, START_BITS, ModemConfig
+from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
 from modem.frames import FrameForm, start_number
-from modem.letters import COORDINATOR, Letters, Said
-from modem.streams import TURN_BITS, Piece, Receiving, Sending, cut_up
-from modem.stretches import Gathering, LayerOf, Stretch
+from modem.layers import Layers
+from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
+from modem.packets import STRETCH, Packets, Stream
+from modem.presence import REPORT_MS, Presence, seldom_ms
+from modem.streams import STREAMS, Receiving, Sending
+from modem.stretches import Gathering, Stretch, Told
 from modem.turns import turns_of
-from modem.waiting import Queue, Waiting, worth
+from modem.waiting import Queue, Waiting
+from planner.keep_out import KeepOut
 
 log = logging.getLogger("secondlook.modem")
 
-STRETCH = Crossing(3000, 300)
 STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
 FROM_DECK_MS = 10_000
 """For so long after it has left the deck it may still hear what was said there."""
+SILENT_CYCLES = 3
+"""For so long a vehicle is silent at most while its agent says states, if these tell nothing new."""
 DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
     "no frame of this run",
     "malformed frame",
@@ -54,8 +59,8 @@ DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
     "does not fit the water",
 )
 """Why frames that have come, or what is in them, are dropped; and last what cannot be said by modem."""
-MOST_BESIDE = 1024
-"""So many starts of a vehicle are told apart by a coordinator's modem that was started anew."""
+MOST_BESIDE, MOST_STARTS = 1024, 8
+"""So many starts of a vehicle are told apart by each of so many of the coordinator's modem."""
 
 
 class Modem:
@@ -67,28 +72,33 @@ class Modem:
         self._dropped: list[str] = []  # and not yet told
         self._letters = Letters(config)
         self._queue = Queue()
-        self._sending: dict[str, Sending] = {}
-        self._receiving: dict[str, Receiving] = {}
+        self._sending: dict[Stream, Sending] = {}
+        self._receiving: dict[Stream, Receiving] = {}
         self._starts: dict[str, int] = {}  # of the others, as their frames tell
         self._start = 0
         self._turns = turns_of(config)
-        self._spoke_ms = 0
-        self._form: FrameForm | None = None
+        self._form: FrameForm | None = None  # this and what follows: since the run's announcement
         self._run: RunInfo | None = None
         self._gathering: Gathering | None = None
-        self._layers: dict[tuple[str, int], LayerOf] = {}
         self._heard: list[Publication] = []
         self._on_deck: list[bytes] = []
         self._told = 0
         self._last_said: dict[str, tuple[int, Any]] = {}
-        self._acked: dict[str, int] = {}  # when each was acknowledged last
-        self._left_out = False  # whether the last packet had no acknowledgement
         self._said_at: Counter[int] = Counter()
+        self._opened_at: Counter[int] = Counter()
+        self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
+        self._held: list[Stretch] = []  # of the strip under way, which may be done yet
+        self._held_of = 0  # and its number
+        self._state_headers: dict[str, Header] = {}  # of the last states told here
+        self._state_told: dict[str, int] = {}  # and when that was
+        self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
+        self._last_frames_ms = 0
+        self._is_alive = False  # whether its agent has said a state since it spoke
         self._incarnation = 0
 
     def start(self, now_ms: int) -> Step:
         """Waits for the run's announcement."""
-        self._start = start_number(now_ms)
+        self._start = start_number(now_ms, self.config.start_bits)
         return Step()
 
     def on_message(self, received: Received, now_ms: int) -> Step:
@@ -117,15 +127,19 @@ class Modem:
         if now_ms < self.config.deck_ms:
             return self._step(now_ms)
         if self._form is not None and self._turns.is_now(now_ms):
-            self._spoke_ms = now_ms
             if (
                 self._gathering is not None
                 and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
             ):
                 self._say_stretch(self._gathering.flush(), now_ms)
-            frames = self._frames(self._form, self._turns.names(), now_ms)
+            silent_ms = self.config.cycle_ms * SILENT_CYCLES
+            is_alive = self._is_alive and now_ms - self._last_frames_ms >= silent_ms
+            frames = self._packets.next(
+                self._start, self._turns.names(), now_ms, is_alive=is_alive or self._turns.must_speak
+            )
             self._turns.has_spoken(now_ms, len(frames))
             if frames:
+                self._last_frames_ms, self._is_alive = now_ms, False
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
         step = self._step(now_ms)
         return Step((*publish, *step.publish), step.wake_ms, step.dropped)
@@ -134,16 +148,26 @@ class Modem:
         self._turns.begin(max(now_ms, self.config.deck_ms))
         self._run, self._form = run, FrameForm(self.config, run)
         for other in self.config.others:
-            self._sending[other] = Sending(self._form.window)
-            self._receiving[other] = self._receiver(other)
+            self._sending |= {(other, number): Sending(self._form.window) for number in range(STREAMS)}
+            self._receive_anew(other)
+        self._letters = Letters(self.config, run.grid.heading_rad)
+        self._layers = Layers(self.config, run)
+        self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
+        is_hub = self.config.platform == self.config.hub
+        keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
+        known = self.config.others if is_hub else (self.config.platform,)
+        self._presences = {one.vehicle: Presence(one, keep_out) for one in run.vehicles if one.vehicle in known}
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         if entry is not None and self.config.platform != self.config.hub:
             self._gathering = Gathering(entry)
 
-    def _receiver(self, other: str) -> Receiving:
-        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said."""
+    def _receive_anew(self, other: str) -> None:
+        """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is
+        what does not tell when it was said."""
         assert self._form is not None
-        return Receiving(self._form.window, in_order=other == self.config.hub)
+        in_order = other == self.config.hub or self._form.is_small
+        for number in range(STREAMS):
+            self._receiving[other, number] = Receiving(self._form.window, in_order=in_order)
 
     def _take(self, received: Received, now_ms: int) -> None:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
@@ -151,12 +175,18 @@ class Modem:
         is_hub = self.config.platform == self.config.hub
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
+        if topic.crossing.is_fine and self.config.is_small:
+            return
         if isinstance(message, Curve) and self._gathering is not None:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
         if not is_hub:
             self._incarnation = received.header.incarnation
+        if not is_hub and not self._is_news(received, now_ms):
+            return
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
             self._say_stretch(self._gathering.flush(), now_ms)
+        if isinstance(message, TaskStatus):
+            self._note_held(message, now_ms)
         about = _about(received)
         if topic.crossing.newest_only and topic.crossing.acknowledged and about == received.key:
             said = (received.header.incarnation, message)
@@ -168,15 +198,51 @@ class Modem:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
                 return
             to = (received.vehicle,)
+            self._note_strip(received.vehicle, message)  # type: ignore[arg-type]
         for platform in to:
             said_here = Said(received.key, received.header, message)
             self._enqueue(topic, topic.crossing, said_here, platform, now_ms, about)
 
+    def _is_news(self, received: Received, now_ms: int) -> bool:
+        """Whether what an agent says of itself and its work is not known at the coordinator's, or will not be."""
+        message, incarnation = received.message, received.header.incarnation
+        presence = self._presences.get(self.config.platform)
+        if isinstance(message, TaskStatus):
+            said = incarnation, message.strip, message.state
+            if said == self._last_status and not self._queue.holds(_about(received)):
+                return False
+            self._last_status = said
+            if presence is not None:
+                presence.hear_status(message, now_ms)
+        elif isinstance(message, AgentState) and presence is not None:
+            if not presence.is_news(message, incarnation, now_ms, seldom_ms(self.config)):
+                self._is_alive = True
+                return False
+            presence.hear_state(message, incarnation, now_ms)
+        return True
+
+    def _note_strip(self, vehicle: str, task: Task) -> None:
+        if task.length_m > 0 and vehicle in self._presences:
+            self._presences[vehicle].strips[task.strip] = task.as_strip
+
+    def _note_held(self, status: TaskStatus, now_ms: int) -> None:
+        """What was seen of the strip under way is said where that ends and is not done."""
+        if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
+            self._held_of = status.strip
+        elif status.strip == self._held_of:
+            held, self._held = self._held, []
+            for stretch in held if status.state is not TaskState.DONE else ():
+                self._enqueue_stretch(stretch, now_ms)
+
     def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
-        if stretch is not None:
-            header = Header(self.config.platform, self._incarnation, 0, now_ms)
-            said = Said("", header, stretch)
-            self._enqueue(None, STRETCH, said, self.config.hub, now_ms)
+        if stretch is not None and self.config.platform in self._layers.by_strips:
+            self._held.append(stretch)
+        elif stretch is not None:
+            self._enqueue_stretch(stretch, now_ms)
+
+    def _enqueue_stretch(self, stretch: Stretch, now_ms: int) -> None:
+        header = Header(self.config.platform, self._incarnation, 0, now_ms)
+        self._enqueue(None, STRETCH, Said("", header, stretch), self.config.hub, now_ms)
 
     def _enqueue(
         self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int, about: str = ""
@@ -200,118 +266,13 @@ class Modem:
         if self.dropped[why] == 1:
             log.warning("modem of %s: %s: %s (said once)", self.config.platform, why, detail)
 
-    # What is said.
-
-    def _frames(self, form: FrameForm, polled: str | None, now_ms: int) -> tuple[bytes, ...]:
-        self._queue.drop_old(now_ms)
-        frames: list[bytes] = []
-        said: set[tuple[str, int]] = set()  # pieces that are in this packet already
-        while len(frames) < self.config.frames:
-            writer = BitWriter()
-            has_acks = not frames and self._write_acks(form, writer)
-            if frames:
-                writer.write(0, 1)
-            while not (form.is_small and writer.bits > 1) and self._write_next(form, writer, said, now_ms):
-                pass
-            if not has_acks and writer.bits == 1 and (frames or not self._turns.must_speak):
-                break
-            frames.append(form.pack(self.config.platform, self._start, writer, polled))
-        return tuple(frames)
-
-    def _write_acks(self, form: FrameForm, writer: BitWriter) -> bool:
-        """What has come of the others, where that is owed, and as far as it has room: in a packet's first frame. Where
-        it leaves little room for anything else, or too little for a piece that waits, it is left out every other time.
-        """
-        a_frame = (form.room - 1 - len(self.config.others)) // (START_BITS + form.window.ack_bits)
-        owed = sorted(
-            (name for name in self.config.others if self._receiving[name].owes),
-            key=lambda name: self._acked.get(name, 0),
-        )[:a_frame]
-        left = form.room - 1 - len(owed) * (1 + START_BITS + form.window.ack_bits)
-        is_tight = left < max(form.room // 2, self._largest_piece_bits(form))
-        if owed and is_tight and not self._left_out and self._has_more_than_acks():
-            owed = []
-        self._left_out = not owed
-        writer.write(bool(owed), 1)
-        for name in self.config.others if owed else ():
-            if len(self.config.others) > 1:
-                writer.write(name in owed, 1)
-            if name in owed:
-                self._acked[name] = self._spoke_ms
-                writer.write(self._starts.get(name, 0), START_BITS)
-                self._receiving[name].acknowledge(writer)
-        return bool(owed)
-
-    def _largest_piece_bits(self, form: FrameForm) -> int:
-        """That a piece which may be said takes, with all about it."""
-        pieces = (piece for sending in self._sending.values() for _, piece, _, _ in sending.may_be_said())
-        sizes = (one.bits + form.size_bits * (not one.is_whole) for one in pieces)
-        return max(sizes, default=0) + self.config.about_piece_bits
-
-    def _write_next(self, form: FrameForm, writer: BitWriter, said: set[tuple[str, int]], now_ms: int) -> bool:
-        """Writes into a frame what is worth most and has room, if anything is."""
-        left = form.room - writer.bits
-        about = self.config.about_piece_bits
-        pieces = [
-            (worth(value, STRETCH.ttl_s, queued_ms, now_ms) / piece.bits, name, number, piece)
-            for name, sending in self._sending.items()
-            for number, piece, value, queued_ms in sending.may_be_said()
-            if (name, number) not in said and piece.bits + about + form.size_bits * (not piece.is_whole) <= left
-        ]
-        best = max(pieces, key=lambda one: one[0], default=None)
-        for one in self._queue.best_first(now_ms):
-            if best is not None and best[0] >= one.worth(now_ms):
-                break
-            if one.crossing.acknowledged or form.is_small or one.said.bits + 2 > form.room - 1:
-                room = left - about
-                if one.said.bits > room:
-                    room -= form.size_bits
-                if room < min(LEAST_PIECE_BITS, one.said.bits) or not self._may_begin(one.to):
-                    continue
-                most = form.room - 1 - about - form.size_bits
-                self._queue.remove(one)
-                self._sending[one.to].add(cut_up(one.said, room, most), one.crossing.value, one.queued_ms)
-                return self._write_next(form, writer, said, now_ms)
-            if one.said.bits + 2 <= left:
-                self._queue.remove(one)
-                writer.write(0b10, 2)
-                writer.write(one.said.value, one.said.bits)
-                return True
-        if best is None:
-            return False
-        _, name, number, piece = best
-        said.add((name, number))
-        self._sending[name].note_said(number)
-        self._write_piece(form, writer, name, number, piece)
-        return True
-
-    def _may_begin(self, to: str) -> bool:
-        """Whether there is room in the window for the first piece of another message."""
-        sending = self._sending[to]
-        return len(sending.unheard) < sending.window.size
-
-    @property
-    def _to_bits(self) -> int:
-        return (len(self.config.others) - 1).bit_length()
-
-    def _write_piece(self, form: FrameForm, writer: BitWriter, name: str, number: int, piece: Piece) -> None:
-        if not form.is_small:
-            writer.write(0b11, 2)
-        writer.write(self.config.others.index(name), self._to_bits)
-        writer.write(self._sending[name].turn, TURN_BITS)
-        writer.write(number % (1 << form.window.number_bits), form.window.number_bits)
-        writer.write(piece.first, 1)
-        writer.write(piece.last, 1)
-        if not form.is_small and not piece.is_whole:
-            writer.write(piece.bits, form.size_bits)
-        writer.write(piece.value, piece.bits)
-
     # What is heard.
 
     def _hear(self, packet: Packet, now_ms: int) -> Step:
         """Takes what has come of a packet, and answers it if that is its turn."""
         assert self._form is not None
         may_be_on_deck = now_ms < self.config.deck_ms + FROM_DECK_MS
+        heard: set[str] = set()
         for frame in packet.frames:
             on_deck = self._form.unpack_on_deck(frame) if may_be_on_deck else None
             opened = on_deck or self._form.unpack(frame)
@@ -322,18 +283,22 @@ class Modem:
             platform, start, reader, polled = opened
             if on_deck is None:
                 self._turns.has_heard(platform, polled, now_ms)
-            known = 0 if self._start == 0 else start  # who is there from the beginning has begun with all others
-            if start != self._starts.get(platform, known):  # it has forgotten what it has said and heard
-                self._receiving[platform] = self._receiver(platform)
-                self._sending[platform].begin_again()
+            # Who is there from the beginning knows that the others were, too; who was started anew does not.
+            if start != self._starts.get(platform, start if self._start else 0):  # it has forgotten all
+                self._receive_anew(platform)
+                for number in range(STREAMS):
+                    self._sending[platform, number].begin_again()
             self._starts[platform] = start
+            heard.add(platform)
             try:
                 if on_deck is not None:
-                    self._tell(platform, *self._letters.open(reader, platform, now_ms), now_ms)
+                    self._open(reader, platform, now_ms)
                 else:
                     self._read(self._form, platform, reader, now_ms)
             except WireError as error:
                 self._drop(MALFORMED, f"{platform}: {error}")
+        for platform in sorted(heard):
+            self._tell_by_reckoning(platform, now_ms)
         return self._speak(now_ms) if self._turns.must_speak else self._step(now_ms)
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
@@ -344,33 +309,69 @@ class Modem:
             elif part.to != self.config.platform:
                 pass
             elif isinstance(part, PieceFor):
-                for letter in self._receiving[platform].take(part.turn, part.number, part.piece):
-                    self._tell(platform, *self._letters.open(letter, platform, now_ms), now_ms)
+                for letter in self._receiving[platform, part.stream].take(part.turn, part.number, part.piece):
+                    self._open(letter, platform, now_ms)
             elif part.start == self._start:
-                self._sending[platform].hear(part.turn, part.missing, part.come)
+                self._sending[platform, part.stream].hear(part.turn, part.missing, part.come)
+
+    def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
+        second = now_ms // 1000
+        topic, said = self._letters.open(reader, platform, now_ms, self._opened_at[second])
+        self._opened_at = Counter({second: self._opened_at[second] + 1})
+        self._tell(platform, topic, said, now_ms)
 
     def _tell(self, platform: str, topic: Topic | None, said: Said, now_ms: int) -> None:
         """Tells what was heard to the nodes here."""
         assert self._run is not None
         header, message = said.header, said.message
-        if (header.sender == COORDINATOR) != (platform == self.config.hub):
+        by_hub = platform == self.config.hub
+        by_whom = None if by_hub else next(one.role for one in self._run.vehicles if one.vehicle == platform)
+        is_its = topic is None or by_whom is None or by_whom in topic.writers
+        if (header.sender == COORDINATOR) != by_hub or not is_its:
             self._drop(NOT_ITS, f"{platform}: {said.key}")
             return
         if topic is TASK and said.key.split("/")[2] != self.config.platform:
             return
+        if isinstance(message, Task):
+            self._last_status = None  # whoever says it again has not heard the answer
+            self._note_strip(self.config.platform, message)
+        if isinstance(message, AgentState):
+            header = self._in_order(platform, header, now_ms)
+            self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
+        elif isinstance(message, TaskStatus):
+            self._presences[platform].hear_status(message, now_ms)
+            strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
+            # The map is told before the word.
+            self._tell_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
         if topic is not None:
             self._say_here(said.key, header, message)
         if isinstance(message, Curve | Stretch) and platform != self.config.hub:
-            layer = self._layers.get((platform, header.incarnation))
-            if layer is None:
-                entry = next(one for one in self._run.vehicles if one.vehicle == platform)
-                layer = self._layers[platform, header.incarnation] = LayerOf(entry, self._run.grid.spec)
-            told = layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
-            for name, tile in told:
-                self._told += 1
-                key = COVERAGE.key(vehicle=platform, tile=name)
-                told_by = layer_start(header.incarnation, self._start)
-                self._say_here(key, header._replace(incarnation=told_by, sequence=self._told), tile)
+            self._tell_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
+
+    def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:
+        header = header._replace(incarnation=layer_start(header.incarnation, self._start))
+        for name, tile in told:
+            self._told += 1
+            self._say_here(COVERAGE.key(vehicle=platform, tile=name), header._replace(sequence=self._told), tile)
+
+    def _tell_by_reckoning(self, platform: str, now_ms: int) -> None:
+        """Who is heard is there: its state as it is by now, where it was not told for a while."""
+        before = self._state_headers.get(platform)
+        if before is None or now_ms - self._state_told[platform] < REPORT_MS:
+            return
+        state = self._presences[platform].at(now_ms)
+        header = before._replace(sequence=now_ms // 1000 * MOST_A_SECOND, sent_ms=now_ms)
+        self._say_here(STATE.key(vehicle=platform), self._in_order(platform, header, now_ms), state)
+
+    def _in_order(self, platform: str, header: Header, now_ms: int) -> Header:
+        """A state's header as it is told here: one that was reckoned before does not make it an old one."""
+        before = self._state_headers.get(platform, header)
+        if header.incarnation == before.incarnation:
+            sequence = header.sequence if before is header else max(header.sequence, before.sequence + 1)
+            header = header._replace(sequence=sequence, sent_ms=max(header.sent_ms, before.sent_ms))
+        if header.incarnation >= before.incarnation:
+            self._state_headers[platform], self._state_told[platform] = header, now_ms
+        return header
 
     def _say_here(self, key: str, header: Header, message: Any) -> None:
         heard = Heard(key, packed(header, body_of(message)))
@@ -387,15 +388,14 @@ class Modem:
         return Step(tuple(publish), None if next_ms is None else max(next_ms, self.config.deck_ms), dropped)
 
     def _has_anything_to_say(self) -> bool:
-        return self._has_more_than_acks() or any(one.owes for one in self._receiving.values())
+        is_owed = any(one.owes for one in self._receiving.values())
+        is_quiet = not len(self._queue) and all(one.is_quiet for one in self._sending.values())
+        return self._is_alive or is_owed or not is_quiet
 
     def _bits_to_say(self) -> int:
         """Bits of what waits, but for what is about it."""
-        pieces = (piece.bits for sending in self._sending.values() for _, piece, _, _ in sending.may_be_said())
-        return self._queue.bits + sum(pieces)
-
-    def _has_more_than_acks(self) -> bool:
-        return bool(len(self._queue) or any(one.unheard for one in self._sending.values()))
+        pieces = (one.piece.bits for sending in self._sending.values() for one in sending.unheard.values())
+        return self._queue.bits + sum(pieces) + sum(sending.rest.bits for sending in self._sending.values())
 
 
 def layer_start(incarnation: int, start: int) -> int:
@@ -404,11 +404,9 @@ def layer_start(incarnation: int, start: int) -> int:
     One that was started anew knows nothing of what it has told before: what it tells from then on counts beside that,
     as that of a vehicle that was started anew does.
     """
-    return (
-        incarnation
-        if start == 0
-        else LARGEST_INCARNATION - (MOST_BESIDE << START_BITS) + (incarnation % MOST_BESIDE << START_BITS) + start
-    )
+    if start == 0:
+        return incarnation
+    return LARGEST_INCARNATION - (MOST_BESIDE - incarnation % MOST_BESIDE) * MOST_STARTS + start
 
 
 def _about(received: Received) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader, BitWriter
@@ -14,7 +15,7 @@ from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Acknowledgement, Letter, PieceFor, parts_of
 from modem.frames import FrameForm
-from modem.letters import CROSSING, KIND_BITS, Letters
+from modem.letters import Letters
 from modem.streams import Piece
 
 STRETCH = "stretch"
@@ -38,28 +39,13 @@ class Contents:
         return sum(self.said.values()) + self.acknowledgements + self.about
 
 
-@dataclass
-class _Heard:
-    """A piece that was heard: of which topic it is, "" as long as that is not known, and where its bits are counted."""
+class _Heard(NamedTuple):
+    """A piece that was heard: of which topic it is, "" where that is not known; how many of its bits are filled up with
+    zeros, as its message ends before it does."""
 
     piece: Piece
-    bits: int
-    name: str = ""
-    counted: list[Counter[str]] = field(default_factory=list)
-
-    def count(self, counter: Counter[str]) -> None:
-        """Counts its bits there."""
-        self.counted.append(counter)
-        counter[self.name] += self.bits
-
-    def call(self, name: str) -> None:
-        """Its topic is known now."""
-        for counter in self.counted:
-            counter[self.name] -= self.bits
-            counter[name] += self.bits
-            if not counter[self.name]:
-                del counter[self.name]
-        self.name = name
+    name: str
+    filled: int
 
 
 class Eavesdropper:
@@ -67,9 +53,9 @@ class Eavesdropper:
 
     def __init__(self, config: ModemConfig, run: RunInfo) -> None:
         self._config = config
-        self._form, self._letters = FrameForm(config, run), Letters(config)
-        # By sender and receiver: the turn, and the pieces by their numbers.
-        self._pieces: dict[tuple[str, str], tuple[int, dict[int, _Heard]]] = {}
+        self._form, self._letters = FrameForm(config, run), Letters(config, run.grid.heading_rad)
+        # By sender, receiver and stream: the turn, and the pieces by their numbers.
+        self._pieces: dict[tuple[str, str, int], tuple[int, dict[int, _Heard]]] = {}
         self._starts: dict[str, int] = {}
 
     def open(self, packet: Packet, now_ms: int) -> Contents:
@@ -91,11 +77,10 @@ class Eavesdropper:
                     elif isinstance(part, Letter):
                         said[_name(part.topic)] += part.bits
                     else:
-                        filled = self._filled(platform, part.piece, now_ms)
-                        one, is_again = self._hear(platform, part, part.bits - filled)
+                        one, is_again = self._hear(platform, part, now_ms)
                         for counter in (said, again) if is_again else (said,):
-                            one.count(counter)
-                        unused += filled
+                            counter[one.name] += part.bits - one.filled
+                        unused += one.filled
             except WireError:
                 continue
             unused += min(reader.left, self._form.room)
@@ -103,31 +88,32 @@ class Eavesdropper:
         return Contents(said, again, acknowledgements, about, unused)
 
     def _forget(self, platform: str, start: int) -> None:
-        """A modem that was started anew numbers its pieces from 0 again."""
+        """A modem that was started anew numbers its pieces from 0 again, and where turns are not told the others do
+        so, too, with those for it."""
         self._starts[platform] = start
-        self._pieces = {pair: pieces for pair, pieces in self._pieces.items() if pair[0] != platform}
+        ends = 1 if self._form.window.turn_bits else 2
+        self._pieces = {stream: pieces for stream, pieces in self._pieces.items() if platform not in stream[:ends]}
 
-    def _hear(self, platform: str, part: PieceFor, bits: int) -> tuple[_Heard, bool]:
-        """A piece, which takes so many bits, and whether it was said before. What its message is about its first piece
-        tells, which may come later."""
-        turn, pieces = self._pieces.get((platform, part.to), (part.turn, {}))
+    def _hear(self, platform: str, part: PieceFor, now_ms: int) -> tuple[_Heard, bool]:
+        """A piece, and whether it was said before. What its message is about its first piece tells, which is said
+        before the others."""
+        stream = platform, part.to, part.stream
+        turn, pieces = self._pieces.get(stream, (part.turn, {}))
         if turn != part.turn:
             pieces = {}
-        self._pieces[platform, part.to] = part.turn, pieces
+        self._pieces[stream] = part.turn, pieces
         number = self._number(pieces, part.number)
         if number in pieces:
             return pieces[number], True
-        one = pieces[number] = _Heard(part.piece, bits)
-        if part.piece.first:
-            kind = part.piece.value >> max(0, part.piece.bits - KIND_BITS)
-            one.name = _name(CROSSING[kind]) if kind < len(CROSSING) else ""
-        elif number - 1 in pieces:
-            one.name = pieces[number - 1].name
-        while one.name and (behind := pieces.get(number + 1)) is not None and not behind.name:
-            number += 1
-            if behind.piece.first:
-                break
-            behind.call(one.name)
+        message = [part.piece]
+        first, before = number, pieces.get(number - 1)
+        while before is not None and not before.piece.last:
+            message.insert(0, before.piece)
+            first, before = first - 1, pieces.get(first - 2)
+        name, filled = "", 0
+        if first == 0 or before is not None or part.piece.whole:
+            name, filled = self._about(platform, message, now_ms)
+        one = pieces[number] = _Heard(part.piece, name, filled)
         return one, False
 
     def _number(self, pieces: Mapping[int, _Heard], told: int) -> int:
@@ -135,16 +121,18 @@ class Eavesdropper:
         low = max(pieces, default=-1) - self._form.window.size + 1
         return self._form.window.near(told, max(0, low))
 
-    def _filled(self, platform: str, piece: Piece, now_ms: int) -> int:
-        """In small frames a message that is whole may end before its piece does."""
-        if not (self._form.is_small and piece.is_whole):
-            return 0
-        whole = BitWriter()
-        whole.write(piece.value, piece.bits)
-        whole.write(0, -piece.bits % 8)
-        reader = BitReader(whole.to_bytes())
+    def _about(self, platform: str, message: list[Piece], now_ms: int) -> tuple[str, int]:
+        """What a message is about of which these pieces were said, and by how many bits it ends before they do, which
+        in small frames it may."""
+        said = BitWriter()
+        for piece in message:
+            said.write(piece.value, piece.bits)
+        name = _name(self._letters.topic_of(BitReader(said.to_bytes()), platform))
+        if not (self._form.is_small and message[-1].last):
+            return name, 0
+        reader = BitReader(said.to_bytes())
         self._letters.open(reader, platform, now_ms)
-        return max(0, reader.left - -piece.bits % 8)
+        return name, max(0, reader.left - -said.bits % 8)
 
 
 def _name(topic: Topic | None) -> str:

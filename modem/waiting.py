@@ -42,8 +42,8 @@ class Queue:
 
     @property
     def bits(self) -> int:
-        """Of all of them."""
-        return sum(one.said.bits for one in self._waiting.values())
+        """Of all of them, but for what may as well be left out."""
+        return sum(one.said.bits for one in self._waiting.values() if not one.crossing.is_fine)
 
     def add(self, one: Waiting) -> None:
         """Takes a message."""
@@ -53,6 +53,10 @@ class Queue:
                     del self._waiting[number]
         self._waiting[self._count] = one
         self._count += 1
+
+    def holds(self, key: str) -> bool:
+        """Whether a message about something waits."""
+        return any(one.key == key for one in self._waiting.values())
 
     def remove(self, one: Waiting) -> None:
         """It is said now."""

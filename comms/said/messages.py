@@ -18,6 +18,7 @@ import numpy as np
 from comms.said.announcement import RunInfo, Vertex
 from comms.said.over_water import (
     Counted,
+    Fine,
     Follows,
     Heading,
     Length,
@@ -228,13 +229,14 @@ class PlannedTrack:
 
     number: Annotated[Count, Follows(0, as_two_before=True)]
     across_m: Annotated[Metres, Length(0.5, signed=True), Follows(3, as_two_before=True)]
-    start_x_m: Annotated[PlaceX, Follows(3, "end_x_m", as_two_before=True)]
-    start_y_m: Annotated[PlaceY, Follows(3, "end_y_m", as_two_before=True)]
-    end_x_m: Annotated[PlaceX, Follows(3, "start_x_m", as_two_before=True)]
-    end_y_m: Annotated[PlaceY, Follows(3, "start_y_m", as_two_before=True)]
+    start_x_m: Annotated[PlaceX, Follows(1, "end_x_m", as_two_before=True, aside=("across_m", "x"))]
+    start_y_m: Annotated[PlaceY, Follows(1, "end_y_m", as_two_before=True, aside=("across_m", "y"))]
+    end_x_m: Annotated[PlaceX, Follows(1, "start_x_m", as_two_before=True, aside=("across_m", "x"))]
+    end_y_m: Annotated[PlaceY, Follows(1, "start_y_m", as_two_before=True, aside=("across_m", "y"))]
     flown: YesNo
 
 
+StripNumber = Annotated[Count, Counted(4, coarse=(5, 1))]
 RangeBeside = Annotated[Count, Counted(6), Follows(3)]
 """A range in whole metres, beside others that are much the same."""
 
@@ -261,7 +263,7 @@ class Curve:
     track: Count
     range_bin_m: Annotated[Metres, Near(1.0, 0.01)]
     p_detect: Annotated[ProbabilityCurve, Profile()]
-    r_eff_m: Annotated[Count, Counted(6)]
+    r_eff_m: Annotated[Count, Counted(6), Fine(0)]
 
     @property
     def detection_curve(self) -> DetectionCurve | None:
@@ -385,12 +387,12 @@ class Task:
     """The coordinator's word to one vehicle. It suffices by itself."""
 
     action: TaskAction
-    strip: Count
+    strip: StripNumber
     start_x_m: Annotated[PlaceX, _WITH_A_PLACE]
     start_y_m: Annotated[PlaceY, _WITH_A_PLACE]
     heading_rad: Annotated[Radians, Heading(13), _WITH_A_STRIP]
     length_m: Annotated[Metres, Length(), _WITH_A_STRIP]
-    width_m: Annotated[Metres, Counted(7, 1.0), _WITH_A_STRIP]
+    width_m: Annotated[Metres, Counted(7, 1.0, coarse=(5, 2.0)), _WITH_A_STRIP]
 
     @property
     def as_strip(self) -> Strip:
@@ -414,10 +416,10 @@ class TaskState(enum.Enum):
 class TaskStatus:
     """How a task stands. `progress`: share of the strip's length swept; `ends_ms`: when it expects to be done."""
 
-    strip: Count
+    strip: StripNumber
     state: TaskState
-    progress: Probability
-    ends_ms: Annotated[Milliseconds, Moment()]
+    progress: Annotated[Probability, Fine(0.0)]
+    ends_ms: Annotated[Milliseconds, Moment(), Fine(0)]
     reason: Annotated[Text, NotOverWater("")]
 
 

@@ -20,11 +20,18 @@ from comms.said.wire import LARGEST_MS, Metres, WireError
 
 PLACE_M = 0.5
 """To which a place is known over water."""
+COARSE_M = 4.0
+"""To which places and lengths are known where words are to be short."""
+COARSE_MS, COARSE_MOMENTS = 8000, 511
+"""A moment there is one of so many, so far apart."""
+COARSE_HEADING_BITS = 9
+COARSE_SHARES = 15
 LATE_S = 600
 """So long before it is said a moment may lie."""
-CURVE_STEP = 500
+CURVE_STEP, COARSE_CURVE_STEP = 500, 1000
 """Centimetres between the points of P(y) that are sent."""
-CURVE_LEVELS = 63
+CURVE_BITS, COARSE_CURVE_BITS = 6, 4
+"""Of each."""
 HIGHEST_P_DETECT = 0.999
 """On the wire."""
 
@@ -32,13 +39,23 @@ HIGHEST_P_DETECT = 0.999
 @dataclass(frozen=True)
 class Around:
     """What sender and receiver both know: the box about all places of the mission, in metres of the mission frame, and
-    when the message was said, in milliseconds of the mission. Raises ValueError where this is no box or no time."""
+    when the message was said, in milliseconds of the mission.
+
+    `coarse`: words are to be short, for frames in which few bits fit. Places and lengths then cross to 4 m, headings
+    beside those of the tracks, which run along `heading_rad` or back, or across; P(y) crosses at every 10th metre, and
+    what is only good to know (`Fine`) not at all. A moment crosses as it is, whenever the message was said: `sent_ms`
+    may then be when it has come.
+
+    Raises ValueError where this is no box or no time.
+    """
 
     low_x_m: float
     low_y_m: float
     high_x_m: float
     high_y_m: float
     sent_ms: int
+    coarse: bool = False
+    heading_rad: float = 0.0
 
     def __post_init__(self) -> None:
         sides_m = (self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m)
@@ -52,10 +69,11 @@ class Around:
 
 
 class Number:
-    """How a field's value becomes a whole number of steps from 0 and back. `order`: of its exp-Golomb code, where no
-    number is the largest."""
+    """How a field's value becomes a whole number of steps from 0 and back."""
 
-    order = 0
+    def order(self, around: Around) -> int:
+        """Of its exp-Golomb code, where no number is the largest."""
+        return 0
 
     def steps(self, value: Any, around: Around) -> int:
         """The steps of a value; any may be outside of what is allowed, which is looked at after this."""
@@ -79,83 +97,118 @@ class Number:
 
 @dataclass(frozen=True)
 class Place(Number):
-    """East, "x", or north, "y", in the mission's box, to 0.5 m. One outside of the box does not fit."""
+    """East, "x", or north, "y", in the mission's box, to 0.5 m, coarse to 4 m. One outside of the box does not fit."""
 
     axis: str
 
     def steps(self, value: float, around: Around) -> int:
-        return round((value - self._ends_m(around)[0]) / PLACE_M)
+        return round((value - self._ends_m(around)[0]) / _place_m(around))
 
     def value(self, steps: int, around: Around) -> float:
-        return self._ends_m(around)[0] + steps * PLACE_M
+        return self._ends_m(around)[0] + steps * _place_m(around)
 
     def most(self, around: Around) -> int:
         low_m, high_m = self._ends_m(around)
-        return math.ceil((high_m - low_m) / PLACE_M)
+        return math.ceil((high_m - low_m) / _place_m(around))
 
     def _ends_m(self, around: Around) -> tuple[float, float]:
         x_m, y_m = (around.low_x_m, around.high_x_m), (around.low_y_m, around.high_y_m)
         return x_m if self.axis == "x" else y_m
 
 
+def _place_m(around: Around) -> float:
+    return COARSE_M if around.coarse else PLACE_M
+
+
 @dataclass(frozen=True)
 class Length(Number):
-    """A length that is at most the mission's box from corner to corner, to `step_m`; `signed`: to either side."""
+    """A length that is at most the mission's box from corner to corner, to `step_m`, coarse to 4 m; `signed`: to either
+    side."""
 
     step_m: float = 1.0
     signed: bool = False
 
     def steps(self, value: float, around: Around) -> int:
-        return round(value / self.step_m) + self.signed * self._reach(around)
+        return round(value / self._step_m(around)) + self.signed * self._reach(around)
 
     def value(self, steps: int, around: Around) -> float:
-        return (steps - self.signed * self._reach(around)) * self.step_m
+        return (steps - self.signed * self._reach(around)) * self._step_m(around)
 
     def most(self, around: Around) -> int:
         return self._reach(around) * (1 + self.signed)
 
     def _reach(self, around: Around) -> int:
-        return math.ceil(around.longest_m / self.step_m)
+        return math.ceil(around.longest_m / self._step_m(around))
+
+    def _step_m(self, around: Around) -> float:
+        return max(self.step_m, COARSE_M) if around.coarse else self.step_m
 
 
 @dataclass(frozen=True)
 class Heading(Number):
     """A heading in so many bits, as one in [0, 2 pi). A strip's has 13, steps of 0.044 degrees: half of one moves the
     far end of a strip of 2 km by 0.8 m. That of a vehicle under way has 6, steps of 5.6 degrees: all that hangs on it
-    is its next turn."""
+    is its next turn.
+
+    Coarse it has 9 at most, as how far it is from one of the tracks' own four, up, down and across: the nearer, the
+    fewer bits."""
 
     bits: int
 
     def steps(self, value: float, around: Around) -> int:
-        return round(value / math.tau * (1 << self.bits)) % (1 << self.bits)
+        if not around.coarse:
+            return round(value / math.tau * (1 << self.bits)) % (1 << self.bits)
+        quarter = 1 << self._coarse_bits - 2
+        from_tracks = round((value - around.heading_rad) / math.tau * (4 * quarter)) % (4 * quarter)
+        nearest = (from_tracks + quarter // 2) // quarter
+        return 4 * folded(from_tracks - nearest * quarter) + nearest % 4
 
     def value(self, steps: int, around: Around) -> float:
-        return steps * math.tau / (1 << self.bits)
+        if not around.coarse:
+            return steps * math.tau / (1 << self.bits)
+        from_tracks = (steps % 4 << self._coarse_bits - 2) + unfolded(steps // 4)
+        return (around.heading_rad + from_tracks * math.tau / (1 << self._coarse_bits)) % math.tau
 
-    def most(self, around: Around) -> int:
-        return (1 << self.bits) - 1
+    def most(self, around: Around) -> int | None:
+        return None if around.coarse else (1 << self.bits) - 1
+
+    def order(self, around: Around) -> int:
+        return 2
+
+    def checked(self, steps: int, around: Around) -> int:
+        if around.coarse and steps > (4 << self._coarse_bits - 2) + 3:
+            raise WireError(f"{steps} steps are no heading")
+        return super().checked(steps, around)
+
+    @property
+    def _coarse_bits(self) -> int:
+        return min(self.bits, COARSE_HEADING_BITS)
 
 
 @dataclass(frozen=True)
 class Share(Number):
-    """A share or a probability from 0 to 1, in 127 steps: 0 and 1 are exact."""
+    """A share or a probability from 0 to 1, in 127 steps, coarse in 15: 0 and 1 are exact."""
 
     def steps(self, value: float, around: Around) -> int:
-        return round(value * 127)
+        return round(value * self.most(around))
 
     def value(self, steps: int, around: Around) -> float:
-        return steps / 127
+        return steps / self.most(around)
 
     def most(self, around: Around) -> int:
-        return 127
+        return COARSE_SHARES if around.coarse else 127
 
 
 @dataclass(frozen=True)
 class Moment(Number):
     """A time as whole seconds from when the message was said, rounded up: 12 bits to 24 minutes ahead, 14 to 92, 16 to
-    228. 0 ms stands for none and stays so. What lies more than `LATE_S` before does not fit."""
+    228. 0 ms stands for none and stays so. What lies more than `LATE_S` before does not fit.
 
-    order = 11
+    Coarse it is rounded up to 8 s, and told as its place on a clock that goes round in 68 minutes, in 9 bits: who hears
+    it takes it for the one that is at most `LATE_S` ago. One farther ahead is told as the farthest."""
+
+    def order(self, around: Around) -> int:
+        return 11
 
     def steps(self, value: int, around: Around) -> int:
         if value == 0:
@@ -163,15 +216,25 @@ class Moment(Number):
         ahead_s = -((around.sent_ms - value) // 1000)
         if ahead_s < -LATE_S or around.sent_ms + ahead_s * 1000 > LARGEST_MS:
             raise WireError(f"{value} ms is too long before it is said, at {around.sent_ms} ms, or too late")
-        return LATE_S + 1 + ahead_s
+        if not around.coarse:
+            return LATE_S + 1 + ahead_s
+        farthest = around.sent_ms // COARSE_MS + COARSE_MOMENTS // 2
+        return 1 + min(-(-value // COARSE_MS), farthest) % COARSE_MOMENTS
 
     def value(self, steps: int, around: Around) -> int:
         if steps == 0:
             return 0
-        value = around.sent_ms + (steps - LATE_S - 1) * 1000
-        if value <= 0:
-            raise WireError("a moment is not after the mission's start")
+        if around.coarse:
+            earliest = max(1, (around.sent_ms - LATE_S * 1000) // COARSE_MS)
+            value = (earliest + (steps - 1 - earliest) % COARSE_MOMENTS) * COARSE_MS
+        else:
+            value = around.sent_ms + (steps - LATE_S - 1) * 1000
+        if not 0 < value <= LARGEST_MS:
+            raise WireError("a moment is not after the mission's start, or too late")
         return value
+
+    def most(self, around: Around) -> int | None:
+        return COARSE_MOMENTS if around.coarse else None
 
 
 @dataclass(frozen=True)
@@ -192,16 +255,24 @@ class OneOf(Number):
 
 @dataclass(frozen=True)
 class Counted(Number):
-    """A number from 0 without a bound of its own, in steps of `step`: `order` + 1 bits below 2^order of them."""
+    """A number from 0 without a bound of its own, in steps of `step`: `few` + 1 bits below 2^few of them. `coarse`:
+    both, where words are to be short."""
 
-    order: int = 4
+    few: int = 4
     step: float = 1
+    coarse: tuple[int, float] | None = None
+
+    def order(self, around: Around) -> int:
+        return self.coarse[0] if around.coarse and self.coarse else self.few
 
     def steps(self, value: float, around: Around) -> int:
-        return round(value / self.step)
+        return round(value / self._step(around))
 
     def value(self, steps: int, around: Around) -> float:
-        return steps * self.step
+        return steps * self._step(around)
+
+    def _step(self, around: Around) -> float:
+        return self.coarse[1] if around.coarse and self.coarse else self.step
 
 
 @dataclass(frozen=True)
@@ -220,23 +291,40 @@ class Near(Number):
 
 @dataclass(frozen=True)
 class Follows:
-    """In a tuple an entry is told by how far it is from where those before lead, in an exp-Golomb code of `order`.
+    """In a tuple an entry is told by how far it is from where those before lead, in an exp-Golomb code of `order`, or
+    of three less, but 0 at least, where it is coarse, an eighth as far.
 
     They lead to the field `field` of the one before, or the same field where none is named. `as_two_before`: and on
     from there as far as it went two entries before. So with tracks that are flown to and fro and spaced in pairs: one
     is expected to begin beside where the one before ended, as far from it as two tracks before, along the same edge.
+    `aside`: and so much farther across the tracks, as a place east, "x", or north, "y", as another field, before it, is
+    than was expected of that.
     """
 
     order: int
     field: str = ""
     as_two_before: bool = False
+    aside: tuple[str, str] | None = None
 
-    def expected(self, name: str, earlier: list[dict[str, int]]) -> int:
-        """The steps to be expected of a field by those of the entries before, at least one."""
+    def order_in(self, around: Around) -> int:
+        """Of the code."""
+        return max(0, self.order - 3) if around.coarse else self.order
+
+    def expected(self, name: str, earlier: list[dict[str, int]], off: Mapping[str, int], around: Around) -> int:
+        """The steps to be expected of a field by those of the entries before, at least one, and by how far fields of
+        this one were `off` from what was expected of them."""
         field = self.field or name
+        expected = earlier[-1][field]
         if self.as_two_before and len(earlier) > 2:
-            return earlier[-1][field] + earlier[-2][name] - earlier[-3][field]
-        return earlier[-1][field]
+            expected += earlier[-2][name] - earlier[-3][field]
+        if self.aside is not None:
+            by, axis = self.aside
+            expected += round(off[by] * (math.cos if axis == "x" else _minus_sin)(around.heading_rad))
+        return expected
+
+
+def _minus_sin(heading_rad: float) -> float:
+    return -math.sin(heading_rad)
 
 
 @dataclass(frozen=True)
@@ -262,11 +350,19 @@ class NotOverWater:
 
 
 @dataclass(frozen=True)
+class Fine:
+    """The field crosses only where words need not be short; else the receiver has `instead`."""
+
+    instead: Any
+
+
+@dataclass(frozen=True)
 class Profile:
     """P(y) over bins of `range_bin_m`, said before it: how many, the first and the last one that see anything, and from
     there to there P_d at every 5th metre and at the last, in 63 steps of 0.016. The receiver draws straight lines
     between these. The first and the last are at least one step, so up to 0.016 too high; between, each point is off by
-    0.008 at most, and what is curved within 5 m by as much more as it is."""
+    0.008 at most, and what is curved within 5 m by as much more as it is. Coarse it is at every 10th metre, in 15 steps
+    of 0.067."""
 
     def put(self, writer: BitWriter, value: NDArray[np.float64], around: Around, said: Mapping[str, Any]) -> None:
         """Writes it. Raises WireError where a bin has no width."""
@@ -277,10 +373,11 @@ class Profile:
         if not seen.size:
             return
         writer.write_count(value.size - 1 - last, 0)
-        for at in _points(first, last, said["range_bin_m"]):
+        bits = _curve_bits(around)
+        for at in _points(first, last, said["range_bin_m"], around):
             # Where it begins and ends stays so: what is seen there at all is at least a step.
-            level = round(float(value[at]) / HIGHEST_P_DETECT * CURVE_LEVELS)
-            writer.write(max(level, 1) if at in (first, last) else level, 6)
+            level = round(float(value[at]) / HIGHEST_P_DETECT * ((1 << bits) - 1))
+            writer.write(max(level, 1) if at in (first, last) else level, bits)
 
     def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> NDArray[np.float64]:
         """What was written, drawn out. Raises WireError where this is no curve."""
@@ -290,20 +387,25 @@ class Profile:
             raise WireError("a curve's bins are not in order, or too many")
         curve = np.zeros(size)
         if first < size:
-            points = _points(first, last, said["range_bin_m"])
-            levels = [reader.read(6) for _ in points]
+            points, bits = _points(first, last, said["range_bin_m"], around), _curve_bits(around)
+            levels = [reader.read(bits) for _ in points]
             if not (levels[0] and levels[-1]):
                 raise WireError("a curve begins and ends where something is seen")
             bins = np.arange(first, last + 1)
-            curve[bins] = np.interp(bins, points, np.array(levels) * (HIGHEST_P_DETECT / CURVE_LEVELS))
+            curve[bins] = np.interp(bins, points, np.array(levels) * (HIGHEST_P_DETECT / ((1 << bits) - 1)))
         return curve
 
 
-def _points(first: int, last: int, range_bin_m: float) -> list[int]:
+def _curve_bits(around: Around) -> int:
+    return COARSE_CURVE_BITS if around.coarse else CURVE_BITS
+
+
+def _points(first: int, last: int, range_bin_m: float, around: Around) -> list[int]:
     width = round(range_bin_m * 100)  # centimetres, as on the wire: both ends must find the same
     if width <= 0:
         raise WireError(f"a bin of {range_bin_m} m has no width")
-    return [*range(first, last, max(1, CURVE_STEP // width)), last]
+    step = COARSE_CURVE_STEP if around.coarse else CURVE_STEP
+    return [*range(first, last, max(1, step // width)), last]
 
 
 PlaceX = Annotated[Metres, Place("x")]

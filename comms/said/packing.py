@@ -14,7 +14,7 @@ from functools import partial
 from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 from comms.said.bits import BitReader, BitWriter
-from comms.said.over_water import Around, Counted, Follows, NotOverWater, Number, OneOf, OnlyWhen, Profile, Share
+from comms.said.over_water import Around, Counted, Fine, Follows, NotOverWater, Number, OneOf, OnlyWhen, Profile, Share
 from comms.said.wire import MISFITS, AtMost, Count, Flag, Probability, WireError, record_of
 
 M = TypeVar("M")
@@ -26,6 +26,7 @@ class _Field(NamedTuple):
     note: Any
     only_when: OnlyWhen | None
     follows: Follows | None
+    fine: Fine | None
 
 
 class _Packing:
@@ -36,9 +37,11 @@ class _Packing:
 
     def put(self, writer: BitWriter, said: Mapping[str, Any], around: Around, earlier: list[dict[str, int]]) -> None:
         """Writes fields by their names; `earlier`: the steps of the entries before, to which these are added."""
-        all_steps: dict[str, int] = {}
-        for name, where, note, only_when, follows in self.fields:
+        all_steps, off = dict[str, int](), dict[str, int]()
+        for name, where, note, only_when, follows, fine in self.fields:
             if only_when is not None and said[only_when.field] not in only_when.values:
+                continue
+            if fine is not None and around.coarse:
                 continue
             try:
                 if not isinstance(note, Number):
@@ -46,9 +49,10 @@ class _Packing:
                     continue
                 steps = all_steps[name] = note.checked(note.steps(said[name], around), around)
                 if follows is not None and earlier:
-                    writer.write_signed(steps - follows.expected(name, earlier), follows.order)
+                    off[name] = steps - follows.expected(name, earlier, off, around)
+                    writer.write_signed(off[name], follows.order_in(around))
                 elif (most := note.most(around)) is None:
-                    writer.write_count(steps, note.order)
+                    writer.write_count(steps, note.order(around))
                 else:
                     writer.write(steps, most.bit_length())
             except MISFITS as error:
@@ -58,19 +62,23 @@ class _Packing:
     def get(self, reader: BitReader, around: Around, earlier: list[dict[str, int]]) -> dict[str, Any]:
         """The fields that `put` has written."""
         said: dict[str, Any] = {}
-        all_steps: dict[str, int] = {}
-        for name, where, note, only_when, follows in self.fields:
+        all_steps, off = dict[str, int](), dict[str, int]()
+        for name, where, note, only_when, follows, fine in self.fields:
             if only_when is not None and said[only_when.field] not in only_when.values:
                 said[name] = 0
+                continue
+            if fine is not None and around.coarse:
+                said[name] = fine.instead
                 continue
             try:
                 if not isinstance(note, Number):
                     said[name] = note.get(reader, around, said)
                     continue
                 if follows is not None and earlier:
-                    steps = follows.expected(name, earlier) + reader.read_signed(follows.order)
+                    off[name] = reader.read_signed(follows.order_in(around))
+                    steps = follows.expected(name, earlier, off, around) + off[name]
                 elif (most := note.most(around)) is None:
-                    steps = reader.read_count(note.order)
+                    steps = reader.read_count(note.order(around))
                 else:
                     steps = reader.read(most.bit_length())
                 all_steps[name] = note.checked(steps, around)
@@ -110,7 +118,8 @@ def _field_of(name: str, hint: Any, where: str) -> _Field:
     notes = get_args(hint)[1:] if get_origin(hint) is Annotated else ()
     only_when = next((one for one in notes if isinstance(one, OnlyWhen)), None)
     follows = next((one for one in notes if isinstance(one, Follows)), None)
-    return _Field(name, where, _packed_by(hint, notes, where), only_when, follows)
+    fine = next((one for one in notes if isinstance(one, Fine)), None)
+    return _Field(name, where, _packed_by(hint, notes, where), only_when, follows, fine)
 
 
 def _packed_by(hint: Any, notes: tuple[Any, ...], where: str) -> Any:

@@ -61,13 +61,17 @@ class Crossing:
     `value`: what one is worth beside those of other topics. `ttl_s`: what has waited for so long is worth twice as
     much; what need not be acknowledged is then said no more. `newest_only`: a newer one takes the place of one that
     waits, of the same key; of tasks and answers, of the same strip and action or state. `acknowledged`: it is said
-    again until it is known to have arrived, and of a key not once more where it is told again as it was.
+    again until it is known to have arrived, and of a key not once more where it is told again as it was. `is_long`: it
+    takes many bits, and what does not need not wait for it. `is_fine`: it is not said where words are to be short, as
+    what else is said tells as much.
     """
 
     value: float
     ttl_s: float
     newest_only: bool = False
     acknowledged: bool = True
+    is_long: bool = False
+    is_fine: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,15 +173,15 @@ MANEUVER = Topic(
 )  # fmt: skip
 STATE = Topic(
     "state", "agent/{vehicle}/state", AgentState, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 200, 0.3,
-    Keep.LATEST, crosses_water=True, crossing=Crossing(80, 30, newest_only=True, acknowledged=False),
+    Keep.LATEST, crosses_water=True, crossing=Crossing(300, 30, newest_only=True, acknowledged=False),
 )  # fmt: skip
 PLAN = Topic(
     "plan", "agent/{vehicle}/plan", Plan, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 150_000, 0.02,
-    Keep.LATEST, crosses_water=True, crossing=Crossing(150, 300, newest_only=True),
+    Keep.LATEST, crosses_water=True, crossing=Crossing(150, 300, newest_only=True, is_long=True),
 )  # fmt: skip
 CURVE = Topic(
     "curve", "agent/{vehicle}/curve", Curve, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 9_000, 0.01,
-    Keep.LATEST, crosses_water=True, crossing=Crossing(200, 300, newest_only=True),
+    Keep.LATEST, crosses_water=True, crossing=Crossing(200, 300, newest_only=True, is_long=True),
 )  # fmt: skip
 COVERAGE = Topic(
     "coverage", "agent/{vehicle}/coverage/{tile}", CoverageTile, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
@@ -189,7 +193,7 @@ CONTACT = Topic(
 )  # fmt: skip
 HOTSPOT = Topic(
     "hotspot", "agent/{vehicle}/hotspot/{number}", Hotspot, _SURVEYORS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 1_000,
-    0.5, Keep.LATEST, crosses_water=True, crossing=Crossing(150, 300, newest_only=True),
+    0.5, Keep.LATEST, crosses_water=True, crossing=Crossing(15, 300, newest_only=True, is_long=True, is_fine=True),
 )  # fmt: skip
 STRIP = Topic(
     "strip", "coord/strip/{number}", StripStatus, _COORDINATOR, _WATCHERS, 1_000, 1.0, Keep.LATEST,

@@ -16,9 +16,11 @@ from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, S
 
 LOST_CYCLES, ANSWER_CYCLES = 6, 5
 """After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
-waits for its slot, and may have to be said again."""
+waits for its slot, and may have to be said again. As many times as many where a word takes that many packets."""
 ABOUT_M = 1000.0
 """So far beyond all places of the scenario a vehicle may be and still tell where it is."""
+WORD_BITS = 80
+"""Of a task to take a strip, with what is about it."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,11 @@ class LinkTimes:
         if self.polls is not None:
             return self.polls.round_ms(self.frames) * (len(self.platforms) - 1)
         return self.slot_ms * len(self.platforms)
+
+    @property
+    def packets_a_word(self) -> int:
+        """How many packets a task takes, the longest word that somebody waits for."""
+        return math.ceil(WORD_BITS / (self.frames * self.frame_bits))
 
 
 def coordinator_platform(scenario: Scenario) -> str:
@@ -107,20 +114,21 @@ def deck_ms_of(link: Link | None) -> int:
     return 0 if link is None else round(link.on_deck_s * 1000)
 
 
-def cycle_ms_of(scenario: Scenario) -> int:
-    """How long it takes until each platform has had a slot; 0 where everybody hears everybody."""
+def word_ms_of(scenario: Scenario) -> int:
+    """How long it takes until each platform has had as many slots, or was polled as often, as a task takes packets; 0
+    where everybody hears everybody."""
     times = link_times(scenario)
-    return 0 if times is None else times.cycle_ms
+    return 0 if times is None else times.cycle_ms * times.packets_a_word
 
 
 def lost_after_ms_of(scenario: Scenario) -> int:
     """Age of a vehicle's state from which the coordinator counts it as lost."""
-    return max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * cycle_ms_of(scenario))
+    return max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * word_ms_of(scenario))
 
 
 def answer_within_ms_of(scenario: Scenario) -> int:
     """Age of an offer from which the coordinator expects no answer any more."""
-    return max(ANSWER_WITHIN_MS, ANSWER_CYCLES * cycle_ms_of(scenario))
+    return max(ANSWER_WITHIN_MS, ANSWER_CYCLES * word_ms_of(scenario))
 
 
 def reach_m_of(scenario: Scenario, link: Link) -> float:

@@ -16,7 +16,7 @@ from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import CLOSED
 from planner.risk import LevelArray
 from secondlook.errors import UserError
-from secondlook.fleet.link import ANSWER_CYCLES, LOST_CYCLES, cycle_ms_of, lost_after_ms_of
+from secondlook.fleet.link import ANSWER_CYCLES, LOST_CYCLES, lost_after_ms_of, word_ms_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.mission import load_run
 from secondlook.storm.witness import Violation, Witness
@@ -74,7 +74,7 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
 
 def _heard_within_s(plan: TroublePlan) -> float:
     """How long it may take until a word has crossed the water, and its answer: 0 where everybody hears everybody."""
-    return HEARD_CYCLES * cycle_ms_of(plan.scenario) / 1000
+    return HEARD_CYCLES * word_ms_of(plan.scenario) / 1000
 
 
 def _where(state: AgentState) -> tuple[Mode, int, float, float]:
