@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from comms.said.bits import BitReader
 from comms.said.topics import Topic
+from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.frames import FrameForm
 from modem.letters import Letters, Said
@@ -86,6 +87,8 @@ def _piece(
     last = is_whole or bool(reader.read(1))
     if form.is_small:  # behind the last one's end there are zeros
         size = reader.left - form.padding_bits
+        if size < 0:
+            raise WireError("a piece that goes on behind its frame")
     elif is_whole:  # it tells by itself where it ends
         ahead = copy(reader)
         letters.open(ahead, platform, now_ms)
