@@ -222,9 +222,12 @@ def test_every_bundled_mission_has_one_digest_on_both_buses_and_on_every_process
     for bus in ("local", "zenoh"):
         (tmp_path / bus).mkdir()
         with contextlib.suppress(RunFailedError):
-            run_mission(
-                load_scenario(name, tuple(overrides), seed=11), RunOptions(tmp_path / bus, bus=bus, record=False)
-            )
+            options = RunOptions(tmp_path / bus, bus=bus, record=False)
+            if (
+                bus == "zenoh" and name == "armada"
+            ):  # its 34 nodes in processes of their own begin for longer than they fly
+                options = replace(options, processes=4)
+            run_mission(load_scenario(name, tuple(overrides), seed=11), options)
         summaries.append(json.loads((tmp_path / bus / "summary.json").read_text()))
     assert summaries[0]["digest"] == summaries[1]["digest"]
     assert (summaries[0]["hotspots"]["revisited"] >= 1) == (name != "paper")
