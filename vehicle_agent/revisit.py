@@ -159,12 +159,11 @@ class SecondLooks:
         self._next = strip
         self._tell(strip.number, TaskState.NEXT, ends_ms)
 
-    def _go_on(self, now_ms: int) -> bool:
-        """Goes on with the next strip; returns whether there is one that it goes to."""
+    def _go_on(self, now_ms: int) -> None:
+        """Goes on with the next strip, if there is one."""
         strip, self._next = self._next, None
         if strip is not None:
             self._consider(strip, now_ms)
-        return self.strip is not None
 
     def _planned(self, strip: Strip, pose: Pose, begin_ms: int) -> tuple[Sweep, int]:
         """The sweep of a strip from a pose, and when it ends if it is begun then; else why it cannot be swept."""

@@ -101,9 +101,10 @@ class RightOfWay:
     def offered(self, name: str, number: int, departures: Departures) -> None:
         """A helper is sent to a strip, at once or when it is done with its present one."""
         way = departures.ways.get((name, number))
-        if way is not None:
-            self._to_sweep[name] = departures.sweeps_s[name, number]
-        if way is not None and departures.is_free(name):
+        if way is None:
+            return
+        self._to_sweep[name] = departures.sweeps_s[name, number]
+        if departures.is_free(name):
             self._traffic.offered(name, *way)
             self._sent_s[name] = departures.now_s
             self.changed(name)
@@ -264,25 +265,31 @@ class Departures:
         """How long the helper has to wait before it may set out to a strip, from what it does if it does anything; 0
         for not at all, infinite for long.
 
-        One that may set out at once is in the way of those judged after it.
+        One that may set out at once is in the way of those judged after it. To a strip that it goes on to from its
+        present one it does not wait: 0 or infinite. Who is free by now has time to stand aside until then.
         """
-        name, now_s = helper.vehicle, self.now_s
-        mine = next(other for other in self.fleet if other.name == name)
-        if helper.task is None and mine.strip is not None:
-            return self._wait_for_next_s(mine, helper, one)
-        course, sweep = self._traffic.to_strip(mine.vehicle, mine.strip, one.strip, now_s)
+        name = helper.vehicle
+        mine = self._of(name)
+        goes_on = helper.task is None and mine.strip is not None
+        from_s = helper.free_s if goes_on else self.now_s
+        if goes_on:
+            course, sweep = self._traffic.onward(mine.vehicle, helper.free_at, from_s, one.strip)
+        else:
+            course, sweep = self._traffic.to_strip(mine.vehicle, mine.strip, one.strip, from_s)
         self.ways[name, one.strip.number] = one.strip, course, sweep
         begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
         self.sweeps_s[name, one.strip.number] = begins_s
         # What it would meet later on its way it is told when it is nearer, if it still is so then.
-        soon_s = now_s + CLEAR_AHEAD_S
+        soon_s = from_s + CLEAR_AHEAD_S
         until_s = course.arrives_s + RESTS_S if begins_s <= soon_s else soon_s
         free, busy = self._others(name)
+        if goes_on:
+            return math.inf if any(self._meet(course, its, from_s, until_s) for its in busy) else 0.0
         for delay_s in DELAYS_S:
             later = course.later(round(delay_s / STEP_S)) if delay_s else course
-            if any(self._meet(later, its, until_s + delay_s) for its in busy):
+            if any(self._meet(later, its, from_s, until_s + delay_s) for its in busy):
                 continue
-            blocking = [who for who, its in free.items() if self._meet(later, its, now_s + STANDS_ASIDE_S)]
+            blocking = [who for who, its in free.items() if self._meet(later, its, from_s, from_s + STANDS_ASIDE_S)]
             self.in_the_way += [(who, course) for who in blocking]
             if blocking:
                 return DELAYS_S[1]
@@ -293,22 +300,12 @@ class Departures:
 
     def is_free(self, name: str) -> bool:
         """Whether a vehicle has no strip."""
-        return next(one for one in self.fleet if one.name == name).strip is None
+        return self._of(name).strip is None
 
-    def _wait_for_next_s(self, mine: Underway, helper: Helper, one: OpenStrip) -> float:
-        """The same for a strip that it goes on to from its present one: 0, or infinite as it will not wait then. Who is
-        free by now has time to stand aside."""
-        course, sweep = self._traffic.onward(mine.vehicle, helper.free_at, helper.free_s, one.strip)
-        self.ways[mine.name, one.strip.number] = one.strip, course, sweep
-        begins_s = course.arrives_s - sweep.length_m / helper.speed_mps
-        self.sweeps_s[mine.name, one.strip.number] = begins_s
-        soon_s = helper.free_s + CLEAR_AHEAD_S
-        until_s = course.arrives_s + RESTS_S if begins_s <= soon_s else soon_s
-        _, busy = self._others(mine.name)
-        return math.inf if any(self._meet(course, its, until_s, helper.free_s) for its in busy) else 0.0
+    def _of(self, name: str) -> Underway:
+        return next(one for one in self.fleet if one.name == name)
 
-    def _meet(self, one: Course, other: Course, until_s: float, from_s: float | None = None) -> bool:
-        from_s = self.now_s if from_s is None else from_s
+    def _meet(self, one: Course, other: Course, from_s: float, until_s: float) -> bool:
         return too_close(one, other, self._least_m, from_s, until_s, self._soon_m) is not None
 
     def _others(self, name: str) -> tuple[dict[str, Course], list[Course]]:

@@ -83,17 +83,17 @@ class Traffic:
     def to_strip(self, vehicle: KnownVehicle, strip: Strip | None, other: Strip, now_s: float) -> tuple[Course, Sweep]:
         """The course of a helper that leaves what it does and sets out to another strip now, and how it sweeps it."""
         pose = self._here(vehicle, now_s, strip)
-        entry, run_out_m = vehicle.entry, self._run_out_m(vehicle, pose)
-        sweep = self._sweep_from(pose, vehicle, other)
-        radius_m, keep_out = entry.turn_radius_m, self._keep_out
-        laid = sweep_course(pose, now_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
-        return laid, sweep
+        return self.onward(vehicle, pose, now_s, other, self._run_out_m(vehicle, pose))
 
-    def onward(self, vehicle: KnownVehicle, pose: Pose, from_s: float, other: Strip) -> tuple[Course, Sweep]:
-        """The course of a helper that sets out to another strip from a pose at a time, and how it sweeps it."""
+    def onward(
+        self, vehicle: KnownVehicle, pose: Pose, from_s: float, other: Strip, run_out_m: float = 0.0
+    ) -> tuple[Course, Sweep]:
+        """The course of a helper that sets out to another strip from a pose at a time, and how it sweeps it.
+        `run_out_m`: what it has first to sail straight on."""
         sweep = self._sweep_from(pose, vehicle, other)
         radius_m, keep_out = vehicle.entry.turn_radius_m, self._keep_out
-        return sweep_course(pose, from_s, vehicle.sailing, radius_m, sweep, keep_out=keep_out), sweep
+        laid = sweep_course(pose, from_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
+        return laid, sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
         """The course of a helper that leaves what it does and waits at a place."""

@@ -25,15 +25,7 @@ from secondlook.fleet.link import (
     modem_configs,
     platforms_of,
 )
-from secondlook.fleet.nodes import (
-    CLOCK,
-    COORDINATOR,
-    OBSERVER,
-    RECORDER,
-    WORLD,
-    NodeSpec,
-    node_spec,
-)
+from secondlook.fleet.nodes import CLOCK, COORDINATOR, OBSERVER, RECORDER, WORLD, NodeSpec, node_spec
 from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, role_of, roster_vehicle, way_home_of
 from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
