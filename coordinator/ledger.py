@@ -14,7 +14,7 @@ from planner.types import Strip
 
 NUMBERS_A_SECOND = 1000  # of the mission: whoever is started anew gives numbers that were never given
 WITH_A_VEHICLE = frozenset({StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY})
-TAKEN = WITH_A_VEHICLE | {StripState.NEXT}
+TAKEN = frozenset(state for state in StripState if state.is_taken)
 """With a vehicle, or to be with it next."""
 ALLOWED: dict[StripState, frozenset[StripState]] = {
     StripState.OPEN: frozenset({StripState.OFFERED, StripState.NEXT, StripState.WITHDRAWN}),

@@ -10,8 +10,6 @@ MOST_PLATFORMS = 64
 SMALL_BITS, TINY_BITS = 128, 64
 """Frames with fewer hold acknowledgements or a single piece of a message, whose words are short; in those with fewer
 than the second the tag is, too, and nothing tells of turns."""
-
-
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
 LARGEST_LEAST_BITS = 256
@@ -114,6 +112,11 @@ class ModemConfig:
     def hub(self) -> str:
         """The platform of the coordinator."""
         return self.platforms[0]
+
+    @property
+    def is_hub(self) -> bool:
+        """Whether it is on that."""
+        return self.platform == self.hub
 
     @property
     def others(self) -> tuple[str, ...]:

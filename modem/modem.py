@@ -153,12 +153,11 @@ class Modem:
         self._letters = Letters(self.config, run.grid.heading_rad)
         self._layers = Layers(self.config, run)
         self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
-        is_hub = self.config.platform == self.config.hub
         keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
-        known = self.config.others if is_hub else (self.config.platform,)
+        known = self.config.others if self.config.is_hub else (self.config.platform,)
         self._presences = {one.vehicle: Presence(one, keep_out) for one in run.vehicles if one.vehicle in known}
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
-        if entry is not None and self.config.platform != self.config.hub:
+        if entry is not None and not self.config.is_hub:
             self._gathering = Gathering(entry)
 
     def _receive_anew(self, other: str) -> None:
@@ -172,7 +171,7 @@ class Modem:
     def _take(self, received: Received, now_ms: int) -> None:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
         topic, message = received.topic, received.message
-        is_hub = self.config.platform == self.config.hub
+        is_hub = self.config.is_hub
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
         if topic.crossing.is_fine and self.config.is_small:

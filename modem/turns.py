@@ -45,7 +45,7 @@ def turns_of(config: ModemConfig) -> Turns:
     """Those of a modem."""
     if config.polls is None:
         return Slots(config)
-    return Polls(config, config.polls) if config.platform == config.hub else Answers(config)
+    return Polls(config, config.polls) if config.is_hub else Answers(config)
 
 
 class Slots:

@@ -15,7 +15,6 @@ from viz.canvas import Canvas, Pace
 from viz.shapes import HOTSPOT_Z_M, STRIP_Z_M, Extent, label_place, ring, strip_ring
 
 LABELLED_SHARE = 0.02  # of the area's longer side: of narrower strips there are too many for a label on each
-IN_HAND = (StripState.NEXT, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
 CHANGES_OFTEN = (HotspotState.ACTIVE, StripState.OPEN)
 OFTEN_EVERY_MS = 60_000
 
@@ -101,7 +100,7 @@ class SecondLooks:
             labels=f"{_words(strip, number)}, {strip.length_m:.0f} m x {strip.width_m:.0f} m{_more(strip)}",
         )
         self._canvas.put(time_ms, path, outline, *([_strip_style(*style)] if restyled else []))
-        shows = wide or strip.state in IN_HAND
+        shows = wide or strip.state.is_taken
         if shows or number in self._labelled:
             self._labelled.add(number)
             told = wide and strip.state is not StripState.DONE

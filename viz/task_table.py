@@ -10,14 +10,13 @@ import rerun as rr
 
 from comms.node import Received
 from comms.said.announcement import RunInfo
-from comms.said.messages import StripState, StripStatus, TaskState, TaskStatus
+from comms.said.messages import StripStatus, TaskState, TaskStatus
 from comms.strip_books import state_in_words
 from viz import paths
 from viz.canvas import Canvas, Pace
 
 MOST_ENDED = 12  # the whole table is written at each change: those that ended long ago are in the log
 IN_HAND = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
-STRIP_IN_HAND = (StripState.NEXT, StripState.OFFERED, StripState.ACCEPTED, StripState.UNDER_WAY)
 STANDING = ("open", "in hand", "left", "failed")
 HEAD = "| vehicle | strip | state | risk to remove | ends |\n|---|---|---|---|---|"
 
@@ -110,7 +109,7 @@ class TaskTable:
 
 
 def _word(strip: StripStatus) -> str:
-    return "in hand" if strip.state in STRIP_IN_HAND else state_in_words(strip)
+    return "in hand" if strip.state.is_taken else state_in_words(strip)
 
 
 def _counted(counts: Counter[str]) -> str:

@@ -340,6 +340,11 @@ class StripState(enum.Enum):
         """Whether nothing becomes of the strip any more."""
         return self in (StripState.DONE, StripState.FAILED, StripState.WITHDRAWN)
 
+    @property
+    def is_taken(self) -> bool:
+        """Whether a vehicle has the strip, or is to have it next."""
+        return not self.has_ended and self is not StripState.OPEN
+
 
 @dataclass(frozen=True, slots=True)
 class StripStatus:
@@ -377,9 +382,15 @@ class TaskAction(enum.Enum):
     TELL_AGAIN = "tell_again"
     TAKE_NEXT = "take_next"
 
+    @property
+    def is_offer(self) -> bool:
+        """Whether it is to take a strip."""
+        return self in (TaskAction.TAKE, TaskAction.TAKE_NEXT)
 
-_WITH_A_PLACE = OnlyWhen("action", (TaskAction.TAKE, TaskAction.TAKE_NEXT, TaskAction.STAND_ASIDE))
-_WITH_A_STRIP = OnlyWhen("action", (TaskAction.TAKE, TaskAction.TAKE_NEXT))
+
+_OFFERS = tuple(one for one in TaskAction if one.is_offer)
+_WITH_A_PLACE = OnlyWhen("action", (*_OFFERS, TaskAction.STAND_ASIDE))
+_WITH_A_STRIP = OnlyWhen("action", _OFFERS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -440,6 +451,11 @@ class Packet:
     all."""
 
     frames: Annotated[tuple[FrameBytes, ...], AtMost(MOST_FRAMES)]
+
+    @property
+    def size_bytes(self) -> int:
+        """Of its frames."""
+        return sum(map(len, self.frames))
 
 
 @dataclass(frozen=True, slots=True)

@@ -319,12 +319,9 @@ class Follows:
             expected += earlier[-2][name] - earlier[-3][field]
         if self.aside is not None:
             by, axis = self.aside
-            expected += round(off[by] * (math.cos if axis == "x" else _minus_sin)(around.heading_rad))
+            share = math.cos(around.heading_rad) if axis == "x" else -math.sin(around.heading_rad)
+            expected += round(off[by] * share)
         return expected
-
-
-def _minus_sin(heading_rad: float) -> float:
-    return -math.sin(heading_rad)
 
 
 @dataclass(frozen=True)

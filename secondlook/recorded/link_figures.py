@@ -54,6 +54,14 @@ class Age:
         self.came_ms = now_ms
 
 
+def state_heard(message: Heard) -> tuple[str, int] | None:
+    """Of which vehicle a modem has heard a state, and when that was said, in ms; None for another message."""
+    found = topic_of(message.key)
+    if found is None or found[0].message is not AgentState:
+        return None
+    return found[1], header_of(message.payload).sent_ms
+
+
 @dataclass
 class LinkFigures:
     """Hears messages in the order of their sending. `deck_ms`: what is sent before goes from hand to hand."""
@@ -70,19 +78,20 @@ class LinkFigures:
     def hear(self, received: Received) -> None:
         """Takes one message."""
         message, sent_ms = received.message, received.header.sent_ms
-        if isinstance(message, Packet) and sent_ms < self.deck_ms:
-            pass
-        elif isinstance(message, Packet):
+        if isinstance(message, Packet):
+            if sent_ms < self.deck_ms:
+                return
             if received.topic is MODEM_TX:
                 self.packets[received.vehicle] = self.packets.get(received.vehicle, 0) + 1
                 self.frames_sent += len(message.frames)
-                self.modem_bytes += sum(map(len, message.frames))
+                self.modem_bytes += message.size_bytes
             else:
                 self.frames_heard += len(message.frames)
         elif isinstance(message, Heard):
-            found = topic_of(message.key)
-            if found is not None and found[0].message is AgentState:
-                self._heard.setdefault(found[1], Age()).hear(header_of(message.payload).sent_ms, sent_ms)
+            state = state_heard(message)
+            if state is not None:
+                vehicle, said_ms = state
+                self._heard.setdefault(vehicle, Age()).hear(said_ms, sent_ms)
         elif received.topic.crosses_water:
             self.said_bytes += len(received.payload)
             if isinstance(message, AgentState):

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 
 from comms.node import Received
 from comms.said.announcement import RunInfo
-from comms.said.codec import header_of
 from comms.said.messages import AgentState, Heard, Packet
-from comms.said.topics import MODEM_TX, topic_of
+from comms.said.topics import MODEM_TX
 from modem.config import ModemConfig
 from modem.overheard import Contents, Eavesdropper
+from secondlook.recorded.link_figures import state_heard
 
 
 @dataclass
@@ -92,9 +92,10 @@ class LinkTrace:
             if received.vehicle == self.config.hub:
                 return self._hear_word(received.vehicle, Word(sent_ms, sent_ms))
         elif isinstance(message, Heard) and received.vehicle == self.config.hub:
-            found = topic_of(message.key)
-            if found is not None and found[0].message is AgentState:
-                return self._hear_word(found[1], Word(sent_ms, header_of(message.payload).sent_ms))
+            state = state_heard(message)
+            if state is not None:
+                vehicle, said_ms = state
+                return self._hear_word(vehicle, Word(sent_ms, said_ms))
         return None
 
     def _hear_packet(self, received: Received, packet: Packet) -> None:
@@ -108,7 +109,7 @@ class LinkTrace:
                 sent_ms,
                 received.vehicle,
                 len(packet.frames),
-                sum(map(len, packet.frames)),
+                packet.size_bytes,
                 self._eavesdropper.open(packet, sent_ms),
             )
             self.packets.append(sent)
@@ -191,9 +192,8 @@ class LinkSeries:
         now_ms = received.header.sent_ms
         while now_ms >= self._told_ms + self._every_ms + SETTLED_MS:
             yield from self._span(self._told_ms + self._every_ms)
-        vehicle = received.vehicle
-        if isinstance(received.message, Heard) and (found := topic_of(received.message.key)) is not None:
-            vehicle = found[1]
+        state = state_heard(received.message) if isinstance(received.message, Heard) else None
+        vehicle = received.vehicle if state is None else state[0]
         before_ms = self._trace.age_ms(vehicle, now_ms)
         word = self._trace.hear(received)
         if word is not None:

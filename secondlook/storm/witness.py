@@ -247,7 +247,7 @@ class CoordinatorWitness:
             if count > 1 or name not in self.node.fleet.vehicles:
                 self._tell("a vehicle has one strip", now_ms, f"{count} strips are with {name or 'nobody'}")
         for key, message in step.publish:
-            if isinstance(message, Task) and message.action in (TaskAction.TAKE, TaskAction.TAKE_NEXT):
+            if isinstance(message, Task) and message.action.is_offer:
                 self._check_offer(key.split("/")[2], message.strip, now_ms)
             elif isinstance(message, MissionOver) and not self.over:
                 self.over = True  # said again it decides nothing: more may have come by then than states tell of

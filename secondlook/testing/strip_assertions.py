@@ -15,7 +15,6 @@ from comms.said.messages import (
     StripState,
     StripStatus,
     Task,
-    TaskAction,
     TaskState,
     TaskStatus,
 )
@@ -228,7 +227,7 @@ def assert_never_assigned_to_lost(flight: Flight) -> None:
         states = [(due_ms, one) for due_ms, one in reached(flight, "coordinator", life) if one.topic.name == "state"]
         for one in flight.said(Task):
             now_ms, task = one.header.sent_ms, one.message
-            if task.action not in (TaskAction.TAKE, TaskAction.TAKE_NEXT) or one.header.incarnation != life.incarnation:
+            if not task.action.is_offer or one.header.incarnation != life.incarnation:
                 continue
             sent_ms = [
                 said.header.sent_ms for due_ms, said in states if said.vehicle == one.vehicle and due_ms <= now_ms
