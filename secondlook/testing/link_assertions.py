@@ -9,7 +9,7 @@ from comms.node import Received
 from comms.said.messages import Packet
 from comms.said.topics import MODEM_TX
 from secondlook.errors import UserError
-from secondlook.fleet.link import coordinator_platform
+from secondlook.fleet.link import coordinator_platform, deck_ms_of
 from secondlook.recorded.link_figures import Age, LinkFigures
 from secondlook.testing.flight import Flight, fail_if
 
@@ -17,16 +17,17 @@ from secondlook.testing.flight import Flight, fail_if
 def assert_bytes_across_water(flight: Flight, *, at_most_per_s: float) -> None:
     """Over the whole flight no more bytes a second were said across the water, by all platforms together.
 
-    With a `link` that is what modems have sent, in whole frames, whether it was heard or not; without one, what agents
-    and coordinator have said for each other. It fails with who said most, and when most was said.
+    With a `link` that is what modems have sent, in whole frames, whether it was heard or not, but for what goes from
+    hand to hand on deck; without one, what agents and coordinator have said for each other. It fails with who said
+    most, and when most was said.
     """
     __tracebackhide__ = True
     if not (math.isfinite(at_most_per_s) and at_most_per_s >= 0):
         raise UserError(f"at_most_per_s: {at_most_per_s} is not allowed; must be bytes a second, 0 or more")
-    by_modem = flight.scenario.link is not None
+    by_modem, deck_ms = flight.scenario.link is not None, deck_ms_of(flight.scenario.link)
     said, minutes = Counter[str](), Counter[int]()
     for one in flight.heard:
-        crossed = _bytes_across(one, by_modem)
+        crossed = 0 if one.header.sent_ms < deck_ms else _bytes_across(one, by_modem)
         if crossed:
             said[one.vehicle if by_modem else one.sender] += crossed
             minutes[int(one.t_s // 60)] += crossed
@@ -43,7 +44,7 @@ def assert_bytes_across_water(flight: Flight, *, at_most_per_s: float) -> None:
 
 def _bytes_across(one: Received, by_modem: bool) -> int:
     if isinstance(one.message, Packet):
-        return sum(map(len, one.message.frames)) if one.topic is MODEM_TX else 0
+        return one.message.size_bytes if one.topic is MODEM_TX else 0
     return len(one.payload) if one.topic.crosses_water and not by_modem else 0
 
 

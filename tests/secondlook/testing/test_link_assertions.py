@@ -58,6 +58,15 @@ class TestBytes:
         assert told.startswith(f"more was said across the water than {0.99 * per_s:g} bytes a second:\n")
         assert f"{32 * len(frames)} bytes in {by_modem.end_s:.0f} s, {per_s:.1f} a second; most were said by " in told
 
+    def test_what_goes_from_hand_to_hand_on_deck_is_none_of_them(self, tmp_path: Path) -> None:
+        on_deck = flown(tmp_path, **{"link.profile": "micromodem-6"})
+        told = [one for one in on_deck.messages("modem/*/tx") if one.t_s < 1]
+        assert len(told) > 2
+        per_s = on_deck.summary["link"]["bytes_per_s"]
+        assert_bytes_across_water(on_deck, at_most_per_s=per_s + 0.06)
+        with pytest.raises(AssertionError, match=f"more was said across the water than {per_s - 0.5:g} bytes"):
+            assert_bytes_across_water(on_deck, at_most_per_s=per_s - 0.5)
+
     def test_it_is_told_who_said_most_and_when(self, by_modem: Flight) -> None:
         said = by_modem.messages("modem/*/tx")
         some = [one for one in said if one.vehicle == "primary" and 60 <= one.t_s < 120][:2]
