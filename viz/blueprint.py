@@ -94,14 +94,27 @@ def _whole_mission() -> rrb.TimeAxis:
     )
 
 
-def _metrics_view() -> rrb.TimeSeriesView:
+def _series_view(
+    origin: str,
+    name: str,
+    legend: rrb.Corner2D | None,
+    *,
+    are_shares: bool = False,
+    contents: Sequence[str] = ("$origin/**",),
+) -> rrb.TimeSeriesView:
+    """Series over the whole mission: all below `origin`, or of the paths in `contents`."""
     return rrb.TimeSeriesView(
-        origin=paths.METRICS,
-        name="Risk and coverage over time",
+        origin=origin,
+        contents=[f"+ {path}" for path in contents],
+        name=name,
         axis_x=_whole_mission(),
-        axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftBottom),
+        axis_y=rrb.ScalarAxis(range=(0.0, 1.0)) if are_shares else None,
+        plot_legend=rrb.PlotLegend(visible=False) if legend is None else rrb.PlotLegend(legend),
     )
+
+
+def _metrics_view() -> rrb.TimeSeriesView:
+    return _series_view(paths.METRICS, "Risk and coverage over time", rrb.Corner2D.LeftBottom, are_shares=True)
 
 
 def _log_view() -> rrb.TextLogView:
@@ -110,41 +123,21 @@ def _log_view() -> rrb.TextLogView:
 
 
 def _ranges_view() -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin=paths.RANGES,
-        name="Range in metres: r_eff, and what is planned for",
-        axis_x=_whole_mission(),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-    )
+    return _series_view(paths.RANGES, "Range in metres: r_eff, and what is planned for", rrb.Corner2D.RightTop)
 
 
 def _ages_view() -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin=paths.LINK_AGES,
-        name="Age in s of what is known",
-        axis_x=_whole_mission(),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop),
-    )
+    return _series_view(paths.LINK_AGES, "Age in s of what is known", rrb.Corner2D.LeftTop)
 
 
 def _bytes_view() -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin=paths.LINK,
-        contents=[f"+ {paths.LINK_BYTES}"],
-        name="Bytes a second",
-        axis_x=_whole_mission(),
-        plot_legend=rrb.PlotLegend(visible=False),
-    )
+    return _series_view(paths.LINK, "Bytes a second", None, contents=[paths.LINK_BYTES])
 
 
 def _shares_view() -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin=paths.LINK,
-        contents=[f"+ {paths.LINK_LOST}", f"+ {paths.LINK_FULL}"],
-        name="Frames lost, slots full",
-        axis_x=_whole_mission(),
-        axis_y=rrb.ScalarAxis(range=(0.0, 1.0)),
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+    contents = [paths.LINK_LOST, paths.LINK_FULL]
+    return _series_view(
+        paths.LINK, "Frames lost, slots full", rrb.Corner2D.RightTop, are_shares=True, contents=contents
     )
 
 

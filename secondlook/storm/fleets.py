@@ -17,7 +17,7 @@ _LONGEST_S = 400.0  # that drawn surveys take, about: a storm is to fly in half 
 LINK_SHARE = 0.2  # of fleets
 FAST_LINKS = ("radio", "unet-data", "micromodem-6")
 SLOW_LINKS = ("micromodem-0", "micromodem-1", "unet-control")
-MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey; by JANUS nothing is kept at all
+MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey; JANUS is not drawn yet
 SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
 
 

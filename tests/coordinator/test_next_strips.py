@@ -3,8 +3,10 @@ where a word is lost."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
-from by_hand import HELPER, PRIMARY
+from by_hand import FLEET, HELPER, PRIMARY
 from coordinator_by_hand import (
     ACCEPTED,
     DONE,
@@ -20,6 +22,7 @@ from coordinator_by_hand import (
     looked,
 )
 
+from comms.said.announcement import RosterVehicle
 from comms.said.messages import Mode, StripStatus, TaskAction, TaskState
 
 AHEAD_MS = 60_000
@@ -43,6 +46,19 @@ def with_a_next(separation_m: float = 0.0) -> Told:
     told = under_way(separation_m=separation_m)
     told.keep_alive((PRIMARY, HELPER), 145)
     told.status(HELPER, 2, TaskState.NEXT)
+    return told
+
+
+def with_a_next_at_once(ends_ms: int, vehicles: tuple[RosterVehicle, ...] = FLEET, **settings: Any) -> Told:
+    """Strip 1 is under way until so soon that strip 2 is offered as the next one; no answer has come."""
+    told = coordinator(vehicles, ahead_ms=AHEAD_MS, **settings)
+    told.hotspot()
+    told.settle()
+    told.status(HELPER, 1, TaskState.UNDER_WAY)
+    told.hotspot(ELSEWHERE, number=2)
+    told.state(HELPER, Mode.REVISIT, 1, ends_ms=ends_ms)
+    told.settle()
+    assert told.states() == {1: UNDER_WAY, 2: NEXT}
     return told
 
 
@@ -91,14 +107,7 @@ def test_one_that_is_not_answered_is_open_again_and_the_helper_keeps_the_present
 
 
 def test_a_late_answer_makes_it_the_next_after_all() -> None:
-    told = coordinator(ahead_ms=AHEAD_MS, allocator=InTurn(1, 2))
-    told.hotspot()
-    told.settle()
-    told.status(HELPER, 1, TaskState.UNDER_WAY)
-    told.hotspot(ELSEWHERE, number=2)
-    told.state(HELPER, Mode.REVISIT, 1, ends_ms=30_000)
-    told.settle()
-    assert told.states() == {1: UNDER_WAY, 2: NEXT}
+    told = with_a_next_at_once(30_000, allocator=InTurn(1, 2))
     told.node.wait(10.0)
     assert told.states() == {1: UNDER_WAY, 2: OPEN}
     told.status(HELPER, 2, TaskState.NEXT)
@@ -148,14 +157,7 @@ def test_who_has_no_work_has_forgotten_what_it_was_to_do_next() -> None:
 
 
 def test_with_the_present_strip_the_next_is_given_back() -> None:
-    told = coordinator(TWO_HELPERS, ahead_ms=AHEAD_MS)
-    told.hotspot()
-    told.settle()
-    told.status(HELPER, 1, TaskState.UNDER_WAY)
-    told.hotspot(ELSEWHERE, number=2)
-    told.state(HELPER, Mode.REVISIT, 1, ends_ms=20_000)
-    told.settle()
-    assert told.states()[2] is NEXT
+    told = with_a_next_at_once(20_000, TWO_HELPERS)
     told.status(HELPER, 2, TaskState.NEXT)
     told.keep_alive((PRIMARY, HELPER), 400)  # it is late with the first, and is told to give it back
     assert (HELPER, TaskAction.GIVE_BACK, 1) in told.tasks()

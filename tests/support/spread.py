@@ -14,9 +14,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import pytest
 from flights import BRIEF, until
 
 from comms.said.topics import LOOK, TOPICS, Keep, topic_of
+from secondlook import cli
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import load_scenario
 
@@ -105,6 +107,22 @@ def spread_fleet(folder: Path, endpoint: str, *options: str, scenario: Path = BR
         yield fleet
     finally:
         fleet.stop()
+
+
+def refusal_of_run(
+    scenario: Path,
+    options: Sequence[str],
+    out: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> str:
+    """What `secondlook run` says of a mission whose processes are to be started by hand: it has flown nothing."""
+    monkeypatch.setattr("sys.argv", ["secondlook", "run", str(scenario), "--out", str(out), *options])
+    with pytest.raises(SystemExit) as stopped:
+        cli.main()
+    assert stopped.value.code == 2
+    assert not out.exists()
+    return capsys.readouterr().err
 
 
 _held: list[socket.socket] = []

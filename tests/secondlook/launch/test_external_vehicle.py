@@ -12,13 +12,12 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-from spread import PATIENT, loopback_endpoint, lost_of_what_is_kept, spread_fleet
+from spread import PATIENT, loopback_endpoint, lost_of_what_is_kept, refusal_of_run, spread_fleet
 
 from comms.said.announcement import ClockMode, Role
 from comms.said.codec import Header, decode, encode
 from comms.said.messages import Look, Maneuver, ManeuverKind, ManeuverState, ManeuverStatus, Message, Nav
 from comms.said.topics import topic_of
-from secondlook import cli
 from secondlook.fleet.build import build_fleet
 from secondlook.recorded.mission_files import read_messages
 from secondlook.scenario import ScenarioError, load_scenario
@@ -123,15 +122,10 @@ def test_no_vehicle_may_have_the_bodys_name(tmp_path: Path) -> None:
 def test_a_run_that_starts_all_itself_refuses_an_external_body(
     options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("sys.argv", ["secondlook", "run", str(BAY), "--out", str(tmp_path / "out"), *options])
-    with pytest.raises(SystemExit) as stopped:
-        cli.main()
-    assert stopped.value.code == 2
-    assert capsys.readouterr().err == (
+    assert refusal_of_run(BAY, options, tmp_path / "out", monkeypatch, capsys) == (
         "vehicles.helper.body: external is a program of its own, which secondlook run cannot start; must be simulated "
         "here, or the fleet started with secondlook node\n"
     )
-    assert not (tmp_path / "out").exists()
 
 
 def test_the_example_flies_a_mission_through_its_own_agent(tmp_path: Path) -> None:

@@ -12,13 +12,12 @@ from pathlib import Path
 import msgpack
 import pytest
 from flights import until
-from spread import PATIENT, loopback_endpoint, spread_fleet
+from spread import PATIENT, loopback_endpoint, refusal_of_run, spread_fleet
 
 from comms.said.announcement import ClockMode, Role
 from comms.said.codec import decode
 from comms.said.messages import Heard, Packet
 from comms.said.topics import MODEM_RX, MODEM_TX, topic_of
-from secondlook import cli
 from secondlook.fleet.build import build_fleet
 from secondlook.fleet.nodes import certified_when_spread, hosts_when_spread
 from secondlook.recorded.mission_files import read_messages
@@ -70,15 +69,10 @@ def test_with_drivers_no_body_need_be_simulated() -> None:
 def test_a_run_that_starts_all_itself_refuses_drivers(
     options: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("sys.argv", ["secondlook", "run", str(BAY), "--out", str(tmp_path / "out"), *options])
-    with pytest.raises(SystemExit) as stopped:
-        cli.main()
-    assert stopped.value.code == 2
-    assert capsys.readouterr().err == (
+    assert refusal_of_run(BAY, options, tmp_path / "out", monkeypatch, capsys) == (
         "link.carried_by: drivers are programs of their own, by the wall clock, which secondlook run cannot start; "
         "must be world here, or the fleet started with secondlook node\n"
     )
-    assert not (tmp_path / "out").exists()
 
 
 def port_told_in(said: Path) -> str:
