@@ -89,7 +89,7 @@ class Briefing:
             if state.works_on == record.strip.number and state.expected_end_ms > 0:
                 ends_ms = state.expected_end_ms
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
-            is_soon = 0 < self._config.ahead_ms >= free_ms - now_ms
+            is_soon = 0 < self._config.ahead_ms >= free_ms - now_ms and not vehicle.silent
             if is_soon and following is None and record.state in AT_WORK:
                 record, pose = None, free_at  # it is given its next now
         sees = footprint_of(entry.sonar)
@@ -108,7 +108,8 @@ class Briefing:
             way_home=way_home_of(entry, vehicle.keep_out, vehicle.flows),
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
-            sweeping=record is not None and (record is following or record.state is StripState.UNDER_WAY),
+            sweeping=record is not None
+            and (vehicle.silent or record is following or record.state is StripState.UNDER_WAY),
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
             keep_out=vehicle.keep_out,
             heard_s=vehicle.heard_ms / 1000,

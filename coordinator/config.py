@@ -33,7 +33,8 @@ def weights_over(grid: GridSpec, inside: BoolArray, priorities: Iterable[Priorit
 class CoordinatorConfig:
     """The mission ends at the latest at `deadline_factor` times the last primary's end, or at `deadline_s`; what does
     not hold is infinite.
-    `lost_after_ms`: age of a vehicle's state from which it counts as lost. `answer_within_ms`: age of an offer from
+    `silent_after_ms`: age of a vehicle's state from which it is offered nothing; `lost_after_ms`: from which it counts
+    as lost, and what it had is open again. `answer_within_ms`: age of an offer from
     which no answer is expected any more. `ahead_ms`: so long before a vehicle is expected to be done with a strip it is
     offered its next; 0 to wait until it is.
     `min_strip_m`, `max_strip_m`: length of a strip.
@@ -48,6 +49,7 @@ class CoordinatorConfig:
 
     allocator: Allocator
     deadline_factor: float
+    silent_after_ms: int
     lost_after_ms: int
     min_strip_m: float
     max_strip_m: float

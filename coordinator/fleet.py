@@ -20,18 +20,22 @@ from planner.risk import LevelArray
 log = logging.getLogger("secondlook.coordinator")
 
 GIVEN_UP_AFTER = 10
-"""So many times as long as for a lost vehicle must a primary be silent, or stand still, before the mission ends without
-it. One that stands still may hear nothing, and then never surveys, though it says each 10 s that it is there."""
+"""So many times as long as for a silent vehicle must a primary be silent, or stand still, before the mission ends
+without it. One that stands still may hear nothing, and then never surveys, though it says each 10 s that it is there.
+"""
 
 
 class KnownFleet:
     """The fleet that the run's announcement names: `vehicles`, by name, and of these the `primaries`, which survey.
 
     `keep_out`: what none may enter. `flows`: of the water, where they are not alike everywhere. `map`: the tiles of
-    all, joined. `lost_after_ms`: age of a vehicle's state from which it counts as lost.
+    all, joined. `silent_after_ms`: age of a vehicle's state from which it is offered nothing; `lost_after_ms`: from
+    which it counts as lost, no less.
     """
 
-    def __init__(self, run: RunInfo, lost_after_ms: int, now_ms: int, flows: FlowGrid | None = None) -> None:
+    def __init__(
+        self, run: RunInfo, silent_after_ms: int, lost_after_ms: int, now_ms: int, flows: FlowGrid | None = None
+    ) -> None:
         self.map = FleetMap(run.grid.spec, run.rho)
         self.keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
         self.vehicles = {
@@ -39,8 +43,8 @@ class KnownFleet:
             for one in run.vehicles
         }
         self.primaries = {name: one for name, one in self.vehicles.items() if one.entry.role.surveys}
-        self._lost_after_ms = lost_after_ms
-        self._given_up_after_ms = GIVEN_UP_AFTER * lost_after_ms
+        self._silent_after_ms, self._lost_after_ms = silent_after_ms, lost_after_ms
+        self._given_up_after_ms = GIVEN_UP_AFTER * silent_after_ms
         self._complained_of: set[str] = set()
 
     @property
@@ -82,6 +86,7 @@ class KnownFleet:
         """Finds of whom too long nothing was heard; returns who is lost that was not before."""
         lost = []
         for name, vehicle in self.vehicles.items():
+            vehicle.silent = now_ms - vehicle.heard_ms >= self._silent_after_ms
             if not vehicle.lost and now_ms - vehicle.heard_ms >= self._lost_after_ms:
                 vehicle.lost = True
                 lost.append(name)
@@ -89,11 +94,12 @@ class KnownFleet:
         for vehicle in self.surveying:
             if now_ms - vehicle.stirred_ms >= self._given_up_after_ms:
                 vehicle.give_up(now_ms)
-                how = "nothing heard of it" if vehicle.lost else "it has not stirred"
+                how = "nothing heard of it" if vehicle.silent else "it has not stirred"
                 log.warning("%s is given up: %s since %.0f s", vehicle.entry.vehicle, how, vehicle.stirred_ms / 1000)
         return lost
 
     def deadlines_ms(self) -> Iterator[int]:
-        """When somebody is lost, or given up, if nothing is heard until then."""
+        """When somebody is silent, lost, or given up, if nothing is heard until then."""
+        yield from (one.heard_ms + self._silent_after_ms for one in self.vehicles.values() if not one.silent)
         yield from (one.heard_ms + self._lost_after_ms for one in self.vehicles.values() if not one.lost)
         yield from (one.stirred_ms + self._given_up_after_ms for one in self.surveying)

@@ -112,8 +112,9 @@ class Offer:
 class KnownVehicle:
     """One vehicle of the fleet.
 
-    `heard_ms`: when its newest state was sent; `stirred_ms`: when the newest that told of another place or work than
-    the one before. `finished_ms`: when it had surveyed all, or was home or given up before; for a primary.
+    `heard_ms`: when its newest state was sent; `silent`: whether that is so long ago that it is offered nothing;
+    `lost`: so long that what it had is open again. `stirred_ms`: when the newest that told of another place or work
+    than the one before. `finished_ms`: when it had surveyed all, or was home or given up before; for a primary.
     `ended_early`: its battery did not last for all of its survey.
     `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
@@ -127,6 +128,7 @@ class KnownVehicle:
     entry: RosterVehicle
     heard_ms: int
     state: AgentState | None = None
+    silent: bool = False
     lost: bool = False
     finished_ms: int | None = None
     refused: set[int] = field(default_factory=set)
@@ -159,7 +161,7 @@ class KnownVehicle:
     def is_idle(self) -> bool:
         """Whether it is there and without work; a primary that serves strips is so once it has surveyed all."""
         free = (Mode.IDLE, Mode.FINISHED) if self.entry.role is Role.SURVEY_REVISIT else (Mode.IDLE,)
-        return not self.lost and self.state is not None and self.state.mode in free
+        return not self.silent and self.state is not None and self.state.mode in free
 
     @property
     def is_at_a_strip(self) -> bool:
@@ -196,7 +198,7 @@ class KnownVehicle:
         self.state = state
         self.heard_ms = header.sent_ms
         self.stirred_ms = header.sent_ms if stirs else self.stirred_ms
-        self.lost = False
+        self.silent = self.lost = False
         if state.mode.is_out_of_work and self.finished_ms is None:
             self.ended_early = True
         if state.mode.has_ended:

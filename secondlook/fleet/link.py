@@ -14,9 +14,11 @@ from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
 from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, SonarEquation
 
-LOST_CYCLES, ANSWER_CYCLES = 6, 5
-"""After so many cycles of a link a vehicle that is not heard of counts as lost, and an offer as not answered: a word
-waits for its slot, and may have to be said again. As many times as many where a word takes that many packets."""
+ANSWER_CYCLES, SILENT_CYCLES = 5, 6
+"""After so many cycles of a link an offer is not answered, and a vehicle that is not heard of silent: a word waits for
+its slot, and may have to be said again. As many times as many where a word takes that many packets."""
+OUT_OF_REACH_MS = 600_000
+"""Who is out of a link's reach goes on with what it has for so long, as far as is known; then it counts as lost."""
 ABOUT_M = 1000.0
 """So far beyond all places of the scenario a vehicle may be and still tell where it is."""
 WORD_BITS = 80
@@ -121,9 +123,15 @@ def word_ms_of(scenario: Scenario) -> int:
     return 0 if times is None else times.cycle_ms * times.packets_a_word
 
 
+def silent_after_ms_of(scenario: Scenario) -> int:
+    """Age of a vehicle's state from which the coordinator offers it nothing."""
+    return max(round(scenario.coordinator.lost_after_s * 1000), SILENT_CYCLES * word_ms_of(scenario))
+
+
 def lost_after_ms_of(scenario: Scenario) -> int:
     """Age of a vehicle's state from which the coordinator counts it as lost."""
-    return max(round(scenario.coordinator.lost_after_s * 1000), LOST_CYCLES * word_ms_of(scenario))
+    silent_ms = silent_after_ms_of(scenario)
+    return silent_ms if scenario.link is None else max(silent_ms, OUT_OF_REACH_MS)
 
 
 def answer_within_ms_of(scenario: Scenario) -> int:

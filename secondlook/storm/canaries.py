@@ -71,11 +71,11 @@ def _offer(method: Method, dispatch: Dispatch, offers: Iterable[tuple[str, int]]
 
 
 def _helper(method: Method, briefing: Briefing, vehicle: KnownVehicle, now_ms: int) -> Any:
-    lost, vehicle.lost = vehicle.lost, False
+    before, vehicle.silent, vehicle.lost = (vehicle.silent, vehicle.lost), False, False
     try:
         return method(briefing, vehicle, now_ms)
     finally:
-        vehicle.lost = lost
+        vehicle.silent, vehicle.lost = before
 
 
 def _hear_state(method: Method, vehicle: KnownVehicle, *about: Any) -> Any:

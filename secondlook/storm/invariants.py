@@ -16,7 +16,7 @@ from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import CLOSED
 from planner.risk import LevelArray
 from secondlook.errors import UserError
-from secondlook.fleet.link import ANSWER_CYCLES, LOST_CYCLES, lost_after_ms_of, word_ms_of
+from secondlook.fleet.link import ANSWER_CYCLES, SILENT_CYCLES, silent_after_ms_of, word_ms_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.mission import load_run
 from secondlook.storm.witness import Violation, Witness
@@ -31,7 +31,7 @@ from secondlook.testing.strip_assertions import (
 
 AGREE_WITHIN_S = 60.0  # after the core is healed: what is late by half a minute, the next report, and its answer
 END_WITHIN_S = 30.0  # of the deadline
-HEARD_CYCLES = LOST_CYCLES + ANSWER_CYCLES  # of a link: a word has come by then, and its answer, as far as any does
+HEARD_CYCLES = SILENT_CYCLES + ANSWER_CYCLES  # of a link: a word has come by then, and its answer, as far as any does
 
 
 def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Violation]:
@@ -66,7 +66,7 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
                 is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING)
                 if is_at_work and _where(one.message) != _where(before.message):
                     failed_s = max(failed_s, one.t_s)
-    surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * lost_after_ms_of(plan.scenario) / 1000)
+    surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * silent_after_ms_of(plan.scenario) / 1000)
     ends_s = mission.ends_s(surveyed_s + _heard_within_s(plan)) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:
         yield Violation("the mission ends", overs[-1].t_s, COORDINATOR, f"it was to be over by {ends_s:.0f} s")

@@ -259,7 +259,7 @@ class CoordinatorWitness:
         if record is None or record.vehicle != name:
             where = "no strip" if record is None else f"with {record.vehicle or 'nobody'}"
             self._tell("an offer is in the books", now_ms, f"strip {number}, offered to {name}, is {where} there")
-        if heard_ms is None or now_ms - heard_ms >= self.node.config.lost_after_ms:
+        if heard_ms is None or now_ms - heard_ms >= self.node.config.silent_after_ms:
             what = f"strip {number} is offered to {name}, which was heard {_at(heard_ms)}"
             self._tell("nothing is offered to the lost", now_ms, what)
 
@@ -271,7 +271,7 @@ class CoordinatorWitness:
             start = header.incarnation
             starts = [max(of) for of in tiles.values()] + [max(of) for of in hotspots.values()]
             newest = max(starts, default=start)
-            given_up = now_ms - header.sent_ms >= GIVEN_UP_AFTER * self.node.config.lost_after_ms
+            given_up = now_ms - header.sent_ms >= GIVEN_UP_AFTER * self.node.config.silent_after_ms
             if given_up or newest > start:  # which tells nothing of what the start before has told
                 continue
             tiles_come = tally(of[start].version for of in tiles.values() if start in of)

@@ -24,7 +24,7 @@ from coordinator.ledger import Ledger, StripRecord
 from coordinator.vehicles import Offer
 from planner.dubins import Pose
 
-CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30, 400, 0.3, 0.2)
+CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
 LEVELS = np.zeros((60, 10), dtype=np.uint8)
 AHEAD = replace(CONFIG, ahead_ms=60_000)
 
@@ -33,7 +33,7 @@ class Known:
     """What a coordinator knows of the fleet by hand, and its briefing."""
 
     def __init__(self, config: CoordinatorConfig = CONFIG) -> None:
-        self.fleet = KnownFleet(run_info(400, 400), config.lost_after_ms, 0)
+        self.fleet = KnownFleet(run_info(400, 400), config.silent_after_ms, config.lost_after_ms, 0)
         self.ledger = Ledger()
         self.briefing = Briefing(config, self.ledger, self.fleet, 0.7)
         self.sector = whole(self.fleet)

@@ -140,6 +140,37 @@ def test_who_is_lost_has_no_next() -> None:
     assert told.strips()[2].reason == f"{HELPER} is lost: nothing heard of it"
 
 
+def test_who_is_silent_keeps_both_until_it_is_lost() -> None:
+    told = with_a_next_at_once(30_000, lost_after_ms=90_000)
+    told.status(HELPER, 2, TaskState.NEXT)
+    told.keep_alive((PRIMARY,), 85)
+    assert told.states() == {1: UNDER_WAY, 2: NEXT}
+    told.keep_alive((PRIMARY,), 10)
+    assert told.states() == {1: OPEN, 2: OPEN}
+    assert told.strips()[2].reason == f"{HELPER} is lost: nothing heard of it"
+
+
+def test_who_is_silent_is_offered_nothing() -> None:
+    told = coordinator(lost_after_ms=90_000)
+    told.keep_alive((PRIMARY,), 40)
+    told.hotspot()
+    told.keep_alive((PRIMARY,), 40)
+    assert (told.states(), told.tasks()) == ({1: OPEN}, [])
+    told.state(HELPER, Mode.IDLE)
+    told.settle()
+    assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)]
+
+
+def test_who_is_heard_again_before_it_is_lost_goes_on_as_it_was() -> None:
+    told = with_a_next_at_once(30_000, lost_after_ms=90_000)
+    told.status(HELPER, 2, TaskState.NEXT)
+    told.keep_alive((PRIMARY,), 60)
+    told.layer(HELPER, looked())
+    told.status(HELPER, 1, TaskState.DONE)
+    told.status(HELPER, 2, TaskState.UNDER_WAY)
+    assert told.states() == {1: DONE, 2: UNDER_WAY}
+
+
 def test_one_that_it_refuses_after_all_is_open() -> None:
     told = with_a_next()
     told.status(HELPER, 2, TaskState.REFUSED, "the battery does not last")

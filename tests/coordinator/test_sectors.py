@@ -32,7 +32,7 @@ class Laid:
     """Two sectors with two helpers each, worth the same a metre."""
 
     def __init__(self) -> None:
-        self.fleet = KnownFleet(run_info(400, 400, vehicles=FLEET), 30_000, 0)
+        self.fleet = KnownFleet(run_info(400, 400, vehicles=FLEET), 30_000, 30_000, 0)
         self.agenda = Agenda()
         self.south, self.north = sector(self.fleet, SOUTH, 0, *HELPERS[:2]), sector(self.fleet, NORTH, 1, *HELPERS[2:])
         self.sectors = Sectors([self.south, self.north], self.fleet.map.grid, self.agenda)

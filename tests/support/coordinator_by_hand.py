@@ -172,15 +172,18 @@ def coordinator(
     helpers_a_team: int = 3,
     ahead_ms: int = 0,
     separation_m: float = 0.0,
+    lost_after_ms: int = 30_000,
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
     one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration.
-    `ahead_ms`: so long before its end a helper is offered the next strip."""
+    `ahead_ms`: so long before its end a helper is offered the next strip. `lost_after_ms`: a vehicle is silent from
+    30 s on."""
     config = CoordinatorConfig(
         allocator=allocator or GreedyAllocator(),
         deadline_factor=1.05 if deadline_s is None else math.inf,
         deadline_s=math.inf if deadline_s is None else deadline_s,
-        lost_after_ms=30_000,
+        silent_after_ms=30_000,
+        lost_after_ms=lost_after_ms,
         min_strip_m=30,
         max_strip_m=max_strip_m,
         worth_risk=0.3,

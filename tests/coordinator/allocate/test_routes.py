@@ -255,7 +255,7 @@ class TestAgainstAllOrders:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(allocate.team, "LATER_SHARE", 0.0)
             found = routes(told.strips, helpers, until_s)
-        assert 0.95 * best_m2 <= found.removed_m2 <= best_m2 + 1e-6
+        assert 0.95 * best_m2 <= found.removed_m2 <= best_m2 + 1e-3  # times are rounded
 
     @settings(max_examples=100, deadline=None)
     @given(told=situations())

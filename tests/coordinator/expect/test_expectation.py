@@ -40,7 +40,7 @@ class Told:
     versions: int = 0
 
     def __post_init__(self) -> None:
-        self.fleet = KnownFleet(run_info(400, 400, vehicles=self.vehicles, rho=self.rho), LOST_MS, 0)
+        self.fleet = KnownFleet(run_info(400, 400, vehicles=self.vehicles, rho=self.rho), LOST_MS, LOST_MS, 0)
         self.expected = ExpectedMap(self.fleet, self.place, self.inside[self.place.cells], 0.7)
 
     def plan(self, *tracks: PlannedTrack, name: str = PRIMARY) -> None:

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import secondlook
 from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.cli import app
-from secondlook.fleet.link import lost_after_ms_of
+from secondlook.fleet.link import silent_after_ms_of
 from secondlook.scenario import load_scenario
 from secondlook.storm import campaign
 from secondlook.storm.campaign import agreement, flown_again, storm_of, times_reached
@@ -45,7 +45,7 @@ def test_all_kinds_of_trouble_are_drawn_and_the_core_is_left_alone_in_time() -> 
             whom = {getattr(one, key, "") for key in ("node", "vehicle", "to", "platform")}
             if whom & set(plan.core) and one.what != "join":
                 assert ends_s <= plan.heals_s + 0.1, (number, one)
-        assert plan.heals_s <= GIVEN_UP_AFTER * lost_after_ms_of(plan.scenario) / 1000
+        assert plan.heals_s <= GIVEN_UP_AFTER * silent_after_ms_of(plan.scenario) / 1000
     assert drawn == set(KINDS)
     assert 15 <= calm <= 50  # a tenth of 300
 
