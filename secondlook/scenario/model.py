@@ -150,8 +150,8 @@ class Coordinator(Mapping):
     node: Annotated[str, plug_in(NODE)] | None = None
     """`package.module:Class` of a whole coordinator of your own."""
     lost_after_s: Annotated[float, Field(ge=20, le=1e7)] = 30.0
-    """A vehicle not heard of for so long counts as lost. Agents tell their state every 10 s: one may be late. With a `link`
-    it is offered nothing from then on, and lost after 600 s, or more where cycles are long."""
+    """A vehicle not heard of for so long counts as lost. Agents tell their state every 10 s: one may be late. With
+    a `link` it is offered nothing from then on, and lost after 600 s, or more where cycles are long."""
     min_strip_m: Annotated[float, Field(ge=1, le=1000)] = 30.0
     """Least length of a strip."""
     max_strip_m: Annotated[float, Field(ge=1, le=10_000)] = 10_000.0
