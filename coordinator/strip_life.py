@@ -97,12 +97,17 @@ class StripLife:
     def ask_back(self, strip: Strip, vehicle: KnownVehicle, now_ms: int) -> None:
         """Tells a vehicle to give a strip back, and with it what it was to do next."""
         name = vehicle.entry.vehicle
-        vehicle.asked_back = strip.number
+        vehicle.asked_back, vehicle.asked_back_ms = strip.number, now_ms
         self._outbox.add_task(TaskAction.GIVE_BACK, name, strip)
         following = self.ledger.next_of(name)
         if following is not None:
             self._move(following, StripState.OPEN, now_ms, f"{name} is told to give strip {strip.number} back")
             self._sectors.assign_by(now_ms, following.window)
+
+    def _ask_back_again(self, strip: Strip, vehicle: KnownVehicle, now_ms: int) -> None:
+        """The same, unless it was told so as lately as its answer may take."""
+        if vehicle.asked_back != strip.number or now_ms - vehicle.asked_back_ms >= self._answer_within_ms:
+            self.ask_back(strip, vehicle, now_ms)
 
     def hear_state(
         self, vehicle: KnownVehicle, header: Header, state: AgentState, now_ms: int, *, was_idle: bool
@@ -218,7 +223,7 @@ class StripLife:
         record, name = self.ledger.get(number), vehicle.entry.vehicle
         if record is None:
             if number > 0:
-                self._outbox.add_task(TaskAction.GIVE_BACK, name, replace(NO_STRIP, number=number))
+                self._ask_back_again(replace(NO_STRIP, number=number), vehicle, now_ms)
             return
         offer = vehicle.offers.get(number)
         is_next = record.state is StripState.NEXT and record.vehicle == name
@@ -234,7 +239,7 @@ class StripLife:
             vehicle.offers[number] = replace(offer, due_ms=max(offer.due_ms, now_ms + self._late_ms))
             self._move(record, StripState.OFFERED, now_ms, f"{name} is at it after all", name)
         if record.vehicle != name or record.state not in TAKEN:
-            self.ask_back(record.strip, vehicle, now_ms)
+            self._ask_back_again(record.strip, vehicle, now_ms)
             return
         vehicle.unanswered = 0
         if under_way and record.state is not StripState.UNDER_WAY:
@@ -252,7 +257,7 @@ class StripLife:
         if record is None or record.state is not StripState.NEXT or record.vehicle != name:
             strip = replace(NO_STRIP, number=number) if record is None else record.strip
             if number > 0:
-                self.ask_back(strip, vehicle, now_ms)
+                self._ask_back_again(strip, vehicle, now_ms)
             return
         vehicle.unanswered, vehicle.agreed_next = 0, number
 

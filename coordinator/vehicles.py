@@ -118,11 +118,11 @@ class KnownVehicle:
     `ended_early`: its battery did not last for all of its survey.
     `refused`: strips that it has refused as they are; `gave_way`: strips that it was told to give back to let another
     pass, which it may be offered again. `failed_at`: where it has failed. `offers`: by number the newest offer of each
-    strip. `asked_back`: the strip that it was last asked to give back, 0 for none; `agreed_next`: the one that it has
-    last said to do next. `failures`: strips in a row that it
-    has accepted and not served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and
-    `curves`: P(y) by track, 0 for that of earlier missions, for a primary. `arrivals`: what has come of its tiles and
-    hotspots. `keep_out`: what it may not enter. `flows`: of the water, where they are not alike everywhere.
+    strip. `asked_back`: the strip that it was last asked to give back, 0 for none, `asked_back_ms`: when;
+    `agreed_next`: the one that it has last said to do next. `failures`: strips in a row that it has accepted and not
+    served; `unanswered`: offers in a row that it has not answered. `plan`: its newest one, and `curves`: P(y) by track,
+    0 for that of earlier missions, for a primary. `arrivals`: what has come of its tiles and hotspots. `keep_out`: what
+    it may not enter. `flows`: of the water, where they are not alike everywhere.
     """
 
     entry: RosterVehicle
@@ -136,6 +136,7 @@ class KnownVehicle:
     failed_at: list[Window] = field(default_factory=list)
     offers: dict[int, Offer] = field(default_factory=dict)
     asked_back: int = 0
+    asked_back_ms: int = 0
     agreed_next: int = 0
     failures: int = 0
     unanswered: int = 0

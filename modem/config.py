@@ -78,7 +78,8 @@ class ModemConfig:
     slot begins a modem may begin to speak, by a clock that does not wait for it. `low_m`, `high_m`: south-west and
     north-east corner of the box in which all places lie that are told. `polls`: where the coordinator's platform polls
     the others, instead of slots. `deck_ms`: before this all are on deck, and what is said goes from hand to hand at
-    once, not through the water.
+    once, not through the water. `answer_ms`: for so long the coordinator waits for the answer to an offer, which is not
+    said any more then.
 
     Raises ValueError where these do not go together.
     """
@@ -94,6 +95,7 @@ class ModemConfig:
     high_m: tuple[float, float]
     polls: PollTimes | None = None
     deck_ms: int = 0
+    answer_ms: int = 10**9
 
     def __post_init__(self) -> None:
         if not 2 <= len(set(self.platforms)) == len(self.platforms) <= MOST_PLATFORMS:

@@ -8,6 +8,7 @@ of acknowledgements, then messages and pieces of messages, what is worth most a 
 from __future__ import annotations
 
 import logging
+import math
 from collections import Counter
 from typing import Any
 
@@ -257,7 +258,9 @@ class Modem:
         if now_ms < self.config.deck_ms and self._form is not None:
             self._on_deck.append(self._form.pack_on_deck(self.config.platform, self._start, bits))
         else:
-            self._queue.add(Waiting(about, platform, crossing, bits, now_ms))
+            is_offer = isinstance(said.message, Task) and said.message.action.is_offer
+            until_ms = now_ms + self.config.answer_ms if is_offer else math.inf
+            self._queue.add(Waiting(about, platform, crossing, bits, now_ms, until_ms))
 
     def _drop(self, why: str, detail: str) -> None:
         self.dropped[why] += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -12,13 +13,14 @@ from comms.said.topics import Crossing
 @dataclass(frozen=True, slots=True)
 class Waiting:
     """A message that waits. `to`: the platform that it is for. `key`: what it is about; of a topic with `newest_only` a
-    newer one with the same takes its place."""
+    newer one with the same takes its place. `until_ms`: from then on nobody waits for it any more."""
 
     key: str
     to: str
     crossing: Crossing
     said: BitWriter
     queued_ms: int
+    until_ms: float = math.inf
 
     def worth(self, now_ms: int) -> float:
         """What a bit of it is worth."""
@@ -64,9 +66,10 @@ class Queue:
         del self._waiting[number]
 
     def drop_old(self, now_ms: int) -> None:
-        """What need not arrive, and has waited for too long, is not said any more."""
+        """What need not arrive, and has waited for too long, is not said any more; nor what nobody waits for."""
         for number, one in list(self._waiting.items()):
-            if not one.crossing.acknowledged and now_ms - one.queued_ms > one.crossing.ttl_s * 1000:
+            is_old = not one.crossing.acknowledged and now_ms - one.queued_ms > one.crossing.ttl_s * 1000
+            if is_old or now_ms >= one.until_ms:
                 del self._waiting[number]
 
     def best_first(self, now_ms: int) -> Iterable[Waiting]:

@@ -166,6 +166,7 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             low_m=(min(x_m) - ABOUT_M, min(y_m) - ABOUT_M),
             high_m=(max(x_m) + ABOUT_M, max(y_m) + ABOUT_M),
             deck_ms=times.deck_ms,
+            answer_ms=answer_within_ms_of(scenario),
             polls=times.polls,
         )
         for platform in times.platforms

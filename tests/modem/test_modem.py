@@ -215,6 +215,20 @@ def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) ->
     assert not any(modem.dropped for modem in waters.modems.values())
 
 
+@pytest.mark.parametrize(("answer_ms", "said"), [(3_000, [2]), (10**9, [1, 2])])
+def test_an_offer_that_has_waited_for_longer_than_its_answer_may_take_is_not_said(
+    answer_ms: int, said: list[int]
+) -> None:
+    waters = Waters(answer_ms=answer_ms)
+    waters.run(9_000)  # the ship's slot is the first of three
+    waters.say("coordinator", "coord/task/beta/1", replace(TAKE, strip=1))
+    waters.run(12_500)
+    waters.say("coordinator", "coord/task/beta/2", replace(TAKE, strip=2, action=TaskAction.GIVE_BACK))
+    waters.run(40_000)
+    told = [one.message for _, to, one in waters.heard if to == "beta"]
+    assert sorted(one.strip for one in told if isinstance(one, Task)) == said
+
+
 @pytest.mark.parametrize("damage", ["bit", "short", "long", "empty"])
 def test_a_damaged_frame_is_counted_and_dropped(damage: str) -> None:
     waters = Waters()

@@ -43,6 +43,7 @@ def config_of(
     slot_ms: int = 4000,
     polls: PollTimes | None = None,
     deck_ms: int = 0,
+    answer_ms: int = 10**9,
 ) -> ModemConfig:
     """A modem's configuration in a fleet of alpha and beta with a ship."""
     return ModemConfig(
@@ -57,6 +58,7 @@ def config_of(
         (900.0, 900.0),
         polls,
         deck_ms,
+        answer_ms,
     )
 
 

@@ -1,0 +1,90 @@
+"""What must hold of every mission, held over every link: the bundled scenarios under the bundled modem profiles.
+
+python -m bench.every_link [--scenarios a,b] [--profiles x,y] [--until S] [--also KEY=VALUE]
+
+Each mission is flown on the local bus, and `secondlook.testing` judges its strips: none lost, none served twice, no
+vehicle at two, none offered to who is silent. A line for each tells the wall time, the bytes a second across the water,
+and what did not hold; the exit code is 1 if anything did not. `--until`: missions are over by then at the latest, in
+simulated seconds; `--also`: overrides a key of all scenarios.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from secondlook.errors import UserError
+from secondlook.scenario import bundled
+from secondlook.testing import (
+    Fleet,
+    Flight,
+    RunFailedError,
+    assert_never_assigned_to_lost,
+    assert_no_strip_lost,
+    assert_no_strip_served_twice,
+    assert_one_strip_at_a_time,
+)
+
+HELD: tuple[Callable[[Flight], None], ...] = (
+    assert_no_strip_lost,
+    assert_no_strip_served_twice,
+    assert_one_strip_at_a_time,
+    assert_never_assigned_to_lost,
+)
+
+
+def flown(scenario: str, profile: str, also: Sequence[str], folder: Path) -> tuple[float | None, list[str]]:
+    """Flies one mission. Returns the bytes a second across the water, None where it failed, and what did not hold.
+
+    Raises UserError for what cannot be flown at all.
+    """
+    fleet = Fleet(scenario, overrides=[f"link.profile={profile}", *also], folder=folder)
+    try:
+        flight = fleet.run()
+    except RunFailedError as error:
+        return None, [str(error)]
+    problems = []
+    for holds in HELD:
+        try:
+            holds(flight)
+        except AssertionError as error:
+            problems.append(f"{holds.__name__}: {str(error).splitlines()[0]}")
+    return flight.summary["link"]["bytes_per_s"], problems
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Flies all that the command line names, and prints the table."""
+    parser = argparse.ArgumentParser(prog="python -m bench.every_link", description=__doc__)
+    parser.add_argument("--scenarios", default=",".join(bundled.scenario_names()))
+    parser.add_argument("--profiles", default=",".join(bundled.link_names()))
+    parser.add_argument("--until", type=float, metavar="S")
+    parser.add_argument("--also", action="append", default=[], metavar="KEY=VALUE")
+    told = parser.parse_args(arguments)
+    also = list(told.also)
+    if told.until is not None:
+        also += [f"mission.deadline_s={told.until}", "mission.deadline_factor=null"]
+    print("| scenario | `link.profile` | wall s | bytes a second | held |\n|---|---|---|---|---|", flush=True)
+    failed = False
+    for scenario in told.scenarios.split(","):
+        for profile in told.profiles.split(","):
+            begun_s = time.perf_counter()
+            with tempfile.TemporaryDirectory() as folder:
+                try:
+                    bytes_per_s, problems = flown(scenario, profile, also, Path(folder))
+                except UserError as error:
+                    print(f"{scenario}, {profile}: {error}", file=sys.stderr)
+                    return 2
+            said = "-" if bytes_per_s is None else f"{bytes_per_s:.1f}"
+            took_s = time.perf_counter() - begun_s
+            row = f"| `{scenario}` | `{profile}` | {took_s:.1f} | {said} | {'; '.join(problems) or 'all'} |"
+            print(row, flush=True)
+            failed |= bool(problems)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

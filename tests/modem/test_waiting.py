@@ -1,0 +1,39 @@
+"""What waits to be said: what takes the place of what, what is dropped, and what goes first."""
+
+from __future__ import annotations
+
+import math
+
+from comms.said.bits import BitWriter
+from comms.said.topics import Crossing
+from modem.waiting import Queue, Waiting
+
+
+def waiting(key: str, *, bits: int = 8, queued_ms: int = 0, until_ms: float = math.inf, **terms: bool) -> Waiting:
+    said = BitWriter()
+    said.write(0, bits)
+    return Waiting(key, "alpha", Crossing(100, 60, **terms), said, queued_ms, until_ms)
+
+
+def keys(queue: Queue, now_ms: int) -> list[str]:
+    return [one.key for one in queue.best_first(now_ms)]
+
+
+def test_what_nobody_waits_for_any_more_is_not_said_whether_acknowledged_or_not() -> None:
+    queue = Queue()
+    for one in (waiting("offer", until_ms=5_000), waiting("else"), waiting("seldom", acknowledged=False)):
+        queue.add(one)
+    queue.drop_old(4_999)
+    assert len(queue) == 3
+    queue.drop_old(5_000)
+    assert keys(queue, 5_000) == ["else", "seldom"]
+    queue.drop_old(60_001)
+    assert keys(queue, 60_001) == ["else"]
+
+
+def test_the_newest_takes_the_place_of_one_about_the_same() -> None:
+    queue = Queue()
+    for one in (waiting("a", newest_only=True), waiting("b"), waiting("a", bits=4, newest_only=True), waiting("b")):
+        queue.add(one)
+    assert sorted(keys(queue, 0)) == ["a", "b", "b"]
+    assert queue.bits == 20
