@@ -49,12 +49,14 @@ class Lines:
     def places(self, ground: Ground, count: int, generator: np.random.Generator) -> FloatArray:
         """The places in their rows, each as far off as is drawn for it, drawn again where that is not in the ground.
 
-        Raises ValueError where no row passes over the ground.
+        Rows are drawn again where none passes over the ground; raises ValueError where that happens every time.
         """
         along, across = _axes(self.heading_rad)
-        row_m, begins_m, ends_m = self._pieces(ground, generator).T
-        if not row_m.size:
+        drawn = (self._pieces(ground, generator) for _ in range(MOST_BATCHES))
+        pieces = next((one for one in drawn if one.size), None)
+        if pieces is None:
             raise ValueError("no row of targets passes over the ground")
+        row_m, begins_m, ends_m = pieces.T
         until_m = np.cumsum(ends_m - begins_m)
         at_m = (np.arange(count) + generator.random()) * (until_m[-1] / max(count, 1))
         piece = np.searchsorted(until_m, at_m, side="right").clip(max=row_m.size - 1)

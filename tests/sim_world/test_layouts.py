@@ -108,6 +108,15 @@ def test_places_that_are_given_are_taken_as_they_are() -> None:
     assert make_targets(TargetsConfig(0, Given(())), SQUARE, 1).truth().targets == ()
 
 
+@pytest.mark.parametrize("seed", range(10))
+def test_rows_are_drawn_until_one_passes_over_the_ground(seed: int) -> None:
+    # One row, and a zone over all but the westernmost tenth.
+    ground = Ground(SQUARE, (((40.0, -10.0), (410.0, -10.0), (410.0, 310.0), (40.0, 310.0)),))
+    places = laid(Lines(0.0, 400.0), 5, seed, ground)
+    assert len(places) == 5
+    assert (places[:, 0] <= 40.0).all()
+
+
 def test_ground_that_no_row_passes_over_is_refused() -> None:
     # All but a strip that is a millimetre wide is a hole.
     ground = Ground(SQUARE, (((-1.0, -1.0), (399.999, -1.0), (399.999, 301.0), (-1.0, 301.0)),))
