@@ -29,7 +29,7 @@ from planner.risk import residual_risk, to_levels
 from planner.types import DetectionCurve, FloatArray
 from secondlook.paper.measured import Survey, fly, scenario_of
 from secondlook.paper.published import PublishedMission, published_missions
-from sim_world.looks import PDetectEstimate
+from sim_world.estimates import PDetectEstimate
 
 CURVE_FILE = Path("secondlook/curves/muscle.yaml")
 KNOTS_M = np.array([25.0, 40.0, 55.0, 70.0, 85.0, 100.0, 115.0, 130.9])
@@ -146,7 +146,8 @@ def figures(candidate: Candidate, survey: Survey, mission: PublishedMission, see
     nats = np.zeros(shape)
     for offset_m in survey.offsets_m:
         truth = np.broadcast_to(curve.at(np.abs(survey.across_m - offset_m)), shape)
-        estimated = estimate.estimate(truth, estimate.track_error(generator), generator)
+        track_error = estimate.track_error(generator)
+        estimated = estimate.estimate(truth, track_error, estimate.cell_errors(shape, generator))
         nats -= np.log1p(-P_DETECT_STEP * np.rint(estimated / P_DETECT_STEP))
     levels = to_levels(nats)
     risk = residual_risk(levels, levels)[levels > 0]

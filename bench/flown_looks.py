@@ -18,11 +18,11 @@ from planner.footprints.cells import look_on_grid
 from planner.types import FloatArray, GridSpec
 from secondlook.fleet.build import build_fleet
 from secondlook.scenario import Scenario
-from sim_world.config import VehicleConfig, WorldConfig
+from sim_world.config import EstimateConfig, VehicleConfig, WorldConfig
 from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
 from sim_world.steadiness import make_current
-from sim_world.targets import Recogniser, Targets
+from sim_world.targets import NO_TARGETS, Recogniser
 from sim_world.vehicle import SimulatedVehicle, Stretch
 
 STRAIGHT = 1 - 1e-6
@@ -74,14 +74,15 @@ class _Body:
     """A helper's body in the world, whose sonar tells the truth."""
 
     def __init__(self, world: WorldConfig, config: VehicleConfig) -> None:
-        exact = replace(config, sensor=replace(config.sensor, noise_cell=0.0, noise_track=0.0))
+        sensor = replace(config.sensor, noise_cell=0.0, noise_track=0.0, estimate=EstimateConfig())
+        exact = replace(config, sensor=sensor)
         self._footprint = footprint_of(config.sensor.shape)
         current = make_current(world.current, world.seed)
         self._vehicle = SimulatedVehicle(config, world.seed, current)
         self._looks = Looks(
             exact,
             sonar=config.sensor.sonar_over(make_seabed(world.seabed, world.area, world.seed), config.vehicle),
-            targets=Targets(world.area, 0, 0),
+            targets=NO_TARGETS,
             recogniser=Recogniser(config.sensor.curve, false_alarms_per_km2=0),
             seed=world.seed,
             current=current,

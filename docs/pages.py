@@ -23,17 +23,21 @@ from secondlook import installed_command
 from secondlook.cli import app
 from secondlook.scenario import (
     Area,
+    ClustersLayout,
     Coordinator,
     Current,
     Curve,
+    Estimate,
     GridCurrent,
     Home,
+    LinesLayout,
     Link,
     Loss,
     Mission,
     Origin,
     Outage,
     PatchySeabed,
+    PlacesLayout,
     Position,
     Profile,
     RevisitVehicle,
@@ -43,12 +47,14 @@ from secondlook.scenario import (
     Start,
     SurveyVehicle,
     Targets,
+    UniformLayout,
     UniformSeabed,
 )
 from secondlook.scenario.area import Priority
 from secondlook.scenario.current import CurrentFromFile
 from secondlook.scenario.degrees import AreaInDegrees, OriginInUtm, PlaceInDegrees, PriorityInDegrees
 from secondlook.scenario.sensor import SENSORS, SensorBase
+from secondlook.scenario.targets import PlacesFromFile
 from secondlook.scenario.vehicle import VehicleBase
 
 ROOT = Path(__file__).parents[1]
@@ -74,12 +80,18 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("Current", "`current`", (Current, CurrentFromFile)),
     ("Current on a grid", "`current`", (GridCurrent,)),
     ("Targets", "`targets`", (Targets,)),
+    (
+        "Layout of targets",
+        "`targets.layout`",
+        (UniformLayout, LinesLayout, ClustersLayout, PlacesLayout, PlacesFromFile),
+    ),
     ("Every vehicle", "`vehicles.ID`", (SurveyVehicle, RevisitVehicle)),
     ("Vehicles that survey", "`vehicles.ID`", (SurveyVehicle,)),
     ("Start", "`vehicles.ID.start`", (Start, PlaceInDegrees)),
     ("Home", "`vehicles.ID.home`", (Home, PlaceInDegrees)),
     ("Settling", "`vehicles.ID.settling`", (Settling,)),
     ("Sensor", "`vehicles.ID.sensor`", tuple(SENSORS.values())),
+    ("Estimate", "`vehicles.ID.sensor.estimate`", (Estimate,)),
     ("Detection curve", "`vehicles.ID.sensor.curve` and `vehicles.ID.prior_curve`", (Curve,)),
     ("Coordinator", "`coordinator`", (Coordinator,)),
     ("Position", "`coordinator.position`", (Position, PlaceInDegrees)),
@@ -94,6 +106,7 @@ SAID = {
     + "of a revisit vehicle.",
     "Seabed": "What lowers every vehicle's P_d: nothing, or, on a `patchy` seabed, fields of sand ripples and patches "
     + "of vegetation.",
+    "Layout of targets": "Where the targets lie, on a layout of one `kind`, or as a file tells.",
     "Sensor": " ".join((SensorBase.__doc__ or "").split()),
 }
 

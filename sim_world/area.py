@@ -1,37 +1,59 @@
-"""Points drawn uniformly inside an outline."""
+"""The ground of a world, in which its targets and patches lie, and points that are drawn in it."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
 import numpy as np
+import shapely
+from shapely.geometry.base import BaseGeometry
 
 from planner.types import BoolArray, FloatArray, Point
 
 MOST_BATCHES = 1000
 
 
-def uniform_points(
-    outline: tuple[Point, ...],
-    count: int,
-    generator: np.random.Generator,
-    holes: tuple[tuple[Point, ...], ...] = (),
-) -> FloatArray:
-    """`count` points inside an outline and outside its holes, uniformly distributed, mission frame, shape (count, 2).
+@dataclass(frozen=True)
+class Ground:
+    """What lies inside an outline and outside its holes, mission frame; holes may overlap, and reach beyond it."""
 
-    Raises:
-        ValueError: the outline encloses too little of its bounding box for points to be found.
-    """
-    corners = np.asarray(outline, dtype=np.float64)
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    found = np.empty((0, 2))
-    for _ in range(MOST_BATCHES):
-        if len(found) >= count:
-            return found[:count]
-        candidates = generator.uniform(low, high, size=(max(64, 2 * count), 2))
-        inside = _inside(corners, candidates)
-        for hole in holes:
-            inside &= ~_inside(np.asarray(hole, dtype=np.float64), candidates)
-        found = np.concatenate([found, candidates[inside]])
-    raise ValueError("the area's outline encloses next to nothing")
+    outline: tuple[Point, ...]
+    holes: tuple[tuple[Point, ...], ...] = ()
+
+    @cached_property
+    def polygon(self) -> BaseGeometry:
+        """The same for geometry."""
+        return shapely.Polygon(self.outline).difference(shapely.union_all([shapely.Polygon(one) for one in self.holes]))
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Which of some points, shape (n, 2), lie in it."""
+        inside = _inside(np.asarray(self.outline, dtype=np.float64), points)
+        for hole in self.holes:
+            inside &= ~_inside(np.asarray(hole, dtype=np.float64), points)
+        return inside
+
+    def points(self, count: int, draw: Callable[[int], FloatArray]) -> FloatArray:
+        """The first `count` of those points that `draw` gives and that lie in it, shape (count, 2). `draw` is told how
+        many to give at once.
+
+        Raises:
+            ValueError: the outline encloses too little of what is drawn for points to be found.
+        """
+        found = np.empty((0, 2))
+        for _ in range(MOST_BATCHES):
+            if len(found) >= count:
+                return found[:count]
+            candidates = draw(max(64, 2 * count))
+            found = np.concatenate([found, candidates[self.holds(candidates)]])
+        raise ValueError("the area's outline encloses next to nothing")
+
+    def uniform_points(self, count: int, generator: np.random.Generator) -> FloatArray:
+        """`count` points in it, uniformly distributed, shape (count, 2); raises as `points`."""
+        corners = np.asarray(self.outline, dtype=np.float64)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        return self.points(count, lambda batch: generator.uniform(low, high, size=(batch, 2)))
 
 
 def _inside(corners: FloatArray, points: FloatArray) -> BoolArray:

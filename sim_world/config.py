@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -19,6 +19,8 @@ from planner.keep_out import NOWHERE, KeepOut
 from planner.types import DetectionCurve, Point, SonarShape
 from sim_world.channel_config import ChannelConfig
 from sim_world.footprints import FOOTPRINTS
+from sim_world.kinds import ALIKE, MIXTURES
+from sim_world.layouts import Given, Layout, Uniform
 from sim_world.sonar import HIGHEST_P_DETECT, CheckedSonar, CurveSonar, Seabed, SonarModel, SufferedSeabed
 
 FARTHEST_M = 1e6
@@ -27,8 +29,10 @@ FARTHEST_RANGE_M = 1e4
 LARGEST_LOOK_CELLS = 65_536
 LARGEST_LOOK_TARGETS = 1_000
 LARGEST_NOISE = 2.0
+BIASES = -0.9, 9.0
 ROUNDING_RAD = 1e-9
 """Half a turn told in degrees may be as much more."""
+LEAST_ASPECT_RAD, LARGEST_ASPECT_RAD = math.radians(5.0) - ROUNDING_RAD, math.pi + ROUNDING_RAD
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,41 @@ class SeabedConfig:
 
 
 @dataclass(frozen=True)
+class EstimateConfig:
+    """How a vehicle's estimate of its own P_d is wrong beyond the noise that `SensorConfig` tells; by nothing as it is.
+
+    `bias`: by what share of it P_d is told too high, below 0 too low, -0.9 to 9; `bias_at_reach`: the same at the
+    sonar's farthest range, growing evenly with the range; `bias_after_turn`: the same where a turn ends, evenly less
+    until the vehicle has gone straight for `turn_m` > 0. They multiply. `blind_to_seabed`: it tells what P_d would be
+    on a seabed that takes nothing. `drift_per_km`: standard deviation, on the logit scale, to which a random walk of
+    the error comes over a kilometre looked at, 0 to 2. `noise_along_m`: over which distance along a track the errors of
+    cells stay alike to 1 / e; None for errors of each cell's own.
+    """
+
+    bias: float = 0.0
+    bias_at_reach: float = 0.0
+    bias_after_turn: float = 0.0
+    turn_m: float = 100.0
+    blind_to_seabed: bool = False
+    drift_per_km: float = 0.0
+    noise_along_m: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("bias", "bias_at_reach", "bias_after_turn"):
+            low, high = BIASES
+            _require(low <= getattr(self, name) <= high, name, getattr(self, name), f"{low:g} to {high:g}")
+        _require(0.01 <= self.turn_m <= 1e4, "turn_m", self.turn_m, "0.01 to 10000 m")
+        _require(0.0 <= self.drift_per_km <= LARGEST_NOISE, "drift_per_km", self.drift_per_km, "0 to 2")
+        along_m = self.noise_along_m
+        _require(along_m is None or 0.01 <= along_m <= 1e4, "noise_along_m", along_m, "0.01 to 10000 m")
+
+    @property
+    def without_chance(self) -> EstimateConfig:
+        """The same where nothing is drawn."""
+        return replace(self, drift_per_km=0.0, noise_along_m=None)
+
+
+@dataclass(frozen=True)
 class SensorConfig:
     """A sonar.
 
@@ -87,6 +126,8 @@ class SensorConfig:
     half_angle_rad: float = 0.0
     seabed_share: float = 1.0
     half_at_crab_rad: float | None = None
+    estimate: EstimateConfig = field(default_factory=EstimateConfig)
+    false_alarms_per_km2: float = 0.0
 
     def __post_init__(self) -> None:
         ranges, values = self.curve.range_m, self.curve.p_detect
@@ -115,6 +156,11 @@ class SensorConfig:
         _require(0.0 <= self.seabed_share <= 1.0, "seabed_share", self.seabed_share, "0 to 1")
         half_rad = self.half_at_crab_rad
         _require(half_rad is None or 1e-3 <= half_rad <= math.pi / 2, "half_at_crab_rad", half_rad, "0.001 to pi / 2")
+        alarms = self.false_alarms_per_km2
+        _require(0.0 <= alarms <= 1e6, "false_alarms_per_km2", alarms, "0 to 1e6")
+        # The looks of a sector ahead overlap: their cells do not lie one behind the other.
+        beside = self.footprint == "side" or self.estimate.noise_along_m is None
+        _require(beside, "estimate.noise_along_m", self.estimate.noise_along_m, "None but for the footprint side")
 
     def sonar_over(self, seabed: Seabed, vehicle: str) -> SonarModel:
         """The true model of a vehicle's sonar over a seabed, of which it loses its share."""
@@ -122,6 +168,12 @@ class SensorConfig:
         if self.sonar is None:
             return CurveSonar(self.curve, suffered)
         return CheckedSonar(self.sonar(curve=self.curve, seabed=suffered), vehicle)
+
+    def believed_over(self, seabed: Seabed, vehicle: str) -> SonarModel | None:
+        """What the vehicle takes its sonar for over a seabed, where that is not the true model."""
+        if not self.estimate.blind_to_seabed:
+            return None
+        return replace(self, seabed_share=0.0).sonar_over(seabed, vehicle)
 
     @property
     def bins_per_look(self) -> int:
@@ -213,14 +265,28 @@ class VehicleConfig:
 
 @dataclass(frozen=True)
 class TargetsConfig:
-    """How many targets lie in the area, at most 1000, and how many false alarms a look raises a square kilometre."""
+    """The targets in the area: how many, at most 1000, where they lie, how alike they are, and what looks at one share.
+
+    `correlation`: how far the looks at one target share their chance, [0, 1], and `aspect_rad`: how far apart the
+    bearings of two of them are where they share nothing any more, 5 degrees to pi, None where bearings do not matter,
+    see `sim_world.strengths`. `kinds`: the mixture that targets are drawn from, one of `sim_world.kinds.MIXTURES`.
+    """
 
     count: int = 0
-    false_alarms_per_km2: float = 0.0
+    layout: Layout = field(default_factory=Uniform)
+    correlation: float = 0.0
+    aspect_rad: float | None = None
+    kinds: str = ALIKE
 
     def __post_init__(self) -> None:
         _require(0 <= self.count <= LARGEST_LOOK_TARGETS, "count", self.count, f"0 to {LARGEST_LOOK_TARGETS}")
-        _require(0.0 <= self.false_alarms_per_km2 <= 1e6, "false_alarms_per_km2", self.false_alarms_per_km2, "0 to 1e6")
+        given = not isinstance(self.layout, Given) or len(self.layout.places_m) == self.count
+        _require(given, "count", self.count, "as many as there are places")
+        _require(0.0 <= self.correlation <= 1.0, "correlation", self.correlation, "0 to 1")
+        aspect_rad = self.aspect_rad
+        wide = aspect_rad is None or LEAST_ASPECT_RAD <= aspect_rad <= LARGEST_ASPECT_RAD
+        _require(wide, "aspect_rad", aspect_rad, "5 degrees to pi")
+        _require(self.kinds in MIXTURES, "kinds", self.kinds, " or ".join(MIXTURES))
 
 
 @dataclass(frozen=True)

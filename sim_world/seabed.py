@@ -13,7 +13,7 @@ import numpy as np
 
 from comms.node import random_stream
 from planner.types import FloatArray, Point
-from sim_world.area import uniform_points
+from sim_world.area import Ground
 from sim_world.config import SeabedConfig
 from sim_world.sonar import Seabed
 
@@ -104,7 +104,7 @@ def _draw(
     generator: np.random.Generator,
     slenderness: tuple[float, float],
 ) -> tuple[Patch, ...]:
-    centres = uniform_points(area, count, generator)
+    centres = Ground(area).uniform_points(count, generator)
     headings = generator.uniform(0.0, math.pi, count)
     half_lengths = generator.uniform(*config.scale_m, count) / (2.0 * HALF_WEIGHT)
     half_widths = half_lengths * generator.uniform(*slenderness, count)

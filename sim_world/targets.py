@@ -10,8 +10,11 @@ from numpy.typing import NDArray
 from comms.node import random_stream
 from comms.said.messages import LookContact, TruthTarget, TruthTargets
 from planner.types import BoolArray, DetectionCurve, FloatArray, Point
-from sim_world.area import uniform_points
+from sim_world.area import Ground
+from sim_world.config import TargetsConfig
 from sim_world.footprints.swath import Swath
+from sim_world.kinds import Alike, Kinds, make_kinds
+from sim_world.strengths import Strengths, Unshared, make_strengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,13 +32,13 @@ class Passed:
 
 
 class Targets:
-    """All targets of a world, uniformly distributed over its area without the holes; their true positions."""
+    """All targets of a world: their true positions, shape (targets, 2), mission frame, what each is, and what the looks
+    at each have in common."""
 
-    def __init__(
-        self, area: tuple[Point, ...], count: int, seed: int, holes: tuple[tuple[Point, ...], ...] = ()
-    ) -> None:
-        points = uniform_points(area, count, random_stream(seed, "world", "targets"), holes)
-        self._x_m, self._y_m = points[:, 0], points[:, 1]
+    def __init__(self, places_m: FloatArray, kinds: Kinds, strengths: Strengths) -> None:
+        self._x_m, self._y_m = places_m[:, 0], places_m[:, 1]
+        self._kinds = kinds
+        self._strengths = strengths
 
     def truth(self) -> TruthTargets:
         """The targets as they are published."""
@@ -47,6 +50,32 @@ class Targets:
         along_m, lateral_m = swath.to_track(self._x_m, self._y_m)
         numbers = swath.sees(along_m, lateral_m).nonzero()[0]
         return Passed(numbers, along_m[numbers], lateral_m[numbers], self._x_m[numbers], self._y_m[numbers])
+
+    def p_detect(self, passed: Passed, p_detect: FloatArray, bearing_rad: FloatArray) -> FloatArray:
+        """The P_d of each target passed, for that of the common target in its place seen along a compass bearing."""
+        return self._kinds.p_detect(passed.numbers, p_detect, bearing_rad)
+
+    def chances(self, passed: Passed, p_detect: FloatArray, bearing_rad: FloatArray) -> FloatArray:
+        """With which chance each is detected by a look with that P_d of its own, for whom its hidden strength is known:
+        P_d itself where looks have nothing in common."""
+        return self._strengths.chances(passed.numbers, p_detect, bearing_rad)
+
+
+NO_TARGETS = Targets(np.empty((0, 2)), Alike(), Unshared())
+
+
+def make_targets(
+    config: TargetsConfig, area: tuple[Point, ...], seed: int, holes: tuple[tuple[Point, ...], ...] = ()
+) -> Targets:
+    """The targets of a world: where they lie, what they are and how strong each has a random stream of its own."""
+    places, kinds, strengths = (
+        random_stream(seed, "world", name) for name in ("targets", "target_kinds", "target_strengths")
+    )
+    return Targets(
+        config.layout.places(Ground(area, holes), config.count, places),
+        make_kinds(config.kinds, config.count, kinds),
+        make_strengths(config.correlation, config.aspect_rad, config.count, strengths),
+    )
 
 
 M2_PER_KM2 = 1e6
@@ -68,11 +97,12 @@ class Recogniser:
         self._farthest_m = float(curve.range_m[min(seen[-1] + 1, curve.range_m.size - 1)]) if seen.size else 0.0
 
     def detect(
-        self, passed: Passed, p_detect: FloatArray, generator: np.random.Generator
+        self, passed: Passed, chances: FloatArray, generator: np.random.Generator
     ) -> tuple[BoolArray, list[LookContact]]:
-        """Which of the targets passed are detected, each with its own true P_d, shape (n,), and the contacts made."""
-        detected = generator.random(p_detect.shape) < p_detect
-        scores = 0.5 + 0.5 * generator.beta(2.0, 2.0, p_detect.shape)
+        """Which of the targets passed are detected, each with a chance of its own, shape (n,), and the contacts
+        made."""
+        detected = generator.random(chances.shape) < chances
+        scores = 0.5 + 0.5 * generator.beta(2.0, 2.0, chances.shape)
         return detected, _contacts(passed.along_m[detected], passed.lateral_m[detected], scores[detected])
 
     def false_alarms(self, swath: Swath, generator: np.random.Generator) -> list[LookContact]:

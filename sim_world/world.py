@@ -15,7 +15,7 @@ from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
 from sim_world.sonar import Seabed
 from sim_world.steadiness import Stream, make_current
-from sim_world.targets import Recogniser, Targets
+from sim_world.targets import Recogniser, Targets, make_targets
 from sim_world.vehicle import SimulatedVehicle
 
 
@@ -31,8 +31,9 @@ class Body:
         self._looks = Looks(
             config,
             sonar=sensor.sonar_over(seabed, config.vehicle),
+            believed=sensor.believed_over(seabed, config.vehicle),
             targets=targets,
-            recogniser=Recogniser(sensor.curve, false_alarms_per_km2=world.targets.false_alarms_per_km2),
+            recogniser=Recogniser(sensor.curve, false_alarms_per_km2=sensor.false_alarms_per_km2),
             seed=world.seed,
             current=current,
         )
@@ -107,7 +108,7 @@ class World:
     """
 
     def __init__(self, config: WorldConfig) -> None:
-        self._targets = Targets(config.area, config.targets.count, config.seed, (*config.holes, *config.keep_out.zones))
+        self._targets = make_targets(config.targets, config.area, config.seed, (*config.holes, *config.keep_out.zones))
         seabed = make_seabed(config.seabed, config.area, config.seed)
         current = make_current(config.current, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)

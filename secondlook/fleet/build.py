@@ -31,11 +31,16 @@ from secondlook.fleet.roster import endurance_ms_of, flows_of, reserve_ms_of, ro
 from secondlook.fleet.survey_area import begin_of, keep_out_of, region_for, region_of, track_heading_rad
 from secondlook.scenario import (
     AnyCurrent,
+    AnyLayout,
+    ClustersLayout,
     GridCurrent,
+    LinesLayout,
     PatchySeabed,
+    PlacesLayout,
     RevisitVehicle,
     Scenario,
     SurveyVehicle,
+    Targets,
     UniformSeabed,
     body_of,
     scenario_hash,
@@ -44,6 +49,7 @@ from secondlook.scenario.plug_ins import ALLOCATOR, SONAR, SPACING, made
 from sim_world.channel_config import Outage
 from sim_world.config import (
     CurrentConfig,
+    EstimateConfig,
     SeabedConfig,
     SensorConfig,
     SettlingConfig,
@@ -51,6 +57,8 @@ from sim_world.config import (
     VehicleConfig,
     WorldConfig,
 )
+from sim_world.kinds import ALIKE
+from sim_world.layouts import Clusters, Given, Layout, Lines, Uniform
 from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevisitConfig
 
 AS_CONVEX = 1e-6
@@ -228,7 +236,7 @@ def world_config(scenario: Scenario, outages: tuple[Outage, ...] = ()) -> WorldC
             vehicle_config(name, vehicle) for name, vehicle in scenario.vehicles.items() if vehicle.body == "simulated"
         ),
         seabed=_seabed(scenario.seabed),
-        targets=TargetsConfig(scenario.targets.count),
+        targets=_targets(scenario.targets),
         current=None if current is None else _current(current),
         channel=channel_config(scenario, outages),
     )
@@ -253,6 +261,27 @@ def _seabed(seabed: UniformSeabed | PatchySeabed) -> SeabedConfig:
         strength=seabed.strength,
         ripple_crests_rad=None if crests is None else (math.radians(crests[0]), math.radians(crests[1])),
     )
+
+
+def _targets(targets: Targets) -> TargetsConfig:
+    return TargetsConfig(
+        count=targets.count,
+        layout=_layout(targets.layout),
+        correlation=targets.correlation or 0.0,
+        aspect_rad=None if targets.aspect_deg is None else math.radians(targets.aspect_deg),
+        kinds=targets.kinds or ALIKE,
+    )
+
+
+def _layout(layout: AnyLayout | None) -> Layout:
+    match layout:
+        case LinesLayout():
+            return Lines(math.radians(layout.heading_deg), layout.rows_apart_m, layout.jitter_m)
+        case ClustersLayout():
+            return Clusters(layout.clusters, layout.spread_m)
+        case PlacesLayout():
+            return Given(layout.places_m)
+    return Uniform()
 
 
 def vehicle_config(name: str, vehicle: SurveyVehicle | RevisitVehicle) -> VehicleConfig:
@@ -292,6 +321,8 @@ def _sensor(vehicle: SurveyVehicle | RevisitVehicle) -> SensorConfig:
         sonar=None if sensor.sonar is None else SONAR.maker(sensor.sonar),
         seabed_share=1.0 if sensor.seabed_share is None else sensor.seabed_share,
         half_at_crab_rad=None if sensor.half_at_crab_deg is None else math.radians(sensor.half_at_crab_deg),
+        estimate=EstimateConfig() if sensor.estimate is None else EstimateConfig(**sensor.estimate.model_dump()),
+        false_alarms_per_km2=sensor.false_alarms_per_km2 or 0.0,
     )
 
 

@@ -16,9 +16,9 @@ from planner.keep_out import KeepOut
 from planner.sweep import shifted
 from sim_world.config import VehicleConfig
 from sim_world.looks import Looks
-from sim_world.sonar import CurveSonar, Seabed, SufferedSeabed
+from sim_world.sonar import Seabed
 from sim_world.steadiness import Stream
-from sim_world.targets import Recogniser, Targets
+from sim_world.targets import NO_TARGETS, Recogniser
 from sim_world.vehicle import SimulatedVehicle, Stretch
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
@@ -72,14 +72,16 @@ class _DryAgent(SurveyAgent):
 
 class _DryFlight:
     def __init__(self, config: SurveyConfig, body: VehicleConfig, run: RunInfo, sea: Sea) -> None:
-        sensor = replace(body.sensor, noise_cell=0.0, noise_track=0.0)
+        errors = body.sensor.estimate.without_chance
+        sensor = replace(body.sensor, noise_cell=0.0, noise_track=0.0, estimate=errors, sonar=None)
         self._run = run
         self._agent = _DryAgent(config)
         self._vehicle = SimulatedVehicle(body, run.seed, sea.current, sea.keep_out)
         self._looks = Looks(
             replace(body, sensor=sensor),
-            sonar=CurveSonar(sensor.curve, SufferedSeabed(sea.seabed, sensor.seabed_share)),
-            targets=Targets(run.outline, 0, run.seed),
+            sonar=sensor.sonar_over(sea.seabed, body.vehicle),
+            believed=sensor.believed_over(sea.seabed, body.vehicle),
+            targets=NO_TARGETS,
             recogniser=Recogniser(sensor.curve, false_alarms_per_km2=0.0),
             seed=run.seed,
             current=sea.current,

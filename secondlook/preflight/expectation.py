@@ -13,7 +13,7 @@ from secondlook.fleet.survey_area import check_tracks, lays_tracks, region_of
 from secondlook.preflight.dry_survey import DrySurvey, Sea, fly_dry
 from secondlook.preflight.helpers import why_idle
 from secondlook.progress import in_seconds
-from secondlook.scenario import Scenario, SurveyVehicle
+from secondlook.scenario import Scenario, SurveyVehicle, at_odds
 from secondlook.scenario.vehicle import RESERVE_SHARE
 from sim_world.seabed import make_seabed
 from sim_world.steadiness import make_current
@@ -140,6 +140,7 @@ def expected_mission(scenario: Scenario) -> MissionExpectation:
     # Where somebody may revisit strips are cut, and left open until then by those who can do nothing.
     latest_s = until_s if may_revisit else min(survey_s, until_s)
     refused, remarks = _flown_too_far(scenario, surveys, able, latest_s)
+    remarks += filter(None, [at_odds(scenario)])
     limit_s = mission.time_limit_s
     if survey_s <= limit_s < latest_s:
         remarks.append(

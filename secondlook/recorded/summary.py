@@ -18,7 +18,7 @@ from comms.result import STRIP_TO_TASK, BusResult
 from secondlook.recorded.ground import RiskMap, risk_in_priorities
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Observer
-from secondlook.scenario import Scenario
+from secondlook.scenario import Scenario, at_odds
 from secondlook.scenario.area import priority_grounds
 from secondlook.scenario.link import IDEAL, SHIP
 
@@ -48,6 +48,7 @@ def summarise(
     told = observer.metrics.summary()
     dropped = _dropped(observer, result, factor)
     closest, entered = told.pop("closest"), told.pop("entered")
+    odds = at_odds(scenario)
     mission_s = (observer.metrics.now_ms if result is None else result.mission_ms) / 1000
     return {
         "scenario": scenario.name,
@@ -63,6 +64,7 @@ def summarise(
         **({"restarts": dict(restarts)} if restarts else {}),
         "time": _times(mission_s, told.pop("primary_s"), wall_s),
         **told,
+        **({"at_odds": odds} if odds else {}),
         "priorities": _priorities(scenario, observer.metrics),
         "separation": {
             "least_m": scenario.mission.separation_m,

@@ -14,23 +14,35 @@ from secondlook.scenario.model import (
     Mission,
     PatchySeabed,
     Scenario,
-    Targets,
     UniformSeabed,
     scenario_hash,
 )
-from secondlook.scenario.sensor import Curve
+from secondlook.scenario.odds import at_odds
+from secondlook.scenario.sensor import Curve, Estimate
+from secondlook.scenario.targets import (
+    AnyLayout,
+    ClustersLayout,
+    LinesLayout,
+    PlacesLayout,
+    Targets,
+    UniformLayout,
+)
 from secondlook.scenario.vehicle import Home, RevisitVehicle, Settling, Start, SurveyVehicle, body_of
 
 __all__ = [
     "IDEAL",
     "SHIP",
     "AnyCurrent",
+    "AnyLayout",
     "Area",
+    "ClustersLayout",
     "Coordinator",
     "Current",
     "Curve",
+    "Estimate",
     "GridCurrent",
     "Home",
+    "LinesLayout",
     "Link",
     "Loss",
     "Mission",
@@ -38,6 +50,7 @@ __all__ = [
     "Outage",
     "PatchySeabed",
     "Place",
+    "PlacesLayout",
     "Position",
     "Problem",
     "Profile",
@@ -49,7 +62,9 @@ __all__ = [
     "Start",
     "SurveyVehicle",
     "Targets",
+    "UniformLayout",
     "UniformSeabed",
+    "at_odds",
     "body_of",
     "bundled_scenarios",
     "load_scenario",

@@ -111,6 +111,20 @@ def read_chart(path: Path) -> Chart:
     )
 
 
+def read_points(path: Path) -> list[tuple[str, Place]]:
+    """The points in such a file, each with what to call it in a sentence.
+
+    Raises:
+        ChartError: the file cannot be read, or holds something else than points.
+    """
+    found = []
+    for feature in _features(_parsed(path)):
+        if feature.geometry["type"] != "Point":
+            raise feature.wrong(f"a {feature.geometry['type']} is not allowed; must be a Point")
+        found.append((feature.called, _place(feature, feature.geometry.get("coordinates"))))
+    return found
+
+
 def _parsed(path: Path) -> dict[str, Any]:
     try:
         with path.open("rb") as file:

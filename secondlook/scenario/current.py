@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise, product
 from pathlib import Path
@@ -15,25 +15,25 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
 from planner.currents import FlowGrid
 from planner.types import FloatArray, Point
 from secondlook.geography import GeographicOrigin
-from secondlook.scenario.errors import shown
+from secondlook.scenario.table import (
+    IN_DEGREES,
+    PLACE_LIMITS,
+    PLACES_IN_WORDS,
+    TableError,
+    check_columns,
+    columns_refused,
+    numbers_of,
+    place_columns,
+    rows_of,
+)
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import TOLERANCE, Coordinate, Heading, Mapping, Speed, refused
 
 MOST_NODES = 10_000
-LARGEST_FILE_BYTES = 10_000_000
 FASTEST_MPS = 30.0
 DECIMALS = 4
 """Of flows in m/s that were read from a file."""
-_LIMITS = {
-    "time_s": 1e9,
-    "x_m": 1e6,
-    "y_m": 1e6,
-    "longitude_deg": 180.0,
-    "latitude_deg": 90.0,
-    "east_mps": FASTEST_MPS,
-    "north_mps": FASTEST_MPS,
-}
-_PLACES = (("x_m", "y_m"), ("longitude_deg", "latitude_deg"))
+_LIMITS = {**PLACE_LIMITS, "time_s": 1e9, "east_mps": FASTEST_MPS, "north_mps": FASTEST_MPS}
 _FLOWS = ("east_mps", "north_mps")
 
 
@@ -146,10 +146,6 @@ AnyCurrent = Annotated[
 ]
 
 
-class FlowFileError(Exception):
-    """A file of flows that cannot be used; `str()` says what is wrong with it, and in which line, without its name."""
-
-
 @dataclass(frozen=True)
 class FlowTable:
     """What such a file holds. `columns`: those that tell places, to the east and to the north; `east`, `north`,
@@ -165,7 +161,7 @@ class FlowTable:
     @property
     def is_in_degrees(self) -> bool:
         """Whether places are told by longitude and latitude."""
-        return self.columns == _PLACES[1]
+        return self.columns == IN_DEGREES
 
     def written(self, origin: GeographicOrigin | None) -> dict[str, Value]:
         """The keys of a `GridCurrent` in the mission frame; `origin`: of that, not None for places in degrees.
@@ -189,26 +185,26 @@ def read_flows(path: Path) -> FlowTable:
     in any order. Lines that begin with # count for nothing.
 
     Raises:
-        FlowFileError: the file cannot be read, or is no such table.
+        TableError: the file cannot be read, or is no such table.
     """
-    rows = _rows(path)
+    rows = rows_of(path)
     heading = next(rows, (0, []))[1]
     columns = _columns(heading)
     found: dict[tuple[float, ...], tuple[float, ...]] = {}
     for line, fields in rows:
-        numbers = _numbers(line, heading, fields)
+        numbers = numbers_of(line, heading, fields, _LIMITS)
         node = (numbers.get("time_s", 0.0), numbers[columns[1]], numbers[columns[0]])
         if node in found:
-            raise FlowFileError(f"line {line}: {_named(columns, node)} is given again; must be given once")
+            raise TableError(f"line {line}: {_named(columns, node)} is given again; must be given once")
         if len(found) == MOST_NODES:
-            raise FlowFileError(f"line {line}: more than {MOST_NODES} places and times; must be fewer")
+            raise TableError(f"line {line}: more than {MOST_NODES} places and times; must be fewer")
         found[node] = numbers["east_mps"], numbers["north_mps"]
     if not found:
-        raise FlowFileError("holds no flow; must have a line for each place of a regular grid")
+        raise TableError("holds no flow; must have a line for each place of a regular grid")
     time_s, north, east = (sorted({node[axis] for node in found}) for axis in range(3))
     for node in product(time_s, north, east):
         if node not in found:
-            raise FlowFileError(
+            raise TableError(
                 f"{_named(columns, node)} is missing; must have every place of a regular grid, at every time"
             )
     shape = len(time_s), len(north), len(east)
@@ -216,49 +212,14 @@ def read_flows(path: Path) -> FlowTable:
     return FlowTable(columns, np.array(east), np.array(north), np.array(time_s), flows[..., 0], flows[..., 1])
 
 
-def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
-    """The lines that hold something, each with its number, from 1."""
-    try:
-        if path.stat().st_size > LARGEST_FILE_BYTES:
-            raise FlowFileError(f"larger than {LARGEST_FILE_BYTES} bytes; must be smaller")
-        text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise FlowFileError("not UTF-8 text; must be CSV") from None
-    except (OSError, ValueError) as error:
-        raise FlowFileError(f"cannot be read: {getattr(error, 'strerror', None) or error}") from error
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.strip() and not line.startswith("#"):
-            yield number, [field.strip() for field in line.split(",")]
-
-
 def _columns(heading: list[str]) -> tuple[str, str]:
     """The columns that hold places."""
-    allowed = "east_mps, north_mps, x_m and y_m or longitude_deg and latitude_deg, and time_s or not"
-    for number, name in enumerate(heading):
-        if name not in _LIMITS or name in heading[:number]:
-            raise FlowFileError(f"column {shown(name)} is not allowed; columns must be {allowed}")
-    places = [pair for pair in _PLACES if set(pair) & set(heading)]
-    if len(places) != 1 or not {*places[0], *_FLOWS} <= set(heading):
-        raise FlowFileError(f"columns {', '.join(heading) or 'none'} are not allowed; must be {allowed}")
-    return places[0]
-
-
-def _numbers(line: int, heading: list[str], fields: list[str]) -> dict[str, float]:
-    if len(fields) != len(heading):
-        raise FlowFileError(f"line {line}: {len(fields)} values; must be {len(heading)}, one for each column")
-    numbers = {}
-    for name, text in zip(heading, fields, strict=True):
-        limit = _LIMITS[name]
-        try:
-            number = float(text)
-        except ValueError:
-            number = math.nan
-        if not abs(number) <= limit:
-            raise FlowFileError(
-                f"line {line}: {name} {shown(text)} is not allowed; must be a number from -{limit:g} to {limit:g}"
-            )
-        numbers[name] = number
-    return numbers
+    allowed = f"east_mps, north_mps, {PLACES_IN_WORDS}, and time_s or not"
+    check_columns(heading, _LIMITS, allowed)
+    places = place_columns(heading)
+    if places is None or not {*_FLOWS} <= set(heading):
+        raise columns_refused(heading, allowed)
+    return places
 
 
 def _named(columns: tuple[str, str], node: tuple[float, ...]) -> str:

@@ -16,9 +16,11 @@ from comms.said.announcement import MOST_CORNERS, MOST_HOLE_CORNERS, MOST_HOLES,
 from secondlook.geography import GeographicOrigin, UnknownGridError, utm_to_degrees, utm_zone
 from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
-from secondlook.scenario.current import Current, CurrentFromFile, FlowFileError, GridCurrent, read_flows
+from secondlook.scenario.current import Current, CurrentFromFile, GridCurrent, read_flows
 from secondlook.scenario.errors import KeyPath
 from secondlook.scenario.link import Position
+from secondlook.scenario.table import TableError
+from secondlook.scenario.targets import PlacesFromFile, PlacesLayout
 from secondlook.scenario.text import Value
 from secondlook.scenario.values import Mapping, check_pair, refused
 from secondlook.scenario.vehicle import Home, Start
@@ -131,6 +133,7 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
     Home: PlaceInDegrees,
     Position: PlaceInDegrees,
     Current: CurrentFromFile,
+    PlacesLayout: PlacesFromFile,
 }
 """What may be given in degrees, in UTM metres or in a file in place of keys of a mapping."""
 
@@ -169,7 +172,7 @@ _NOT_BESIDE = {
 }
 _NOT_BESIDE_FLOWS = (Current.model_fields.keys() | GridCurrent.model_fields.keys()) - {"keeps"}
 _SEVERAL = ("holes", "keep_out")  # keys, without their ending, that hold several rings
-_NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
+NEEDS_ORIGIN = "must stand with origin, which tells where x 0, y 0 is: {latitude_deg: ..., longitude_deg: ...}"
 
 
 @dataclass(frozen=True)
@@ -185,7 +188,7 @@ class InMetres:
     errors: list[ErrorDetails] = field(default_factory=list)
 
 
-class _RefusedError(Exception):
+class RefusedError(Exception):
     """What cannot be used: where it is, what was given, and what is allowed; or that it is missing."""
 
     def __init__(self, path: KeyPath, value: object, allowed: str, kind: str = "refused") -> None:
@@ -211,11 +214,11 @@ class _Frame:
         if not math.hypot(x_m, y_m) <= FARTHEST_KM * 1000:
             if path[:2] == ("area", "file"):
                 said = f"latitude {place[0]:g}, longitude {place[1]:g} is not; charts have longitude first"
-                raise _RefusedError(path[:2], None, f"all must be within {FARTHEST_KM} km of origin, but {said}")
+                raise RefusedError(path[:2], None, f"all must be within {FARTHEST_KM} km of origin, but {said}")
             hint = "; latitude comes first" if isinstance(path[-1], int) else ""
             if self.epsg is not None:
                 hint = f"; easting comes first, and the zone is that of EPSG:{self.epsg}"
-            raise _RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
+            raise RefusedError(path, [*place], f"must be within {FARTHEST_KM} km of origin{hint}")
         return [round(x_m, 3) + 0.0, round(y_m, 3) + 0.0]
 
     def ring_m(self, path: KeyPath, corners: Sequence[tuple[float, float]]) -> list[Value]:
@@ -242,16 +245,16 @@ def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
             checked = model.model_validate(given)
             for key, value in given.items():
                 if others := [other for other in _NOT_BESIDE[key] if other in holder]:
-                    raise _RefusedError((*path, key), value, f"must be left out beside {' and '.join(others)}")
+                    raise RefusedError((*path, key), value, f"must be left out beside {' and '.join(others)}")
                 if data.get("origin") is None and key != "epsg":
-                    raise _RefusedError((*path, key), value, _NEEDS_ORIGIN)
+                    raise RefusedError((*path, key), value, NEEDS_ORIGIN)
             _turn(turned, path, holder, checked, data, folder)
         except ValidationError as error:
             turned.errors.extend({**one, "loc": (*path, *one["loc"])} for one in error.errors())
         except _ToldError:
             pass
-        except _RefusedError as error:
-            if error.details["msg"] != _NEEDS_ORIGIN or not any(one["msg"] == _NEEDS_ORIGIN for one in turned.errors):
+        except RefusedError as error:
+            if error.details["msg"] != NEEDS_ORIGIN or not any(one["msg"] == NEEDS_ORIGIN for one in turned.errors):
                 turned.errors.append(error.details)
         for key in given:
             del holder[key]
@@ -290,20 +293,20 @@ def _take_flows(turned: InMetres, current: dict[str, Value], folder: Path) -> No
     turned.written["current", "keeps"] = ("current", "keeps"), current.get("keeps")
     try:
         if not isinstance(file, str):
-            raise _RefusedError(path, file, "must be a text")
+            raise RefusedError(path, file, "must be a text")
         if others := [key for key in current if key in _NOT_BESIDE_FLOWS]:
-            raise _RefusedError(path, file, f"must be left out beside {' and '.join(others)}")
+            raise RefusedError(path, file, f"must be left out beside {' and '.join(others)}")
         table = read_flows(folder / file)
         origin = None
         if table.is_in_degrees:
             if turned.data.get("origin") is None:
-                raise _RefusedError(path, file, _NEEDS_ORIGIN)
+                raise RefusedError(path, file, NEEDS_ORIGIN)
             origin = GeographicOrigin(**Origin.model_validate(turned.data["origin"]).model_dump())
         current.update(table.written(origin))
         return
-    except FlowFileError as error:
-        turned.errors.append(_RefusedError(path, file, str(error)).details)
-    except _RefusedError as error:
+    except TableError as error:
+        turned.errors.append(RefusedError(path, file, str(error)).details)
+    except RefusedError as error:
         turned.errors.append(error.details)
     except ValidationError:
         pass  # of the origin: told when the whole is validated
@@ -316,7 +319,7 @@ def _epsg(data: dict[str, Value], path: KeyPath, own: int | None) -> int:
     found: Any = own if own is not None or not isinstance(area, dict) else area.get("epsg")
     if found is None:
         missing = ("area",) if isinstance(area, dict) and "polygon_utm_m" in area else path
-        raise _RefusedError((*missing, "epsg"), None, "must be given", kind="missing")
+        raise RefusedError((*missing, "epsg"), None, "must be given", kind="missing")
     try:
         utm_zone(found)
     except (UnknownGridError, TypeError):
@@ -373,9 +376,9 @@ def _take_chart(turned: InMetres, area: dict[str, Value], file: str, folder: Pat
     try:
         chart = read_chart(folder / file)
     except ChartError as error:
-        raise _RefusedError(path, file, str(error)) from error
+        raise RefusedError(path, file, str(error)) from error
     if chart.left_out:
-        raise _RefusedError(path, file, f"{chart.left_out[0]}; secondlook new leaves such features out")
+        raise RefusedError(path, file, f"{chart.left_out[0]}; secondlook new leaves such features out")
     area["polygon_m"] = frame.ring_m(path, chart.area)
     area["holes_m"] = [frame.ring_m(path, hole) for hole in chart.holes]
     if chart.keep_out:

@@ -18,7 +18,10 @@ from secondlook.scenario.text import Value
 from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle
 
 # Pydantic puts the chosen member of a union into the location of an error, and this where a key itself is wrong.
-_TAGS = frozenset({"survey", "revisit", "uniform", "patchy", "degrees", "auto", "alike", "grid", *SENSORS})
+_TAGS = frozenset(
+    {"survey", "revisit", "uniform", "patchy", "degrees", "auto", "alike", "grid", *SENSORS}
+    | {"lines", "clusters", "places"}
+)
 _KEY_MARK = "[key]"
 
 # A default that is made from other fields was not, as one of these has an error of its own.

@@ -17,6 +17,7 @@ from secondlook.scenario.errors import KeyPath, Place, Problem, ScenarioError, d
 from secondlook.scenario.explain import explain, nearest, place_of
 from secondlook.scenario.link import Profile
 from secondlook.scenario.model import Scenario
+from secondlook.scenario.places import take_places
 from secondlook.scenario.text import LARGEST_FILE_BYTES, Document, Value, decode, read, read_value
 
 M = TypeVar("M", bound=BaseModel)
@@ -143,6 +144,7 @@ def bundled_scenarios() -> list[tuple[str, str]]:
 def _validated(document: Document, folder: Path) -> Scenario:
     classes: dict[int, type[BaseModel]] = {}
     turned = in_metres(document.data, folder)
+    take_places(turned, folder)
     problems = document.problems + explain(turned.errors, document.data, document.places, classes)
     problems += _take_profile(turned.data, document, folder)
     try:

@@ -18,6 +18,7 @@ from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
 from secondlook.scenario.link import SHIP, Link, Position
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
+from secondlook.scenario.targets import PlacesLayout, Targets, first_outside
 from secondlook.scenario.text import dump
 from secondlook.scenario.values import (
     LEAST,
@@ -132,13 +133,6 @@ class PatchySeabed(Mapping):
         if pair is not None and pair[1] - pair[0] > 180:
             raise refused("must be at most 180 degrees apart")
         return pair
-
-
-class Targets(Mapping):
-    """The targets on the seabed, spread at random; no agent knows of them, they serve evaluation alone."""
-
-    count: Annotated[int, Field(ge=0, le=1000)] = 200
-    """How many."""
 
 
 class Coordinator(Mapping):
@@ -265,6 +259,16 @@ class Scenario(Mapping):
         if isinstance(current, GridCurrent) and area is not None and (told := current.outside(area.polygon_m)):
             raise refused(f"must cover the area, but {told}")
         return current
+
+    @field_validator("targets")
+    @classmethod
+    def _check_places(cls, targets: Targets, info: ValidationInfo) -> Targets:
+        area: Area | None = info.data.get("area")
+        if isinstance(targets.layout, PlacesLayout) and area is not None:
+            outside = first_outside(area, targets.layout.places_m)
+            if outside is not None:
+                raise refused("must lie in the area", ("layout", "places_m", outside))
+        return targets
 
     @field_validator("vehicles")
     @classmethod

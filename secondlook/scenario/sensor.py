@@ -6,7 +6,16 @@ import math
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from comms.errors import NO_FAILURES, in_words
 from planner.types import DetectionCurve, SonarShape
@@ -100,6 +109,34 @@ def _noise(name: Literal["noise_cell", "noise_track"]) -> Any:
     return Field(default_factory=default)
 
 
+Bias = Annotated[float, Field(ge=-0.9, le=9)]
+
+
+class Estimate(Mapping):
+    """How wrong the P_d is that a vehicle tells of its looks, beyond `noise_cell` and `noise_track`; what it detects
+    stays as it is. The shares multiply."""
+
+    bias: Bias = 0.0
+    """The share by which it tells too much, below 0 too little: 0.2 for a fifth more than there is."""
+    bias_at_reach: Bias = 0.0
+    """The same at the farthest range, and evenly less down to nothing at range 0."""
+    bias_after_turn: Bias = 0.0
+    """The same where a turn ends, and evenly less until it has gone straight for `turn_m`."""
+    turn_m: Length = 100.0
+    """For how long a straight run `bias_after_turn` lasts; the run-in counts."""
+    blind_to_seabed: bool = False
+    """It tells what its sonar would see if the seabed took nothing."""
+    drift_per_km: Noise = 0.0
+    """Standard deviation, in logits, to which a random walk of its error comes over a kilometre looked at."""
+    noise_along_m: Length | None = None
+    """Over which distance along the track the errors of cells stay alike, to 1 / e; left out, each has its own. Not of
+    a `wedge`, whose looks overlap."""
+
+
+def _none_if_right(estimate: Estimate | None) -> Estimate | None:
+    return None if estimate == Estimate() else estimate  # the same sensor, so the same scenario
+
+
 class SensorBase(Mapping):
     """What every sonar has, whatever the kind of its footprint. What it detects is either a `curve`, or, flat,
     `p_detect` up to `range_m`."""
@@ -125,6 +162,12 @@ class SensorBase(Mapping):
     """Standard deviation of P_d per cell, in logits; left out, the curve's own, or else that of `muscle`."""
     noise_track: Noise = _noise("noise_track")
     """The same per track."""
+    estimate: Annotated[Estimate | None, AfterValidator(_none_if_right)] = None
+    """How wrong the P_d is that the vehicle tells, on purpose; left out, right but for that noise."""
+    false_alarms_per_km2: Annotated[float | None, Field(ge=0, le=100_000), AfterValidator(lambda one: one or None)] = (
+        Field(default=None, json_schema_extra={"default": 0})
+    )
+    """How many contacts of nothing it reports a square kilometre that it sees."""
     along_bin_m: Bin = 5.0
     """Bin of a look along the track, in whole centimetres."""
     range_bin_m: Bin = 1.0
@@ -192,6 +235,13 @@ class WedgeSensor(SensorBase):
     """Of a wedge: how far it sees to either side of the bow."""
     near_m: LengthOrZero = 0.0
     """Of a wedge: from which distance on it sees; the farthest is `range_m`, or its curve's last."""
+
+    @field_validator("estimate")
+    @classmethod
+    def _check_estimate(cls, estimate: Estimate | None) -> Estimate | None:
+        if estimate is not None and estimate.noise_along_m is not None:
+            raise refused("must be left out with footprint wedge, whose looks overlap", ("noise_along_m",))
+        return estimate
 
     @model_validator(mode="after")
     def _check_depth(self) -> Self:

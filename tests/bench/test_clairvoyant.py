@@ -29,7 +29,7 @@ from secondlook.scenario import load_scenario
 from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
 from sim_world.sonar import CurveSonar
-from sim_world.targets import Recogniser, Targets
+from sim_world.targets import NO_TARGETS, Recogniser
 from sim_world.vehicle import Stretch
 from vehicle_agent.coverage import CoverageLayer
 
@@ -177,7 +177,7 @@ class TestALegOnTheMap:
         looks = Looks(
             config,
             sonar=CurveSonar(config.sensor.curve, make_seabed(world.seabed, world.area, world.seed)),
-            targets=Targets(world.area, 0, 0),
+            targets=NO_TARGETS,
             recogniser=Recogniser(config.sensor.curve, false_alarms_per_km2=0),
             seed=1,
         )

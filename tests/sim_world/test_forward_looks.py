@@ -8,11 +8,11 @@ import pytest
 from comms.said.messages import Look, Maneuver, ManeuverKind, TruthLook
 from planner.footprints.wedge import ForwardLooking
 from planner.types import DetectionCurve, FloatArray
-from sim_world.config import SensorConfig, SettlingConfig, VehicleConfig
+from sim_world.config import SensorConfig, SettlingConfig, TargetsConfig, VehicleConfig
 from sim_world.looks import Looks
 from sim_world.seabed import UniformSeabed
 from sim_world.sonar import CurveSonar, Position, SonarModel
-from sim_world.targets import Recogniser, Targets
+from sim_world.targets import Recogniser, make_targets
 from sim_world.vehicle import Stretch
 
 AREA = ((0.0, 0.0), (400.0, 0.0), (400.0, 300.0), (0.0, 300.0))
@@ -44,7 +44,7 @@ def looks_of_a_pass(
     maker = Looks(
         config,
         sonar=sonar,
-        targets=Targets(AREA, targets, 1),
+        targets=make_targets(TargetsConfig(targets), AREA, 1),
         recogniser=Recogniser(CURVE, false_alarms_per_km2=0.0),
         seed=1,
     )
@@ -78,7 +78,7 @@ def test_a_look_is_as_steady_as_the_vehicle_is_where_it_makes_it() -> None:
 
 def test_targets_are_found_by_their_own_place_in_every_look_that_sees_them() -> None:
     told = looks_of_a_pass(CurveSonar(CURVE, UniformSeabed()), targets=300)
-    places = Targets(AREA, 300, 1).truth().targets
+    places = make_targets(TargetsConfig(300), AREA, 1).truth().targets
     found = 0
     for number, (look, truth) in enumerate(told):
         expected = {}

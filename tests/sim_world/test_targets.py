@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.types import DetectionCurve, SonarShape
-from sim_world.area import uniform_points
+from sim_world.area import Ground
+from sim_world.config import TargetsConfig
 from sim_world.footprints.side import SideSwath
-from sim_world.targets import Passed, Recogniser, Targets
+from sim_world.targets import Passed, Recogniser, make_targets
 
 AREA = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0))
 CURVE = DetectionCurve(np.array([0.0, 20.0, 30.0, 70.0, 130.0, 140.0]), np.array([0.0, 0.0, 0.2, 0.5, 0.1, 0.0]))
@@ -28,7 +29,7 @@ def passed(count: int) -> Passed:
 def test_points_lie_uniformly_within_a_concave_outline() -> None:
     # An L: the lower half of a square and the upper left quarter.
     outline = ((0.0, 0.0), (2.0, 0.0), (2.0, 1.0), (1.0, 1.0), (1.0, 2.0), (0.0, 2.0))
-    points = uniform_points(outline, 6000, np.random.default_rng(1))
+    points = Ground(outline).uniform_points(6000, np.random.default_rng(1))
     x, y = points[:, 0], points[:, 1]
     quarters = [np.mean((x < 1) & (y < 1)), np.mean((x > 1) & (y < 1)), np.mean((x < 1) & (y > 1))]
     assert quarters == pytest.approx([1 / 3, 1 / 3, 1 / 3], abs=0.025)  # 4 standard deviations
@@ -38,34 +39,34 @@ def test_points_lie_uniformly_within_a_concave_outline() -> None:
 def test_no_point_lies_in_a_hole() -> None:
     square = ((0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0))
     holes = (((1.0, 1.0), (2.0, 1.0), (2.0, 2.0), (1.0, 2.0)), ((2.5, 0.0), (3.0, 0.0), (3.0, 0.5), (2.5, 0.5)))
-    points = uniform_points(square, 3000, np.random.default_rng(1), holes)
+    points = Ground(square, holes).uniform_points(3000, np.random.default_rng(1))
     x, y = points[:, 0], points[:, 1]
     assert not ((x > 1) & (x < 2) & (y > 1) & (y < 2)).any()
     assert not ((x > 2.5) & (y < 0.5)).any()
     assert np.mean(y < 1) == pytest.approx(2.75 / 7.75, abs=0.035)  # 4 standard deviations
-    truth = Targets(square, 500, 1, holes[:1]).truth().targets
+    truth = make_targets(TargetsConfig(500), square, 1, holes[:1]).truth().targets
     assert not any(1 < target.x_m < 2 and 1 < target.y_m < 2 for target in truth)
 
 
 @pytest.mark.parametrize("outline", [((0.0, 0.0), (1.0, 1.0), (2.0, 2.0)), ((5.0, 5.0), (5.0, 5.0), (5.0, 5.0))])
 def test_an_outline_around_nothing_is_refused(outline: tuple[tuple[float, float], ...]) -> None:
     with pytest.raises(ValueError, match="encloses"):
-        uniform_points(outline, 1, np.random.default_rng(1))
+        Ground(outline).uniform_points(1, np.random.default_rng(1))
 
 
 def test_a_seed_puts_targets_in_one_place_and_they_are_all_told() -> None:
-    one, same, other = (Targets(AREA, 50, seed).truth() for seed in (1, 1, 2))
+    one, same, other = (make_targets(TargetsConfig(50), AREA, seed).truth() for seed in (1, 1, 2))
     assert one == same != other
     assert len(one.targets) == 50
     assert all(0.0 <= target.x_m <= 1000.0 and 0.0 <= target.y_m <= 400.0 for target in one.targets)
-    assert Targets(AREA, 0, 1).truth().targets == ()
+    assert make_targets(TargetsConfig(0), AREA, 1).truth().targets == ()
 
 
 @given(seed=st.integers(0, 20), heading_rad=st.floats(0.0, 6.28), look_m=st.sampled_from([5.0, 20.0, 35.0]))
 def test_each_target_beside_a_track_is_passed_by_exactly_one_of_its_looks(
     seed: int, heading_rad: float, look_m: float
 ) -> None:
-    targets = Targets(AREA, 300, seed)
+    targets = make_targets(TargetsConfig(300), AREA, seed)
     looks = [
         SideSwath.over(SHAPE, (500.0, 200.0), heading_rad, n * look_m, 1, (look_m, 5.0))
         for n in range(round(420 / look_m))
@@ -80,7 +81,7 @@ def test_each_target_beside_a_track_is_passed_by_exactly_one_of_its_looks(
 
 
 def test_port_is_negative() -> None:
-    targets = Targets(AREA, 1, 1)
+    targets = make_targets(TargetsConfig(1), AREA, 1)
     (target,) = targets.truth().targets
     beside = targets.passed(SideSwath.over(SHAPE, (target.x_m + 30.0, target.y_m - 12.0), 0.0, 0.0, 1, (20.0, 5.0)))
     assert (beside.along_m.tolist(), beside.lateral_m.tolist()) == ([pytest.approx(12.0)], [pytest.approx(-30.0)])

@@ -45,7 +45,7 @@ CURVE = DetectionCurve(
     np.array([0.0, 25.0, 40.0, 70.0, 100.0, 130.0, 130.9]), np.array([0.0, 0.0, 0.2, 0.49, 0.2, 0.07, 0.07])
 )
 SENSOR = SensorConfig(CURVE)
-NOISY_SENSOR = SensorConfig(CURVE, noise_cell=0.2, noise_track=0.05)
+NOISY_SENSOR = SensorConfig(CURVE, noise_cell=0.2, noise_track=0.05, false_alarms_per_km2=500.0)
 A = VehicleConfig("a", 0.0, -100.0, 0.0, speed_mps=2.0, turn_radius_m=20.0, altitude_m=10.0, sensor=SENSOR)
 B = replace(A, vehicle="b", start_x_m=600.0, speed_mps=1.5, turn_radius_m=8.0)
 QUIET = WorldConfig(seed=1, area=AREA, vehicles=(A,))
@@ -54,7 +54,7 @@ NOISY = WorldConfig(
     area=AREA,
     vehicles=(replace(A, sensor=NOISY_SENSOR), replace(B, sensor=NOISY_SENSOR)),
     seabed=SeabedConfig("patchy", ripple_fields=7, vegetation_patches=7),
-    targets=TargetsConfig(200, false_alarms_per_km2=500.0),
+    targets=TargetsConfig(200),
 )
 
 Published = list[tuple[int, Publication]]
@@ -413,7 +413,7 @@ def test_detected_share_of_targets_is_the_true_p_detect() -> None:
 
 
 def test_a_look_reports_at_most_as_many_contacts_as_a_message_holds_the_best_of_them() -> None:
-    crowded = replace(QUIET, targets=TargetsConfig(0, false_alarms_per_km2=1e6))
+    crowded = replace(QUIET, vehicles=(replace(A, sensor=replace(SENSOR, false_alarms_per_km2=1e6)),))
     look = Sea(crowded).order("a", NORTH_400).until(60_000).looks()[0]
     assert len(look.contacts) == 200  # of about 4200
     assert min(contact.score for contact in look.contacts) > 0.5

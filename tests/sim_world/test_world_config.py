@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from planner.types import DetectionCurve
-from sim_world.config import CurrentConfig, SensorConfig, SettlingConfig, TargetsConfig, VehicleConfig, WorldConfig
+from sim_world.config import (
+    CurrentConfig,
+    EstimateConfig,
+    SensorConfig,
+    SettlingConfig,
+    TargetsConfig,
+    VehicleConfig,
+    WorldConfig,
+)
+from sim_world.layouts import Clusters, Given, Lines
 
 SENSOR = SensorConfig(DetectionCurve(np.array([0.0, 130.9]), np.array([0.5, 0.1])))
 VEHICLE = VehicleConfig("a", 0.0, 0.0, 0.0, speed_mps=2.0, turn_radius_m=20.0, altitude_m=10.0, sensor=SENSOR)
@@ -61,14 +70,51 @@ def test_bins_follow_from_the_lengths() -> None:
         (CurrentConfig(1.0, 0.0), "drift_mps", -0.1),
         (CurrentConfig(1.0, 0.0), "set_rad", 90.0),
         (CurrentConfig(1.0, 0.0), "period_s", 0.0),
+        (SENSOR, "false_alarms_per_km2", -1.0),
+        (EstimateConfig(), "bias", -1.0),
+        (EstimateConfig(), "bias_at_reach", 10.0),
+        (EstimateConfig(), "bias_after_turn", float("nan")),
+        (EstimateConfig(), "turn_m", 0.0),
+        (EstimateConfig(), "drift_per_km", 2.1),
+        (EstimateConfig(), "noise_along_m", 0.0),
         (TargetsConfig(), "count", 1001),
-        (TargetsConfig(), "false_alarms_per_km2", -1.0),
+        (TargetsConfig(), "correlation", 1.1),
+        (TargetsConfig(), "aspect_rad", 0.05),
+        (TargetsConfig(), "aspect_rad", 3.2),
+        (TargetsConfig(), "kinds", "moored"),
+        (Lines(), "heading_rad", 360.0),
+        (Lines(), "rows_apart_m", 0.0),
+        (Lines(), "jitter_m", -1.0),
+        (Clusters(), "count", 0),
+        (Clusters(), "spread_m", 0.0),
     ],
 )
 def test_a_value_out_of_range_is_refused_by_name(
-    config: SensorConfig | VehicleConfig | WorldConfig | TargetsConfig | SettlingConfig | CurrentConfig,
+    config: SensorConfig
+    | EstimateConfig
+    | VehicleConfig
+    | WorldConfig
+    | TargetsConfig
+    | Lines
+    | Clusters
+    | SettlingConfig
+    | CurrentConfig,
     name: str,
     value: object,
 ) -> None:
     with pytest.raises(ValueError, match=name):
         replace(config, **{name: value})  # type: ignore[arg-type]
+
+
+def test_errors_along_the_track_are_for_looks_that_lie_one_behind_the_other() -> None:
+    along = EstimateConfig(noise_along_m=20.0)
+    assert replace(SENSOR, estimate=along).estimate.noise_along_m == 20.0
+    with pytest.raises(ValueError, match="noise_along_m"):
+        replace(SENSOR, footprint="wedge", half_angle_rad=0.7, estimate=along)
+
+
+def test_places_that_are_given_are_all_there_are() -> None:
+    places = Given(((1.0, 2.0), (3.0, 4.0)))
+    assert TargetsConfig(2, places).count == 2
+    with pytest.raises(ValueError, match="count: 3"):
+        TargetsConfig(3, places)

@@ -13,9 +13,10 @@ from comms.said.topics import RUN
 from comms.said.wire import record_of
 from planner.area import SurveyArea
 from secondlook.errors import UserError
-from secondlook.fleet.build import build_fleet
+from secondlook.fleet.build import build_fleet, world_config
 from secondlook.scenario import ScenarioError, load_scenario, make_scenario
-from sim_world.config import CurrentConfig, SettlingConfig
+from sim_world.config import CurrentConfig, EstimateConfig, SettlingConfig, TargetsConfig
+from sim_world.layouts import Clusters, Given, Layout, Lines, Uniform
 
 
 def announced(*overrides: str) -> RunInfo:
@@ -176,3 +177,41 @@ class TestTheWorld:
         for vehicle in world.vehicles:
             sensor = vehicle.sensor
             assert (vehicle.settling, sensor.half_at_crab_rad, sensor.seabed_share) == (None, None, 1)
+
+
+@pytest.mark.parametrize(
+    ("layout", "made"),
+    [
+        ("{kind: uniform}", Uniform()),
+        ("{kind: lines, heading_deg: 90, rows_apart_m: 30, jitter_m: 2}", Lines(math.pi / 2, 30.0, 2.0)),
+        ("{kind: clusters, clusters: 3, spread_m: 20}", Clusters(3, 20.0)),
+        ("{kind: places, places_m: [[1, 2], [3, 4]]}", Given(((1.0, 2.0), (3.0, 4.0)))),
+    ],
+)
+def test_the_world_lays_targets_as_the_scenario_says(layout: str, made: Layout) -> None:
+    targets = world_config(load_scenario("tellaro", [f"targets={{layout: {layout}}}"])).targets
+    assert targets == TargetsConfig(2 if isinstance(made, Given) else 200, made)
+
+
+def test_the_world_is_told_what_is_true_and_each_vehicle_how_it_errs() -> None:
+    plain = world_config(load_scenario("tellaro"))
+    assert plain.targets == TargetsConfig(200)
+    assert [one.sensor.estimate for one in plain.vehicles] == [EstimateConfig()] * 2
+    assert [one.sensor.false_alarms_per_km2 for one in plain.vehicles] == [0.0, 0.0]
+    estimate = (
+        "{bias: 0.1, bias_at_reach: 0.2, bias_after_turn: 0.3, turn_m: 40, blind_to_seabed: true, drift_per_km: 0.5"
+    )
+    odd = world_config(
+        load_scenario(
+            "tellaro",
+            [
+                "targets={count: 7, correlation: 0.4, aspect_deg: 45, kinds: mines}",
+                f"vehicles.primary.sensor.estimate={estimate}, noise_along_m: 60}}",
+                "vehicles.helper.sensor.false_alarms_per_km2=8",
+            ],
+        )
+    )
+    assert odd.targets == TargetsConfig(7, correlation=0.4, aspect_rad=math.pi / 4, kinds="mines")
+    primary, helper = odd.vehicles
+    assert primary.sensor.estimate == EstimateConfig(0.1, 0.2, 0.3, 40.0, True, 0.5, 60.0)
+    assert (primary.sensor.false_alarms_per_km2, helper.sensor.false_alarms_per_km2) == (0.0, 8.0)

@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from planner.footprints.wedge import ForwardLooking
 from planner.types import SonarShape
+from sim_world.config import TargetsConfig
 from sim_world.footprints.wedge import WedgeSwath
-from sim_world.targets import Targets
+from sim_world.targets import make_targets
 
 QUARTER = math.pi / 4
 SHAPE = SonarShape("wedge", 0.0, 15.0, QUARTER, 10.0)
@@ -46,7 +47,7 @@ def test_a_place_is_seen_off_the_bow_from_where_the_stretch_begins(lateral_m: fl
 
 
 def test_targets_in_the_sector_are_passed_and_others_are_not() -> None:
-    targets = Targets(((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0)), 1, 1)
+    targets = make_targets(TargetsConfig(1), ((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0)), 1)
     (target,) = targets.truth().targets
 
     def passed(bearing_deg: float, range_m: float) -> list[float]:
