@@ -92,6 +92,7 @@ class Modem:
         self._held_of = 0  # and its number
         self._state_headers: dict[str, Header] = {}  # of the last states told here
         self._state_told: dict[str, int] = {}  # and when that was
+        self._words: dict[str, tuple[int, int]] = {}  # of the newest words on tasks told here
         self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
         self._last_frames_ms = 0
         self._is_alive = False  # whether its agent has said a state since it spoke
@@ -217,6 +218,7 @@ class Modem:
         elif isinstance(message, AgentState) and presence is not None:
             if not presence.is_news(message, incarnation, now_ms, seldom_ms(self.config)):
                 self._is_alive = True
+                self._queue.forget(_about(received))  # what waits was news before its words on tasks told as much
                 return False
             presence.hear_state(message, incarnation, now_ms)
         return True
@@ -338,9 +340,12 @@ class Modem:
             self._last_status = None  # whoever says it again has not heard the answer
             self._note_strip(self.config.platform, message)
         if isinstance(message, AgentState):
+            if not self.config.is_small and _order(header) < self._words.get(platform, _order(header)):
+                return  # its word on a task has overtaken it, and tells what it does since
             header = self._in_order(platform, header, now_ms)
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
+            self._words[platform] = max(_order(header), self._words.get(platform, _order(header)))
             self._presences[platform].hear_status(message, now_ms)
             strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
             # The map is told before the word.
@@ -409,6 +414,11 @@ def layer_start(incarnation: int, start: int) -> int:
     if start == 0:
         return incarnation
     return LARGEST_INCARNATION - (MOST_BESIDE - incarnation % MOST_BESIDE) * MOST_STARTS + start
+
+
+def _order(header: Header) -> tuple[int, int]:
+    """Of what one sender says the newer is greater."""
+    return header.incarnation, header.sequence
 
 
 def _about(received: Received) -> str:

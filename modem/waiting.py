@@ -60,6 +60,10 @@ class Queue:
         """Whether a message about something waits."""
         return any(one.key == key for one in self._waiting.values())
 
+    def forget(self, key: str) -> None:
+        """What waits about something is not said."""
+        self._waiting = {number: one for number, one in self._waiting.items() if one.key != key}
+
     def remove(self, one: Waiting) -> None:
         """It is said now."""
         number = next(number for number, other in self._waiting.items() if other is one)

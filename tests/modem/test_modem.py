@@ -215,6 +215,29 @@ def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) ->
     assert not any(modem.dropped for modem in waters.modems.values())
 
 
+@pytest.mark.parametrize(("frame_bits", "backwards"), [(256, False), (256, True), (96, False)])
+def test_a_state_that_a_word_on_a_task_has_overtaken_is_not_told(frame_bits: int, backwards: bool) -> None:
+    waters = Waters(arrives=lambda _, to, count: to != "ship" or count == 0 or not backwards, frame_bits=frame_bits)
+    waters.say("coordinator", "coord/task/beta/1", TAKE)
+    waters.say("beta", "agent/beta/state", state(Mode.REVISIT, works_on=7))
+    waters.run(30_000)
+    waters.say("beta", "agent/beta/state", state(Mode.IDLE))
+    if backwards:
+        waters.run(33_000)  # it is on its way
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 1.0, 30_000, ""))
+    waters.say("beta", "agent/beta/task_status/2", TaskStatus(8, TaskState.ACCEPTED, 0.0, 200_000, ""))
+    waters.say("beta", "agent/beta/state", state(Mode.TRANSIT, works_on=8))
+    waters.run(50_000)
+    if backwards:  # what was lost comes after what was said behind it
+        for packet in [one for _, platform, one in waters.packets if platform == "beta"][:0:-1]:
+            waters.say("world", "modem/ship/rx", packet)
+    waters.run(200_000)
+    told = [one.message for _, to, one in waters.heard if to == "ship"]
+    accepted = next(place for place, one in enumerate(told) if isinstance(one, TaskStatus) and one.strip == 8)
+    after = [one.mode for one in told[accepted:] if isinstance(one, AgentState)]
+    assert set(after) <= {Mode.TRANSIT}
+
+
 @pytest.mark.parametrize(("answer_ms", "said"), [(3_000, [2]), (10**9, [1, 2])])
 def test_an_offer_that_has_waited_for_longer_than_its_answer_may_take_is_not_said(
     answer_ms: int, said: list[int]

@@ -37,3 +37,11 @@ def test_the_newest_takes_the_place_of_one_about_the_same() -> None:
         queue.add(one)
     assert sorted(keys(queue, 0)) == ["a", "b", "b"]
     assert queue.bits == 20
+
+
+def test_what_waits_about_something_may_be_forgotten() -> None:
+    queue = Queue()
+    for one in (waiting("a"), waiting("b"), waiting("a")):
+        queue.add(one)
+    queue.forget("a")
+    assert keys(queue, 0) == ["b"]
