@@ -18,6 +18,7 @@ import secondlook
 
 Row = dict[str, Any]
 LINK, IDEAL = "link.profile", "ideal"
+NAMED = {"coordinator.platform": "coordinator on"}
 
 
 def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tuple[Row, float]]]:
@@ -58,13 +59,22 @@ def main(folders: list[str]) -> None:
         sweep = secondlook.load_sweep(folder)
         varied = list(dict.fromkeys([*varied, *sweep.vary]))
         rows += [{**row, "scenario": sweep.scenario} for row in sweep.table.to_pylist()]
-    print(f"| {' | '.join(varied)} | missions | share kept | least | bytes a second | age in s |")
-    print(f"|{'---|' * (len(varied) + 5)}")
+    print("\n".join(table(rows, varied)))
+
+
+def table(rows: list[Row], varied: list[str]) -> list[str]:
+    """The lines of the table, as Markdown. Raises ValueError as `shares` does."""
+    names = [f"`{key}`" if key.startswith("link.") else NAMED.get(key, f"`{key}`") for key in varied]
+    heads = [*names, "missions", "share kept", "least", "bytes a second", "age in s"]
+    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
     for values, missions in shares(rows, varied).items():
         kept = [share for _, share in missions]
         bytes_per_s, age_s = (fmean(of(row) for row, _ in missions) for of in (_bytes_per_s, _age_s))
-        names = " | ".join(f"`{one}`" for one in values)
-        print(f"| {names} | {len(kept)} | {fmean(kept):.3f} | {min(kept):.3f} | {bytes_per_s:.1f} | {age_s:.0f} |")
+        told = " | ".join(f"`{one}`" for one in values)
+        lines.append(
+            f"| {told} | {len(kept)} | {fmean(kept):.3f} | {min(kept):.3f} | {bytes_per_s:.1f} | {age_s:.0f} |"
+        )
+    return lines
 
 
 def _bytes_per_s(row: Row) -> float:

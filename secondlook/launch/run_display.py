@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -42,6 +42,14 @@ def ending_of(name: str, vehicle: dict[str, Any]) -> Ending:
     return Ending(name, vehicle["ended"], vehicle["ended_s"], vehicle["battery_left"], cut_short)
 
 
+def mines_left_words(mines: Mapping[str, Any]) -> str:
+    """How many mines may be left, and how sure that is, by that part of the summary."""
+    return (
+        f"about {mines['left']:.0f}, {mines['left_low']} to {mines['left_high']} with 90 %; none with "
+        f"{mines['none_left']:.1%}; {mines['found']:.0f} found"
+    )
+
+
 def closing_table(summary: dict[str, Any], folder: Path) -> None:
     """Prints what came of the mission, where its files are, and how to look at it."""
     table = Table(show_header=False, box=None, pad_edge=False)
@@ -71,6 +79,8 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     table.add_row(
         "not seen", f"{risk['uncovered_share']:.2%} of the area, primary alone {alone['uncovered_share']:.2%}"
     )
+    if mines := summary["mines"]:
+        table.add_row("mines left", mines_left_words(mines))
     for number, one in enumerate(summary["priorities"], start=1):
         if one["mean"] is not None:
             told = f"{one['mean']:.3f}, primary alone {one['mean_primary_alone']:.3f}; counts {one['weight']:g} times"

@@ -14,7 +14,9 @@ from comms.node import Received
 from comms.said.announcement import Role, RunInfo
 from comms.said.messages import (
     AgentState,
+    Contact,
     CoverageTile,
+    Curve,
     Look,
     ManeuverState,
     ManeuverStatus,
@@ -28,12 +30,14 @@ from comms.said.messages import (
     TruthTargets,
 )
 from comms.strip_books import StripBooks
+from planner.clearance import MinesLeft, mines_left, scatter_of
+from planner.contacts import Objects
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
-from planner.types import BoolArray, FloatArray, Point
+from planner.types import BoolArray, DetectionCurve, FloatArray, Point
 from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.recorded.kept_out import Entries
 from secondlook.recorded.vehicles import Ending
@@ -104,6 +108,8 @@ class Metrics:
     entries: Entries = field(default_factory=lambda: Entries(()))
     misfits: int = 0
     books: StripBooks = field(default_factory=StripBooks)
+    objects: Objects = field(default_factory=Objects)
+    curves: dict[str, dict[int, DetectionCurve]] = field(default_factory=dict)
 
     def hear(self, received: Received) -> None:
         """Folds one message in. What contradicts the run's announcement, and looks that make no sense, are counted in
@@ -124,6 +130,10 @@ class Metrics:
                 self.misfits += 1
         elif isinstance(message, CoverageTile):
             self._hear_tile(received, message)
+        elif isinstance(message, Contact):
+            self.objects.hear(message.x_m, message.y_m, message.sigma_m, message.score)
+        elif isinstance(message, Curve) and message.track > 0 and message.detection_curve is not None:
+            self.curves.setdefault(received.vehicle, {})[message.track] = message.detection_curve
         elif isinstance(message, Plan) and vehicle is not None:
             vehicle.plan = message
         elif isinstance(message, AgentState) and vehicle is not None:
@@ -202,6 +212,14 @@ class Metrics:
         missed = ~np.isin(np.arange(x_m.size), sorted(self.detected))
         return self.map.risk[rows, columns], missed
 
+    def mines_left(self) -> MinesLeft | None:
+        """How many mines may be left in the area, by the map and by what was found; None where nothing was seen."""
+        if self.map is None:
+            return None
+        scatter = max((scatter_of(list(one.values())) for one in self.curves.values()), default=scatter_of([]))
+        area_m2 = self.map.grid.cell_area_m2
+        return mines_left(self.map.risk, self.inside, self.inside, area_m2, self.objects.mines, scatter)
+
     def close(self) -> None:
         """The mission has ended: vehicles were where their last courses led until now, and times that were not reached
         have the risk of its end."""
@@ -221,6 +239,7 @@ class Metrics:
             "risk": asdict(risk) if risk else None,
             "risk_primary_alone": asdict(alone) if alone else None,
             "risk_at": self.risk_at,
+            "mines": self._mines_summary(),
             "truth": self._truth_summary(),
             "hotspots": self._strip_summary(),
             "closest": [
@@ -301,6 +320,20 @@ class Metrics:
         strip.status = status
         if status.state in (StripState.ACCEPTED, StripState.UNDER_WAY) and strip.accepted_ms is None:
             strip.accepted_ms = received.header.sent_ms
+
+    def _mines_summary(self) -> dict[str, Any] | None:
+        left = self.mines_left()
+        if left is None:
+            return None
+        return {
+            "objects": len(self.objects),
+            "found": left.found,
+            "left": left.mean,
+            "left_low": left.low,
+            "left_high": left.high,
+            "none_left": left.none,
+            "clearance": left.clearance,
+        }
 
     def _truth_summary(self) -> dict[str, Any]:
         risk, missed = self.targets_met()

@@ -146,6 +146,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "fates": [one for one in fates if one.css != "withdrawn"],
         "withdrawn": [one for one in fates if one.css == "withdrawn"],
         "kinds": kind_figures(mission.strips, before, after),
+        "mines": mission.summary.get("mines"),
         "targets": _targets(mission, after),
         "at_odds": mission.summary.get("at_odds"),
         "log": log,

@@ -40,6 +40,10 @@ FIGURES: Mapping[str, Any] = {
     "risk": _RISK,
     "risk_primary_alone": _RISK,
     "risk_at": {"0": _RISK_AT, "1": _RISK_AT},
+    "mines": {
+        **dict.fromkeys(("objects", "left_low", "left_high"), WHOLE),
+        **dict.fromkeys(("found", "left", "none_left", "clearance"), REAL),
+    },
     "truth": {"targets": WHOLE, "missed_share": REAL, "predicted_missed_share": REAL},
     "hotspots": {
         **dict.fromkeys(("published", "places", "revisited", "left", "withdrawn", "failed"), WHOLE),

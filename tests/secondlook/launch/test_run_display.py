@@ -72,6 +72,10 @@ def test_after_a_run_each_line_says_how_to_open_what_there_is(
     assert whole["mission"].startswith(f"{in_seconds(summary['time']['mission_s'])} simulated in ")
     strips = summary["hotspots"]
     assert whole["strips"].startswith(f"{strips['revisited']} of {strips['places']} places seen again, ")
+    mines = summary["mines"]
+    assert whole["mines left"].startswith(
+        f"about {mines['left']:.0f}, {mines['left_low']} to {mines['left_high']} with 90 %; none with "
+    )
     assert not any(line.startswith("priority") for line in whole)
     north = "area.priorities=[{polygon_m: [[0, 50], [300, 50], [300, 100], [0, 100]], weight: 2}]"
     bare = lines_of(tmp_path / "bare", "--no-record", "--set", north)

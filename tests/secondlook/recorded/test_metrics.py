@@ -15,7 +15,9 @@ from one_node import received
 from comms.said.announcement import RunInfo
 from comms.said.messages import (
     AgentState,
+    Contact,
     CoverageTile,
+    Curve,
     Look,
     Maneuver,
     ManeuverKind,
@@ -243,6 +245,27 @@ class TestRisk:
         assert (summary["risk"], summary["risk_primary_alone"], summary["risk_at"]) == (None, None, [])
         assert summary["primary_s"] is None
         assert summary["truth"] == {"targets": 0, "missed_share": None, "predicted_missed_share": None}
+        assert summary["mines"] is None
+
+    def test_contacts_of_one_thing_are_one_object_and_tell_how_many_are_left(self) -> None:
+        stream = begun()
+        assert stream.metrics.summary()["mines"] is None  # nothing was seen
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        for number, (x_m, score) in enumerate(((3.0, 0.9), (3.5, 0.8), (17.0, 0.9))):
+            stream.say(2, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, 4.0, 0.2, score, 1))
+        mines = stream.metrics.summary()["mines"]
+        assert (mines["objects"], mines["found"]) == (2, pytest.approx(2.0, abs=0.01))
+        # Without scatter 2.5 e^-1 / (1 - e^-1) = 1.45 would be left; that P(y) is not known takes it up a little.
+        assert 1.45 < mines["left"] < 2.0
+        assert mines["left_low"] <= 1 < mines["left_high"]
+        told = [curve(number, peak) for number, peak in ((1, 0.5), (2, 0.5))]
+        for one in told:
+            stream.say(3, f"agent/{PRIMARY}/curve", one)
+        assert stream.metrics.summary()["mines"]["left"] == pytest.approx(2.5 / (math.e - 1.0), rel=0.01)
+
+
+def curve(track: int, peak: float) -> Curve:
+    return Curve(track, 1.0, np.full(40, peak), 30)
 
 
 class TestTruth:

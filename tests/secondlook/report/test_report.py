@@ -84,6 +84,8 @@ def test_what_it_says_is_what_the_summary_says(page: Page, mission: RecordedMiss
     missed = round(summary["truth"]["missed_share"] * summary["truth"]["targets"])
     assert f"{missed} were missed, which is {summary['truth']['missed_share']:.0%}".replace("%", " %") in page.told
     assert f"{summary['truth']['predicted_missed_share']:.0%}".replace("%", " % were to be expected") in page.told
+    mines = summary["mines"]
+    assert f"{mines['left']:.0f} may be left: {mines['left_low']} to {mines['left_high']} with 90 %" in page.told
     assert summary["digest"] in page.told
     assert f"secondlook {summary['version']}" in page.told
     assert f"seed 3, SHA-256 {mission.run.scenario_sha256}" in page.told

@@ -1,0 +1,120 @@
+"""How many mines may be left: what a residual-risk map and the number of mines found say of those that were not.
+
+Mines lie at random at an unknown density (a Poisson process), and a mine that lies in a cell is missed with the cell's
+residual risk. Those found then tell of the density, and the density and the map of those left: with a gamma prior the
+number left follows a negative binomial distribution. (Washburn, Search and Detection, and the chapter on mine
+clearance in Washburn and Kress, Combat Modeling; the gamma-Poisson pair is that of any Bayesian textbook.)
+
+That P(y) is known by few tracks alone makes the answer wider: all that looks have seen is taken for so much more or
+less of it as the tracks differ from each other.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planner.types import BoolArray, DetectionCurve, FloatArray
+
+PRIOR_MINES = 0.5
+"""The gamma prior's shape, at a rate of 0: Jeffreys' prior of a Poisson process, half a mine found at any density."""
+UNKNOWN_SCATTER = 0.3
+"""Taken for the spread of P(y) between tracks where fewer than two are known."""
+NODES = 9
+MOST_MINES = 100_000
+LOW, HIGH = 0.05, 0.95
+
+
+@dataclass(frozen=True)
+class MinesLeft:
+    """How many mines are left somewhere: the `mean`, the 90 % interval from `low` to `high`, and the chance that there
+    is `none`. `found`: those that were found there or elsewhere and told of the density; `clearance`: the share of all
+    mines there that is expected to have been found, [0, 1]."""
+
+    found: float
+    mean: float
+    low: int
+    high: int
+    none: float
+    clearance: float
+
+
+def mines_left(
+    risk: FloatArray,
+    searched: BoolArray,
+    place: BoolArray,
+    cell_area_m2: float,
+    found: float,
+    scatter: float,
+    weights: FloatArray | float = 1.0,
+) -> MinesLeft | None:
+    """The mines left in the cells of `place`, given how many were `found` in those that were `searched`; None where
+    nothing was seen, and nothing can be said.
+
+    `risk`: residual risk by cell, in [0, 1]. `scatter`: relative standard deviation of what looks are taken to have
+    seen, see `scatter_of`. `weights`: how much denser mines lie in some cells than in others.
+
+    Raises ValueError for a number found, or a scatter, that is negative or not finite.
+    """
+    if not (0.0 <= found < math.inf and 0.0 <= scatter < math.inf):
+        raise ValueError(f"found and scatter must be at least 0 and finite, not {found} and {scatter}")
+    nodes, shares = np.polynomial.hermite_e.hermegauss(NODES)
+    chances, means, cleared = np.zeros(1), 0.0, 0.0
+    shares = shares / shares.sum()
+    area = np.broadcast_to(np.asarray(weights, dtype=np.float64) * cell_area_m2, risk.shape)
+    for node, share in zip(nodes.tolist(), shares.tolist(), strict=True):
+        missed = risk ** max(0.0, 1.0 + scatter * node)
+        seen_m2 = float(((1.0 - missed) * area)[searched].sum())
+        left_m2 = float((missed * area)[place].sum())
+        if seen_m2 <= 0.0:
+            if scatter == 0.0 or node == 0.0:
+                return None
+            continue
+        expected = (found + PRIOR_MINES) * left_m2 / seen_m2
+        chances = _sum(chances, share * _negative_binomial(found + PRIOR_MINES, expected))
+        means += share * expected
+        within = float(((1.0 - missed) * area)[place].sum())
+        cleared += share * (within / (within + left_m2) if within + left_m2 > 0.0 else 1.0)
+    total = float(chances.sum())
+    reached = chances.cumsum() / total
+    return MinesLeft(
+        found=found,
+        mean=means,
+        low=int(np.searchsorted(reached, LOW)),
+        high=int(np.searchsorted(reached, HIGH)),
+        none=float(chances[0]) / total,
+        clearance=cleared,
+    )
+
+
+def scatter_of(curves: Sequence[DetectionCurve]) -> float:
+    """The relative standard error of what looks have seen, by P(y) as several tracks have measured it: of the mean over
+    tracks of -ln(1 - P(y)), integrated over range. With fewer than two `UNKNOWN_SCATTER`."""
+    seen = np.array([np.trapezoid(-np.log1p(-one.p_detect), one.range_m) for one in curves])
+    seen = seen[seen > 0.0]
+    if len(seen) < 2:
+        return UNKNOWN_SCATTER
+    return float(seen.std(ddof=1) / seen.mean() / math.sqrt(len(seen)))
+
+
+def _negative_binomial(shape: float, mean: float) -> FloatArray:
+    """The chances of 0, 1, 2 and so on, of a mean, as far as they count."""
+    if mean <= 0.0:
+        return np.ones(1)
+    miss = mean / (shape + mean)
+    most = min(MOST_MINES, math.ceil(mean + 12.0 * math.sqrt(mean * (1.0 + mean / shape)) + 40.0))
+    counts = np.arange(most)
+    steps = np.log((shape + counts) / (counts + 1.0) * miss)
+    logs = shape * math.log1p(-miss) + np.concatenate([[0.0], steps.cumsum()])
+    return np.asarray(np.exp(logs))
+
+
+def _sum(one: FloatArray, other: FloatArray) -> FloatArray:
+    """The sum of two rows of which the shorter one ends in zeros."""
+    longer, shorter = (one, other) if len(one) >= len(other) else (other, one)
+    total = longer.copy()
+    total[: len(shorter)] += shorter
+    return total

@@ -1,0 +1,110 @@
+"""How many mines may be left: by hand, against another library's distribution, and as often right as it says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import nbinom
+
+from planner.clearance import PRIOR_MINES, UNKNOWN_SCATTER, MinesLeft, mines_left, scatter_of
+from planner.types import DetectionCurve
+
+CELL_M2 = 25.0
+ALL = np.ones((8, 10), dtype=np.bool_)
+
+
+def left_of(risk: float | np.ndarray, found: float, scatter: float = 0.0, place: np.ndarray = ALL) -> MinesLeft:
+    told = mines_left(np.broadcast_to(risk, ALL.shape).astype(np.float64), ALL, place, CELL_M2, found, scatter)
+    assert told is not None
+    return told
+
+
+def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> None:
+    told = left_of(0.5, 20)
+    assert told.mean == pytest.approx(20.5)
+    assert told.none == pytest.approx(0.5**20.5)
+    assert told.clearance == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5)])
+def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: float) -> None:
+    told, true = left_of(risk, found), nbinom(found + PRIOR_MINES, 1.0 - risk)
+    assert (told.low, told.high) == (true.ppf(0.05), true.ppf(0.95))
+    assert told.none == pytest.approx(true.pmf(0))
+    assert told.mean == pytest.approx(true.mean())
+
+
+def test_what_was_found_elsewhere_tells_of_a_place_and_a_place_well_seen_is_cleared() -> None:
+    risk = np.full(ALL.shape, 0.5)
+    risk[:, :2] = 0.0
+    risk[:, 2:4] = 1.0
+    west = np.zeros(ALL.shape, dtype=np.bool_)
+    west[:, :2] = True
+    unseen = np.roll(west, 2, axis=1)
+    assert (left_of(risk, 9, place=west).high, left_of(risk, 9, place=west).none) == (0, 1.0)
+    # Of 10 columns 2 are seen wholly and 6 half, 5 columns' worth: 9.5 mines in 5 columns are 3.8 in 2.
+    assert left_of(risk, 9, place=unseen).mean == pytest.approx(3.8)
+    assert left_of(risk, 9, place=unseen).clearance == 0.0
+
+
+def test_where_mines_lie_denser_more_are_left() -> None:
+    weights = np.ones(ALL.shape)
+    weights[:, :5] = 3.0
+    west = np.zeros(ALL.shape, dtype=np.bool_)
+    west[:, :5] = True
+    told = mines_left(np.full(ALL.shape, 0.5), ALL, west, CELL_M2, 7.5, 0.0, weights)
+    assert told is not None
+    assert told.mean == pytest.approx(8.0 * 3 / 4)
+
+
+def test_where_nothing_was_seen_nothing_can_be_said() -> None:
+    assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, 0, 0.0) is None
+    assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, 0, 0.2) is None
+
+
+@pytest.mark.parametrize(("found", "scatter"), [(-1.0, 0.0), (math.nan, 0.0), (3.0, -0.1), (3.0, math.inf)])
+def test_what_makes_no_sense_is_refused(found: float, scatter: float) -> None:
+    with pytest.raises(ValueError, match="found and scatter must be at least 0 and finite"):
+        left_of(0.5, found, scatter)
+
+
+@given(risk=st.floats(0.001, 0.99), found=st.integers(0, 500), scatter=st.floats(0.0, 0.3), more=st.floats(1.001, 1.2))
+def test_more_risk_leaves_more_and_less_knowledge_tells_less(
+    risk: float, found: int, scatter: float, more: float
+) -> None:
+    told, worse = left_of(risk, found, scatter), left_of(min(0.999, risk * more), found, scatter)
+    assert told.mean < worse.mean
+    assert told.none >= worse.none
+    assert told.low <= worse.low
+    assert told.high <= worse.high
+    assert 0 <= told.low <= told.high
+    sure = left_of(risk, found)
+    assert sure.high - sure.low <= told.high - told.low
+
+
+def test_ninety_percent_intervals_hold_nine_times_in_ten() -> None:
+    rng = np.random.default_rng(3)
+    risk = rng.uniform(0.0, 0.8, ALL.shape)
+    held = 0
+    for _ in range(2000):
+        mines = rng.poisson(rng.uniform(0.2, 1.5), ALL.shape)
+        missed = rng.binomial(mines, risk)
+        told = left_of(risk, int((mines - missed).sum()))
+        held += told.low <= missed.sum() <= told.high
+    assert 0.88 <= held / 2000 <= 0.94  # of whole numbers a little more than 0.9 lie between two of them
+
+
+def curve(peak: float) -> DetectionCurve:
+    return DetectionCurve(np.array([0.0, 50.0, 100.0]), np.array([peak, peak, peak]))
+
+
+def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None:
+    assert scatter_of([curve(0.5)] * 4) == pytest.approx(0.0, abs=1e-12)
+    one, other = -math.log(0.6), -math.log(0.4)
+    mean, deviation = (one + other) / 2, (other - one) / math.sqrt(2)
+    assert scatter_of([curve(0.4), curve(0.6)]) == pytest.approx(deviation / mean / math.sqrt(2))
+    assert scatter_of([curve(0.5)]) == scatter_of([]) == UNKNOWN_SCATTER
