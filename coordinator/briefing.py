@@ -90,7 +90,8 @@ class Briefing:
                 ends_ms = state.expected_end_ms
             free_at, free_ms = expected.free_at, max(now_ms, ends_ms)
             is_soon = 0 < self._config.ahead_ms >= free_ms - now_ms and not vehicle.silent
-            if is_soon and following is None and record.state in AT_WORK:
+            is_kept = record.state in AT_WORK and vehicle.asked_back != record.strip.number
+            if is_soon and following is None and is_kept:
                 record, pose = None, free_at  # it is given its next now
         sees = footprint_of(entry.sonar)
         helper = Helper(

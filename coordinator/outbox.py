@@ -44,6 +44,17 @@ class Outbox:
         task = Task(action, strip.number, *strip.start, strip.heading_rad, strip.length_m, strip.width_m)
         self._waiting.append(Publication(TASK.key(vehicle=vehicle, number=self._tasks), task))
 
+    def unsay_offer(self, vehicle: str, number: int) -> None:
+        """A strip is not offered to a vehicle after all, where that has not gone out yet."""
+
+        def offers_it(one: Publication) -> bool:
+            task = one.message
+            if not isinstance(task, Task) or not task.action.is_offer:
+                return False
+            return task.strip == number and TASK.vehicle_of(one.key) == vehicle
+
+        self._waiting = [one for one in self._waiting if not offers_it(one)]
+
     def add_over(self, over: MissionOver) -> None:
         """Says that the mission is over."""
         self._waiting.append(Publication(MISSION_OVER.key(), over))

@@ -101,6 +101,7 @@ class StripLife:
         self._outbox.add_task(TaskAction.GIVE_BACK, name, strip)
         following = self.ledger.next_of(name)
         if following is not None:
+            self._outbox.unsay_offer(name, following.strip.number)  # of this moment, if there is one
             self._move(following, StripState.OPEN, now_ms, f"{name} is told to give strip {strip.number} back")
             self._sectors.assign_by(now_ms, following.window)
 

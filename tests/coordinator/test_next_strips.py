@@ -3,10 +3,11 @@ where a word is lost."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
-from by_hand import FLEET, HELPER, PRIMARY
+from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER
 from coordinator_by_hand import (
     ACCEPTED,
     DONE,
@@ -23,7 +24,8 @@ from coordinator_by_hand import (
 )
 
 from comms.said.announcement import RosterVehicle
-from comms.said.messages import Mode, StripStatus, TaskAction, TaskState
+from comms.said.messages import Mode, StripStatus, Task, TaskAction, TaskState
+from coordinator.outbox import NO_STRIP, Outbox
 
 AHEAD_MS = 60_000
 
@@ -194,6 +196,16 @@ def test_with_the_present_strip_the_next_is_given_back() -> None:
     assert (HELPER, TaskAction.GIVE_BACK, 1) in told.tasks()
     second = [one.message for one in told.node.said if isinstance(one.message, StripStatus) and one.number == 2]
     assert any(one.reason == f"{HELPER} is told to give strip 1 back" for one in second)
+
+
+def test_a_next_that_is_taken_back_in_the_moment_of_its_offer_is_not_offered() -> None:
+    outbox, strip = Outbox(), replace(NO_STRIP, number=2)
+    outbox.add_task(TaskAction.TAKE_NEXT, HELPER, strip)
+    outbox.add_task(TaskAction.TAKE_NEXT, SECOND_HELPER, strip)
+    outbox.add_task(TaskAction.GIVE_BACK, HELPER, strip)
+    outbox.unsay_offer(HELPER, 2)
+    said = [(one.key.split("/")[2], one.message.action) for one in outbox.empty() if isinstance(one.message, Task)]
+    assert said == [(SECOND_HELPER, TaskAction.TAKE_NEXT), (HELPER, TaskAction.GIVE_BACK)]
 
 
 def test_the_end_leaves_it() -> None:
