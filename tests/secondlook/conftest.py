@@ -4,11 +4,11 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
 import yaml
 from browser import chromium
+from called import Call, Called
 from flights import BRIEF
 from playwright.sync_api import Browser
 
@@ -65,16 +65,8 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str | by
     return write_file
 
 
-class Called(NamedTuple):
-    """How a command has ended: its exit code, and what it has printed on standard output and standard error."""
-
-    code: int | str | None
-    out: str
-    err: str
-
-
 @pytest.fixture
-def called(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Called]:
+def called(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
     """Calls the command as a user does, within this process."""
     monkeypatch.setattr("gc.freeze", lambda: None)  # what a test leaves is not to stay
 

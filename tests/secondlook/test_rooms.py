@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from called import Call
 
 import secondlook
 from comms import errors
@@ -62,7 +62,7 @@ def test_a_program_of_the_users_that_loads_a_run_is_told_too(tmp_path: Path) -> 
 @pytest.mark.parametrize("part", ["mine.py", "parts/mine.py", "planner.py"])
 @pytest.mark.parametrize("hidden", ["planner.py", "planner/__init__.py"])
 def test_a_part_beside_a_file_that_is_called_like_a_room_is_refused(
-    users_folder: Path, called: Callable[..., tuple[int, str, str]], part: str, hidden: str
+    users_folder: Path, called: Call, part: str, hidden: str
 ) -> None:
     for file in (users_folder / part, users_folder / hidden):
         file.parent.mkdir(exist_ok=True)

@@ -28,7 +28,7 @@ import logging
 import re
 import shlex
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
@@ -36,6 +36,7 @@ from typing import Any, get_args
 import pytest
 import typer
 import yaml
+from called import Call
 from pydantic import BaseModel
 
 from secondlook import cli
@@ -145,7 +146,7 @@ def test_a_bad_input_is_told_in_a_sentence_and_changes_no_file(
     folder: Path,
     request: pytest.FixtureRequest,
     monkeypatch: pytest.MonkeyPatch,
-    called: Callable[..., tuple[int | str | None, str, str]],
+    called: Call,
 ) -> None:
     if any("flown" in word for word in row.arguments):
         shutil.copytree(request.getfixturevalue("brief_run"), folder / "flown")

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from called import Call
 
 from secondlook.scenario import load_scenario
 
@@ -130,7 +131,7 @@ def folder(users_folder: Path) -> Path:
     return users_folder
 
 
-Run = Callable[..., tuple[int, dict[str, object], str]]
+Run = Callable[..., tuple[int | str | None, dict[str, object], str]]
 
 
 def words(settings: tuple[str, ...], bus: str) -> list[str]:
@@ -139,11 +140,11 @@ def words(settings: tuple[str, ...], bus: str) -> list[str]:
 
 
 @pytest.fixture
-def run(folder: Path, called: Callable[..., tuple[int, str, str]]) -> Run:
+def run(folder: Path, called: Call) -> Run:
     """Flies the mission with settings; gives exit code, summary and standard error. Over Zenoh the nodes alone have
     processes of their own."""
 
-    def fly(*settings: str, bus: str = "local") -> tuple[int, dict[str, object], str]:
+    def fly(*settings: str, bus: str = "local") -> tuple[int | str | None, dict[str, object], str]:
         code, out, error = called(*words(settings, bus))
         return code, json.loads(out) if out else {}, error
 
