@@ -192,19 +192,19 @@ def test_the_digest_is_the_same_on_a_busy_machine(tmp_path: Path, digest: str) -
 
 # Of each no more than the first strips' second looks, by this time: all of it takes long over Zenoh.
 UNTIL_S = {
-    "armada": 290,
-    "clear": 1000,
-    "five-helpers": 600,
-    "forward-looking": 1500,
-    "harbour": 700,
-    "headland": 1200,
-    "paper": 1200,
-    "patchy": 1200,
-    "ripples": 1500,
-    "tellaro": 1200,
-    "turns": 1200,
-    "two-helpers": 900,
-    "wide": 300,
+    "armada": 248,
+    "clear": 900,
+    "five-helpers": 450,
+    "forward-looking": 600,
+    "harbour": 350,
+    "headland": 750,
+    "paper": 700,
+    "patchy": 750,
+    "ripples": 900,
+    "tellaro": 750,
+    "turns": 850,
+    "two-helpers": 760,
+    "wide": 283,
 }
 BEYOND_THE_LEAST = " ".join(np.show_config(mode="dicts")["SIMD Extensions"].get("found", ()))
 """What numpy makes use of that not every processor has."""
@@ -217,16 +217,15 @@ def test_every_bundled_mission_has_one_digest_on_both_buses_and_on_every_process
     overrides = [f"mission.time_limit_s={UNTIL_S[name]}"]
     if name in ("wide", "armada"):  # fewer cells, and strips that are done sooner
         overrides += [f"area.cell_m={25 if name == 'armada' else 10}", "coordinator.max_strip_m=500"]
+    if name == "armada":
+        overrides += ["area.polygon_m=[[0, 0], [10000, 0], [10000, 600], [0, 600]]"]
     monkeypatch.setenv("NPY_DISABLE_CPU_FEATURES", BEYOND_THE_LEAST)  # in processes that are started from now on
     summaries = []
     for bus in ("local", "zenoh"):
         (tmp_path / bus).mkdir()
         with contextlib.suppress(RunFailedError):
-            options = RunOptions(tmp_path / bus, bus=bus, record=False)
-            if (
-                bus == "zenoh" and name == "armada"
-            ):  # its 34 nodes in processes of their own begin for longer than they fly
-                options = replace(options, processes=4)
+            # The agents in one process beside the world's: each in its own begins for longer than some of these fly.
+            options = RunOptions(tmp_path / bus, bus=bus, processes=2 if bus == "zenoh" else None, record=False)
             run_mission(load_scenario(name, tuple(overrides), seed=11), options)
         summaries.append(json.loads((tmp_path / bus / "summary.json").read_text()))
     assert summaries[0]["digest"] == summaries[1]["digest"]
@@ -246,7 +245,7 @@ def test_the_digest_is_the_same_with_a_recorder_that_cannot_keep_up(tmp_path: Pa
     assert run_with(tmp_path, NodeSpec("faulty_nodes:SlowListener", 3000)).digest == digest
 
 
-@pytest.mark.parametrize("turn", range(3))
+@pytest.mark.parametrize("turn", [0, 2])
 def test_the_digest_is_the_same_in_whatever_order_processes_start(
     tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch, turn: int
 ) -> None:
