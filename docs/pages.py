@@ -20,7 +20,7 @@ import typer
 from pydantic import BaseModel
 
 from secondlook import installed_command
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.scenario import (
     Area,
     ClustersLayout,
@@ -236,7 +236,7 @@ EXIT_CODES = (
 
 def command_line_page() -> str:
     """Every command with its arguments and options."""
-    root: Any = typer.main.get_command(app)
+    root: Any = typer.main.get_command(app_for([]))
     lines = [
         "# Command line",
         "",

@@ -2,62 +2,40 @@
 
 from __future__ import annotations
 
+import pkgutil
 import sys
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from secondlook.commands.certificates import certificates
-from secondlook.commands.check import check
-from secondlook.commands.compare import compare
-from secondlook.commands.export import export, geojson
+from secondlook.commands.left_out import REAL_TIME, is_number, with_value
 from secondlook.commands.many_missions import DASK, HERE, is_address
-from secondlook.commands.new import new
-from secondlook.commands.node import node_app
-from secondlook.commands.paper import paper
-from secondlook.commands.picture import picture, video
-from secondlook.commands.plan import plan
-from secondlook.commands.replay import replay
-from secondlook.commands.report import report
-from secondlook.commands.run import REAL_TIME, run
-from secondlook.commands.scenarios import scenarios
-from secondlook.commands.storm import storm
-from secondlook.commands.sweep import sweep
-from secondlook.commands.view import view
 from secondlook.errors import UserError
 from secondlook.installed_command import WRONG_USE
 
-
-def with_value(arguments: Sequence[str], option: str, left_out: str, is_value: Callable[[str], bool]) -> list[str]:
-    """The arguments with `left_out` as the option's value wherever none follows the option."""
-    completed = []
-    for place, argument in enumerate(arguments):
-        following = arguments[place + 1] if place + 1 < len(arguments) else ""
-        if argument == option and not is_value(following):
-            completed.append(f"{option}={left_out}")
-        else:
-            completed.append(argument)
-    return completed
-
-
-def is_number(text: str) -> bool:
-    """Whether this may be the value of --real-time, which can be left out."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-# Plain messages: no boxes for a user's mistake, and Python's own traceback for ours.
-app = typer.Typer(
-    name="secondlook",
-    no_args_is_help=True,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-)
+COMMANDS = {
+    "run": "run:run",
+    "scenarios": "scenarios:scenarios",
+    "new": "new:new",
+    "check": "check:check",
+    "plan": "plan:plan",
+    "compare": "compare:compare",
+    "sweep": "sweep:sweep",
+    "storm": "storm:storm",
+    "paper": "paper:paper",
+    "replay": "replay:replay",
+    "view": "view:view",
+    "report": "report:report",
+    "geojson": "export:geojson",
+    "export": "export:export",
+    "picture": "picture:picture",
+    "video": "picture:video",
+    "certificates": "certificates:certificates",
+    "node": "node:node_app",
+}
+"""Each command in the order of `secondlook --help`, and where it lies in `secondlook.commands`."""
 
 
 def _print_version(wanted: bool) -> None:
@@ -66,7 +44,6 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
 def secondlook(
     _version: Annotated[
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
@@ -75,20 +52,36 @@ def secondlook(
     """Survey and revisit vehicles that share a mission."""
 
 
-_MISSIONS = (run, scenarios, new, check, plan, compare, sweep, storm, paper)
-_OF_A_RUN = (replay, view, report, geojson, export, picture, video)
-for command in (*_MISSIONS, *_OF_A_RUN, certificates):
-    app.command()(command)
+def app_for(arguments: Sequence[str]) -> typer.Typer:
+    """The command that the arguments name, as each takes a while to load; all of them where they name none of ours."""
+    # Plain messages: no boxes for a user's mistake, and Python's own traceback for ours.
+    app = typer.Typer(name="secondlook", no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.callback()(secondlook)
+    named = next((one for one in arguments if not one.startswith("-")), "")
+    for name in [named] if named in COMMANDS else COMMANDS:
+        command: Any = pkgutil.resolve_name(f"secondlook.commands.{COMMANDS[name]}")
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        else:
+            app.command()(command)
+    return app
 
 
-app.add_typer(node_app, name="node")
+def command_line(arguments: Sequence[str]) -> Callable[[], None]:
+    """What they ask for, loaded and not yet begun. It exits: 0 done, 1 failed, 2 wrong use or bad input, 130 Ctrl-C."""
+    completed = with_value(with_value(arguments, REAL_TIME, "1", is_number), DASK, HERE, is_address)
+    app = app_for(completed)
+
+    def run() -> None:
+        try:
+            app(completed)
+        except UserError as error:
+            sys.stderr.write(f"{error}\n")
+            sys.exit(WRONG_USE)
+
+    return run
 
 
 def main() -> None:
-    """Run the command line, and exit: 0 done, 1 failed, 2 wrong use or bad input, 130 Ctrl-C."""
-    try:
-        arguments = with_value(sys.argv[1:], REAL_TIME, "1", is_number)
-        app(with_value(arguments, DASK, HERE, is_address))
-    except UserError as error:
-        sys.stderr.write(f"{error}\n")
-        sys.exit(WRONG_USE)
+    """Runs the command line, and exits."""
+    command_line(sys.argv[1:])()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 from collections import Counter
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -15,6 +17,18 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("secondlook", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("secondlook")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[None]:
+    """What is imported for the tests stays, and messages of a flight hold no circles: garbage is looked for less."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.set_threshold(20_000)
+        gc.enable()
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

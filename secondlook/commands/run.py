@@ -19,6 +19,7 @@ from comms.said.announcement import LARGEST_SEED
 from comms.session import PATIENCE_S
 from comms.wall.drive import ByWallClock
 from comms.wall.words import LARGEST_FACTOR
+from secondlook.commands.left_out import REAL_TIME
 from secondlook.commands.reading import REPORT, reading
 from secondlook.commands.scenarios import names_beginning_with
 from secondlook.errors import UserError
@@ -71,7 +72,6 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
 
 
 MISSION_FAILED = 1
-REAL_TIME = "--real-time"
 
 
 class BusName(StrEnum):

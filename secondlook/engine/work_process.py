@@ -146,14 +146,16 @@ def main() -> None:
     path = pipe.recv()
     # Behind our own path, so that nothing there can stand in a room's way.
     sys.path.extend(entry for entry in path if entry not in sys.path)
+    gc.disable()  # until the first work is loaded: that stays, and need not be looked through again and again
     work: queue.SimpleQueue[bytes] = queue.SimpleQueue()
     receiving = threading.Thread(target=_receive, args=(pipe, work), daemon=True)
     receiving.start()
     while True:
         try:
             function, arguments = pickle.loads(work.get())
-            if not gc.get_freeze_count():  # what was loaded stays: the collector need not go through it again and again
+            if not gc.isenabled():
                 gc.freeze()
+                gc.enable()
             pipe.send((None, None))  # begun
             pipe.send((True, function(*arguments)))
         except Exception as error:

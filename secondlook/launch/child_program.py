@@ -52,6 +52,7 @@ def main() -> int:
     def tell(**words: Any) -> None:
         status.write(json.dumps(words) + "\n")
 
+    gc.disable()  # until all is loaded: that stays, and to look through it again and again takes a tenth of the time
     child = receive_setup(sys.stdin.buffer)
     try:
         with _told(tell):
@@ -117,8 +118,9 @@ class _LauncherWatch:
 
 def _make_nodes(child: ChildSetup) -> dict[str, Any]:
     nodes = make_nodes(child.nodes)
-    gc.freeze()  # what there is by now stays: no use in looking through all modules for garbage again and again
+    gc.freeze()  # what there is by now is never garbage
     gc.set_threshold(YOUNG_OBJECTS)
+    gc.enable()
     return nodes
 
 

@@ -1,15 +1,18 @@
 """A short scenario that is valid, and a brief mission that was flown, for tests to spoil."""
 
 import shutil
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 import yaml
 from browser import chromium
+from called import Call, Called
 from flights import BRIEF
 from playwright.sync_api import Browser
 
+from secondlook import installed_command
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario, make_scenario
 
@@ -60,6 +63,33 @@ def write(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str | by
         return "bad.yaml"
 
     return write_file
+
+
+@pytest.fixture
+def called(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Calls the command as a user does, within this process."""
+    monkeypatch.setattr("gc.freeze", lambda: None)  # what a test leaves is not to stay
+
+    def call(*arguments: str | Path) -> Called:
+        monkeypatch.setattr("sys.argv", ["secondlook", *map(str, arguments)])
+        with pytest.raises(SystemExit) as stopped:
+            installed_command.main()
+        return Called(stopped.value.code, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def users_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Where a command is called; modules that were imported from there are forgotten."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", [*sys.path])
+    monkeypatch.setattr("sys.dont_write_bytecode", True)
+    before = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - before:
+        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
+            del sys.modules[name]
 
 
 @pytest.fixture(scope="session")

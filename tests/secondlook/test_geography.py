@@ -88,6 +88,6 @@ def test_an_origin_that_is_none_is_refused(place: tuple[float, float]) -> None:
 
 
 def test_who_needs_no_degrees_does_not_wait_for_pyproj() -> None:
-    code = "import sys, secondlook.cli, secondlook.recorded.geojson; print('pyproj' in sys.modules)"
+    code = "import sys, secondlook.cli; secondlook.cli.app_for([]); print('pyproj' in sys.modules)"
     told = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     assert told.stdout == "False\n"

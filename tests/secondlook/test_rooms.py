@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from called import Call
 
 import secondlook
 from comms import errors
@@ -60,28 +61,29 @@ def test_a_program_of_the_users_that_loads_a_run_is_told_too(tmp_path: Path) -> 
 
 @pytest.mark.parametrize("part", ["mine.py", "parts/mine.py", "planner.py"])
 @pytest.mark.parametrize("hidden", ["planner.py", "planner/__init__.py"])
-def test_a_part_beside_a_file_that_is_called_like_a_room_is_refused(tmp_path: Path, part: str, hidden: str) -> None:
-    (tmp_path / part).parent.mkdir(exist_ok=True)
-    (tmp_path / part).write_text("class Mine:\n    def assign(self, situation):\n        return {}\n")
-    (tmp_path / hidden).parent.mkdir(exist_ok=True)
-    (tmp_path / hidden).touch()
+def test_a_part_beside_a_file_that_is_called_like_a_room_is_refused(
+    users_folder: Path, called: Call, part: str, hidden: str
+) -> None:
+    for file in (users_folder / part, users_folder / hidden):
+        file.parent.mkdir(exist_ok=True)
+        file.touch()
+    (users_folder / part).write_text("class Mine:\n    def assign(self, situation):\n        return {}\n")
     module = part.removesuffix(".py").replace("/", ".")
     if part.startswith("parts"):
-        (tmp_path / "parts" / "__init__.py").touch()
-    setting = f"coordinator.allocator={module}:Mine"
-    command = [str(Path(sys.executable).with_name("secondlook")), "check", "tellaro", "--set"]
-    done = subprocess.run([*command, setting], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60)
-    assert (done.returncode, done.stdout) == (2, "")
+        (users_folder / "parts" / "__init__.py").touch()
+    command = ("check", "tellaro", "--set", f"coordinator.allocator={module}:Mine")
     first = "planner.py" if part == "planner.py" else hidden
-    told = f"must not lie beside {tmp_path / first}, which has the name of a package of ours and hides it or is hidden"
-    assert done.stderr == (f'--set {setting}: coordinator.allocator: "{module}:Mine" is not allowed; {told}\n')
-    for file in (tmp_path / "planner.py", tmp_path / "planner" / "__init__.py"):
+    told = (
+        f"must not lie beside {users_folder / first}, which has the name of a package of ours and hides it or is hidden"
+    )
+    assert called(*command) == (
+        2, "", f'--set {command[-1]}: coordinator.allocator: "{module}:Mine" is not allowed; {told}\n'
+    )  # fmt: skip
+    for file in (users_folder / "planner.py", users_folder / "planner" / "__init__.py"):
         file.unlink(missing_ok=True)
     if part != "planner.py" and hidden == "planner.py":
-        again = subprocess.run(
-            [*command, setting], cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60
-        )
-        assert (again.returncode, again.stderr) == (0, "")
+        code, _, error = called(*command)
+        assert (code, error) == (0, "")
 
 
 def test_failures_are_told_of_parts_but_never_of_a_room() -> None:

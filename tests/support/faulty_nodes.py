@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
 
 from comms.node import Received, Step
 
@@ -51,6 +52,22 @@ class ListenerThatFails:
         self._left -= 1
         if self._left == 0:
             raise OSError("no space left on device")
+
+    def close(self) -> None:
+        """Has nothing to close."""
+
+
+class ListenerThatStops:
+    """A listener that stops its process at its nth message, until somebody lets it go on."""
+
+    def __init__(self, nth: int) -> None:
+        self._left = nth
+
+    def on_message(self, received: Received) -> None:
+        """Stops at the nth."""
+        self._left -= 1
+        if self._left == 0:
+            os.kill(os.getpid(), signal.SIGSTOP)
 
     def close(self) -> None:
         """Has nothing to close."""

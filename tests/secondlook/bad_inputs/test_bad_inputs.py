@@ -28,7 +28,6 @@ import logging
 import re
 import shlex
 import shutil
-import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,15 +36,16 @@ from typing import Any, get_args
 import pytest
 import typer
 import yaml
+from called import Call
 from pydantic import BaseModel
 
-from secondlook import cli, installed_command
+from secondlook import cli
 from secondlook.scenario import Scenario
 from secondlook.scenario.degrees import IN_DEGREES
 
 TABLES = sorted(Path(__file__).parent.glob("*.yaml"))
 LONGEST_LINE = 600  # characters
-COMMAND = typer.main.get_command(cli.app)
+COMMAND = typer.main.get_command(cli.app_for([]))
 
 
 class Loader(yaml.SafeLoader):
@@ -134,17 +134,10 @@ def tree(folder: Path) -> dict[str, bytes | None]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """Where a command is called; modules that were imported from there are forgotten."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.path", [*sys.path])
-    monkeypatch.setattr("sys.dont_write_bytecode", True)
-    before = set(sys.modules)
-    yield tmp_path
+def folder(users_folder: Path) -> Iterator[Path]:
+    """Where a command is called."""
+    yield users_folder
     logging.getLogger("secondlook").setLevel(logging.NOTSET)  # nodes say more
-    for name in set(sys.modules) - before:
-        if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
-            del sys.modules[name]
 
 
 @pytest.mark.parametrize("row", ROWS.values(), ids=ROWS)
@@ -153,24 +146,21 @@ def test_a_bad_input_is_told_in_a_sentence_and_changes_no_file(
     folder: Path,
     request: pytest.FixtureRequest,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    called: Call,
 ) -> None:
     if any("flown" in word for word in row.arguments):
         shutil.copytree(request.getfixturevalue("brief_run"), folder / "flown")
     for name, content in row.files.items():
         put(folder / name, content)
     before = tree(folder)
-    monkeypatch.setattr(cli, "app", COMMAND)  # made once: that takes longer than most rows
-    monkeypatch.setattr("sys.argv", ["secondlook", *row.arguments])
-    with pytest.raises(SystemExit) as stopped:
-        installed_command.main()
-    out, err = capsys.readouterr()
+    monkeypatch.setattr(cli, "app_for", lambda arguments: COMMAND)  # made once: that takes longer than most rows
+    code, out, err = called(*row.arguments)
     lines = err.splitlines()
     if err.startswith("Usage: "):  # what the command line's parser refuses it tells below two lines of help
         assert lines[1:3] == [lines[1], ""], err
         assert lines[1].startswith("Try 'secondlook "), err
         lines = [line.removeprefix("Error: ") for line in lines[3:]]
-    assert (stopped.value.code, out) == (2, ""), err
+    assert (code, out) == (2, ""), err
     assert len(lines) == len(row.holds), err
     for line, holds in zip(lines, row.holds, strict=True):
         assert line == holds if row.whole else line.startswith(row.begins), line

@@ -218,6 +218,13 @@ def test_a_shell_completes_commands_options_and_bundled_scenarios(tmp_path: Path
         assert set(done.stdout.split()) == offered
 
 
+def test_a_command_is_loaded_without_what_others_need() -> None:
+    code = "import sys; from secondlook.cli import app_for; app_for(['view', 'run']); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
+    assert "secondlook.commands.view" in done.stdout.split()
+    assert not {"secondlook.commands.run", "secondlook.scenario"} & {*done.stdout.split()}
+
+
 def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
     code, out, err = secondlook("scenarios")
     assert (code, err) == (0, "")

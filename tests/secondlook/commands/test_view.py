@@ -55,7 +55,7 @@ def test_the_page_is_there_until_ctrl_c(brief_run: Path) -> None:
 
 def test_a_page_has_no_moment_to_open_at(brief_run: Path) -> None:
     with pytest.raises(UserError, match=r"^--at: not allowed beside --web; a browser's page begins where it chooses$"):
-        cli.app(["view", str(brief_run), "--web", "--at", "5"], standalone_mode=False)
+        cli.app_for(["view"])(["view", str(brief_run), "--web", "--at", "5"], standalone_mode=False)
 
 
 def test_a_recording_whose_recorder_was_killed_is_repaired_with_all_it_had(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from flights import BRIEF, TWO_PRIMARIES
 
 from comms.said.messages import AgentState, MissionOver, Mode, Plan, StripState, Task, TaskAction
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.commands.planned_survey import planned_surveys
 from secondlook.scenario.text import Value
 from secondlook.testing import Fleet, assert_all_finished, assert_home_before_empty, assert_kept_apart
@@ -116,7 +116,9 @@ def test_the_command_has_exit_code_1_where_a_battery_runs_empty(
     changed = ("vehicles.primary.endurance_s=60", "vehicles.primary.home={x_m: 5000, y_m: 0}")
     sets = [word for one in changed for word in ("--set", one)]
     with pytest.raises(SystemExit) as ended:
-        app(["run", str(BRIEF), "--bus", "local", "--no-record", "--out", str(tmp_path), "--anyway", *sets])
+        app_for(["run"])(
+            ["run", str(BRIEF), "--bus", "local", "--no-record", "--out", str(tmp_path), "--anyway", *sets]
+        )
     assert ended.value.code == 1
     told = capsys.readouterr()
     assert told.err.splitlines()[-1] == "primary: the battery was empty before it was home"

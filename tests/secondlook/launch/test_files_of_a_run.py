@@ -11,10 +11,13 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from called import Call, Called
 from flights import BRIEF, events, flight, until, without_expected
 from required import missing_for_small_disks, require
 
@@ -63,18 +66,29 @@ def test_a_killed_launcher_leaves_all_but_the_last_second(tmp_path: Path, bus: s
     assert drawn_ms / 1000 >= killed_s - lost
 
 
-def with_room_for(most_bytes: int, *arguments: str | Path) -> subprocess.CompletedProcess[str]:
-    """A command where, as on a full disk, a write fails that would make a file larger, and part of it is written. It
-    writes no compiled modules: Python would leave them cut short, for all to come."""
-    return subprocess.run(
-        [Path(sys.executable).with_name("secondlook"), *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes)),
-    )
+@contextmanager
+def room_for(most_bytes: int) -> Iterator[None]:
+    """As on a full disk, a write fails that would make a file larger, and part of it is written."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+@pytest.fixture
+def with_room_for(called: Call, monkeypatch: pytest.MonkeyPatch) -> Call:
+    """Calls a command with so much room. It writes no compiled modules: Python would leave them cut short, for all to
+    come."""
+    monkeypatch.setattr("sys.dont_write_bytecode", True)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+
+    def call(most_bytes: int, *arguments: str | Path) -> Called:
+        with room_for(most_bytes):
+            return called(*arguments)
+
+    return call
 
 
 @pytest.mark.parametrize(
@@ -85,11 +99,13 @@ def with_room_for(most_bytes: int, *arguments: str | Path) -> subprocess.Complet
         (20_001, "zenoh"),  # then the recorder
     ],
 )
-def test_a_full_disk_ends_the_run_in_one_sentence(tmp_path: Path, most_bytes: int, bus: str) -> None:
+def test_a_full_disk_ends_the_run_in_one_sentence(
+    with_room_for: Call, tmp_path: Path, most_bytes: int, bus: str
+) -> None:
     folder = tmp_path / "out"
-    done = with_room_for(most_bytes, "run", BRIEF, "--out", folder, "--bus", bus)
-    assert (done.returncode, without_expected(done.stdout)) == (1, "")
-    (sentence,) = done.stderr.splitlines()
+    code, out, err = with_room_for(most_bytes, "run", BRIEF, "--out", folder, "--bus", bus)
+    assert (code, without_expected(out)) == (1, "")
+    (sentence,) = err.splitlines()
     path, _, what = sentence.partition(": ")
     assert Path(path).parent == folder
     assert what == f"File too large; must be a file that can be written; what was recorded is in {folder}"
@@ -135,7 +151,15 @@ def test_on_a_disk_without_room_for_anything_more_the_summary_has_room(tmp_path:
 
 
 def test_a_disk_that_is_full_from_the_start_is_told_before_anything_flies(tmp_path: Path) -> None:
-    done = with_room_for(100, "run", BRIEF, "--out", tmp_path / "out", "--bus", "local")
+    done = subprocess.run(
+        [Path(sys.executable).with_name("secondlook"), "run", BRIEF, "--out", tmp_path / "out", "--bus", "local"],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100)),
+    )
     scenario = tmp_path / "out" / "scenario.yaml"
     assert (done.returncode, done.stderr) == (2, f"{scenario}: File too large; must be a file that can be written\n")
     assert list((tmp_path / "out").iterdir()) == []
@@ -159,7 +183,14 @@ COMPARE = ("compare", str(BRIEF), "--allocators", "none", "--seeds", "1", "--job
     ],
 )
 def test_whoever_writes_tells_of_a_full_disk_and_leaves_nothing_cut_short(
-    charted_run: Path, tmp_path: Path, most_bytes: int, command: tuple[str, ...], code: int, told: str, left: list[str]
+    charted_run: Path,
+    with_room_for: Call,
+    tmp_path: Path,
+    most_bytes: int,
+    command: tuple[str, ...],
+    code: int,
+    told: str,
+    left: list[str],
 ) -> None:
     run, out = tmp_path / "run", tmp_path / "out"
     shutil.copytree(charted_run, run)
@@ -169,10 +200,10 @@ def test_whoever_writes_tells_of_a_full_disk_and_leaves_nothing_cut_short(
         return word.replace("RUN", str(run)).replace("OUT", str(out))
 
     done = with_room_for(most_bytes, *map(placed, command))
-    assert done.returncode == code
+    assert done.code == code
     full = "File too large(; must be a file that can be written)?|No usable temporary directory found in .*"
     sentence = rf"{placed(told)}: ({full})"
-    assert re.fullmatch(sentence, done.stderr.strip())
+    assert re.fullmatch(sentence, done.err.strip())
     assert [one.name for one in out.iterdir()] == left
     assert not list(run.glob(".*"))
     assert not (run / "report.html").exists()

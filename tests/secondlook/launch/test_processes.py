@@ -77,7 +77,7 @@ def assert_failed(flying: Flight, code: int, out: str, err: str, said: str) -> N
     assert sum(summary["messages"].values()) == len(read_messages(flying.folder / "messages.mpk"))
 
 
-@pytest.mark.parametrize("host", HOSTS)
+@pytest.mark.parametrize("host", ["world", "coordinator", "recorder"])  # the hub, one that acts, one that only listens
 def test_a_killed_process_ends_the_run_with_a_sentence_that_names_it(tmp_path: Path, host: str) -> None:
     with flight(tmp_path / "out", *LONG) as flying:
         children = take_off(flying)
@@ -89,14 +89,10 @@ def test_a_killed_process_ends_the_run_with_a_sentence_that_names_it(tmp_path: P
     assert_readable(flying.folder)
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path, number: signal.Signals) -> None:
+def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path) -> None:
     with flight(tmp_path / "out", *LONG) as flying:
         children = take_off(flying)
-        if number == signal.SIGINT:
-            flying.press_ctrl_c()
-        else:
-            flying.process.send_signal(number)
+        flying.press_ctrl_c()
         printed = flying.finish(SOON_S)
         assert_gone(flying, children)
     assert_failed(flying, *printed, said=INTERRUPTED)
@@ -105,11 +101,12 @@ def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path, numbe
     assert not (flying.folder / "logs").exists()
 
 
-def test_a_run_on_the_local_bus_is_interrupted_alike(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_run_on_the_local_bus_is_interrupted_alike(tmp_path: Path, number: signal.Signals) -> None:
     with flight(tmp_path / "out", *LONG, "--bus", "local") as flying:
         messages = flying.folder / "messages.mpk"
         assert until(lambda: flying.is_under_way() and messages.stat().st_size > ENOUGH_BYTES)
-        flying.press_ctrl_c()
+        flying.process.send_signal(number)
         printed = flying.finish(SOON_S)
     assert_failed(flying, *printed, said=INTERRUPTED)
     assert_readable(flying.folder)
@@ -163,20 +160,14 @@ class Saboteur:
 
 @pytest.fixture
 def fleet() -> Fleet:
-    return build_fleet(load_scenario(str(BRIEF), SLOW), record=True)
-
-
-RECORDER_THAT_LISTENS = NodeSpec("faulty_nodes:ListenerThatFails", 10**9)
+    return build_fleet(load_scenario(str(BRIEF), SLOW), record=False)
 
 
 Sabotage = Callable[[dict[str, int]], None]
 
 
-def run_fleet(
-    fleet: Fleet, logs: Path, observer: Saboteur, recorder: NodeSpec, sabotage: Sabotage, patience_s: float
-) -> str:
+def run_fleet(fleet: Fleet, logs: Path, observer: Saboteur, sabotage: Sabotage, patience_s: float) -> str:
     """The sentence with which a run of the fleet fails; no process of it is left, and the observer closed."""
-    fleet = replace(fleet, specs=fleet.specs | {RECORDER: recorder})
     with Processes(fleet, logs, observer, Lockstep(), patience_s=patience_s) as running:
         observer.act = lambda: sabotage(running.process_ids)
         with pytest.raises(RunFailedError) as caught:
@@ -191,12 +182,6 @@ def run_fleet(
     ("host", "nth", "sentence"),
     [
         ("primary", 150, r"nothing heard for 8 s at .*: no answer from primary|primary has fallen silent at .*"),
-        (
-            "recorder",
-            150,
-            # It is waited for in mid-mission, or at the end where all that it has not taken is less than may wait.
-            r"nothing heard for 8 s at .*: no (acknowledgement|last word) from recorder|recorder has fallen silent .*",
-        ),
         # Late enough for the hub to have given signs of life in mid-mission.
         ("world", 4000, r"world has fallen silent, last heard at [1-9]\d*\.\d{3} s of the mission"),
     ],
@@ -209,11 +194,25 @@ def test_a_frozen_process_is_given_up_and_named(
     def freeze(pids: dict[str, int]) -> None:
         os.kill(pids[host], signal.SIGSTOP)
 
-    assert re.fullmatch(sentence, run_fleet(fleet, tmp_path, Saboteur(nth), RECORDER_THAT_LISTENS, freeze, PATIENCE_S))
+    assert re.fullmatch(sentence, run_fleet(fleet, tmp_path, Saboteur(nth), freeze, PATIENCE_S))
 
 
 def say_nothing(pids: dict[str, int]) -> None:
     """No sabotage."""
+
+
+def recorded_by(factory: str, config: Any, *settings: str) -> Fleet:
+    """The mission's fleet with another recorder."""
+    fleet = build_fleet(load_scenario(str(BRIEF), settings), record=True)
+    return replace(fleet, specs={**fleet.specs, RECORDER: NodeSpec(f"faulty_nodes:{factory}", config)})
+
+
+def test_a_frozen_recorder_is_waited_for_at_the_end_then_given_up_and_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(processes, "GRACE_S", 0.3)
+    said = run_fleet(recorded_by("ListenerThatStops", 3), tmp_path, Saboteur(), say_nothing, PATIENCE_S)
+    assert re.fullmatch(r"nothing heard for 8 s at .*: no last word from recorder|recorder has fallen silent .*", said)
 
 
 @pytest.mark.parametrize(
@@ -237,29 +236,27 @@ def say_nothing(pids: dict[str, int]) -> None:
         ("helper", "CannotBeMade", "", r"helper has failed: ValueError: no such vehicle \(\w+\.py, line \d+, in \w+\)"),
         ("world", "CannotBeMade", "", r"world has failed: ValueError: no such vehicle \(\w+\.py, line \d+, in \w+\)"),
         ("coordinator", "Missing", "", r"coordinator has failed: AttributeError: .*has no attribute 'Missing'"),
-        (
-            "recorder",
-            "ListenerThatFails",
-            3,
-            r"recorder has failed at \d\.\d{3} s: OSError: no space left on device \(\w+\.py, line \d+, in \w+\)",
-        ),
     ],
 )
 def test_a_node_that_fails_in_its_process_is_named_with_its_reason(
     tmp_path: Path, fleet: Fleet, node: str, factory: str, config: Any, sentence: str
 ) -> None:
-    spec = NodeSpec(f"faulty_nodes:{factory}", config)
-    recorder = spec if node == RECORDER else RECORDER_THAT_LISTENS
-    specs = fleet.specs if node == RECORDER else {**fleet.specs, node: spec}
-    said = run_fleet(replace(fleet, specs=specs), tmp_path, Saboteur(), recorder, say_nothing, 20.0)
-    assert re.fullmatch(sentence, said)
+    faulty = replace(fleet, specs={**fleet.specs, node: NodeSpec(f"faulty_nodes:{factory}", config)})
+    assert re.fullmatch(sentence, run_fleet(faulty, tmp_path, Saboteur(), say_nothing, 20.0))
+
+
+def test_so_is_a_recorder(tmp_path: Path) -> None:
+    said = run_fleet(recorded_by("ListenerThatFails", 3, *SLOW), tmp_path, Saboteur(), say_nothing, 20.0)
+    assert re.fullmatch(
+        r"recorder has failed at \d\.\d{3} s: OSError: no space left on device \(\w+\.py, line \d+, in \w+\)", said
+    )
 
 
 def test_an_observer_that_fails_is_named_with_its_reason(tmp_path: Path, fleet: Fleet) -> None:
     def fail(pids: dict[str, int]) -> None:
         raise OSError("no space left on device")
 
-    said = run_fleet(fleet, tmp_path, Saboteur(), RECORDER_THAT_LISTENS, fail, 20.0)
+    said = run_fleet(fleet, tmp_path, Saboteur(), fail, 20.0)
     assert re.fullmatch(
         r"observer has failed at \d+\.\d{3} s: OSError: no space left on device \(\w+\.py, line \d+, in \w+\)", said
     )

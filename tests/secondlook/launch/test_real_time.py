@@ -16,7 +16,8 @@ from flights import BRIEF, Flight, events, flight, has_ended, until
 from comms.said.announcement import ClockMode, RunInfo
 from comms.said.codec import decode
 from comms.said.topics import topic_of
-from secondlook.cli import is_number, main, with_value
+from secondlook.cli import main
+from secondlook.commands.left_out import is_number, with_value
 from secondlook.recorded.mission_files import read_messages
 
 # Half as long again after the primary's end, so that the helper has time for its strips however slow the machine is.

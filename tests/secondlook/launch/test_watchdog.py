@@ -43,6 +43,13 @@ class Forever:
         loop()
 
 
+class Waiting:
+    """One that waits for what never comes."""
+
+    def assign(self, situation: Any) -> Any:
+        wait()
+
+
 @pytest.mark.parametrize("never_returns", [loop, wait])
 def test_a_call_that_does_not_come_back_is_interrupted(never_returns: Callable[[], None]) -> None:
     def call() -> None:
@@ -103,17 +110,18 @@ def test_what_cannot_be_interrupted_is_ended_with_the_process() -> None:
 
 
 @pytest.mark.parametrize(
-    ("bus", "patience_s", "sentence"),
+    ("bus", "allocator", "patience_s", "sentence"),
     [
-        ("local", PATIENCE_S, r"coordinator has not come back within 0\.5 s at 0\.\d{3} s of the mission"),
+        ("local", Forever, PATIENCE_S, r"coordinator has not come back within 0\.5 s at 0\.\d{3} s of the mission"),
         # Its processes have to start within that too.
-        ("zenoh", 5.0, r"nothing heard for 5 s at 0\.\d{3} s of the mission: no answer from coordinator"),
+        ("zenoh", Waiting, 5.0, r"nothing heard for 5 s at 0\.\d{3} s of the mission: no answer from coordinator"),
     ],
 )
 def test_a_part_that_never_returns_ends_the_mission_and_names_its_node(
-    tmp_path: Path, bus: Any, patience_s: float, sentence: str
+    tmp_path: Path, bus: Any, allocator: type, patience_s: float, sentence: str
 ) -> None:
-    fleet = Fleet(BRIEF, folder=tmp_path, overrides={"coordinator.allocator": Forever}, bus=bus, patience_s=patience_s)
+    part = {"coordinator.allocator": allocator}
+    fleet = Fleet(BRIEF, folder=tmp_path, overrides=part, bus=bus, patience_s=patience_s)
     with pytest.raises(RunFailedError) as caught:
         fleet.run()
     assert re.fullmatch(sentence, str(caught.value))

@@ -84,17 +84,19 @@ def test_the_surveys_of_a_bundled_mission_come_to_what_is_told_before(name: str,
     mission = load_scenario(name)
     if name in ("wide", "armada"):  # ways and durations are the same on fewer cells, and with longer looks
         longer = [f"vehicles.{vehicle}.sensor.look_m=400" for vehicle in mission.survey_vehicles]
-        mission = load_scenario(name, ["area.cell_m=50", *longer])
+        shorter = ["area.polygon_m=[[0, 0], [10000, 0], [10000, 2500], [0, 2500]]"] if name == "armada" else []
+        mission = load_scenario(name, ["area.cell_m=50", *longer, *shorter])
     alone = mission.model_copy(update={"vehicles": mission.survey_vehicles})  # a helper never holds them up
     expected = check_mission(alone)
     assert_comes_to(expected, fly(alone, tmp_path))
     assert expected.latest_s == expected.survey_s
 
 
-@pytest.mark.parametrize("name", ["tellaro", "patchy", "five-helpers"])
+@pytest.mark.parametrize("name", ["tellaro", "five-helpers"])
 def test_a_bundled_mission_with_helpers_comes_to_what_is_told_before(name: str, tmp_path: Path) -> None:
-    expected = check_mission(name)
-    assert_comes_to(expected, fly(load_scenario(name), tmp_path))
+    mission = load_scenario(name, ["area.cell_m=10"])  # on fewer cells strips are cut sooner
+    expected = check_mission(mission)
+    assert_comes_to(expected, fly(mission, tmp_path))
     assert expected.latest_s == pytest.approx(1.05 * expected.survey_s)
 
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 import secondlook
 from comms.said.codec import header_of
 from comms.said.messages import StripStatus
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.errors import UserError
 from secondlook.recorded.message_records import HEAD, Missing, Record, records_in
 from secondlook.recorded.mission_files import Recording, read_recording
@@ -213,7 +213,7 @@ def test_what_can_be_read_is_reported_and_what_is_missing_said_once(
     assert caplog.messages == [f"{damaged_copy}/{told}"]
     for command in ("report", "picture", "geojson"):
         caplog.clear()
-        done = CliRunner().invoke(app, [command, str(damaged_copy)])
+        done = CliRunner().invoke(app_for([command]), [command, str(damaged_copy)])
         assert (done.exit_code, caplog.messages) == (0, [f"{damaged_copy}/{told}"]), command
     page = (damaged_copy / "report.html").read_text()
     assert page.count(f"<strong>Not all of this run can be read</strong>: messages.mpk {mission.damage}.") == 1
@@ -222,7 +222,7 @@ def test_what_can_be_read_is_reported_and_what_is_missing_said_once(
 @pytest.mark.parametrize("node", ["world", "coordinator"])
 def test_a_replay_cannot_be_exact_and_says_so(damaged_copy: Path, node: str) -> None:
     what = f"{damaged_copy}/messages.mpk: {secondlook.load(damaged_copy).damage}"
-    done = CliRunner().invoke(app, ["replay", str(damaged_copy), "--node", node])
+    done = CliRunner().invoke(app_for(["replay"]), ["replay", str(damaged_copy), "--node", node])
     said = f"{node}: cannot be replayed exactly, as messages are missing that it may have heard or said\n"
     assert (done.exit_code, done.output) == (1, f"{what}\n{said}")
 
@@ -233,6 +233,6 @@ def test_without_the_announcement_messages_are_read_and_a_report_is_refused(
     (brief_copy / "messages.mpk").write_bytes(content[: len(HEAD)] + content[records[0].end :])
     mission = secondlook.load(brief_copy)
     assert len(list(mission.messages())) == len(records) - 1
-    done = CliRunner().invoke(app, ["report", str(brief_copy)])
+    done = CliRunner().invoke(app_for(["report"]), ["report", str(brief_copy)])
     assert isinstance(done.exception, UserError)
     assert str(done.exception) == f"{brief_copy}: what announces the mission is among the messages that are missing"

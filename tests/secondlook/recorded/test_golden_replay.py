@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from comms.said.codec import decode, encode
 from comms.said.topics import topic_of
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.recorded.message_records import HEAD, record
 from secondlook.recorded.mission_files import read_messages
 
@@ -40,7 +40,9 @@ def golden(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def replay(folder: Path, node: str, tolerance: float) -> tuple[int, str]:
     """Exit code and output of the command."""
-    result = CliRunner().invoke(app, ["replay", str(folder), "--node", node, "--tolerance", str(tolerance)])
+    result = CliRunner().invoke(
+        app_for(["replay"]), ["replay", str(folder), "--node", node, "--tolerance", str(tolerance)]
+    )
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result.exit_code, result.output
 

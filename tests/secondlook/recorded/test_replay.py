@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from comms.said.codec import decode, encode
 from comms.said.messages import StripStatus
 from comms.wall.drive import ByWallClock
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.recorded.message_records import FILE_FORMAT, HEAD, record
@@ -44,7 +44,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def replay(folder: Path, node: str) -> tuple[int, str]:
     """Exit code and output of the command."""
-    result = CliRunner().invoke(app, ["replay", str(folder), "--node", node])
+    result = CliRunner().invoke(app_for(["replay"]), ["replay", str(folder), "--node", node])
     assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
     return result.exit_code, result.output
 
@@ -62,7 +62,7 @@ def test_a_run_by_the_wall_clock_cannot_be_repeated_and_that_is_said(tmp_path: P
     out = tmp_path / "run"
     out.mkdir()
     run_mission(load_scenario(str(tmp_path / "bay.yaml")), RunOptions(out, bus="local", drive=ByWallClock(1000.0)))
-    result = CliRunner().invoke(app, ["replay", str(out)])
+    result = CliRunner().invoke(app_for(["replay"]), ["replay", str(out)])
     assert isinstance(result.exception, UserError)
     assert str(result.exception).startswith(f"{out}: was flown by the wall clock, where ")
     assert "cannot be repeated" in str(result.exception)

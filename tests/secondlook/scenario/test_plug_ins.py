@@ -6,9 +6,11 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from called import Call
 
 from secondlook.scenario import load_scenario
 
@@ -122,52 +124,66 @@ vehicles:
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(users_folder: Path) -> Path:
     """A user's folder: a module of parts and a scenario."""
-    (tmp_path / "own.py").write_text(OWN)
-    (tmp_path / "bay.yaml").write_text(BAY)
-    return tmp_path
+    (users_folder / "own.py").write_text(OWN)
+    (users_folder / "bay.yaml").write_text(BAY)
+    return users_folder
 
 
-def run(folder: Path, *settings: str, bus: str = "local") -> tuple[int, dict[str, object], str]:
-    """Exit code, summary and standard error of a mission called from the user's folder."""
-    sets = [word for setting in settings for word in ("--set", setting)]
-    code = "from secondlook.installed_command import main; main()"
-    command = [sys.executable, "-P", "-c", code, "run", "bay.yaml", "--no-record", "--json", "--bus", bus, *sets]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=120)
-    return done.returncode, json.loads(done.stdout) if done.stdout else {}, done.stderr
+Run = Callable[..., tuple[int | str | None, dict[str, object], str]]
+
+
+def words(settings: tuple[str, ...], bus: str) -> list[str]:
+    """How the mission is called."""
+    return ["run", "bay.yaml", "--no-record", "--json", "--bus", bus, *(w for one in settings for w in ("--set", one))]
+
+
+@pytest.fixture
+def run(folder: Path, called: Call) -> Run:
+    """Flies the mission with settings; gives exit code, summary and standard error. Over Zenoh the nodes alone have
+    processes of their own."""
+
+    def fly(*settings: str, bus: str = "local") -> tuple[int | str | None, dict[str, object], str]:
+        code, out, error = called(*words(settings, bus))
+        return code, json.loads(out) if out else {}, error
+
+    return fly
 
 
 @pytest.mark.parametrize("bus", ["local", "zenoh"])
 def test_all_kinds_of_parts_together_on_either_bus(folder: Path, bus: str) -> None:
-    code, summary, error = run(
-        folder,
+    """In a process of the user's, which knows nothing of these tests."""
+    settings = (
         "coordinator.allocator=own:LastFirst",
         "vehicles.primary.spacing=own:Every60",
         "vehicles.primary.agent=own:HalfCharged",
         "vehicles.helper.sensor.sonar=own:Deaf",
-        bus=bus,
     )
-    assert (code, error) == (0, "")
-    assert summary["vehicles"]["primary"]["tracks"] == 5  # type: ignore[index]
+    program = [sys.executable, "-P", "-c", "from secondlook.installed_command import main; main()"]
+    done = subprocess.run(
+        [*program, *words(settings, bus)], cwd=folder, capture_output=True, text=True, check=False, timeout=120
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout)["vehicles"]["primary"]["tracks"] == 5
 
 
-def test_a_part_changes_what_happens(folder: Path) -> None:
-    _, plain, _ = run(folder)
+def test_a_part_changes_what_happens(run: Run) -> None:
+    _, plain, _ = run()
     for setting in (
         "coordinator.allocator=own:Idle",
         "vehicles.primary.spacing=own:Every60",
         "vehicles.primary.agent=own:HalfCharged",
         "vehicles.helper.sensor.sonar=own:Deaf",
     ):
-        code, changed, _ = run(folder, setting)
+        code, changed, _ = run(setting)
         assert code == 0
         assert changed["digest"] != plain["digest"], setting
 
 
-def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path) -> None:
+def test_a_curve_of_ones_own_is_written_out_in_the_scenario(folder: Path, run: Run) -> None:
     (folder / "bay.yaml").write_text(BAY.replace("sensor: {p_detect: 0.3, range_m: 60}", 'sensor: {curve: "own:tent"}'))
-    code, _, error = run(folder)
+    code, _, error = run()
     assert (code, error) == (0, "")
     (run_folder,) = (folder / "runs").iterdir()
     sensor = load_scenario(run_folder / "scenario.yaml").vehicles["primary"].sensor
@@ -199,8 +215,8 @@ IN_PROCESSES = [(*one, "zenoh") for one in (EXITS[0], *EXITS[3:])]
 
 
 @pytest.mark.parametrize(("setting", "sentence", "bus"), [*((*one, "local") for one in EXITS), *IN_PROCESSES])
-def test_a_part_that_exits_has_failed(folder: Path, setting: str, sentence: str, bus: str) -> None:
-    code, _, error = run(folder, setting, bus=bus)
+def test_a_part_that_exits_has_failed(folder: Path, run: Run, setting: str, sentence: str, bus: str) -> None:
+    code, _, error = run(setting, bus=bus)
     assert code == 1
     told = re.search(rf"^({sentence}); what was recorded is in (.*)$", error, re.MULTILINE)
     assert told, error
@@ -217,9 +233,9 @@ def test_a_part_that_exits_has_failed(folder: Path, setting: str, sentence: str,
     ],
 )
 def test_a_part_that_fails_ends_the_mission_with_one_sentence(
-    folder: Path, setting: str, sentence: str, bus: str
+    folder: Path, run: Run, setting: str, sentence: str, bus: str
 ) -> None:
-    code, _, error = run(folder, setting, bus=bus)
+    code, _, error = run(setting, bus=bus)
     assert code == 1
     told, where = error.splitlines()
     assert told.startswith(sentence)
@@ -247,8 +263,8 @@ WRONG_SONARS = [
     # In the world's own process: what we find wrong, and what the model itself fails at.
     [*((*one, "local") for one in WRONG_SONARS), *((*one, "zenoh") for one in (WRONG_SONARS[0], WRONG_SONARS[-1]))],
 )
-def test_a_sonar_model_that_answers_wrongly_is_named(folder: Path, model: str, sentence: str, bus: str) -> None:
-    code, _, error = run(folder, f"vehicles.helper.sensor.sonar=own:{model}", bus=bus)
+def test_a_sonar_model_that_answers_wrongly_is_named(run: Run, model: str, sentence: str, bus: str) -> None:
+    code, _, error = run(f"vehicles.helper.sensor.sonar=own:{model}", bus=bus)
     assert code == 1
     assert re.match(rf"world has failed at \d+\.\d+ s: {sentence}; what was recorded is in ", error), error
     assert error.count("\n") == 2
@@ -268,7 +284,7 @@ def test_a_sonar_model_that_answers_wrongly_is_named(folder: Path, model: str, s
         ("Speechless", "ValueError: the allocator must answer with a mapping from vehicle to strip number, not None"),
     ],
 )
-def test_an_answer_that_is_none_is_told_for_what_it_is(folder: Path, allocator: str, sentence: str) -> None:
-    code, _, error = run(folder, f"coordinator.allocator=own:{allocator}")
+def test_an_answer_that_is_none_is_told_for_what_it_is(run: Run, allocator: str, sentence: str) -> None:
+    code, _, error = run(f"coordinator.allocator=own:{allocator}")
     assert code == 1
     assert re.search(rf"^coordinator has failed at \d+\.\d+ s: {re.escape(sentence)}", error, re.MULTILINE), error

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from planner.fleet_map import VehicleLayer
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.errors import UserError
 from secondlook.scenario import load_scenario
 from secondlook.storm.campaign import storm_of
@@ -172,7 +172,7 @@ def test_the_command_writes_the_smallest_and_flies_it(tmp_path: Path) -> None:
     plan = plan.model_copy(update={"scenario": changed, "trouble": tuple(mild)})
     (tmp_path / "six.yaml").write_text(plan.to_yaml())
     arguments = ["storm", "--plan", str(tmp_path / "six.yaml"), "--shrink", "--out", str(tmp_path / "o")]
-    done = CliRunner().invoke(app, [*arguments, "--flights", "8"])
+    done = CliRunner().invoke(app_for(["storm"]), [*arguments, "--flights", "8"])
     assert done.exit_code == 1, done.output
     assert "Left are 0 of 6 faults and 2 of 2 vehicles, in an area of " in done.output
     assert "tired" in done.output
@@ -195,7 +195,9 @@ def test_ctrl_c_keeps_the_smallest_until_then(tmp_path: Path, monkeypatch: pytes
 
     monkeypatch.setattr("secondlook.commands.storm.make_smaller", broken_off)
     monkeypatch.setattr("secondlook.commands.storm.violations_of", always_late)
-    done = CliRunner().invoke(app, ["storm", "--plan", str(tmp_path / "two.yaml"), "--shrink", "--out", str(tmp_path)])
+    done = CliRunner().invoke(
+        app_for(["storm"]), ["storm", "--plan", str(tmp_path / "two.yaml"), "--shrink", "--out", str(tmp_path)]
+    )
     assert done.exit_code == 1
     assert "Left are 1 of 2 faults and 2 of 2 vehicles, in an area of 300 x 100 m" in done.output
     told = f"interrupted after 0 of 300 flights; the smallest until then is {tmp_path / 'plan.yaml'}\n"
@@ -209,14 +211,14 @@ def always_late(plan: TroublePlan, bus: str) -> tuple[Violation, ...]:
 
 
 def test_where_all_holds_there_is_nothing_to_shrink(tmp_path: Path) -> None:
-    done = CliRunner().invoke(app, ["storm", "--seed", "5", "--shrink", "--out", str(tmp_path)])
+    done = CliRunner().invoke(app_for(["storm"]), ["storm", "--seed", "5", "--shrink", "--out", str(tmp_path)])
     assert done.exit_code == 0, done.output
     assert done.output.startswith("All that must hold does; the mission was over at ")
     assert load_plan(tmp_path / "plan.yaml") == storm_of(None, 5)
 
 
 def test_many_storms_are_not_shrunk() -> None:
-    refused = CliRunner().invoke(app, ["storm", "--shrink"])
+    refused = CliRunner().invoke(app_for(["storm"]), ["storm", "--shrink"])
     assert isinstance(refused.exception, UserError)
     assert str(refused.exception) == "--shrink: not allowed without --seed or --plan; it shrinks a single storm"
 

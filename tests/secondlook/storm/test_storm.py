@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import secondlook
 from coordinator.fleet import GIVEN_UP_AFTER
-from secondlook.cli import app
+from secondlook.cli import app_for
 from secondlook.fleet.link import silent_after_ms_of
 from secondlook.scenario import load_scenario
 from secondlook.storm import campaign
@@ -203,7 +203,7 @@ def test_a_plan_file_is_flown_as_the_storm_it_was_written_from(tmp_path: Path) -
 
 def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
     many = CliRunner().invoke(
-        app, ["storm", "--seeds", f"{QUICK}..{QUICK}", "--jobs", "1", "--out", str(tmp_path / "m")]
+        app_for(["storm"]), ["storm", "--seeds", f"{QUICK}..{QUICK}", "--jobs", "1", "--out", str(tmp_path / "m")]
     )
     assert many.exit_code == 0, many.output
     assert "1 storms flown; in 0 of them something did not hold." in many.output
@@ -211,7 +211,7 @@ def test_the_command_flies_many_and_one(tmp_path: Path) -> None:
     told = json.loads((tmp_path / "m" / "storm.json").read_text())
     assert told["flown"] == 1
     assert told["reached"].keys() == SOMETIMES.keys()
-    one = CliRunner().invoke(app, ["storm", "--seed", str(QUICK), "--out", str(tmp_path / "o")])
+    one = CliRunner().invoke(app_for(["storm"]), ["storm", "--seed", str(QUICK), "--out", str(tmp_path / "o")])
     assert one.exit_code == 0, one.output
     assert load_plan(tmp_path / "o" / "plan.yaml") == storm_of(None, QUICK)
     assert (tmp_path / "o" / "flight-1" / "mission.rrd").is_file()
