@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test docs example pictures golden lock release clean
+.PHONY: run test docs docs-figures example pictures golden lock release clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -43,6 +43,10 @@ pictures: .venv/.test-ready
 docs: .venv/.test-ready
 	@$(BIN)/python -m docs.pages
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --clean
+
+# The tables of the docs that missions are flown for, all of them anew: an hour and more on two cores.
+docs-figures: .venv/.test-ready
+	@$(BIN)/python -m bench.figures --fly all
 
 # The recorded mission that every node has to say again, and the steps that missions take, anew: after a change that is
 # meant to change what nodes say.

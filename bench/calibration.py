@@ -40,7 +40,7 @@ def table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     found = defaultdict[tuple[str, ...], list[Row]](list)
     for row in rows:
         if row["failure"] is None and row["truth.targets"] and row["mines.left"] is not None:
-            found[tuple("-" if row.get(key) is None else str(row[key]) for key in varied)].append(row)
+            found[tuple("-" if row.get(key) in (None, "") else str(row[key]) for key in varied)].append(row)
     heads = [*(f"`{key}`" for key in varied), *HEADS]
     lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
     for values, missions in found.items():

@@ -1,0 +1,219 @@
+"""Tables of the docs that missions are flown for: made by a command, kept with the missions that they rest on, and
+checked against both.
+
+python -m bench.figures [--fly NAME ...]
+
+Without a name it writes each table anew into its page, from what is kept in docs/figures/: behind the line
+`<!-- figures: NAME -->`. With `--fly` it flies the missions of these tables before that, or of `all`, and keeps what
+they left; that is an hour and more for all. A test holds the pages to what is kept, and flies one mission of each table
+again: where that leaves something else, the table is stale.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+from pathlib import Path
+from typing import Any
+
+import secondlook
+from bench import calibration, compared, link_share
+
+ROOT = Path(__file__).parents[1]
+KEPT = ROOT / "docs" / "figures"
+DIGITS = 6  # of what is kept: more than tables tell
+
+CONTENDERS = ("plan", "lawnmower", "across", "beforehand", "second_survey", "greedy", "nearest", "cbba")
+COMPARED = ("tellaro", "two-helpers", "patchy", "clear")
+LINKED = ("tellaro", "two-helpers", "patchy")
+PROFILES = ("ideal", "radio", "micromodem-6", "micromodem-1", "micromodem-0", "janus")
+
+CALIBRATED: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("tellaro", ()),
+    ("two-helpers", ()),
+    ("patchy", ()),
+    ("tellaro", ("targets.correlation=1", "mission.rho=1")),
+    ("tellaro", ("targets.correlation=1",)),
+    ("tellaro", ("mission.rho=1",)),
+    ("tellaro", tuple(f"vehicles.{one}.sensor.false_alarms_per_km2=200" for one in ("primary", "helper"))),
+    ("tellaro", ("targets.kinds=mines",)),
+    ("tellaro", tuple(f"vehicles.{one}.sensor.estimate.bias=0.2" for one in ("primary", "helper"))),
+    ("patchy", ("vehicles.primary.sensor.estimate.blind_to_seabed=true",)),
+)
+"""What is true, or told of, otherwise than in a scenario as it is."""
+CALIBRATED_BY = (
+    *("seed", "failure", "risk.mean", "risk.worst30_mean", "truth.targets", "truth.missed_share"),
+    *("mines.left", "mines.left_low", "mines.left_high"),
+)
+
+Document = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Mission:
+    """One mission that a table rests on, to be flown again: the `risk` that it left, mean and over the worst 30 %."""
+
+    scenario: str
+    overrides: tuple[str, ...]
+    seed: int
+    risk: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a `page`. `fly`: flies its missions, with files in a folder, and returns what is to be kept;
+    `lines`: makes the table of that; `first`: one of its missions."""
+
+    page: str
+    fly: Callable[[Path], Document]
+    lines: Callable[[Document], list[str]]
+    first: Callable[[Document], Mission]
+
+
+def _secondlook(*arguments: str) -> None:
+    program = "from secondlook.installed_command import main; main()"
+    subprocess.run([sys.executable, "-c", program, *arguments], check=True, cwd=ROOT)
+
+
+def _fly_compared(folder: Path) -> Document:
+    kept = []
+    for scenario in COMPARED:
+        out = folder / scenario
+        seeds = ("--first-seed", "1001", "--seeds", "50")
+        _secondlook("compare", scenario, "--allocators", ",".join(CONTENDERS), *seeds, "--out", str(out))
+        kept.append(compared_kept(json.loads((out / "compare.json").read_text())))
+    return {"comparisons": kept}
+
+
+def compared_kept(told: Document) -> Document:
+    """What is kept of a comparison's `compare.json`: what the table tells, and the first mission."""
+    names = ("name", "mean_end", "worst30_mean_end", "against_first")
+    contenders = [{name: one[name] for name in names} for one in told["contenders"]]
+    first = {name: told["missions"][0][name] for name in ("contender", "seed", "at_end")}
+    document = {"scenario": told["scenario"], "objective": told["objective"], "contenders": contenders, "first": first}
+    return dict(json.loads(json.dumps(document), parse_float=lambda text: round(float(text), DIGITS)))
+
+
+def _first_compared(document: Document) -> Mission:
+    told = document["comparisons"][0]
+    first, left = told["first"], told["first"]["at_end"]
+    overrides = (f"coordinator.allocator={first['contender']}",)
+    return Mission(told["scenario"], overrides, first["seed"], (left["mean"], left["worst30_mean"]))
+
+
+def _fly_linked(folder: Path) -> Document:
+    rows = []
+    for scenario in LINKED:
+        out = folder / scenario
+        profiles, platforms = f"link.profile={','.join(PROFILES)}", "coordinator.platform=ship,primary"
+        varied = ("--vary", profiles, "--vary", platforms)
+        _secondlook("sweep", scenario, "--seeds", "1001..1004", *varied, "--out", str(out))
+        rows += linked_kept(scenario, secondlook.load_sweep(out).table.to_pylist())
+    return {"varied": ["link.profile", "coordinator.platform"], "rows": rows}
+
+
+def linked_kept(scenario: str, rows: Sequence[Document]) -> list[Document]:
+    """What is kept of a sweep's rows: what shares and ages are reckoned from."""
+    names = ("seed", "failure", "link.profile", "coordinator.platform", "link.bytes_per_s")
+    kept = []
+    for row in rows:
+        figures = (name for name in row if name.startswith(("risk.", "risk_primary")) or name.endswith(".mean_s"))
+        kept.append({"scenario": scenario, **_some(row, dict.fromkeys((*names, *figures)))})
+    return kept
+
+
+def _first_linked(document: Document) -> Mission:
+    row = next(row for row in document["rows"] if row["link.profile"] != "ideal")
+    overrides = tuple(f"{key}={row[key]}" for key in document["varied"])
+    return Mission(row["scenario"], overrides, row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
+
+
+def _fly_calibrated(folder: Path) -> Document:
+    rows = []
+    for place, (scenario, overrides) in enumerate(CALIBRATED):
+        out = folder / str(place)
+        set_ = [word for one in overrides for word in ("--set", one)]
+        _secondlook("sweep", scenario, "--seeds", "1..40", *set_, "--out", str(out))
+        swept = secondlook.load_sweep(out).table.to_pylist()
+        rows += [{"scenario": scenario, "overrides": " ".join(overrides), **_some(row, CALIBRATED_BY)} for row in swept]
+    return {"rows": rows}
+
+
+def _some(row: Document, names: Iterable[str]) -> Document:
+    """Some of a row's figures, rounded."""
+    return {name: round(row[name], DIGITS) if isinstance(row[name], float) else row[name] for name in names}
+
+
+def _first_calibrated(document: Document) -> Mission:
+    row = next(row for row in document["rows"] if row["overrides"])
+    overrides = tuple(row["overrides"].split(" "))
+    return Mission(row["scenario"], overrides, row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
+
+
+TABLES: dict[str, Table] = {
+    "compared": Table(
+        page="docs/comparing.md",
+        fly=_fly_compared,
+        lines=lambda document: compared.table(document["comparisons"]).splitlines(),
+        first=_first_compared,
+    ),
+    "clearance": Table(
+        page="docs/clearance.md",
+        fly=_fly_calibrated,
+        lines=lambda document: calibration.table(document["rows"], ("scenario", "overrides")),
+        first=_first_calibrated,
+    ),
+    "across-the-water": Table(
+        page="docs/across-the-water.md",
+        fly=_fly_linked,
+        lines=lambda document: link_share.table(document["rows"], document["varied"]),
+        first=_first_linked,
+    ),
+}
+
+
+def kept(name: str) -> Document:
+    """What is kept of a table's missions."""
+    return dict(json.loads((KEPT / f"{name}.json").read_text()))
+
+
+def keep(name: str, document: Document) -> None:
+    """Keeps what came of a table's missions, a line for each."""
+    (KEPT / f"{name}.json").write_text(json.dumps(document).replace("}, {", "},\n{") + "\n")
+
+
+def written(name: str) -> str:
+    """The text of a table's page with the table as it is made of what is kept.
+
+    Raises ValueError where the page has no place for it.
+    """
+    lines, mark = (ROOT / TABLES[name].page).read_text().splitlines(), f"<!-- figures: {name} -->"
+    if mark not in lines:
+        raise ValueError(f"{TABLES[name].page}: there is no line {mark}")
+    start = lines.index(mark) + 2  # behind an empty line
+    old = list(takewhile(lambda line: line.startswith("|"), lines[start:]))
+    return "\n".join([*lines[:start], *TABLES[name].lines(kept(name)), *lines[start + len(old) :], ""])
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Flies what the command line names, and writes all tables into their pages."""
+    parser = argparse.ArgumentParser(prog="python -m bench.figures", description=__doc__)
+    parser.add_argument("--fly", nargs="+", default=[], choices=[*TABLES, "all"], metavar="NAME")
+    named = parser.parse_args(arguments).fly
+    for name in TABLES if "all" in named else named:
+        with tempfile.TemporaryDirectory() as folder:
+            document = TABLES[name].fly(Path(folder))
+        KEPT.mkdir(exist_ok=True)
+        keep(name, document)
+    for name, table in TABLES.items():
+        (ROOT / table.page).write_text(written(name))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,66 @@
+"""The tables of the docs that missions were flown for: they tell what is kept, and a mission of each still leaves
+that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bench import figures
+from bench.figures import TABLES, compared_kept, kept, linked_kept, written
+from secondlook.testing import Fleet
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_page_has_the_table_that_what_is_kept_makes(name: str) -> None:
+    page = figures.ROOT / TABLES[name].page
+    assert written(name) == page.read_text(), f"{TABLES[name].page} is stale: python -m bench.figures"
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_a_mission_of_it_still_leaves_what_is_kept(name: str, tmp_path: Path) -> None:
+    mission = TABLES[name].first(kept(name))
+    fleet = Fleet(mission.scenario, overrides=mission.overrides, seed=mission.seed, folder=tmp_path)
+    risk = fleet.run().summary["risk"]
+    left = (round(risk["mean"], 3), round(risk["worst30_mean"], 3))
+    assert left == tuple(round(one, 3) for one in mission.risk), f"stale: python -m bench.figures --fly {name}"
+
+
+def test_a_table_is_put_in_the_place_of_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(figures, "ROOT", tmp_path)
+    monkeypatch.setattr(figures, "KEPT", tmp_path)
+    mission = figures.Mission("toy", (), 1, (0.5, 0.5))
+    table = figures.Table(
+        "page.md", lambda _: {}, lambda document: ["| a |", f"| {document['a']} |"], lambda _: mission
+    )
+    monkeypatch.setitem(figures.TABLES, "toy", table)
+    (tmp_path / "toy.json").write_text('{"a": 2}')
+    (tmp_path / "page.md").write_text("Before.\n\n<!-- figures: toy -->\n\n| a |\n| 1 |\n| 3 |\n\nAfter.\n")
+    assert written("toy") == "Before.\n\n<!-- figures: toy -->\n\n| a |\n| 2 |\n\nAfter.\n"
+    (tmp_path / "page.md").write_text("No place.\n")
+    with pytest.raises(ValueError, match=r"page\.md: there is no line <!-- figures: toy -->"):
+        written("toy")
+
+
+def test_what_is_kept_is_rounded_and_no_more_than_tables_need() -> None:
+    pair = {"both": {"difference": 0.123456789, "better": 1}}
+    contender: dict[str, Any] = {"name": "plan", "mean_end": {"mean": 1 / 3}, "worst30_mean_end": {"mean": 2 / 3}}
+    contender |= {"against_first": pair, "served": {"mean": 1.0}}
+    mission = {"contender": "plan", "seed": 1001, "at_end": {"mean": 1 / 3, "worst30_mean": 0.5}, "digest": "ab"}
+    told = {"scenario": "toy", "objective": "both", "contenders": [contender], "missions": [mission, mission]}
+    found = compared_kept(told)
+    assert found["contenders"][0]["against_first"] == {"both": {"difference": 0.123457, "better": 1}}
+    assert "served" not in found["contenders"][0]
+    assert found["first"] == {"contender": "plan", "seed": 1001, "at_end": {"mean": 0.333333, "worst30_mean": 0.5}}
+
+
+def test_of_a_sweep_the_figures_that_shares_are_reckoned_from() -> None:
+    row = {"seed": 1, "failure": None, "link.profile": "janus", "coordinator.platform": "ship", "digest": "ab"}
+    figures_of_it = {"risk.mean": 1 / 3, "link.bytes_per_s": 1.0, "link.age.helper.mean_s": None, "time.wall_s": 3.0}
+    (found,) = linked_kept("toy", [row | figures_of_it])
+    assert found == {
+        "scenario": "toy", "seed": 1, "failure": None, "link.profile": "janus", "coordinator.platform": "ship",
+        "link.bytes_per_s": 1.0, "risk.mean": 0.333333, "link.age.helper.mean_s": None,
+    }  # fmt: skip
