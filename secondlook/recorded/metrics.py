@@ -212,13 +212,15 @@ class Metrics:
         missed = ~np.isin(np.arange(x_m.size), sorted(self.detected))
         return self.map.risk[rows, columns], missed
 
-    def mines_left(self) -> MinesLeft | None:
-        """How many mines may be left in the area, by the map and by what was found; None where nothing was seen."""
+    def mines_left(self, place: BoolArray | None = None) -> MinesLeft | None:
+        """How many mines may be left in the area, or in some of its cells, by the map and by what was found anywhere;
+        None where nothing was seen."""
         if self.map is None:
             return None
         scatter = max((scatter_of(list(one.values())) for one in self.curves.values()), default=scatter_of([]))
         area_m2 = self.map.grid.cell_area_m2
-        return mines_left(self.map.risk, self.inside, self.inside, area_m2, self.objects.mines, scatter)
+        place = self.inside if place is None else place & self.inside
+        return mines_left(self.map.risk, self.inside, place, area_m2, self.objects.mines, scatter)
 
     def close(self) -> None:
         """The mission has ended: vehicles were where their last courses led until now, and times that were not reached

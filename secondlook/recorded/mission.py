@@ -13,9 +13,11 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
+import numpy as np
 import shapely
 import yaml
 from pydantic import BaseModel, ValidationError
+from shapely.geometry.base import BaseGeometry
 
 from comms.node import Received
 from comms.said.announcement import RunInfo
@@ -35,6 +37,7 @@ from comms.said.messages import (
 from comms.said.topics import TOPICS, Topic, topic_of
 from comms.said.wire import WireError
 from comms.strip_books import StripBooks
+from planner.clearance import MinesLeft
 from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.types import PriorityGround
@@ -148,6 +151,22 @@ class Mission(ABC):
         self.run  # noqa: B018 - raises where there is none
         assert self._figures.map is not None
         return self._figures.map
+
+    def mines_left(self, within: BaseGeometry | None = None) -> MinesLeft | None:
+        """How many mines may be left in the area at the end, or in what of it lies within a geometry (mission frame),
+        as a lane: `shapely.LineString(way).buffer(width_m / 2)`. None where nothing was seen.
+
+        All that was found, wherever, tells how dense mines lie. Raises UserError where no cell of the area has its
+        centre there.
+        """
+        if within is None:
+            return self._figures.mines_left()
+        there = self.risk()
+        place = np.zeros(there.inside.shape, dtype=np.bool_)
+        place[there.cells_within(within)] = True
+        if not place.any():
+            raise UserError("within: no cell of the area lies there; must be a geometry in the mission frame")
+        return self._figures.mines_left(place)
 
     @property
     def closest(self) -> list[Closest]:

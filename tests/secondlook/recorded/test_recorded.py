@@ -116,6 +116,21 @@ def test_the_risk_without_the_helpers_is_that_of_the_primaries(
     assert (mission.primaries, mission.helpers) == (["primary"], ["helper"])
 
 
+def test_mines_left_in_parts_are_those_of_the_whole(mission: RecordedMission, summary: dict[str, Any]) -> None:
+    whole = mission.mines_left()
+    assert whole is not None
+    told = summary["mines"]
+    assert (whole.mean, whole.low, whole.high) == (told["left"], told["left_low"], told["left_high"])
+    west, south, east, north = mission.area.buffer(1.0).bounds
+    middle = (west + east) / 2 + 0.1  # no cell has its centre there
+    boxes = (west, south, middle, north), (middle, south, east, north)
+    halves = [mission.mines_left(shapely.box(*box)) for box in boxes]
+    assert sum(half.mean for half in halves if half is not None) == pytest.approx(whole.mean)
+    assert all(half is not None and half.none > whole.none for half in halves)
+    with pytest.raises(UserError, match="within: no cell of the area lies there"):
+        mission.mines_left(shapely.box(-90, -90, -80, -80))
+
+
 def test_cells_know_their_places() -> None:
     # Tracks heading east: along is east, across is south of the origin at (100, 50).
     grid = GridSpec(SweepFrame(100.0, 50.0, math.pi / 2), 10.0, columns=2, rows=3)
