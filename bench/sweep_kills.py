@@ -30,11 +30,12 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=60)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        sys.exit(kill_and_resume(Path(folder), arguments.kills, arguments.seeds))
+        sys.exit(kill_and_resume(Path(folder), arguments.kills, arguments.seeds, LATEST_S))
 
 
-def kill_and_resume(folder: Path, kills: int, seeds: int) -> int:
-    """The exit code: 1 where a table differs. Sweeps are begun until one has been killed so often."""
+def kill_and_resume(folder: Path, kills: int, seeds: int, latest_s: float) -> int:
+    """The exit code: 1 where a table differs. Sweeps are begun until so many processes have been killed, each
+    `latest_s` after its start or sooner."""
     undisturbed = _table(folder / "undisturbed", seeds)
     chance, killed, sweeps, different, times = random.Random(1), 0, 0, 0, Counter[int]()
     while killed < kills:
@@ -44,7 +45,7 @@ def kill_and_resume(folder: Path, kills: int, seeds: int) -> int:
         while not done:
             process = _start(out, seeds)
             try:
-                done = process.wait(chance.uniform(0.5, LATEST_S) if killed < kills else None) == 0
+                done = process.wait(chance.uniform(0.5, latest_s) if killed < kills else None) == 0
                 assert done, "it is not to fail by itself"
             except subprocess.TimeoutExpired:
                 process.kill()

@@ -223,6 +223,6 @@ def test_what_dies_too_often_ends_a_run_that_keeps_going(tmp_path: Path, monkeyp
         processes.run()
     assert str(failed.value) == (
         "helper has ended with exit code 1: helper has failed: ValueError: no such vehicle (faulty_nodes.py, "
-        "line 15, in __init__); that was too often in a row to start it again"
+        "line 16, in __init__); that was too often in a row to start it again"
     )
     assert processes.restarts == {"helper": 1}

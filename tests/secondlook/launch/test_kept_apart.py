@@ -28,14 +28,16 @@ def until(deadline_s: int) -> tuple[str, ...]:
     return "mission.deadline_factor=null", f"mission.deadline_s={deadline_s}"
 
 
-HARD = [("five-helpers", "plan", ())]  # the fleet that is most in its own way
+COARSE = "area.cell_m=10"
+"""A map of fewer cells, of which strips are cut sooner."""
+HARD = [("five-helpers", "plan", (COARSE, *until(1800)))]  # the fleet that is most in its own way
 # By then each helper has served some.
-IN_SHORT = [("five-helpers", name, until(1200)) for name in ALLOCATORS if name not in ("plan", "none")]
+IN_SHORT = [("five-helpers", name, (COARSE, *until(1000))) for name in ALLOCATORS if name not in ("plan", "none")]
 OTHERS = [
-    ("tellaro", "plan", ()),
-    ("two-helpers", "nearest", ()),
-    ("patchy", "auction", ()),
-    ("headland", "plan", until(2500)),
+    ("tellaro", "plan", (COARSE,)),
+    ("two-helpers", "nearest", (COARSE,)),
+    ("patchy", "auction", (COARSE,)),
+    ("headland", "plan", (COARSE, *until(2500))),
 ]
 
 
@@ -59,9 +61,10 @@ class TestMissions:
     @pytest.mark.parametrize("allocator", ["greedy", "nearest"])
     def test_no_two_come_too_close_where_long_strips_cross(self, tmp_path: Path, allocator: str) -> None:
         crossing = ("coordinator.across=true", "coordinator.max_strip_m=2000", f"coordinator.allocator={allocator}")
-        assert_kept_apart(Fleet("five-helpers", folder=tmp_path, overrides=(*crossing, *until(1500)), seed=1).run())
+        overrides = (COARSE, *crossing, *until(1500))
+        assert_kept_apart(Fleet("five-helpers", folder=tmp_path, overrides=overrides, seed=1).run())
 
-    @pytest.mark.parametrize("seed", [1, 2, 3, 4])
+    @pytest.mark.parametrize("seed", [2, 4])
     def test_nor_does_a_primary_that_revisits(self, tmp_path: Path, seed: int) -> None:
         # It passes beside what it sees, and each leg has a run-out of 20 m: where it is not expected it was met at
         # 1.5 m (seed 2).
@@ -75,7 +78,9 @@ class TestMissions:
     def test_they_do_where_nobody_sees_to_it_and_that_is_told(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
-        fleet = Fleet("five-helpers", folder=tmp_path, overrides=("mission.separation_m=0", *until(1500)), seed=1)
+        fleet = Fleet(
+            "five-helpers", folder=tmp_path, overrides=("mission.separation_m=0", COARSE, *until(1500)), seed=1
+        )
         flight = fleet.run()
         assert_kept_apart(flight)
         with pytest.raises(AssertionError, match=r"came within \d+\.\d m of each other at \d+\.\d{3} s"):

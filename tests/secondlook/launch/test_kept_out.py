@@ -103,7 +103,7 @@ def test_who_does_not_heed_it_is_told(tmp_path: Path, monkeypatch: pytest.Monkey
         return SimulatedVehicle(config, seed, current)
 
     monkeypatch.setattr("sim_world.world.SimulatedVehicle", heedless)
-    flight = fly(tmp_path, ROCKS)
+    flight = fly(tmp_path, ROCKS, over_by(1200))
     entered = flight.entered[0]
     with pytest.raises(AssertionError, match=f"{entered.vehicle} entered zone 1 at {entered.t_s:.3f} s"):
         assert_kept_out(flight)
@@ -158,7 +158,7 @@ def test_in_the_harbour_there_is_a_way_to_all_of_it() -> None:
 
 @pytest.mark.parametrize("begin", ["nearest", "nw"])
 def test_a_survey_begins_where_it_is_told_to(tmp_path: Path, begin: str) -> None:
-    start = {"vehicles.primary.start.x_m": 640, "vehicles.primary.begin": begin}
+    start = {"vehicles.primary.start.x_m": 640, "vehicles.primary.begin": begin, "coordinator.allocator": "none"}
     flight = fly(tmp_path, PIERS, start)
     assert_kept_out(flight)
     assert_all_finished(flight)

@@ -21,7 +21,7 @@ from secondlook.scenario import load_scenario
 PROGRAM = Path(__file__).parents[2] / "support" / "stopped_run.py"
 FACTOR = 20.0
 SLOW = (
-    "vehicles.primary.speed_mps=0.06",
+    "vehicles.primary.speed_mps=0.12",
     "vehicles.primary.endurance_s=360000",
 )  # some seconds of wall time in lockstep
 STOPPED_S = 1.2 * PATIENCE_S

@@ -99,7 +99,7 @@ class TestRunUntil:
         whole = brief().run()
         ended = {}
         for bus in ("local", "zenoh"):
-            fleet = brief(bus=bus)
+            fleet = brief(bus=bus, processes=2)
             flight = fleet.run_until(under_way, timeout_s=100)
             count = len(flight.heard)
             assert [one.payload for one in flight.heard] == [one.payload for one in whole.heard[:count]]
@@ -112,7 +112,7 @@ class TestRunUntil:
 
     @BOTH
     def test_one_goes_on_from_there(self, brief: MakeFleet, bus: str) -> None:
-        fleet = brief(bus=bus)
+        fleet = brief(bus=bus, processes=1)
         counts = []
         for _ in range(2):  # the same condition holds again only with a later message
             fleet.run_until(under_way, timeout_s=100)

@@ -22,7 +22,7 @@ def test_marked(fleet):
 def test_unmarked(fleet):
     assert fleet.scenario.name == "tellaro"
 
-@pytest.mark.fleet(bus="both")
+@pytest.mark.fleet(bus="both", processes=1)
 class TestBoth:
     def test_two(self, make_fleet, tmp_path):
         fleets = [make_fleet("bay.yaml", seed=seed) for seed in (1, 2)]

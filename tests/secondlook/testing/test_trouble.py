@@ -118,13 +118,14 @@ class TestNodes:
         assert any(10 <= at_s < 90 for at_s in times_s(fleet.run(), "primary"))
 
 
-class TestMessages:
-    @pytest.fixture
-    def hotspot(self, brief: MakeFleet) -> Received:
-        """What the primary says of a hotspot after 50.5 s."""
-        said = brief().run().messages("agent/*/hotspot/*")
-        return next(one for one in said if 50_500 < one.header.sent_ms < 99_000)
+@pytest.fixture(scope="module")
+def hotspot(tmp_path_factory: pytest.TempPathFactory) -> Received:
+    """What the primary says of a hotspot after 50.5 s."""
+    said = Fleet(BRIEF, folder=tmp_path_factory.mktemp("flown")).run().messages("agent/*/hotspot/*")
+    return next(one for one in said if 50_500 < one.header.sent_ms < 99_000)
 
+
+class TestMessages:
     def test_what_is_lost_changes_the_mission(self, brief: MakeFleet) -> None:
         fleet = brief()
         fleet.drop("agent/*/hotspot/*")
@@ -175,7 +176,7 @@ class TestMessages:
 class TestInMidMission:
     @pytest.mark.parametrize("bus", ["local", "zenoh"])
     def test_trouble_from_now_on_leaves_what_was(self, brief: MakeFleet, bus: Any) -> None:
-        fleet = brief(bus=bus)
+        fleet = brief(bus=bus, processes=1)  # over Zenoh: and one for who is killed
         before = fleet.run_until(first_task, timeout_s=100)
         fleet.kill("helper")
         fleet.drop("agent/primary/coverage/*", probability=0.5)
@@ -281,7 +282,7 @@ class TestLinks:
     def test_trouble_from_now_on_is_one_mission_on_both_buses(self, link: MakeFleet) -> None:
         digests = []
         for bus in ("local", "zenoh"):
-            fleet = link(bus=bus)
+            fleet = link(bus=bus, processes=2)
             fleet.run_until(first_task, timeout_s=100)
             began_s = fleet.now_s
             fleet.blackout("primary", for_s=15)
