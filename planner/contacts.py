@@ -20,6 +20,8 @@ from planner.types import FloatArray
 GATE_SIGMAS = 3.0
 LEAST_GATE_M = 2.0
 """What the sonar itself cannot tell apart."""
+MOST_GATE_M = 60.0
+"""Contacts farther apart are two objects, however little is known of where they are."""
 LEAST_SIGMA_M = 0.1
 PLACE_M = 20.0  # objects are looked up by squares of this side
 ROUNDS = 200
@@ -111,7 +113,7 @@ def _place(x_m: float, y_m: float) -> tuple[int, int]:
 
 
 def _gate_m(one_sigma_m: float, other_sigma_m: float) -> float:
-    return max(LEAST_GATE_M, GATE_SIGMAS * math.hypot(one_sigma_m, other_sigma_m))
+    return min(MOST_GATE_M, max(LEAST_GATE_M, GATE_SIGMAS * math.hypot(one_sigma_m, other_sigma_m)))
 
 
 def _variance(sigma_m: float) -> float:

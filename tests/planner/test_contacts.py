@@ -30,6 +30,15 @@ def test_what_is_known_less_well_may_lie_farther_apart() -> None:
     assert len(objects) == 2
 
 
+def test_who_knows_nothing_of_its_place_joins_no_more_than_what_is_near() -> None:
+    objects = Objects()
+    objects.hear(0.0, 0.0, 1e9, 0.8)
+    objects.hear(59.0, 0.0, 0.0, 0.8)
+    assert len(objects) == 1
+    objects.hear(-61.0, 0.0, 1e9, 0.8)
+    assert len(objects) == 2
+
+
 def test_the_nearest_is_taken_and_the_surer_place_counts_more() -> None:
     objects = Objects()
     objects.hear(0.0, 0.0, 1.0, 0.8)
