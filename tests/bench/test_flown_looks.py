@@ -179,7 +179,7 @@ class TestAFlownMission:
         assert removed_m2(flown, made) == pytest.approx(measured * made.inside.sum() * 25, rel=0.03)
 
     def test_a_seed_is_flown_and_solved(self) -> None:
-        row = one_seed(load_scenario(BRIEF, (), 1), ["greedy", "across", "none"], 2.0)
+        row = one_seed(load_scenario(BRIEF, (), 1), ["greedy", "across", "none"], 1.0)
         greedy, across, none = (row.removed_m2[name] for name in ("greedy", "across", "none"))
         assert greedy is not None
         assert across is not None

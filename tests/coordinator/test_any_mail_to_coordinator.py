@@ -60,7 +60,7 @@ BEGINNING = [
 ]
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(
     allocator=st.sampled_from([GreedyAllocator(), GreedyAllocator(), GreedyAllocator(), NoAllocator()]),
     run=st.sampled_from([RUNS[0], RUNS[0], RUNS[0], *RUNS]),

@@ -6,8 +6,6 @@ import random
 
 import numpy as np
 import pytest
-import scipy.optimize
-import scipy.sparse
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,6 +28,9 @@ def seen(offset_m: float, gap_m: float, range_m: float, at_m: np.ndarray) -> np.
 
 def fewest_by_integer_programming(left: list[Span], gap_m: int, range_m: int) -> int:
     """An independent answer: a set cover with a variable for every offset within a range of what is left."""
+    import scipy.optimize  # it takes half a second to import
+    import scipy.sparse
+
     cells_m = np.unique(np.concatenate([np.arange(near_m, far_m) for near_m, far_m in left])) + 0.5
     offsets_m = np.arange(np.floor(cells_m.min()) - range_m, np.ceil(cells_m.max()) + range_m + 1)
     lateral_m = np.abs(cells_m[:, np.newaxis] - offsets_m)
@@ -167,6 +168,9 @@ class TestEveryCover:
         assert len(found.offsets_m) == choice.tracks == track_count(width_m, gap_m, highest_m)
 
 
+SLOW_FOR_THE_OTHER = {0, 5, 12, 13, 24, 27, 30, 33, 34, 35, 36, 45}
+
+
 class TestOptimality:
     """Against integer programming by scipy (HiGHS), which knows nothing of how it is done here."""
 
@@ -180,14 +184,14 @@ class TestOptimality:
         left = [(float(near_m), float(far_m)) for near_m, far_m in ends_m]
         assert_the_fewest(left, *sensor)
 
-    @pytest.mark.parametrize("seed", sorted({*range(60)} - {0, 5, 12, 13, 24, 27, 30, 34}))  # those are slow for it
+    @pytest.mark.parametrize("seed", sorted({*range(50)} - SLOW_FOR_THE_OTHER))
     def test_of_covers_of_a_quarter_of_that(self, seed: int) -> None:
         rng = random.Random(seed)
         range_m = rng.randint(11, 29)
         left = after_a_survey(rng, 303, 10, range_m)
         assert_the_fewest(left, 10, range_m)
 
-    @pytest.mark.parametrize("seed", [6, 7, 8, 10, 11, 12, 13])  # of which the other solver is not slow
+    @pytest.mark.parametrize("seed", [7, 8, 10, 11, 13])  # of which the other solver is not slow
     def test_of_covers_of_the_papers_size(self, seed: int) -> None:
         rng = random.Random(seed)
         range_m = rng.randint(75, 119)
