@@ -131,8 +131,8 @@ def _problem(
         what = _allowed(error)
     if made_from is not None:
         path, value = made_from
-    if not path:
-        return Problem(place_of(path, places), what)  # of the whole file
+    if not path:  # of the whole file
+        return Problem(place_of(path, places), f"a key {what}" if kind == "string_unicode" else what)
     text = shown(value)
     if kind == "refused" and made_from is None and isinstance(holder, dict) and path[-1] not in holder:
         text = f"{shown(error['input'])}, the default,"

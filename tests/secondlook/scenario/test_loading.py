@@ -298,6 +298,12 @@ def outcome(path: Path) -> Scenario | ScenarioError:
         return error
 
 
+def test_a_key_of_half_a_character_is_refused(folder: Path) -> None:
+    path = folder / "half.yaml"
+    path.write_text('name: toy\n"\\uD800": 1\n', encoding="utf-8")
+    assert "a key must be a text of whole characters" in str(outcome(path))
+
+
 @given(mapping=mutations())
 def test_any_mutation_loads_or_is_refused_in_lines(folder: Path, mapping: dict[str, Any]) -> None:
     path = folder / "mutated.yaml"
