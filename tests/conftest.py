@@ -31,9 +31,15 @@ def pytest_collection() -> Iterator[None]:
         gc.enable()
 
 
+WAITING = {
+    *("test_certificates", "test_dask_cluster", "test_external_vehicle", "test_going_on", "test_modem_drivers"),
+    *("test_namespaces", "test_processes", "test_spread_fleet", "test_stopped", "test_view_in_browser"),
+}
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """The longest comes first, as at the end one process would wait for the other to be done with it."""
-    items.sort(key=lambda item: "both_buses[armada]" not in item.name)
+    """Who waits for a clock, up to half a minute, comes first: meanwhile others work, and at the end nobody waits."""
+    items.sort(key=lambda item: item.path.stem not in WAITING)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

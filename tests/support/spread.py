@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import json
 import os
 import signal
@@ -125,16 +126,13 @@ def refusal_of_run(
     return capsys.readouterr().err
 
 
-_held: list[socket.socket] = []
-
-
 def loopback_endpoint() -> str:
     """One on which nobody listens. Its port is held until these tests end, so that the system gives it to nobody else;
     a router, which sets SO_REUSEADDR too, may listen there all the same."""
     held = socket.socket()
     held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     held.bind(("127.0.0.1", 0))
-    _held.append(held)
+    atexit.register(held.close)
     return f"tcp/127.0.0.1:{held.getsockname()[1]}"
 
 

@@ -31,6 +31,7 @@ from comms.said.topics import CONTACT, TASK
 
 ROUTING = Routing(ROSTER)
 END_MS = 1000
+QUIET_MS = 200  # a fleet that goes on talking is waited for until 10 s after the mission's end
 
 
 @pytest.fixture(params=BUSES)
@@ -45,9 +46,14 @@ def say_contact(number: int) -> Publication:
 
 
 def every_ten(*publications: Publication) -> Scripted:
-    """Says this every 10 ms, beginning 10 ms after its start."""
+    """Says this every 10 ms, beginning 10 ms after its start, for a while."""
+
+    def next_ms(now_ms: int) -> int | None:
+        return now_ms + 10 if now_ms < QUIET_MS else None
+
     return Scripted(
-        starts=lambda now_ms: Step(wake_ms=now_ms + 10), wakes=lambda now_ms: says(*publications, wake_ms=now_ms + 10)
+        starts=lambda now_ms: Step(wake_ms=next_ms(now_ms)),
+        wakes=lambda now_ms: says(*publications, wake_ms=next_ms(now_ms)),
     )
 
 

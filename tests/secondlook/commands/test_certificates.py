@@ -7,22 +7,21 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from ipaddress import ip_address
 from pathlib import Path
 
 import pytest
+from called import Call
 from certificates import files_of, make_certificates, options
 from cryptography import x509
 from cryptography.x509.oid import NameOID
 from flights import BRIEF
 from spread import PATIENT, SpreadFleet, loopback_endpoint, spread_fleet
 
-from secondlook import cli
 from secondlook.fleet.certificates import certify
 
-Certificates = Callable[..., tuple[int | str | None, str, str]]
 BAY = Path(__file__).parents[3] / "examples" / "vehicle" / "bay.yaml"
 OF_BRIEF = ["router", "world", "primary", "helper", "coordinator", "recorder"]
 HERE = ("--host", "127.0.0.1")
@@ -30,17 +29,10 @@ NOW = datetime(2026, 7, 1, 12, tzinfo=UTC)
 
 
 @pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Certificates:
-    """Runs the command in an empty folder; gives its exit code, and what it prints on standard output and error."""
+def command(called: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Call:
+    """`secondlook certificates` in an empty folder."""
     monkeypatch.chdir(tmp_path)
-
-    def run(*arguments: str | Path) -> tuple[int | str | None, str, str]:
-        monkeypatch.setattr("sys.argv", ["secondlook", "certificates", *map(str, arguments)])
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code, *capsys.readouterr()
-
-    return run
+    return partial(called, "certificates")
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -60,9 +52,7 @@ def alternatives(one: x509.Certificate) -> list[x509.GeneralName]:
     return list(one.extensions.get_extension_for_class(x509.SubjectAlternativeName).value)
 
 
-def test_a_fleet_flies_with_them_and_nobody_takes_part_with_anything_else(
-    command: Certificates, tmp_path: Path
-) -> None:
+def test_a_fleet_flies_with_them_and_nobody_takes_part_with_anything_else(command: Call, tmp_path: Path) -> None:
     assert command(BRIEF, "--out", "own", *HERE)[0] == 0
     stranger = make_certificates(tmp_path / "others", ["coordinator"], "127.0.0.1")["coordinator"]
     endpoint = loopback_endpoint().replace("tcp/", "tls/")
@@ -94,7 +84,7 @@ def test_a_fleet_flies_with_them_and_nobody_takes_part_with_anything_else(
         assert fleet.summary["hotspots"]["revisited"] > 0
 
 
-def test_every_node_has_one_that_the_authority_signed_in_its_name(command: Certificates) -> None:
+def test_every_node_has_one_that_the_authority_signed_in_its_name(command: Call) -> None:
     hosts = ("192.0.2.1", "ship.example", "[2001:db8::1]", "helper=192.0.2.7")
     before = datetime.now(UTC).replace(microsecond=0)
     code, out, err = command(BAY, "--out", "own", "--days", "30", *(word for one in hosts for word in ("--host", one)))
@@ -120,7 +110,7 @@ def test_every_node_has_one_that_the_authority_signed_in_its_name(command: Certi
 
 
 def test_a_key_is_its_owners_alone_from_the_first_whatever_the_umask(
-    command: Certificates, monkeypatch: pytest.MonkeyPatch
+    command: Call, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:
         raise AssertionError("rights were changed after a file was made")
@@ -139,7 +129,7 @@ def test_a_key_is_its_owners_alone_from_the_first_whatever_the_umask(
     assert modes == {f"{name}.key": 0o600 for name in names} | {f"{name}.pem": 0o644 for name in names}
 
 
-def test_a_folder_that_others_may_look_into_is_refused(command: Certificates) -> None:
+def test_a_folder_that_others_may_look_into_is_refused(command: Call) -> None:
     Path("own").mkdir()
     Path("own").chmod(0o755)
     assert command(BRIEF, "--out", "own", *HERE) == (
@@ -148,7 +138,7 @@ def test_a_folder_that_others_may_look_into_is_refused(command: Certificates) ->
     assert contents(Path("own")) == {}
 
 
-def test_nothing_is_overwritten(command: Certificates) -> None:
+def test_nothing_is_overwritten(command: Call) -> None:
     command(BRIEF, "--out", "own", *HERE)
     before = contents(Path("own"))
     code, out, err = command(BRIEF, "--out", "own", *HERE)
@@ -162,7 +152,7 @@ def test_nothing_is_overwritten(command: Certificates) -> None:
     assert contents(Path("own")) == before
 
 
-def test_what_is_missing_is_added_by_the_same_authority_and_valid_no_longer(command: Certificates) -> None:
+def test_what_is_missing_is_added_by_the_same_authority_and_valid_no_longer(command: Call) -> None:
     command(BRIEF, "--out", "own", *HERE, "--days", "30")
     before = contents(Path("own"))
     primary, helper = BRIEF.read_text().split("  helper:\n")
@@ -179,7 +169,7 @@ def test_what_is_missing_is_added_by_the_same_authority_and_valid_no_longer(comm
     assert one.not_valid_after_utc == authority.not_valid_after_utc
 
 
-def test_where_one_file_cannot_be_written_none_is(command: Certificates) -> None:
+def test_where_one_file_cannot_be_written_none_is(command: Call) -> None:
     command(BRIEF, "--out", "own", *HERE)
     for name in ("world.pem", "world.key", "helper.pem"):
         Path("own", name).unlink()
@@ -190,7 +180,7 @@ def test_where_one_file_cannot_be_written_none_is(command: Certificates) -> None
     assert contents(Path("own")) == before
 
 
-def test_a_host_of_one_that_has_its_certificate_is_refused(command: Certificates) -> None:
+def test_a_host_of_one_that_has_its_certificate_is_refused(command: Call) -> None:
     command(BRIEF, "--out", "own", *HERE)
     Path("own/world.pem").unlink()
     assert command(BRIEF, "--out", "own", "--add", *HERE) == (
@@ -205,7 +195,7 @@ NO_AUTHORITY = (
 
 
 @pytest.mark.parametrize(("file", "content"), [("ca.pem", "senseless"), ("ca.key", "senseless"), ("ca.key", None)])
-def test_an_authority_that_is_none_is_refused(command: Certificates, file: str, content: str | None) -> None:
+def test_an_authority_that_is_none_is_refused(command: Call, file: str, content: str | None) -> None:
     command(BRIEF, "--out", "own", *HERE)
     Path("own/world.pem").unlink()
     Path("own", file).write_text(content or Path("own/helper.key").read_text())
@@ -218,7 +208,7 @@ def test_an_authority_that_is_none_is_refused(command: Certificates, file: str, 
     )
 
 
-def test_an_authority_that_is_over_adds_nothing(command: Certificates, tmp_path: Path) -> None:
+def test_an_authority_that_is_over_adds_nothing(command: Call, tmp_path: Path) -> None:
     own = Path("own")
     assert certify(own, {"router": ["127.0.0.1"]}, NOW, 10) == NOW + timedelta(days=10)
     before = contents(own)

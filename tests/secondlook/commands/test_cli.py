@@ -10,50 +10,34 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from called import Call
 from flights import BRIEF
 
 from comms.session import Certificates
 from planner.spacing import track_offsets
-from secondlook import cli
 from secondlook.commands.node import certificates
 from secondlook.scenario import load_scenario
-
-SecondLook = Callable[..., tuple[int | str | None, str, str]]
-
-
-@pytest.fixture
-def secondlook(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> SecondLook:
-    """Runs a command; gives its exit code, and what it prints on standard output and standard error."""
-
-    def run(*arguments: str) -> tuple[int | str | None, str, str]:
-        monkeypatch.setattr("sys.argv", ["secondlook", *arguments])
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code, *capsys.readouterr()
-
-    return run
-
 
 PLAN = ("plan", "--width", "1212", "--nadir", "40", "--range")
 
 
-def test_plan_prints_the_published_spacing_as_json_alone(secondlook: SecondLook) -> None:
-    code, out, err = secondlook(*PLAN, "120", "145", "--json")
+def test_plan_prints_the_published_spacing_as_json_alone(called: Call) -> None:
+    code, out, err = called(*PLAN, "120", "145", "--json")
     assert (code, err) == (0, "")
     plan = json.loads(out)
     # Three pairs of 3 * 138 - 40 = 374 m each leave 90 m, which one track at 1212 - 138 covers.
     assert plan == {"r_adpt_m": 138, "tracks": 7, "offsets_m": [138, 236, 512, 610, 886, 984, 1074]}
 
 
-def test_plan_prints_a_sentence_for_people(secondlook: SecondLook) -> None:
-    code, out, err = secondlook(*PLAN, "120", "130")
+def test_plan_prints_a_sentence_for_people(called: Call) -> None:
+    code, out, err = called(*PLAN, "120", "130")
     assert (code, err) == (0, "")
     assert out.splitlines()[0] == "8 tracks at a range of 120 m, laid at"
     assert len(out.splitlines()[1].split(",")) == 8
 
 
-def test_plan_of_a_scenario_lays_its_tracks_in_the_sweep_frame(secondlook: SecondLook) -> None:
-    code, out, err = secondlook("plan", "tellaro")
+def test_plan_of_a_scenario_lays_its_tracks_in_the_sweep_frame(called: Call) -> None:
+    code, out, err = called("plan", "tellaro")
     assert (code, err) == (0, "")
     first, frame, *tracks = out.splitlines()
     assert first.startswith("primary: 7 tracks along 0 degrees, 2.8 km; up to 145 m all is covered; ")
@@ -64,13 +48,13 @@ def test_plan_of_a_scenario_lays_its_tracks_in_the_sweep_frame(secondlook: Secon
     assert len(tracks) == 7
 
 
-def test_plan_of_a_scenario_takes_any_area_heading_and_spacing(secondlook: SecondLook) -> None:
+def test_plan_of_a_scenario_takes_any_area_heading_and_spacing(called: Call) -> None:
     settings = (
         "area.polygon_m=[[0, 0], [1212, 0], [606, 400]]",
         "area.track_heading_deg=90",
         "vehicles.primary.spacing=fixed",
     )
-    code, out, err = secondlook("plan", "tellaro", "--json", *(word for one in settings for word in ("--set", one)))
+    code, out, err = called("plan", "tellaro", "--json", *(word for one in settings for word in ("--set", one)))
     assert (code, err) == (0, "")
     (survey,) = json.loads(out)["surveys"]
     # Tracks east are laid from the north, 400 m across: a pair for 145 m is pulled in to end with the area.
@@ -83,10 +67,10 @@ def test_plan_of_a_scenario_takes_any_area_heading_and_spacing(secondlook: Secon
         assert track["start_m"][1] == track["end_m"][1] == 400 - track["across_m"]
 
 
-def test_plan_of_a_scenario_as_geojson_lies_where_the_scenario_does(secondlook: SecondLook) -> None:
+def test_plan_of_a_scenario_as_geojson_lies_where_the_scenario_does(called: Call) -> None:
     origin = ("--set", "origin={latitude_deg: 44, longitude_deg: 10}")
     for settings, east in (((), (0, 1300)), (origin, (10, 10.02))):
-        code, out, err = secondlook("plan", "headland", "--geojson", *settings)
+        code, out, err = called("plan", "headland", "--geojson", *settings)
         assert (code, err) == (0, "")
         features = json.loads(out)["features"]
         kinds = [feature["properties"]["kind"] for feature in features]
@@ -99,9 +83,7 @@ def test_plan_of_a_scenario_as_geojson_lies_where_the_scenario_does(secondlook: 
         )
 
 
-def test_a_survey_that_outlasts_its_battery_is_told(
-    secondlook: SecondLook, write: Callable[[str], str], valid_text: str
-) -> None:
+def test_a_survey_that_outlasts_its_battery_is_told(called: Call, write: Callable[[str], str], valid_text: str) -> None:
     # Three tracks of 400 m take 800 s; with the way to the first and two turns it is more than 900. Home is 400 m
     # and more from where the first and the third end.
     name = write(valid_text.replace("endurance_s: 36000", "endurance_s: 900"))
@@ -109,7 +91,7 @@ def test_a_survey_that_outlasts_its_battery_is_told(
         r"primary: its survey takes (\d+) s and (\d+) s home, longer than its endurance_s of 900 less 100 to spare; "
         r"it will go home after 1 of 3 tracks\n"
     )
-    code, _, err = secondlook("plan", name)
+    code, _, err = called("plan", name)
     match = told.fullmatch(err)
     assert code == 0
     assert match is not None
@@ -118,52 +100,52 @@ def test_a_survey_that_outlasts_its_battery_is_told(
 
 
 def test_what_cannot_end_within_its_limits_is_refused_in_one_sentence_and_flown_anyway(
-    secondlook: SecondLook, tmp_path: Path
+    called: Call, tmp_path: Path
 ) -> None:
     limit = ("--set", "mission.time_limit_s=60")
     told = re.compile(
         r"mission\.time_limit_s: 60 s ends the survey after about 2 of 4 tracks, as it takes about 106 s; must be "
         r"larger by about 46 s, or flown with --anyway\n"
     )
-    code, out, err = secondlook("check", str(BRIEF), *limit)
+    code, out, err = called("check", str(BRIEF), *limit)
     assert code == 2
     assert out.splitlines()[2].startswith("primary: about 4 tracks and 0.8 km with turns in 106 s")
     assert told.fullmatch(err)
     run = ("run", str(BRIEF), *limit, "--bus", "local", "--no-record", "--out", str(tmp_path / "run"))
-    assert secondlook(*run) == (2, "", err)
+    assert called(*run) == (2, "", err)
     assert not (tmp_path / "run").exists()
-    assert secondlook(*run, "--json") == (2, "", err)
-    code, _, err = secondlook(*run, "--anyway")
+    assert called(*run, "--json") == (2, "", err)
+    code, _, err = called(*run, "--anyway")
     assert (code, err.split(";")[0]) == (1, "the mission is not over at its time limit, mission.time_limit_s: 60")
     assert json.loads((tmp_path / "run" / "summary.json").read_text())["vehicles"]["primary"]["tracks"] == 2
 
 
-def test_a_router_refuses_it_as_well(secondlook: SecondLook) -> None:
+def test_a_router_refuses_it_as_well(called: Call) -> None:
     words = ("node", "router", str(BRIEF), "--listen", "tcp/127.0.0.1:0", "--set", "mission.time_limit_s=60")
-    code, _, err = secondlook(*words)
+    code, _, err = called(*words)
     assert code == 2
     assert err.splitlines()[-1].startswith("mission.time_limit_s: 60 s ends the survey after about 2 of 4 tracks")
 
 
-def test_check_counts_of_a_share_of_the_area_what_is_its_own(secondlook: SecondLook) -> None:
-    _, out, _ = secondlook("check", "wide")
+def test_check_counts_of_a_share_of_the_area_what_is_its_own(called: Call) -> None:
+    _, out, _ = called("check", "wide")
     assert [line.split("; ")[-1] for line in out.splitlines()[1:4]] == ["up to 145 m all is covered"] * 3
 
 
 DOCS = Path(__file__).parents[3] / "docs" / "scenarios.md"
 
 
-def test_check_tells_what_the_docs_show(secondlook: SecondLook) -> None:
+def test_check_tells_what_the_docs_show(called: Call) -> None:
     def shown(command: str) -> str:
         return DOCS.read_text().split(f"```\n$ secondlook {command}\n")[1].split("```")[0]
 
-    assert secondlook("check", "tellaro") == (0, shown("check tellaro"), "")
+    assert called("check", "tellaro") == (0, shown("check tellaro"), "")
     limit = "tellaro --set mission.time_limit_s=2000"
-    assert secondlook("run", *limit.split())[::2] == (2, shown(f"run {limit}"))
+    assert called("run", *limit.split())[::2] == (2, shown(f"run {limit}"))
 
 
-def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook: SecondLook) -> None:
-    code, out, _ = secondlook("check", "headland")
+def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(called: Call) -> None:
+    code, out, _ = called("check", "headland")
     told = re.fullmatch(
         r"primary: (\d+) tracks along 90 degrees in (\d+) convex parts, \d\.\d km; up to 130 m all is covered",
         out.splitlines()[1],
@@ -173,25 +155,23 @@ def test_check_tells_how_an_area_is_cut_and_along_what_it_is_surveyed(secondlook
     assert int(told[1]) >= int(told[2]) > 2
 
 
-def test_check_tells_what_a_plan_cannot_cover(secondlook: SecondLook, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_check_tells_what_a_plan_cannot_cover(called: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     # One track fewer: the last one's 90 m, but for what its neighbours see.
     monkeypatch.setattr(
         "planner.spacing_planners.track_offsets", lambda *told, **covered: track_offsets(*told, **covered)[:-1]
     )
-    _, out, _ = secondlook("check", "tellaro")
+    _, out, _ = called("check", "tellaro")
     share = re.search(r"6 tracks .* up to 145 m (\d\.\d\d)% is not covered", out)
     assert share is not None
     assert 5 < float(share[1]) < 9
 
 
-def test_check_takes_settings(secondlook: SecondLook) -> None:
-    assert (
-        secondlook("check", "tellaro")[1] != secondlook("check", "tellaro", "--set", "vehicles.primary.range_m=130")[1]
-    )
+def test_check_takes_settings(called: Call) -> None:
+    assert called("check", "tellaro")[1] != called("check", "tellaro", "--set", "vehicles.primary.range_m=130")[1]
 
 
-def test_a_bundled_scenario_is_shown_as_its_file_is(secondlook: SecondLook, write: Callable[[str], str]) -> None:
-    code, shown, err = secondlook("scenarios", "--show", "patchy")
+def test_a_bundled_scenario_is_shown_as_its_file_is(called: Call, write: Callable[[str], str]) -> None:
+    code, shown, err = called("scenarios", "--show", "patchy")
     assert (code, err) == (0, "")
     assert load_scenario(write(shown)) == load_scenario("patchy")
 
@@ -225,8 +205,8 @@ def test_a_command_is_loaded_without_what_others_need() -> None:
     assert not {"secondlook.commands.run", "secondlook.scenario"} & {*done.stdout.split()}
 
 
-def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
-    code, out, err = secondlook("scenarios")
+def test_scenarios_lists_the_bundled_ones(called: Call) -> None:
+    code, out, err = called("scenarios")
     assert (code, err) == (0, "")
     names = [line.split()[0] for line in out.splitlines()]
     trials = ["five-helpers", "forward-looking", "headland", "paper", "patchy", "tellaro", "two-helpers", "wide"]
@@ -234,22 +214,20 @@ def test_scenarios_lists_the_bundled_ones(secondlook: SecondLook) -> None:
 
 
 def test_live_without_a_display_is_told_before_anything_flies(
-    secondlook: SecondLook, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    called: Call, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.platform", "linux")
     for variable in ("DISPLAY", "WAYLAND_DISPLAY"):
         monkeypatch.delenv(variable, raising=False)
     expected = "--live: there is no display for the viewer's window; add --web to watch in a browser\n"
-    code, _, err = secondlook("run", "--live", "--out", str(tmp_path / "run"))
+    code, _, err = called("run", "--live", "--out", str(tmp_path / "run"))
     assert (code, err) == (2, expected)
     assert not (tmp_path / "run").exists()
 
 
-def test_a_cell_is_the_scenarios(secondlook: SecondLook, tmp_path: Path) -> None:
+def test_a_cell_is_the_scenarios(called: Call, tmp_path: Path) -> None:
     brief = Path(__file__).parents[2] / "support" / "brief.yaml"
-    code, _, err = secondlook(
-        "run", str(brief), "--cell", "10", "--bus", "local", "--no-record", "--out", str(tmp_path)
-    )
+    code, _, err = called("run", str(brief), "--cell", "10", "--bus", "local", "--no-record", "--out", str(tmp_path))
     assert (code, err) == (0, "")
     assert "cell_m: 10" in (tmp_path / "scenario.yaml").read_text()
 

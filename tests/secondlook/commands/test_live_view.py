@@ -19,7 +19,7 @@ from urllib.parse import parse_qs, urlsplit
 
 import psutil  # type: ignore[import-untyped]
 import pytest
-from flights import until
+from flights import BRIEF, until
 
 from tests.viz.recordings import entities, rows, rows_so_far, verify
 from viz.picture import what_is_missing
@@ -52,9 +52,9 @@ def unwatched(tmp_path_factory: pytest.TempPathFactory, valid_text: str) -> Alon
     return Alone(json.loads(done.stdout), folder / "alone" / "mission.rrd")
 
 
-def test_on_a_terminal_the_page_stays_until_ctrl_c(scenario: str, tmp_path: Path) -> None:
+def test_on_a_terminal_the_page_stays_until_ctrl_c(tmp_path: Path) -> None:
     ours, theirs = pty.openpty()
-    command = [*COMMAND, scenario, "--live", "--web", "--bus", "local", "--out", "run"]
+    command = [*COMMAND, str(BRIEF), "--live", "--web", "--bus", "local", "--out", str(tmp_path / "run")]
     process = subprocess.Popen(
         command, stdin=theirs, stdout=subprocess.PIPE, stderr=theirs, start_new_session=True, text=True
     )
@@ -76,13 +76,14 @@ def test_on_a_terminal_the_page_stays_until_ctrl_c(scenario: str, tmp_path: Path
         urllib.request.urlopen(found[1], timeout=30)
 
 
-def test_without_a_terminal_it_ends_with_the_mission(scenario: str, unwatched: Alone) -> None:
-    command = [*COMMAND, scenario, "--live", "--web", "--processes", "1", "--out", "run", "--json"]
+def test_without_a_terminal_it_ends_with_the_mission(brief_run: Path, tmp_path: Path) -> None:
+    command = [*COMMAND, str(BRIEF), "--live", "--web", "--processes", "1", "--out", str(tmp_path / "run"), "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0
     assert re.fullmatch(r"The mission is shown until it is over at\nhttp://127\.0\.0\.1:\d+/\S+\n", done.stderr)
     # What it says is the same as with nobody watching.
-    assert json.loads(done.stdout)["digest"] == unwatched.told["digest"]
+    unwatched = json.loads((brief_run / "summary.json").read_text())
+    assert json.loads(done.stdout)["digest"] == unwatched["digest"]
 
 
 @pytest.mark.parametrize(("whom", "harm"), [("viewer", signal.SIGSTOP), ("server", signal.SIGKILL)])

@@ -61,7 +61,7 @@ def test_a_page_has_no_moment_to_open_at(brief_run: Path) -> None:
 def test_a_recording_whose_recorder_was_killed_is_repaired_with_all_it_had(tmp_path: Path) -> None:
     run = tmp_path / "out"
     recording = run / "mission.rrd"
-    with flight(run, *LONG) as flying:
+    with flight(run, *LONG, "--processes", "1") as flying:
         assert until(lambda: flying.is_under_way() and recording.stat().st_size > 100_000, 60.0)
         os.kill(flying.children()["recorder"], signal.SIGKILL)
         code, _, said = flying.finish()

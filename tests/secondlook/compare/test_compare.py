@@ -12,14 +12,15 @@ import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
+from called import Call
 from flights import BRIEF, until
 from results import result
 from rich.console import Console
 
-from secondlook import cli
 from secondlook.compare.flights import (
     BASELINES,
     Baseline,
@@ -223,20 +224,10 @@ def test_a_mission_is_flown_as_by_run(tmp_path: Path) -> None:
     assert [risk.t_s for risk in flown.over_time] == sorted(risk.t_s for risk in flown.over_time)
 
 
-Command = Callable[..., tuple[int | str | None, str, str]]
-
-
 @pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+def command(called: Call) -> Call:
     """`secondlook compare` in this process."""
-
-    def run(*arguments: str) -> tuple[int | str | None, str, str]:
-        monkeypatch.setattr("sys.argv", ["secondlook", "compare", *arguments])
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code, *capsys.readouterr()
-
-    return run
+    return partial(called, "compare")
 
 
 @pytest.fixture
@@ -251,7 +242,7 @@ def by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class TestCommand:
-    def test_missions_are_flown_in_processes_and_written(self, command: Command, tmp_path: Path) -> None:
+    def test_missions_are_flown_in_processes_and_written(self, command: Call, tmp_path: Path) -> None:
         arguments = ("--allocators", "greedy,none", "--seeds", "2", "--jobs", "2", "--out", str(tmp_path / "out"))
         code, out, err = command(str(BRIEF), *arguments)
         assert (code, err) == (0, "")  # and no progress in a pipe
@@ -266,13 +257,13 @@ class TestCommand:
         assert (written["objective"], written["reacting"]) == ("both", None)
         assert (tmp_path / "out" / "risk.png").read_bytes().startswith(b"\x89PNG")
 
-    def test_json_alone_is_printed(self, command: Command, by_hand: None) -> None:
+    def test_json_alone_is_printed(self, command: Call, by_hand: None) -> None:
         code, out, _ = command("--json")
         assert code == 1  # a mission failed
         assert [one["name"] for one in json.loads(out)["contenders"]] == ["first", "other", "equal"]
 
     def test_a_mission_that_fails_is_told_and_counted_and_the_others_are_compared(
-        self, command: Command, by_hand: None
+        self, command: Call, by_hand: None
     ) -> None:
         code, out, err = command()
         assert (code, err) == (1, "other, seed 3: it failed\n")
@@ -287,7 +278,7 @@ class TestCommand:
         [("mean", "the mean residual risk", "2, 4"), ("targets", "the share of targets expected to be found", "5, 1")],
     )
     def test_they_are_judged_by_the_objective_that_was_chosen(
-        self, command: Command, monkeypatch: pytest.MonkeyPatch, objective: str, what: str, better: str
+        self, command: Call, monkeypatch: pytest.MonkeyPatch, objective: str, what: str, better: str
     ) -> None:
         # The other leaves less on 2 of 6 seeds, and is expected to find more on 5.
         def fly_all(chosen: object, seeds: range, engine: object, flown: Flown, progress: object) -> None:
@@ -304,11 +295,11 @@ class TestCommand:
         _, out, _ = command(*arguments, "--json")
         assert json.loads(out)["objective"] == objective
 
-    def test_the_deadline_is_told_as_the_scenario_has_it(self, command: Command, by_hand: None) -> None:
+    def test_the_deadline_is_told_as_the_scenario_has_it(self, command: Call, by_hand: None) -> None:
         _, out, _ = command("--set", "mission.deadline_factor=null", "--set", "mission.deadline_s=3000")
         assert out.splitlines()[1] == "It ends at 3000 s at the latest."
 
-    def test_seeds_are_flown_from_the_first_one(self, command: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_seeds_are_flown_from_the_first_one(self, command: Call, monkeypatch: pytest.MonkeyPatch) -> None:
         told: list[int] = []
 
         def fly_all(chosen: object, seeds: range, engine: object, flown: Flown, progress: object) -> None:
@@ -321,7 +312,7 @@ class TestCommand:
         assert "seeds 1001 to 1003" in out
 
     def test_a_line_under_the_table_says_whether_reacting_was_worth_it(
-        self, command: Command, monkeypatch: pytest.MonkeyPatch
+        self, command: Call, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         def fly_all(chosen: list[Contender], seeds: range, engine: object, flown: Flown, progress: object) -> None:
             ends = {"plan": 0.3, "greedy": 0.2, "blind": 0.4}
@@ -348,7 +339,7 @@ class TestCommand:
         ids=["interrupted", "lost"],
     )
     def test_what_was_flown_before_an_end_too_early_is_told(
-        self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
+        self, command: Call, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
     ) -> None:
         def fail(chosen: object, seeds: object, jobs: object, flown: Flown, progress: Callable[[Flown], None]) -> None:
             flown["greedy"] = {1: result(1, 0.4)}
@@ -360,18 +351,16 @@ class TestCommand:
         assert (code, err) == (1, told)
         assert "0.400" in out
 
-    def test_a_part_that_raises_fails_its_missions_alone(
-        self, command: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        (tmp_path / "mine.py").write_text("class Fails:\n    def assign(self, situation):\n        raise ValueError\n")
-        monkeypatch.chdir(tmp_path)
+    def test_a_part_that_raises_fails_its_missions_alone(self, command: Call, users_folder: Path) -> None:
+        part = "class Fails:\n    def assign(self, situation):\n        raise ValueError\n"
+        (users_folder / "mine.py").write_text(part)
         code, out, err = command(str(BRIEF), "--allocators", "none,mine:Fails", "--seeds", "1", "--jobs", "1")
         assert code == 1
         assert err.startswith("mine:Fails, seed 1: coordinator")
         assert "none" in out
 
     def test_without_matplotlib_one_sentence_says_what_is_missing(
-        self, command: Command, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+        self, command: Call, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     ) -> None:
         find = importlib.util.find_spec
         monkeypatch.setattr(

@@ -4,6 +4,7 @@ import json
 import os
 import select
 from collections.abc import Iterator
+from contextlib import closing
 
 import pytest
 from hypothesis import given
@@ -51,18 +52,17 @@ def test_last_lines_come_before_the_end(pipe: tuple[StatusLines, int]) -> None:
 @given(st.lists(st.dictionaries(st.text(), st.integers() | st.text(), max_size=3), max_size=5), st.data())
 def test_lines_cut_anywhere_come_whole(said: list[dict[str, object]], data: st.DataObject) -> None:
     read_fd, write_fd = os.pipe()
-    lines = StatusLines(read_fd)
-    stream = b"".join(json.dumps(one).encode() + b"\n" for one in said)
-    got: list[dict[str, object]] = []
-    while stream:
-        size = data.draw(st.integers(1, len(stream)))
-        os.write(write_fd, stream[:size])
-        stream = stream[size:]
-        got += lines.read() or []
-    os.close(write_fd)
-    assert got == said
-    assert lines.read() is None
-    lines.close()
+    with closing(StatusLines(read_fd)) as lines, os.fdopen(write_fd, "wb", buffering=0) as writing:
+        stream = b"".join(json.dumps(one).encode() + b"\n" for one in said)
+        got: list[dict[str, object]] = []
+        while stream:
+            size = data.draw(st.integers(1, len(stream)))  # which may give the example up
+            writing.write(stream[:size])
+            stream = stream[size:]
+            got += lines.read() or []
+        writing.close()
+        assert got == said
+        assert lines.read() is None
 
 
 def test_a_line_longer_than_a_chunk_comes_whole(pipe: tuple[StatusLines, int]) -> None:

@@ -7,14 +7,15 @@ import io
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from called import Call
 from rich.console import Console
 
 from planner.types import DetectionCurve, FloatArray
-from secondlook import cli
 from secondlook.commands.paper import seed_of
 from secondlook.engine.engine import EngineError, own_processes
 from secondlook.launch.processes import RunFailedError
@@ -236,11 +237,8 @@ class TestReport:
         assert told.startswith("1-adaptive, seed 9: spaced for 138, 120, 120, 12")
 
 
-Command = Callable[..., tuple[int | str | None, str, str]]
-
-
 @pytest.fixture
-def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Command:
+def command(called: Call, monkeypatch: pytest.MonkeyPatch) -> Call:
     """`secondlook paper`, with missions by hand in place of flown ones."""
 
     def missions(
@@ -250,32 +248,25 @@ def command(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch)
         return [by_hand(name) for _ in range(len(asked) // 6) for name in MISSIONS]
 
     monkeypatch.setattr("secondlook.commands.paper.measure_all", missions)
-
-    def run(*arguments: str) -> tuple[int | str | None, str, str]:
-        monkeypatch.setattr("sys.argv", ["secondlook", "paper", *arguments])
-        with pytest.raises(SystemExit) as stopped:
-            cli.main()
-        return stopped.value.code, *capsys.readouterr()
-
-    return run
+    return partial(called, "paper")
 
 
 class TestCommand:
-    def test_json_alone_is_printed(self, command: Command) -> None:
+    def test_json_alone_is_printed(self, command: Call) -> None:
         code, out, err = command("--json", "--seeds", "2")
         assert (code, err) == (0, "")
         entries = json.loads(out)
         assert [f"{entry['experiment']}-{entry['strategy']}" for entry in entries] == list(MISSIONS)
         assert all(entry["spread"]["runs"] == 2 for entry in entries)
 
-    def test_the_tables_are_printed(self, command: Command) -> None:
+    def test_the_tables_are_printed(self, command: Call) -> None:
         code, out, err = command()
         assert (code, err) == (0, "")
         assert "Table 1" in out
         assert "Table 2" in out
 
     def test_without_the_extra_one_sentence_says_what_is_missing(
-        self, command: Command, monkeypatch: pytest.MonkeyPatch
+        self, command: Call, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         find = importlib.util.find_spec
         monkeypatch.setattr(
@@ -297,7 +288,7 @@ class TestCommand:
         ids=["failed", "interrupted", "lost"],
     )
     def test_missions_that_fail_are_told_in_one_sentence(
-        self, command: Command, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
+        self, command: Call, monkeypatch: pytest.MonkeyPatch, raised: BaseException, told: str
     ) -> None:
         def fail(*_: object) -> None:
             raise raised
@@ -305,7 +296,7 @@ class TestCommand:
         monkeypatch.setattr("secondlook.commands.paper.measure_all", fail)
         assert command() == (1, "", told)
 
-    def test_an_out_that_is_a_file_is_refused(self, command: Command, tmp_path: Path) -> None:
+    def test_an_out_that_is_a_file_is_refused(self, command: Call, tmp_path: Path) -> None:
         taken = tmp_path / "taken"
         taken.write_text("")
         code, out, err = command("--out", str(taken))

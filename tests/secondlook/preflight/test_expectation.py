@@ -92,7 +92,7 @@ def test_the_surveys_of_a_bundled_mission_come_to_what_is_told_before(name: str,
     assert expected.latest_s == expected.survey_s
 
 
-@pytest.mark.parametrize("name", ["tellaro", "five-helpers"])
+@pytest.mark.parametrize("name", ["tellaro", "two-helpers"])
 def test_a_bundled_mission_with_helpers_comes_to_what_is_told_before(name: str, tmp_path: Path) -> None:
     mission = load_scenario(name, ["area.cell_m=10"])  # on fewer cells strips are cut sooner
     expected = check_mission(mission)

@@ -168,7 +168,7 @@ class TestResumed:
         assert not left.exists()
 
     def test_killed_again_and_again_it_comes_to_the_same_table(self, tmp_path: Path) -> None:
-        assert kill_and_resume(tmp_path, kills=2, seeds=3, latest_s=2.5) == 0
+        assert kill_and_resume(tmp_path, kills=2, seeds=2, latest_s=2.0) == 0
 
 
 class TestRefusedFolder:
