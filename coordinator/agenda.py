@@ -13,6 +13,7 @@ class Item(Enum):
     ASSIGN = auto()
     KEEP_APART = auto()
     ASK_AGAIN = auto()
+    GOAL = auto()
     SAY_OVER = auto()
 
 

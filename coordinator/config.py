@@ -11,6 +11,7 @@ import numpy as np
 
 from coordinator.allocate.situation import Allocator
 from planner.currents import FlowGrid
+from planner.goal import Goal
 from planner.region import Region
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 
@@ -45,7 +46,8 @@ class CoordinatorConfig:
     `across`: whether strips may run across the tracks, too.
     `priorities`: ground whose residual risk counts more, or less.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens.
-    `flows`: of the water, where they are not alike everywhere."""
+    `flows`: of the water, where they are not alike everywhere.
+    `goal`: with which the mission ends as soon as it is reached."""
 
     allocator: Allocator
     deadline_factor: float
@@ -65,3 +67,4 @@ class CoordinatorConfig:
     flows: FlowGrid | None = None
     answer_within_ms: int = ANSWER_WITHIN_MS
     ahead_ms: int = 0
+    goal: Goal | None = None

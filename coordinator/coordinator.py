@@ -11,7 +11,7 @@ from itertools import chain
 from comms.node import Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.codec import Header
-from comms.said.messages import AgentState, CoverageTile, Curve, Hotspot, Mode, Plan, TaskState, TaskStatus
+from comms.said.messages import AgentState, Contact, CoverageTile, Curve, Hotspot, Mode, Plan, TaskState, TaskStatus
 from coordinator.agenda import Agenda, Item
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
@@ -20,6 +20,7 @@ from coordinator.dispatch import Dispatch
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fixed import Beforehand, Lanes
 from coordinator.fleet import KnownFleet
+from coordinator.goal import GoalWatch
 from coordinator.ledger import NUMBERS_A_SECOND, Ledger
 from coordinator.mission_end import MissionEnd
 from coordinator.outbox import Outbox
@@ -50,6 +51,7 @@ class Coordinator:
     _strips: StripLife
     _dispatch: Dispatch
     _end: MissionEnd
+    _goal: GoalWatch
     _briefing: Briefing  # where there are helpers
 
     def __init__(self, config: CoordinatorConfig) -> None:
@@ -113,7 +115,8 @@ class Coordinator:
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
         self._sectors = sectors = Sectors(_sectors(config, fleet, in_reach, p_detect), run.grid.spec, agenda)
         self._strips = strips = StripLife(ledger, fleet, inside, sectors, outbox, config.answer_within_ms)
-        self._end = MissionEnd(config, fleet, strips, sectors, agenda, outbox)
+        self._goal = goal = GoalWatch(config.goal, fleet, inside, agenda, now_ms)
+        self._end = MissionEnd(config, fleet, strips, sectors, goal, agenda, outbox)
         if narrowest is not None:
             self._briefing = briefing = Briefing(config, ledger, fleet, p_detect)
             weights = weights_over(run.grid.spec, inside, config.priorities)
@@ -139,6 +142,8 @@ class Coordinator:
             sectors = self._hear_hotspot(received, message)
             if not is_over:
                 self._cut_soon(sectors, now_ms)
+        elif isinstance(message, Contact):
+            self._goal.hear(message)
         elif is_over:
             if isinstance(message, AgentState) and vehicle is not None:
                 vehicle.hear_state(header, message, now_ms)

@@ -9,6 +9,7 @@ from comms.said.messages import MissionOver, TaskAction
 from coordinator.agenda import Agenda, Item
 from coordinator.config import CoordinatorConfig
 from coordinator.fleet import KnownFleet
+from coordinator.goal import GoalWatch
 from coordinator.outbox import Outbox
 from coordinator.sectors import Sectors
 from coordinator.strip_life import StripLife
@@ -20,9 +21,9 @@ SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
 class MissionEnd:
     """The mission is over when every primary has finished, all of which states tell has arrived and was cut by, no
-    strip is left and nobody is on its way home, at the latest at the deadline, by the last primary's end or by the
-    clock. Who ends its survey early, as its battery is low, has finished when it is home. `over`: what was said of
-    that, None until then."""
+    strip is left and nobody is on its way home; at once where its goal is reached; at the latest at the deadline, by
+    the last primary's end or by the clock. Who ends its survey early, as its battery is low, has finished when it is
+    home. `over`: what was said of that, None until then."""
 
     def __init__(
         self,
@@ -30,6 +31,7 @@ class MissionEnd:
         fleet: KnownFleet,
         strips: StripLife,
         sectors: Sectors,
+        goal: GoalWatch,
         agenda: Agenda,
         outbox: Outbox,
     ) -> None:
@@ -39,6 +41,7 @@ class MissionEnd:
         self._fleet = fleet
         self._strips = strips
         self._sectors = sectors
+        self._goal = goal
         self._agenda = agenda
         self._outbox = outbox
 
@@ -53,6 +56,8 @@ class MissionEnd:
             early = ", ".join(name for name, one in self._fleet.primaries.items() if one.ended_early)
             cut_short = f"; the survey of {early} has ended early, as the battery lasted for no more" if early else ""
             reason = f"every primary has finished and no strip is left{cut_short}"
+        elif goal := self._goal.find(now_ms):
+            reason = f"the goal is reached: {goal}, {len(left)} strips are left"
         elif now_ms >= self.deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
             end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"

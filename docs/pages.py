@@ -52,7 +52,8 @@ from secondlook.scenario import (
 )
 from secondlook.scenario.area import Priority
 from secondlook.scenario.current import CurrentFromFile
-from secondlook.scenario.degrees import AreaInDegrees, OriginInUtm, PlaceInDegrees, PriorityInDegrees
+from secondlook.scenario.degrees import AreaInDegrees, LaneInDegrees, OriginInUtm, PlaceInDegrees, PriorityInDegrees
+from secondlook.scenario.goal import ClearanceGoal, LaneGoal, NoneLeftGoal
 from secondlook.scenario.sensor import SENSORS, SensorBase
 from secondlook.scenario.targets import PlacesFromFile
 from secondlook.scenario.vehicle import VehicleBase
@@ -76,6 +77,7 @@ SECTIONS: tuple[tuple[str, str, tuple[type[BaseModel], ...]], ...] = (
     ("Priorities", "each of `area.priorities`", (Priority, PriorityInDegrees)),
     ("Origin", "`origin`", (Origin, OriginInUtm)),
     ("Mission", "`mission`", (Mission,)),
+    ("Goal", "`mission.goal`", (ClearanceGoal, NoneLeftGoal, LaneGoal, LaneInDegrees)),
     ("Seabed", "`seabed`", (UniformSeabed, PatchySeabed)),
     ("Current", "`current`", (Current, CurrentFromFile)),
     ("Current on a grid", "`current`", (GridCurrent,)),
@@ -106,6 +108,7 @@ SAID = {
     + "of a revisit vehicle.",
     "Seabed": "What lowers every vehicle's P_d: nothing, or, on a `patchy` seabed, fields of sand ripples and patches "
     + "of vegetation.",
+    "Goal": "What the mission is [flown for](../clearance.md#stop-when-it-is-enough), of one `kind`.",
     "Layout of targets": "Where the targets lie, on a layout of one `kind`, or as a file tells.",
     "Sensor": " ".join((SensorBase.__doc__ or "").split()),
 }

@@ -12,11 +12,12 @@ less of it as the tracks differ from each other.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from planner.fleet_map import EVERYWHERE, FleetMap
 from planner.types import BoolArray, DetectionCurve, FloatArray
 
 PRIOR_MINES = 0.5
@@ -32,7 +33,7 @@ LOW, HIGH = 0.05, 0.95
 class MinesLeft:
     """How many mines are left somewhere: the `mean`, the 90 % interval from `low` to `high`, and the chance that there
     is `none`. `found`: those that were found there or elsewhere and told of the density; `clearance`: the share of all
-    mines there that is expected to have been found, [0, 1]."""
+    mines there that is expected to have been found, [0, 1]. `reached`: the chances of at most 0, 1, 2 and so on."""
 
     found: float
     mean: float
@@ -40,6 +41,15 @@ class MinesLeft:
     high: int
     none: float
     clearance: float
+    reached: FloatArray = field(compare=False, repr=False)
+
+    def chance_of_at_most(self, number: float) -> float:
+        """With which chance no more than so many are left; of less than none 0."""
+        return float(self.reached[min(math.floor(number), len(self.reached) - 1)]) if number >= 0 else 0.0
+
+    def at_most_with(self, chance: float) -> int:
+        """The least number of which no more are left with a chance in [0, 1]."""
+        return min(int(np.searchsorted(self.reached, chance)), len(self.reached) - 1)
 
 
 def mines_left(
@@ -87,7 +97,28 @@ def mines_left(
         high=int(np.searchsorted(reached, HIGH)),
         none=float(chances[0]) / total,
         clearance=cleared,
+        reached=reached,
     )
+
+
+def mines_left_by(
+    map_: FleetMap, inside: BoolArray, found: float, scatter: float, place: BoolArray | None = None
+) -> MinesLeft | None:
+    """The same by a fleet's map, of the area's cells, `inside`, or of those in a `place`; from the number of cells that
+    have each level, as there are few levels and many cells."""
+    levels, risk = map_.levels_within(EVERYWHERE, map_.layers)
+    places = [inside] if place is None else [inside & place, inside & ~place]
+    counts = [np.bincount(levels[one], minlength=risk.size) for one in places]
+    in_place = np.repeat([True, False][: len(places)], risk.size)
+    searched = np.ones_like(in_place)
+    weights = np.concatenate(counts).astype(np.float64)
+    risks = np.tile(risk, len(places))
+    return mines_left(risks, searched, in_place, map_.grid.cell_area_m2, found, scatter, weights)
+
+
+def scatter_of_all(vehicles: Iterable[Sequence[DetectionCurve]]) -> float:
+    """The largest of what several vehicles' tracks tell, see `scatter_of`; with no vehicle `UNKNOWN_SCATTER`."""
+    return max((scatter_of(curves) for curves in vehicles), default=UNKNOWN_SCATTER)
 
 
 def scatter_of(curves: Sequence[DetectionCurve]) -> float:

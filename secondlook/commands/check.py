@@ -10,6 +10,8 @@ import typer
 from secondlook.commands.planned_survey import planned_surveys, unreachable
 from secondlook.commands.run import expected_of, refuse, tell_expected
 from secondlook.commands.scenarios import names_beginning_with
+from secondlook.preflight.goal import goal_estimate
+from secondlook.progress import no_remark, shown_progress
 from secondlook.scenario import load_scenario
 
 
@@ -24,7 +26,8 @@ def check(
 ) -> None:
     """Validate a scenario. Tells all that is wrong with it by line, or how its area will be surveyed, what the mission
     is expected to come to, who can do nothing in it, and what cannot be reached past ground to keep out of. One that
-    cannot end within its limits is refused."""
+    cannot end within its limits is refused. One with a goal is flown with a few other seeds, to see whether it is
+    reached."""
     valid = load_scenario(scenario, set_ or ())
     surveys = planned_surveys(valid)
     across_m, along_m = valid.area.extent_m
@@ -37,3 +40,8 @@ def check(
     expected = expected_of(valid)
     tell_expected(expected)
     refuse(expected)
+    if valid.mission.goal is None:
+        return
+    with shown_progress("trying the goal", "of the missions flown") as tell:
+        estimate = goal_estimate(valid, lambda share: tell(share, no_remark))
+    typer.echo(estimate.sentence, err=estimate.is_doubtful)

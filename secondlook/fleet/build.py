@@ -63,6 +63,8 @@ from vehicle_agent.config import Homing, RevisitConfig, SurveyConfig, SurveyRevi
 
 AS_CONVEX = 1e-6
 """Share of its area that an outline's dents may have for it to count as convex."""
+LANE_WEIGHT = 10.0
+"""So many times counts the risk in the lane that is the mission's goal."""
 
 
 @dataclass(frozen=True)
@@ -354,5 +356,16 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         objective=scenario.coordinator.objective,
         separation_m=scenario.mission.separation_m,
         flows=flows_of(scenario),
-        priorities=tuple(PriorityGround((one.polygon_m,), one.weight) for one in scenario.area.priorities),
+        priorities=_priorities(scenario),
+        goal=None if scenario.mission.goal is None else scenario.mission.goal.goal,
     )
+
+
+def _priorities(scenario: Scenario) -> tuple[PriorityGround, ...]:
+    """Those of the scenario; where it has none the lane that a ship is to pass."""
+    found = tuple(PriorityGround((one.polygon_m,), one.weight) for one in scenario.area.priorities)
+    goal = None if scenario.mission.goal is None else scenario.mission.goal.goal
+    if found or goal is None or goal.lane is None:
+        return found
+    rings = [ring for part in shapely.get_parts(goal.lane.outline) for ring in (part.exterior, *part.interiors)]
+    return (PriorityGround(tuple(tuple(ring.coords[:-1]) for ring in rings), LANE_WEIGHT),)

@@ -81,6 +81,9 @@ def closing_table(summary: dict[str, Any], folder: Path) -> None:
     )
     if mines := summary["mines"]:
         table.add_row("mines left", mines_left_words(mines))
+    if goal := summary.get("goal"):
+        told = f"{'reached' if goal['reached'] else 'missed'}: {goal['wanted']}; {goal['now']}"
+        table.add_row("goal", told, style=None if goal["reached"] else "yellow")
     for number, one in enumerate(summary["priorities"], start=1):
         if one["mean"] is not None:
             told = f"{one['mean']:.3f}, primary alone {one['mean_primary_alone']:.3f}; counts {one['weight']:g} times"

@@ -30,7 +30,7 @@ from comms.said.messages import (
     TruthTargets,
 )
 from comms.strip_books import StripBooks
-from planner.clearance import MinesLeft, mines_left, scatter_of
+from planner.clearance import MinesLeft, mines_left_by, scatter_of_all
 from planner.contacts import Objects
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
@@ -217,10 +217,8 @@ class Metrics:
         None where nothing was seen."""
         if self.map is None:
             return None
-        scatter = max((scatter_of(list(one.values())) for one in self.curves.values()), default=scatter_of([]))
-        area_m2 = self.map.grid.cell_area_m2
-        place = self.inside if place is None else place & self.inside
-        return mines_left(self.map.risk, self.inside, place, area_m2, self.objects.mines, scatter)
+        scatter = scatter_of_all(list(one.values()) for one in self.curves.values())
+        return mines_left_by(self.map, self.inside, self.objects.mines, scatter, place)
 
     def close(self) -> None:
         """The mission has ended: vehicles were where their last courses led until now, and times that were not reached

@@ -64,6 +64,7 @@ def summarise(
         **({"restarts": dict(restarts)} if restarts else {}),
         "time": _times(mission_s, told.pop("primary_s"), wall_s),
         **told,
+        **_goal(scenario, observer.metrics),
         **({"at_odds": odds} if odds else {}),
         "priorities": _priorities(scenario, observer.metrics),
         "separation": {
@@ -80,6 +81,22 @@ def summarise(
         "messages": dict(sorted((observer.messages if result is None else result.messages).items())),
         "dropped": dropped,
     }
+
+
+def _goal(scenario: Scenario, metrics: Metrics) -> dict[str, dict[str, Any]]:
+    """Whether what the mission was flown for is reached, and how far it is."""
+    if scenario.mission.goal is None:
+        return {}
+    goal = scenario.mission.goal.goal
+    left = None if metrics.map is None else metrics.mines_left(goal.place(metrics.map.grid))
+    told = {
+        "wanted": goal.words,
+        "now": goal.words_now(left),
+        "reached": goal.is_reached(left),
+        "wanted_chance": goal.chance,
+        "chance": goal.chance_now(left),
+    }
+    return {"goal": told}
 
 
 def _priorities(scenario: Scenario, metrics: Metrics) -> list[dict[str, float | None]]:

@@ -147,6 +147,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "withdrawn": [one for one in fates if one.css == "withdrawn"],
         "kinds": kind_figures(mission.strips, before, after),
         "mines": mission.summary.get("mines"),
+        "goal": mission.summary.get("goal"),
         "targets": _targets(mission, after),
         "at_odds": mission.summary.get("at_odds"),
         "log": log,

@@ -18,6 +18,7 @@ from secondlook.scenario.area import Area, Priority
 from secondlook.scenario.chart import ChartError, read_chart
 from secondlook.scenario.current import Current, CurrentFromFile, GridCurrent, read_flows
 from secondlook.scenario.errors import KeyPath
+from secondlook.scenario.goal import MOST_WAY_POINTS, LaneGoal
 from secondlook.scenario.link import Position
 from secondlook.scenario.table import TableError
 from secondlook.scenario.targets import PlacesFromFile, PlacesLayout
@@ -110,6 +111,19 @@ class PriorityInDegrees(Mapping):
     """In place of `polygon_m`: the corners as [easting, northing]; the last may repeat the first."""
 
 
+class LaneInDegrees(Mapping):
+    """What of a lane may be given in degrees or in UTM metres."""
+
+    lane_deg: Annotated[tuple[Point, ...], Field(strict=False, min_length=2, max_length=MOST_WAY_POINTS)] | None = None
+    """In place of `lane_m`: the points of its middle as [latitude, longitude], WGS84."""
+    epsg: Epsg | None = None
+    """The UTM zone of `lane_utm_m`; the area's if left out."""
+    lane_utm_m: (
+        Annotated[tuple[UtmPoint, ...], Field(strict=False, min_length=2, max_length=MOST_WAY_POINTS)] | None
+    ) = None
+    """In place of `lane_m`: the points of its middle as [easting, northing]."""
+
+
 class PlaceInDegrees(Mapping):
     """What of a start, home or position may be given in degrees or in UTM metres."""
 
@@ -129,6 +143,7 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
     Origin: OriginInUtm,
     Area: AreaInDegrees,
     Priority: PriorityInDegrees,
+    LaneGoal: LaneInDegrees,
     Start: PlaceInDegrees,
     Home: PlaceInDegrees,
     Position: PlaceInDegrees,
@@ -140,6 +155,8 @@ IN_DEGREES: dict[type[BaseModel] | None, type[BaseModel]] = {
 _GIVES: dict[str, tuple[str, ...]] = {
     "polygon_deg": ("polygon_m",),
     "polygon_utm_m": ("polygon_m",),
+    "lane_deg": ("lane_m",),
+    "lane_utm_m": ("lane_m",),
     "holes_deg": ("holes_m",),
     "holes_utm_m": ("holes_m",),
     "latitude_deg": ("y_m",),
@@ -161,13 +178,14 @@ _PARTNER = {
 _NOT_BESIDE = {
     **_GIVES,
     "polygon_utm_m": ("polygon_m", "polygon_deg"),
+    "lane_utm_m": ("lane_m", "lane_deg"),
     "holes_utm_m": ("holes_m", "holes_deg"),
     "latitude_deg": ("x_m", "y_m"),
     "longitude_deg": ("x_m", "y_m"),
     "keep_out_utm_m": ("keep_out_m", "keep_out_deg"),
     "easting_m": ("x_m", "y_m", "latitude_deg", "longitude_deg"),
     "northing_m": ("x_m", "y_m", "latitude_deg", "longitude_deg"),
-    "epsg": ("polygon_m", "x_m", "y_m"),
+    "epsg": ("polygon_m", "lane_m", "x_m", "y_m"),
     "file": tuple(f"{key}_{ending}" for key in ("polygon", "holes", "keep_out") for ending in ("m", "deg", "utm_m")),
 }
 _NOT_BESIDE_FLOWS = (Current.model_fields.keys() | GridCurrent.model_fields.keys()) - {"keeps"}
@@ -223,8 +241,11 @@ class _Frame:
 
     def ring_m(self, path: KeyPath, corners: Sequence[tuple[float, float]]) -> list[Value]:
         """Of a ring, whose last corner may be its first again."""
-        open_corners = corners[:-1] if len(corners) > 3 and corners[0] == corners[-1] else corners
-        return [self.place_m((*path, index), corner) for index, corner in enumerate(open_corners)]
+        return self.way_m(path, corners[:-1] if len(corners) > 3 and corners[0] == corners[-1] else corners)
+
+    def way_m(self, path: KeyPath, points: Sequence[tuple[float, float]]) -> list[Value]:
+        """Of points one after the other."""
+        return [self.place_m((*path, index), point) for index, point in enumerate(points)]
 
 
 def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
@@ -266,6 +287,8 @@ def in_metres(data: dict[str, Value], folder: Path) -> InMetres:
 
 def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value], type[BaseModel]]]:
     """The mappings in which degrees or UTM metres may be given, the origin first."""
+    mission = data.get("mission")
+    goal = mission.get("goal") if isinstance(mission, dict) else None
     origin, area, vehicles = data.get("origin"), data.get("area"), data.get("vehicles")
     if isinstance(origin, dict):
         yield ("origin",), origin, OriginInUtm
@@ -275,6 +298,8 @@ def _holders(data: dict[str, Value]) -> Iterator[tuple[KeyPath, dict[str, Value]
         for index, one in enumerate(priorities if isinstance(priorities, list) else ()):
             if isinstance(one, dict):
                 yield ("area", "priorities", index), one, PriorityInDegrees
+    if isinstance(goal, dict) and goal.get("kind") == "lane":
+        yield ("mission", "goal"), goal, LaneInDegrees
     for key, vehicle in vehicles.items() if isinstance(vehicles, dict) else ():
         for name in ("start", "home"):
             place = vehicle.get(name) if isinstance(vehicle, dict) else None
@@ -354,6 +379,11 @@ def _turn(
         case PlaceInDegrees(easting_m=float(easting_m), northing_m=float(northing_m)):
             frame = replace(frame, epsg=_epsg(data, path, checked.epsg))
             holder["x_m"], holder["y_m"] = frame.place_m((*path, "easting_m"), (easting_m, northing_m))
+        case LaneInDegrees(lane_deg=tuple(way)):
+            holder["lane_m"] = frame.way_m((*path, "lane_deg"), way)
+        case LaneInDegrees(lane_utm_m=tuple(way)):
+            frame = replace(frame, epsg=_epsg(data, path, checked.epsg))
+            holder["lane_m"] = frame.way_m((*path, "lane_utm_m"), way)
         case AreaInDegrees(file=str(file)):
             _take_chart(turned, holder, file, folder, frame)
         case AreaInDegrees() | PriorityInDegrees():

@@ -20,7 +20,7 @@ from secondlook.scenario.vehicle import RevisitVehicle, SurveyVehicle
 # Pydantic puts the chosen member of a union into the location of an error, and this where a key itself is wrong.
 _TAGS = frozenset(
     {"survey", "revisit", "uniform", "patchy", "degrees", "auto", "alike", "grid", *SENSORS}
-    | {"lines", "clusters", "places"}
+    | {"lines", "clusters", "places", "cleared", "none_left", "lane"}
 )
 _KEY_MARK = "[key]"
 

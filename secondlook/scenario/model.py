@@ -16,6 +16,7 @@ from modem.config import MOST_PLATFORMS, least_frame_bits
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
+from secondlook.scenario.goal import MOST_OUTSIDE, AnyGoal, share_outside
 from secondlook.scenario.link import SHIP, Link, Position
 from secondlook.scenario.plug_ins import ALLOCATOR, NODE
 from secondlook.scenario.targets import PlacesLayout, Targets, first_outside
@@ -59,6 +60,9 @@ class Mission(Mapping):
     """Correlation of looks in the residual risk: 0 independent, as in the paper, 1 only the best look counts."""
     separation_m: Annotated[float, Field(ge=0, le=1000)] = 12.0
     """Helpers give way to whom they would come nearer; 0: they need not."""
+    goal: AnyGoal | None = None
+    """What it is flown for: it ends as soon as that is reached. Left out, it goes on while a second look is worth it,
+    or until its deadline. Not with a `link`, as contacts do not cross the water."""
     start_utc: Annotated[str, AfterValidator(check_utc)] | None = None
     """When second 0 is, ISO 8601, such as `2026-08-01T09:30:00Z`: report and exported files then tell times in UTC,
     too. Nothing in the mission depends on it."""
@@ -218,6 +222,15 @@ class Scenario(Mapping):
     link: Link | None = None
     """How platforms talk. Left out, everybody hears everybody, at once."""
 
+    @field_validator("mission")
+    @classmethod
+    def _check_lane(cls, mission: Mission, info: ValidationInfo) -> Mission:
+        area: Area | None = info.data.get("area")
+        lane = None if mission.goal is None else mission.goal.goal.lane
+        if lane is not None and area is not None and (outside := share_outside(lane, area)) > MOST_OUTSIDE:
+            raise refused(f"must lie in what is surveyed, but {outside:.0%} of the lane does not", ("goal", "lane_m"))
+        return mission
+
     @field_validator("coordinator")
     @classmethod
     def _check_platform(cls, coordinator: Coordinator, info: ValidationInfo) -> Coordinator:
@@ -231,6 +244,9 @@ class Scenario(Mapping):
     def _check_link(cls, link: Link | None, info: ValidationInfo) -> Link | None:
         if link is None or link.profile is None:
             return None  # the same fleet, so the same scenario
+        mission: Mission | None = info.data.get("mission")
+        if mission is not None and mission.goal is not None:
+            raise refused("must be left out beside mission.goal, as contacts do not cross the water")
         vehicles: dict[str, Vehicle] = info.data.get("vehicles", {})
         coordinator: Coordinator | None = info.data.get("coordinator")
         ship = coordinator is not None and coordinator.platform in (None, SHIP)

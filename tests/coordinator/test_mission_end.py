@@ -19,15 +19,73 @@ from coordinator_by_hand import (
 )
 
 from comms.said.announcement import Role
-from comms.said.messages import AgentState, MissionOver, Mode, StripStatus, Task, TaskAction, TaskState
+from comms.said.messages import AgentState, Contact, MissionOver, Mode, StripStatus, Task, TaskAction, TaskState
 from coordinator.allocate.simple import GreedyAllocator, NoAllocator
 from coordinator.allocate.situation import Allocator
 from coordinator.coordinator import Coordinator
 from coordinator.fixed import FixedRoutes
 from coordinator.vehicles import KnownVehicle
+from planner.goal import Goal, Lane, goal_of_lane
 from planner.tiles import tiles
 
 ALL_TILES = sum(range(1, len(tiles(GRID)) + 1))  # what a state tells of all of them in their first version
+
+
+def hear_contacts(told: Told, count: int) -> None:
+    """So many contacts that are mines for sure, one 30 m beside the other."""
+    for number in range(1, count + 1):
+        place = 30.0 * (number % 12), 30.0 * (number // 12)
+        told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(*place, 1.0, 0.95, number))
+
+
+class TestTheGoal:
+    GOAL = Goal(0.5, 0.9)
+
+    def test_it_is_over_when_enough_of_the_mines_are_found(self) -> None:
+        told = coordinator(goal=self.GOAL)
+        told.layer(PRIMARY, np.full(GRID.shape, 0.2))
+        hear_contacts(told, 40)
+        told.keep_alive((PRIMARY, HELPER), 29.9)
+        assert told.node.all(MissionOver) == []
+        said = told.node.wait_until(30_001)
+        (reason,) = (one.message.reason for one in said if isinstance(one.message, MissionOver))
+        assert reason.startswith("the goal is reached: a clearance of 0.5 with a chance of 0.9; the chance is ")
+
+    def test_it_goes_on_while_too_much_was_missed(self) -> None:
+        told = coordinator(goal=self.GOAL)
+        told.layer(PRIMARY, np.full(GRID.shape, 0.6))
+        hear_contacts(told, 40)
+        told.keep_alive((PRIMARY, HELPER), 100)
+        assert told.node.all(MissionOver) == []
+        told.layer(HELPER, np.full(GRID.shape, 0.3))
+        told.keep_alive((PRIMARY, HELPER), 35)
+        assert len(told.node.all(MissionOver)) >= 1
+
+    def test_of_contacts_that_are_false_alarms_nothing_is_believed_to_be_found(self) -> None:
+        told = coordinator(goal=self.GOAL)
+        told.layer(PRIMARY, np.full(GRID.shape, 0.2))
+        for number in range(1, 41):
+            told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(9.0 * number, 50.0, 1.0, 0.2, number))
+        told.keep_alive((PRIMARY, HELPER), 60)
+        # Half a mine, by Jeffreys' prior: none is left with a chance of about 0.8 ** 0.5.
+        assert told.node.all(MissionOver) == []
+
+    def test_without_a_goal_nothing_ends_it(self) -> None:
+        told = coordinator()
+        told.layer(PRIMARY, np.full(GRID.shape, 0.01))
+        hear_contacts(told, 40)
+        told.keep_alive((PRIMARY, HELPER), 100)
+        assert told.node.all(MissionOver) == []
+
+    def test_of_a_lane_only_what_lies_in_it_counts(self) -> None:
+        risk = np.full(GRID.shape, 0.8)
+        risk[:, 18:23] = 0.0005  # columns are 5 m apart: 90 m to 110 m east
+        for at_m, is_over in ((100.0, True), (200.0, False)):
+            told = coordinator(goal=goal_of_lane(Lane(((at_m, 0.0), (at_m, 400.0)), 20.0), 0.1))
+            told.layer(PRIMARY, risk)
+            hear_contacts(told, 10)
+            told.keep_alive((PRIMARY, HELPER), 40)
+            assert bool(told.node.all(MissionOver)) == is_over
 
 
 class TestTheEnd:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
@@ -10,8 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import nbinom
 
-from planner.clearance import PRIOR_MINES, UNKNOWN_SCATTER, MinesLeft, mines_left, scatter_of
-from planner.types import DetectionCurve
+from planner.clearance import (
+    PRIOR_MINES,
+    UNKNOWN_SCATTER,
+    MinesLeft,
+    mines_left,
+    mines_left_by,
+    scatter_of,
+    scatter_of_all,
+)
+from planner.fleet_map import FleetMap
+from planner.types import BoolArray, DetectionCurve, GridSpec, SweepFrame
 
 CELL_M2 = 25.0
 ALL = np.ones((8, 10), dtype=np.bool_)
@@ -59,6 +69,55 @@ def test_where_mines_lie_denser_more_are_left() -> None:
     told = mines_left(np.full(ALL.shape, 0.5), ALL, west, CELL_M2, 7.5, 0.0, weights)
     assert told is not None
     assert told.mean == pytest.approx(8.0 * 3 / 4)
+
+
+@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0)])
+def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: float) -> None:
+    told, true = left_of(risk, found), nbinom(found + PRIOR_MINES, 1.0 - risk)
+    for number in (0, 1, 3, 9.9, 30):
+        assert told.chance_of_at_most(number) == pytest.approx(true.cdf(math.floor(number)))
+    assert told.chance_of_at_most(-0.5) == 0.0
+    assert told.chance_of_at_most(1e9) == pytest.approx(1.0)
+    for chance in (0.1, 0.5, 0.9):
+        assert told.at_most_with(chance) == true.ppf(chance)
+    assert told.chance_of_at_most(told.at_most_with(1.0)) == pytest.approx(1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """The one tile of a map of 8 by 10 cells."""
+
+    sum_levels: np.ndarray
+    largest_levels: np.ndarray
+    version: int = 1
+    first_row: int = 0
+    first_column: int = 0
+    settled: BoolArray = field(default_factory=lambda: ALL)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.5])
+@pytest.mark.parametrize("of_a_part", [False, True])
+def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None:
+    fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=10, rows=8), rho)
+    for number, vehicle in enumerate(("one", "other")):
+        levels = np.random.default_rng(number).integers(0, 120, ALL.shape).astype(np.uint8)
+        fleet.join(vehicle, 0, Tile(levels, levels // 2))
+    inside = ALL.copy()
+    inside[:3, :4] = False
+    west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
+    told = mines_left_by(fleet, inside, 20.0, 0.1, west if of_a_part else None)
+    expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, 20.0, 0.1)
+    assert told is not None
+    assert expected is not None
+    assert told.mean == pytest.approx(expected.mean, rel=1e-3 if rho else 1e-9)
+    assert told.clearance == pytest.approx(expected.clearance, rel=1e-3 if rho else 1e-9)
+    assert (told.low, told.high) == (expected.low, expected.high)
+
+
+def test_of_several_vehicles_the_one_whose_tracks_differ_most_counts() -> None:
+    alike, other = curve(0.4), curve(0.6)
+    assert scatter_of_all([[alike, alike], [alike, other]]) == scatter_of([alike, other]) > 0.0
+    assert scatter_of_all([]) == UNKNOWN_SCATTER
 
 
 def test_where_nothing_was_seen_nothing_can_be_said() -> None:

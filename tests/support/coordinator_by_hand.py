@@ -31,6 +31,7 @@ from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Allocator, Situation
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
+from planner.goal import Goal
 from planner.risk import to_levels
 from planner.tiles import tiles
 
@@ -173,6 +174,7 @@ def coordinator(
     ahead_ms: int = 0,
     separation_m: float = 0.0,
     lost_after_ms: int = 30_000,
+    goal: Goal | None = None,
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
     one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration.
@@ -194,6 +196,7 @@ def coordinator(
         helpers_a_team=helpers_a_team,
         ahead_ms=ahead_ms,
         separation_m=separation_m,
+        goal=goal,
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
     run = run_info(400, 400, vehicles=vehicles)

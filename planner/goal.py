@@ -1,0 +1,98 @@
+"""What a mission is flown for: that enough of the mines are found, in the area or in a lane that a ship is to pass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from planner.clearance import MinesLeft
+from planner.region import Region
+from planner.types import BoolArray, GridSpec, Point
+
+
+@dataclass(frozen=True)
+class Lane:
+    """Where a ship is to pass: along a `way` of 2 points or more, mission frame, `width_m` wide."""
+
+    way: tuple[Point, ...]
+    width_m: float
+
+    @cached_property
+    def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
+        """What lies within half the width of the way; its ends are straight."""
+        return shapely.LineString(self.way).buffer(self.width_m / 2.0, cap_style="flat", join_style="mitre")
+
+    def cells(self, grid: GridSpec) -> BoolArray:
+        """The cells that have their centre in it, shape of the grid."""
+        found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
+        for part in shapely.get_parts(self.outline):
+            holes = tuple(tuple(ring.coords[:-1]) for ring in part.interiors)
+            found |= Region(tuple(part.exterior.coords[:-1]), holes).inside(grid)
+        return found
+
+
+@dataclass(frozen=True)
+class Goal:
+    """That of all mines there, those found and those left, at least the share `clearance` is found, in (0, 1], with a
+    `chance` in (0, 1); with a clearance of 1, that none is left. There: in the area, or in a `lane`, of which a goal
+    can only be that none is left."""
+
+    clearance: float
+    chance: float
+    lane: Lane | None = None
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.clearance <= 1.0 and 0.0 < self.chance < 1.0):
+            raise ValueError(f"clearance {self.clearance} and chance {self.chance} must be in (0, 1] and (0, 1)")
+        if self.lane is not None and self.clearance < 1.0:
+            raise ValueError("of a lane a goal can only be that no mine is left: clearance must be 1")
+
+    def place(self, grid: GridSpec) -> BoolArray | None:
+        """The cells in which mines that are left count, shape of the grid; None for all of the area."""
+        return None if self.lane is None else self.lane.cells(grid)
+
+    def chance_now(self, left: MinesLeft | None) -> float:
+        """With which chance what is wanted is so; 0 where nothing was seen."""
+        return 0.0 if left is None else left.chance_of_at_most(self._may_be_left(left))
+
+    def is_reached(self, left: MinesLeft | None) -> bool:
+        """Whether it is so with the chance that is wanted."""
+        return self.chance_now(left) >= self.chance
+
+    def cleared_with(self, left: MinesLeft | None) -> float:
+        """The share of the mines that is found with the chance that is wanted; 0 where nothing was seen."""
+        if left is None:
+            return 0.0
+        at_most = left.at_most_with(self.chance)
+        return left.found / (left.found + at_most) if at_most else 1.0
+
+    @property
+    def words(self) -> str:
+        """What is wanted."""
+        if self.lane is not None:
+            return f"a risk of at most {1.0 - self.chance:.3g} that a mine is left in the lane"
+        if self.clearance == 1.0:
+            return f"no mine left with a chance of {self.chance:.3g}"
+        return f"a clearance of {self.clearance:.3g} with a chance of {self.chance:.3g}"
+
+    def words_now(self, left: MinesLeft | None) -> str:
+        """How far it is. `left`: how many mines are left there, None where nothing was seen."""
+        if left is None:
+            return "nothing was seen"
+        now = self.chance_now(left)
+        if self.lane is not None:
+            return f"the risk is {1.0 - now:.3f}"
+        if self.clearance == 1.0:
+            return f"the chance is {now:.3f}"
+        return f"the chance is {now:.3f}, and with {self.chance:.3g} the clearance is {self.cleared_with(left):.3f}"
+
+    def _may_be_left(self, left: MinesLeft) -> float:
+        return left.found * (1.0 / self.clearance - 1.0)
+
+
+def goal_of_lane(lane: Lane, risk: float) -> Goal:
+    """That a ship passes a lane with a risk of at most so much, in (0, 1), that a mine is left in it."""
+    return Goal(1.0, 1.0 - risk, lane)

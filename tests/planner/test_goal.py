@@ -1,0 +1,88 @@
+"""When a goal is reached: by hand, from how many mines are left with which chance; and which cells a lane has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import nbinom
+
+from planner.clearance import PRIOR_MINES, MinesLeft, mines_left
+from planner.goal import Goal, Lane, goal_of_lane
+from planner.types import GridSpec, SweepFrame
+
+ALL = np.ones((8, 10), dtype=np.bool_)
+
+
+def left_of(risk: float, found: float) -> MinesLeft:
+    told = mines_left(np.full(ALL.shape, risk), ALL, ALL, 25.0, found, 0.0)
+    assert told is not None
+    return told
+
+
+def test_of_100_that_are_found_25_may_be_left_for_a_clearance_of_80_percent() -> None:
+    left, true = left_of(0.15, 100.0), nbinom(100.0 + PRIOR_MINES, 0.85)
+    goal = Goal(0.8, 0.9)
+    assert goal.chance_now(left) == pytest.approx(true.cdf(25))
+    assert goal.is_reached(left)
+    assert not Goal(0.8, float(true.cdf(25)) + 0.001).is_reached(left)
+    # With 90 % no more than so many are left, so that of all so many are found.
+    assert goal.cleared_with(left) == pytest.approx(100.0 / (100.0 + true.ppf(0.9)))
+    assert goal.words_now(left) == f"the chance is {true.cdf(25):.3f}, and with 0.9 the clearance is 0.806"
+    assert goal.words == "a clearance of 0.8 with a chance of 0.9"
+
+
+def test_none_is_left_with_the_chance_of_0() -> None:
+    left = left_of(0.001, 10.0)
+    goal = Goal(1.0, 0.95)
+    assert goal.chance_now(left) == pytest.approx(0.999**10.5)
+    assert goal.is_reached(left)
+    assert not Goal(1.0, 0.99).is_reached(left)
+    assert goal.words_now(left) == "the chance is 0.990"
+
+
+def test_where_nothing_was_found_and_much_was_seen_a_clearance_is_that_none_is_left() -> None:
+    left = left_of(0.1, 0.0)
+    assert Goal(0.9, 0.5).chance_now(left) == Goal(1.0, 0.5).chance_now(left) == pytest.approx(0.9**0.5)
+    assert Goal(0.9, 0.9).cleared_with(left) == 1.0
+
+
+def test_where_nothing_was_seen_nothing_is_reached() -> None:
+    goal = Goal(0.5, 0.1)
+    assert (goal.chance_now(None), goal.is_reached(None), goal.cleared_with(None)) == (0.0, False, 0.0)
+    assert goal.words_now(None) == "nothing was seen"
+
+
+def test_a_lane_has_the_cells_whose_centres_lie_within_half_its_width() -> None:
+    grid = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)  # columns at 0, 5, ... 100 m, rows at 2.5 ...
+    lane = Lane(((50.0, 20.0), (50.0, 80.0)), 30.0)
+    expected = np.zeros(grid.shape, dtype=np.bool_)
+    expected[4:16, 7:14] = True
+    np.testing.assert_array_equal(lane.cells(grid), expected)
+    goal = goal_of_lane(lane, 0.05)
+    np.testing.assert_array_equal(goal.place(grid), expected)
+    assert Goal(0.5, 0.5).place(grid) is None
+    left = left_of(0.001, 10.0)
+    assert goal.is_reached(left)
+    assert not goal_of_lane(lane, 0.005).is_reached(left)
+    assert goal.words == "a risk of at most 0.05 that a mine is left in the lane"
+    assert goal.words_now(left) == "the risk is 0.010"
+
+
+def test_what_a_lane_goes_round_is_not_in_it() -> None:
+    grid = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)
+    round_about = Lane(((10.0, 10.0), (90.0, 10.0), (90.0, 90.0), (10.0, 90.0), (10.0, 5.0)), 10.0)
+    cells = round_about.cells(grid)
+    assert cells[2, 10]
+    assert cells[10, 2]
+    assert not cells[10, 10]
+
+
+@pytest.mark.parametrize(("clearance", "chance"), [(0.0, 0.5), (1.1, 0.5), (0.5, 0.0), (0.5, 1.0)])
+def test_what_makes_no_sense_is_refused(clearance: float, chance: float) -> None:
+    with pytest.raises(ValueError, match="must be in"):
+        Goal(clearance, chance)
+
+
+def test_of_a_lane_no_clearance_can_be_wanted() -> None:
+    with pytest.raises(ValueError, match="clearance must be 1"):
+        Goal(0.9, 0.9, Lane(((0.0, 0.0), (10.0, 0.0)), 5.0))

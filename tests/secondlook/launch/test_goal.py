@@ -1,0 +1,95 @@
+"""A mission that is flown for a goal: it ends with it, on both buses alike, and says how far it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from called import Call
+from flights import BRIEF
+
+import secondlook
+from comms.said.messages import MissionOver
+from planner.goal import Goal, Lane
+from secondlook.fleet.build import build_fleet
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.recorded.metrics import Metrics
+from secondlook.report import report_page
+from secondlook.scenario import load_scenario
+from secondlook.testing import Fleet, assert_repeats
+
+SOME = "mission.goal={kind: cleared, clearance: 0.3}"
+ALL = "mission.goal={kind: none_left, chance: 0.99}"
+LANE = "mission.goal={kind: lane, lane_m: [[50, 10], [50, 90]], width_m: 20, risk: 0.5}"
+
+
+def test_it_ends_with_its_goal_on_both_buses_alike(tmp_path: Path) -> None:
+    flight = assert_repeats(Fleet(load_scenario(str(BRIEF), [SOME]), folder=tmp_path), ("local", "zenoh"))
+    (over,) = {one.message.reason for one in flight.said(MissionOver)}
+    assert over.startswith("the goal is reached: a clearance of 0.3 with a chance of 0.9; the chance is ")
+    assert flight.summary["time"]["mission_s"] < 100.0  # the whole one takes 111 s
+    goal = flight.summary["goal"]
+    assert (goal["reached"], goal["wanted_chance"]) == (True, 0.9)
+    # It is the chance that so few are left that those found are 30 %.
+    metrics = Metrics()
+    for one in flight.messages():
+        metrics.hear(one)
+    left = metrics.mines_left()
+    assert left is not None
+    assert goal["chance"] == pytest.approx(left.chance_of_at_most(left.found * 0.7 / 0.3))
+    assert goal["chance"] >= 0.9
+
+
+def test_one_that_is_missed_says_by_how_much(tmp_path: Path) -> None:
+    summary = run_mission(load_scenario(str(BRIEF), [ALL]), RunOptions(tmp_path, bus="local"))
+    assert summary["time"]["mission_s"] > 100.0
+    assert summary["goal"]["reached"] is False
+    assert summary["goal"]["chance"] == summary["mines"]["none_left"] < 0.99
+    page = report_page(secondlook.load(tmp_path))
+    assert "for no mine left with a chance of 0.99. <b>That is missed</b>: the chance is 0.0" in page
+
+
+def test_without_one_nothing_is_said_of_it(tmp_path: Path) -> None:
+    run_mission(load_scenario(str(BRIEF)), RunOptions(tmp_path, bus="local"))
+    assert "goal" not in json.loads((tmp_path / "summary.json").read_text())
+    assert "was flown for" not in report_page(secondlook.load(tmp_path))
+
+
+def test_second_looks_go_to_the_lane_first() -> None:
+    config = build_fleet(load_scenario(str(BRIEF), [LANE]), record=False).specs["coordinator"].config
+    assert config.goal == Goal(1.0, 0.5, Lane(((50.0, 10.0), (50.0, 90.0)), 20.0))
+    (priority,) = config.priorities
+    assert {*priority.outlines_m[0]} == {(40.0, 10.0), (60.0, 10.0), (40.0, 90.0), (60.0, 90.0)}
+    own = "area.priorities=[{polygon_m: [[0, 50], [300, 50], [300, 100], [0, 100]], weight: 2}]"
+    config = build_fleet(load_scenario(str(BRIEF), [LANE, own]), record=False).specs["coordinator"].config
+    assert [one.weight for one in config.priorities] == [2.0]
+
+
+def test_a_lane_in_degrees_or_utm_metres_is_where_it_is_in_metres() -> None:
+    at = ("origin={easting_m: 583900, northing_m: 6638600, epsg: 32632}",)
+    in_metres = load_scenario(str(BRIEF), [*at, LANE])
+    assert in_metres.origin is not None
+    told = "lane_utm_m: [[583950, 6638610], [583950, 6638690]], epsg: 32632"
+    utm = load_scenario(str(BRIEF), [*at, LANE.replace("lane_m: [[50, 10], [50, 90]]", told)])
+    assert utm.mission.goal is not None
+    lane = utm.mission.goal.goal.lane
+    assert lane is not None
+    # Grid north is not true north, some 1.3 degrees off here, and a UTM metre is 0.9997 m.
+    for place, (x_m, y_m) in zip(lane.way, ((50.0, 10.0), (50.0, 90.0)), strict=True):
+        assert place == pytest.approx((x_m, y_m), abs=0.03 * max(x_m, y_m))
+        assert place != (x_m, y_m)
+
+
+def test_check_flies_it_to_see_whether_it_is_reached(called: Call) -> None:
+    code, out, err = called("check", str(BRIEF), "--set", SOME)
+    assert (code, err) == (0, "")
+    *_, told = out.splitlines()
+    assert told.startswith(
+        "mission.goal: a clearance of 0.3 with a chance of 0.9 is reached in 3 of 3 missions flown to try it, after "
+    )
+    code, out, err = called("check", str(BRIEF), "--set", ALL)
+    assert (code, "mission.goal" in out) == (0, False)
+    assert err.startswith(
+        "mission.goal: no mine left with a chance of 0.99 is reached in 0 of 3 missions flown to try it; missed: the "
+    )
