@@ -3,7 +3,8 @@
 `secondlook sweep SCENARIO --seeds 1..100 --vary targets.correlation=0,1 --vary mission.rho=0,1 --out DIR` flies them;
 `python -m bench.calibration DIR ...` prints a line for each combination of what was varied: how many missions, how many
 mines were left on average and how many were told, the share of missions whose 90 % interval holds the truth, with the
-95 % interval of that share, and how many have more left than that interval, and fewer.
+95 % interval of that share, and how many have more left than that interval, and fewer. Of missions that were flown for
+a goal a second table tells how many have reached it, and in how many of these it is so in truth.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from secondlook.errors import UserError
 
 Row = dict[str, Any]
 HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer")
+GOAL_HEADS = ("missions", "reached it", "after, s", "true", "95 % of that")
 
 
 def left_of(row: Row) -> int:
@@ -55,6 +57,26 @@ def table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     return lines
 
 
+def goal_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
+    """The lines of the table of missions flown for a goal; none where there are none."""
+    found = defaultdict[tuple[str, ...], list[Row]](list)
+    for row in rows:
+        if row["failure"] is None and row["goal.reached"] is not None:
+            found[tuple("-" if row.get(key) in (None, "") else str(row[key]) for key in varied)].append(row)
+    heads = [*(f"`{key}`" for key in varied), *GOAL_HEADS]
+    lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"] if found else []
+    for values, missions in found.items():
+        reached = [row for row in missions if row["goal.reached"]]
+        figures = [str(len(missions)), str(len(reached)), "-", "-", "-"]
+        if reached:
+            true = sum(bool(row["goal.true"]) for row in reached)
+            low, high = share_interval(true, len(reached))
+            ends = fmean(row["time.mission_s"] for row in reached)
+            figures[2:] = f"{ends:.0f}", f"{true / len(reached):.1%}", f"{low:.1%} to {high:.1%}"
+        lines.append(f"| {' | '.join([*(f'`{one}`' for one in values), *figures])} |")
+    return lines
+
+
 def main(folders: Sequence[str]) -> int:
     """Prints the table of these folders, each of a sweep."""
     rows, varied = list[Row](), dict[str, None]()
@@ -66,7 +88,7 @@ def main(folders: Sequence[str]) -> int:
     except UserError as error:
         print(error, file=sys.stderr)
         return 2
-    print("\n".join(table(rows, list(varied))))
+    print("\n".join([*table(rows, list(varied)), "", *goal_table(rows, list(varied))]).rstrip())
     return 0
 
 

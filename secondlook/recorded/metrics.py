@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from comms.node import Received
 from comms.said.announcement import Role, RunInfo
@@ -37,7 +38,7 @@ from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
 from planner.region import Region
 from planner.risk import RiskStatistics, risk_statistics
-from planner.types import BoolArray, DetectionCurve, FloatArray, Point
+from planner.types import BoolArray, DetectionCurve, FloatArray, GridSpec, Point
 from secondlook.recorded.closest_approach import ClosestApproaches
 from secondlook.recorded.kept_out import Entries
 from secondlook.recorded.vehicles import Ending
@@ -203,14 +204,27 @@ class Metrics:
         (targets,)."""
         if self.map is None or self.targets is None:
             return np.zeros(0), np.zeros(0, dtype=np.bool_)
-        grid = self.map.grid
+        missed = ~np.isin(np.arange(len(self.targets.targets)), sorted(self.detected))
+        return self.map.risk[self._target_cells(self.map.grid)], missed
+
+    def truly_found(self, place: BoolArray | None = None) -> float | None:
+        """The share of the targets in some cells, or in all, that somebody has detected, 1 where none lies there; None
+        in a world without targets."""
+        _, missed = self.targets_met()
+        if self.map is None or not missed.size:
+            return None
+        there = missed if place is None else missed[place[self._target_cells(self.map.grid)]]
+        return 1.0 - float(there.mean()) if there.size else 1.0
+
+    def _target_cells(self, grid: GridSpec) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """The row and column of each target's cell."""
+        assert self.targets is not None
         x_m = np.array([target.x_m for target in self.targets.targets])
         y_m = np.array([target.y_m for target in self.targets.targets])
         across, along = grid.frame.to_sweep(x_m, y_m)
         columns = np.clip(np.rint(across / grid.cell_m).astype(int), 0, grid.columns - 1)
         rows = np.clip(np.floor(along / grid.cell_m).astype(int), 0, grid.rows - 1)
-        missed = ~np.isin(np.arange(x_m.size), sorted(self.detected))
-        return self.map.risk[rows, columns], missed
+        return rows, columns
 
     def mines_left(self, place: BoolArray | None = None) -> MinesLeft | None:
         """How many mines may be left in the area, or in some of its cells, by the map and by what was found anywhere;

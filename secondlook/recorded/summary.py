@@ -88,13 +88,15 @@ def _goal(scenario: Scenario, metrics: Metrics) -> dict[str, dict[str, Any]]:
     if scenario.mission.goal is None:
         return {}
     goal = scenario.mission.goal.goal
-    left = None if metrics.map is None else metrics.mines_left(goal.place(metrics.map.grid))
+    place = None if metrics.map is None else goal.place(metrics.map.grid)
+    left, truly_found = metrics.mines_left(place), metrics.truly_found(place)
     told = {
         "wanted": goal.words,
         "now": goal.words_now(left),
         "reached": goal.is_reached(left),
         "wanted_chance": goal.chance,
         "chance": goal.chance_now(left),
+        "true": None if truly_found is None else truly_found >= goal.clearance,
     }
     return {"goal": told}
 

@@ -44,7 +44,7 @@ FIGURES: Mapping[str, Any] = {
         **dict.fromkeys(("objects", "left_low", "left_high"), WHOLE),
         **dict.fromkeys(("found", "left", "none_left", "clearance"), REAL),
     },
-    "goal": {"reached": YES_NO, "chance": REAL},
+    "goal": {"reached": YES_NO, "chance": REAL, "true": YES_NO},
     "truth": {"targets": WHOLE, "missed_share": REAL, "predicted_missed_share": REAL},
     "hotspots": {
         **dict.fromkeys(("published", "places", "revisited", "left", "withdrawn", "failed"), WHOLE),

@@ -39,6 +39,7 @@ def test_it_ends_with_its_goal_on_both_buses_alike(tmp_path: Path) -> None:
     assert left is not None
     assert goal["chance"] == pytest.approx(left.chance_of_at_most(left.found * 0.7 / 0.3))
     assert goal["chance"] >= 0.9
+    assert goal["true"] == (flight.summary["truth"]["missed_share"] <= 0.7)
 
 
 def test_one_that_is_missed_says_by_how_much(tmp_path: Path) -> None:
@@ -46,6 +47,7 @@ def test_one_that_is_missed_says_by_how_much(tmp_path: Path) -> None:
     assert summary["time"]["mission_s"] > 100.0
     assert summary["goal"]["reached"] is False
     assert summary["goal"]["chance"] == summary["mines"]["none_left"] < 0.99
+    assert (summary["goal"]["true"], summary["truth"]["missed_share"] > 0.0) == (False, True)
     page = report_page(secondlook.load(tmp_path))
     assert "for no mine left with a chance of 0.99. <b>That is missed</b>: the chance is 0.0" in page
 
@@ -54,6 +56,15 @@ def test_without_one_nothing_is_said_of_it(tmp_path: Path) -> None:
     run_mission(load_scenario(str(BRIEF)), RunOptions(tmp_path, bus="local"))
     assert "goal" not in json.loads((tmp_path / "summary.json").read_text())
     assert "was flown for" not in report_page(secondlook.load(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("targets", "true"), [("count: 0", None), ("layout: {kind: places, places_m: [[200, 50]]}", True)]
+)
+def test_of_a_lane_the_truth_is_that_of_the_targets_in_it(tmp_path: Path, targets: str, true: bool | None) -> None:
+    scenario = load_scenario(str(BRIEF), [LANE.replace("0.5", "0.001"), f"targets={{{targets}}}"])
+    summary = run_mission(scenario, RunOptions(tmp_path, bus="local", record=False))
+    assert (summary["goal"]["reached"], summary["goal"]["true"]) == (False, true)
 
 
 def test_second_looks_go_to_the_lane_first() -> None:
