@@ -47,6 +47,7 @@ class CoordinatorConfig:
     `priorities`: ground whose residual risk counts more, or less.
     `separation_m`: how near to each other vehicles may come, 0 for as near as it happens.
     `flows`: of the water, where they are not alike everywhere.
+    `contacts`: whether those that may be mines are looked at again.
     `goal`: with which the mission ends as soon as it is reached."""
 
     allocator: Allocator
@@ -67,4 +68,5 @@ class CoordinatorConfig:
     flows: FlowGrid | None = None
     answer_within_ms: int = ANSWER_WITHIN_MS
     ahead_ms: int = 0
+    contacts: bool = False
     goal: Goal | None = None

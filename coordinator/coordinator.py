@@ -17,6 +17,7 @@ from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig, weights_over
 from coordinator.cut.window import Window
 from coordinator.dispatch import Dispatch
+from coordinator.expect.contacts import KnownContacts
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.fixed import Beforehand, Lanes
 from coordinator.fleet import KnownFleet
@@ -51,7 +52,7 @@ class Coordinator:
     _strips: StripLife
     _dispatch: Dispatch
     _end: MissionEnd
-    _goal: GoalWatch
+    _contacts: KnownContacts
     _briefing: Briefing  # where there are helpers
 
     def __init__(self, config: CoordinatorConfig) -> None:
@@ -115,13 +116,14 @@ class Coordinator:
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
         self._sectors = sectors = Sectors(_sectors(config, fleet, in_reach, p_detect), run.grid.spec, agenda)
         self._strips = strips = StripLife(ledger, fleet, inside, sectors, outbox, config.answer_within_ms)
-        self._goal = goal = GoalWatch(config.goal, fleet, inside, agenda, now_ms)
+        self._contacts = contacts = KnownContacts(fleet, inside)
+        goal = GoalWatch(config.goal, fleet, contacts, inside, agenda, now_ms)
         self._end = MissionEnd(config, fleet, strips, sectors, goal, agenda, outbox)
         if narrowest is not None:
             self._briefing = briefing = Briefing(config, ledger, fleet, p_detect)
             weights = weights_over(run.grid.spec, inside, config.priorities)
             self._cutting = [
-                StripCutting(narrowest, config, weights, one, len(sectors.all), briefing, fleet, strips)
+                StripCutting(narrowest, config, weights, one, len(sectors.all), briefing, fleet, contacts, strips)
                 for one in sectors.all
             ]
             if config.strips == "beforehand":
@@ -143,7 +145,9 @@ class Coordinator:
             if not is_over:
                 self._cut_soon(sectors, now_ms)
         elif isinstance(message, Contact):
-            self._goal.hear(message)
+            if self.config.goal is not None or self.config.contacts:
+                strip = self.ledger.strip_of(received.vehicle)
+                self._contacts.hear(received, message, across=strip is not None and strip.window.across)
         elif is_over:
             if isinstance(message, AgentState) and vehicle is not None:
                 vehicle.hear_state(header, message, now_ms)

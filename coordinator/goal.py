@@ -3,11 +3,10 @@ them."""
 
 from __future__ import annotations
 
-from comms.said.messages import Contact
 from coordinator.agenda import Agenda, Item
+from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
 from planner.clearance import mines_left_by, scatter_of_all
-from planner.contacts import Objects
 from planner.goal import Goal
 from planner.types import BoolArray
 
@@ -18,20 +17,23 @@ class GoalWatch:
     """Looks every LOOK_EVERY_MS. `goal`: None where the mission has none. `inside`: the area's cells, shape of the
     grid."""
 
-    def __init__(self, goal: Goal | None, fleet: KnownFleet, inside: BoolArray, agenda: Agenda, now_ms: int) -> None:
+    def __init__(
+        self,
+        goal: Goal | None,
+        fleet: KnownFleet,
+        contacts: KnownContacts,
+        inside: BoolArray,
+        agenda: Agenda,
+        now_ms: int,
+    ) -> None:
         self._goal = goal
         self._fleet = fleet
         self._inside = inside
         self._place = None if goal is None else goal.place(fleet.map.grid)
         self._agenda = agenda
-        self._objects = Objects()
+        self._contacts = contacts
         if goal is not None:
             agenda.add(Item.GOAL, now_ms + LOOK_EVERY_MS)
-
-    def hear(self, contact: Contact) -> None:
-        """Joins a contact."""
-        if self._goal is not None:
-            self._objects.hear(contact.x_m, contact.y_m, contact.sigma_m, contact.score)
 
     def find(self, now_ms: int) -> str:
         """What is told where the goal is found to be reached now; empty where it is not, or it is not time to look."""
@@ -41,5 +43,5 @@ class GoalWatch:
         self._agenda.add(Item.GOAL, now_ms + LOOK_EVERY_MS)
         curves = [[curve for track, curve in one.curves.items() if track > 0] for one in self._fleet.vehicles.values()]
         scatter = scatter_of_all(one for one in curves if one)
-        left = mines_left_by(self._fleet.map, self._inside, self._objects.mines, scatter, self._place)
+        left = mines_left_by(self._fleet.map, self._inside, self._contacts.mines, scatter, self._place)
         return f"{goal.words}; {goal.words_now(left)}" if goal.is_reached(left) else ""

@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import StripState
 from coordinator.allocate.routes import HORIZON_S, plan_routes
@@ -16,6 +18,7 @@ from coordinator.cut.cutter import Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.room import Room
 from coordinator.cut.strips import Counted, Cut, CuttingRules
+from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import TAKEN
 from coordinator.reasons import Reasons
@@ -47,6 +50,7 @@ class StripCutting:
         sectors: int,
         briefing: Briefing,
         fleet: KnownFleet,
+        contacts: KnownContacts,
         strips: StripLife,
     ) -> None:
         swath_m = footprint_of(narrowest.sonar).reach.strip_width_m
@@ -65,7 +69,9 @@ class StripCutting:
         self._cutter = Cutter(
             grid, rules, least_worth, across=config.across, room=room, turns_each=min(sectors, MOST_BETWEEN)
         )
-        self._weights = weights[sector.window.cells] * area_m2
+        self._cell_weights = weights[sector.window.cells]
+        self._weights = self._cell_weights * area_m2
+        self._contacts = contacts if config.contacts else None
         self._sector = sector
         self._grid = grid
         self._briefing = briefing
@@ -93,8 +99,14 @@ class StripCutting:
         reasons = Reasons(self._grid, self._fleet.primaries, expected.risk)
 
         def why(cut: Cut) -> str:
-            return reasons.why(replace(cut, window=cut.window.within(place)))
+            told = reasons.why(replace(cut, window=cut.window.within(place)))
+            count = 0 if self._contacts is None else self._contacts.doubtful(cut.window)
+            return f"{told}; {count} contact{'s' if count > 1 else ''} that may be mines" if count else told
 
+        contacts = None
+        if self._contacts is not None:
+            look = np.where(expected.risk > 0.0, expected.look, 0.0)  # none where no second look goes
+            contacts = self._contacts.worth(place, look, self._cell_weights)
         ground = Ground(
             risk=expected.risk,
             look=expected.look,
@@ -102,6 +114,8 @@ class StripCutting:
             is_seen=expected.is_seen,
             objective=self._objective,
             threshold=self._cutter.threshold,
+            contacts=None if contacts is None else self._objective.mean * contacts[0],
+            contacts_across=None if contacts is None else self._objective.mean * contacts[1],
         )
         claimed = [one.window.within(place) for one in ledger.in_state(*TAKEN) if one.window.shared(place)]
         unmatched = [one for one in ledger.in_state(StripState.OPEN) if sector.holds(one.window)]

@@ -16,7 +16,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.risk import MOST_LEVELS, LevelArray, residual_risk, risk_of_levels
+from planner.risk import MOST_LEVELS, NATS_PER_LEVEL, LevelArray, residual_risk, risk_of_levels
 from planner.tiles import tile_shape
 from planner.types import BoolArray, FloatArray, GridSpec
 
@@ -180,6 +180,16 @@ class FleetMap:
         self._changed[place] = window
         self.changes += 1
         return True
+
+    def nats_at(self, x_m: FloatArray, y_m: FloatArray) -> FloatArray:
+        """What all looks have seen where points of the mission frame lie, -ln(1 - P_d) summed over them, 0 beyond the
+        grid; of the points' shape."""
+        rows, columns = self.grid.cells_of(x_m, y_m)
+        here = (rows >= 0) & (rows < self.grid.rows) & (columns >= 0) & (columns < self.grid.columns)
+        nats = np.zeros(here.shape)
+        for layer in self.layers.values():
+            nats[here] += NATS_PER_LEVEL * layer.sum_levels[rows[here], columns[here]]
+        return nats
 
     def seen(self) -> BoolArray:
         """Cells with at least one look by anyone."""

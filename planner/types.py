@@ -68,6 +68,12 @@ class GridSpec:
         """Area of one cell."""
         return self.cell_m * self.cell_m
 
+    def cells_of(self, x_m: FloatArray, y_m: FloatArray) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the cells in which points of the mission frame lie, also beyond the grid."""
+        across_m, along_m = self.frame.to_sweep(x_m, y_m)
+        rows, columns = np.floor(along_m / self.cell_m), np.rint(across_m / self.cell_m)
+        return rows.astype(np.intp), columns.astype(np.intp)
+
     def part(self, first_row: int, end_row: int, first_column: int, end_column: int) -> GridSpec:
         """The grid of some of its rows and columns; the same one where these are all."""
         if (first_row, end_row, first_column, end_column) == (0, self.rows, 0, self.columns):

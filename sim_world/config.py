@@ -270,6 +270,8 @@ class TargetsConfig:
     `correlation`: how far the looks at one target share their chance, [0, 1], and `aspect_rad`: how far apart the
     bearings of two of them are where they share nothing any more, 5 degrees to pi, None where bearings do not matter,
     see `sim_world.strengths`. `kinds`: the mixture that targets are drawn from, one of `sim_world.kinds.MIXTURES`.
+    `clutter_per_km2`: how many things are expected to lie there, a square kilometre, that are seen as targets are and
+    are none, 0 to 1000.
     """
 
     count: int = 0
@@ -277,6 +279,7 @@ class TargetsConfig:
     correlation: float = 0.0
     aspect_rad: float | None = None
     kinds: str = ALIKE
+    clutter_per_km2: float = 0.0
 
     def __post_init__(self) -> None:
         _require(0 <= self.count <= LARGEST_LOOK_TARGETS, "count", self.count, f"0 to {LARGEST_LOOK_TARGETS}")
@@ -287,6 +290,7 @@ class TargetsConfig:
         wide = aspect_rad is None or LEAST_ASPECT_RAD <= aspect_rad <= LARGEST_ASPECT_RAD
         _require(wide, "aspect_rad", aspect_rad, "5 degrees to pi")
         _require(self.kinds in MIXTURES, "kinds", self.kinds, " or ".join(MIXTURES))
+        _require(0.0 <= self.clutter_per_km2 <= 1000.0, "clutter_per_km2", self.clutter_per_km2, "0 to 1000")
 
 
 @dataclass(frozen=True)

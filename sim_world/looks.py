@@ -17,7 +17,7 @@ from sim_world.footprints import FOOTPRINTS
 from sim_world.footprints.swath import Swath
 from sim_world.sonar import SonarModel
 from sim_world.steadiness import STILL_WATER, Steadiness, Stream
-from sim_world.targets import Recogniser, Targets
+from sim_world.targets import NO_TARGETS, Recogniser, Targets
 from sim_world.vehicle import Stretch
 
 MOST_CONTACTS = 200
@@ -37,7 +37,7 @@ class Sight:
 
 class Looks:
     """The looks of one vehicle, one after the other, numbered from 1. `believed`: what it takes its `sonar` for where
-    that is not the true model.
+    that is not the true model. `clutter`: what lies there beside the `targets`, and is reported as they are.
 
     What is drawn for a look depends on the seed, the vehicle and the look's number (a track's error: on the number of
     tracks the vehicle has looked at so far), never on times or other vehicles. A look's cells are where the vehicle
@@ -51,6 +51,7 @@ class Looks:
         sonar: SonarModel,
         believed: SonarModel | None = None,
         targets: Targets,
+        clutter: Targets = NO_TARGETS,
         recogniser: Recogniser,
         seed: int,
         current: Stream = STILL_WATER,
@@ -60,6 +61,7 @@ class Looks:
         self._believed = believed or sonar
         self._steadiness = Steadiness(config, current)
         self._targets = targets
+        self._clutter = clutter
         self._recogniser = recogniser
         self._seed = seed
         self._estimates = Estimates(config.sensor, self._stream)
@@ -88,6 +90,7 @@ class Looks:
         places = swath.along_m, swath.lateral_m, swath.cell_centres()
         cells = self._sight(self._believed, swath, *places, maneuver, time_s)
         contacts, truth = self._targets_passed(swath, maneuver, time_s)
+        contacts += self._clutter_passed(swath, maneuver, time_s)
         if self._recogniser.raises_false_alarms:  # making a generator takes longer than using it
             contacts += self._recogniser.false_alarms(swath, self._stream("false_alarms", self._looks))
         contacts = sorted(contacts, key=lambda contact: contact.score, reverse=True)[:MOST_CONTACTS]
@@ -136,6 +139,15 @@ class Looks:
             tuple(passed.numbers[detected].tolist()),
         )
         return contacts, truth
+
+    def _clutter_passed(self, swath: Swath, maneuver: Maneuver, time_s: float) -> list[LookContact]:
+        passed = self._clutter.passed(swath)
+        if not passed.numbers.size:
+            return []
+        places = passed.along_m, passed.lateral_m, (passed.x_m, passed.y_m)
+        p_detect = self._sight(self._sonar, swath, *places, maneuver, time_s).p_detect
+        _, contacts = self._recogniser.detect(passed, p_detect, self._stream("clutter", self._looks), clutter=True)
+        return contacts
 
     def _sight(
         self,

@@ -14,6 +14,7 @@ from sim_world.area import Ground
 from sim_world.config import TargetsConfig
 from sim_world.footprints.swath import Swath
 from sim_world.kinds import Alike, Kinds, make_kinds
+from sim_world.layouts import Uniform
 from sim_world.strengths import Strengths, Unshared, make_strengths
 
 
@@ -78,11 +79,23 @@ def make_targets(
     )
 
 
+def make_clutter(
+    per_km2: float, area: tuple[Point, ...], seed: int, holes: tuple[tuple[Point, ...], ...] = ()
+) -> Targets:
+    """What lies there, is seen as targets are, and is none: Poisson in number, spread evenly."""
+    if per_km2 == 0.0:
+        return NO_TARGETS
+    stream, ground = random_stream(seed, "world", "clutter"), Ground(area, holes)
+    count = int(stream.poisson(per_km2 / M2_PER_KM2 * ground.polygon.area))
+    return Targets(Uniform().places(ground, count, stream), Alike(), Unshared())
+
+
 M2_PER_KM2 = 1e6
 
 
 class Recogniser:
-    """Reports contacts with scores: those of targets lie between 0.5 and 1, those of false alarms mostly lower.
+    """Reports contacts with scores: those of targets lie between 0.5 and 1, those of clutter and of false alarms mostly
+    lower.
 
     `false_alarms_per_km2`: how many false alarms are expected a square kilometre of swath, both sides together,
     between the ranges at which `curve` rises above 0.
@@ -97,12 +110,15 @@ class Recogniser:
         self._farthest_m = float(curve.range_m[min(seen[-1] + 1, curve.range_m.size - 1)]) if seen.size else 0.0
 
     def detect(
-        self, passed: Passed, chances: FloatArray, generator: np.random.Generator
+        self, passed: Passed, chances: FloatArray, generator: np.random.Generator, *, clutter: bool = False
     ) -> tuple[BoolArray, list[LookContact]]:
-        """Which of the targets passed are detected, each with a chance of its own, shape (n,), and the contacts
-        made."""
+        """Which of the targets passed, or of `clutter`, are detected, each with a chance of its own, shape (n,), and
+        the contacts made."""
         detected = generator.random(chances.shape) < chances
-        scores = 0.5 + 0.5 * generator.beta(2.0, 2.0, chances.shape)
+        if clutter:
+            scores = 0.75 * generator.beta(2.0, 3.0, chances.shape)
+        else:
+            scores = 0.5 + 0.5 * generator.beta(2.0, 2.0, chances.shape)
         return detected, _contacts(passed.along_m[detected], passed.lateral_m[detected], scores[detected])
 
     def false_alarms(self, swath: Swath, generator: np.random.Generator) -> list[LookContact]:

@@ -15,7 +15,7 @@ from sim_world.looks import Looks
 from sim_world.seabed import make_seabed
 from sim_world.sonar import Seabed
 from sim_world.steadiness import Stream, make_current
-from sim_world.targets import Recogniser, Targets, make_targets
+from sim_world.targets import Recogniser, Targets, make_clutter, make_targets
 from sim_world.vehicle import SimulatedVehicle
 
 
@@ -23,7 +23,13 @@ class Body:
     """A vehicle of a world, with the keys under which it speaks."""
 
     def __init__(
-        self, config: VehicleConfig, world: WorldConfig, seabed: Seabed, current: Stream, targets: Targets
+        self,
+        config: VehicleConfig,
+        world: WorldConfig,
+        seabed: Seabed,
+        current: Stream,
+        targets: Targets,
+        clutter: Targets,
     ) -> None:
         self.name = config.vehicle
         self._vehicle = SimulatedVehicle(config, world.seed, current, world.keep_out)
@@ -33,6 +39,7 @@ class Body:
             sonar=sensor.sonar_over(seabed, config.vehicle),
             believed=sensor.believed_over(seabed, config.vehicle),
             targets=targets,
+            clutter=clutter,
             recogniser=Recogniser(sensor.curve, false_alarms_per_km2=sensor.false_alarms_per_km2),
             seed=world.seed,
             current=current,
@@ -108,11 +115,13 @@ class World:
     """
 
     def __init__(self, config: WorldConfig) -> None:
-        self._targets = make_targets(config.targets, config.area, config.seed, (*config.holes, *config.keep_out.zones))
+        ground = config.area, config.seed, (*config.holes, *config.keep_out.zones)
+        self._targets = make_targets(config.targets, *ground)
+        clutter = make_clutter(config.targets.clutter_per_km2, *ground)
         seabed = make_seabed(config.seabed, config.area, config.seed)
         current = make_current(config.current, config.seed)
         by_id = sorted(config.vehicles, key=lambda vehicle: vehicle.vehicle)
-        self._bodies = {one.vehicle: Body(one, config, seabed, current, self._targets) for one in by_id}
+        self._bodies = {one.vehicle: Body(one, config, seabed, current, self._targets, clutter) for one in by_id}
         self._channel = None if config.channel is None else Channel(config.channel, config.seed)
         self._still = {} if config.channel is None else dict(config.channel.still)
         self._next_ms = dict.fromkeys(self._bodies, 0)

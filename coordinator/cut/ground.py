@@ -37,6 +37,9 @@ class Ground:
     not on what is expected of tracks to come. `threshold`: residual risk above which a cell is expected to be of the
     worst 30 % in the end: what is above it, summed, is least for the right threshold and is then what the worst 30 %
     have beyond it (the conditional value at risk as Rockafellar and Uryasev write it, 2000).
+    `contacts`, `contacts_across`: what a look at the objects in a cell counts beside that (residual risk times m2),
+    from a strip along the tracks and from one across; None where contacts count for nothing. Looked at once they count
+    no more: what was found then tells anew.
     """
 
     risk: FloatArray
@@ -45,16 +48,29 @@ class Ground:
     is_seen: BoolArray
     objective: Objective
     threshold: float
+    contacts: FloatArray | None = None
+    contacts_across: FloatArray | None = None
 
     def copy(self) -> Ground:
         """One that may be flown."""
-        return replace(self, risk=self.risk.copy())
+        if self.contacts is None or self.contacts_across is None:
+            return replace(self, risk=self.risk.copy())
+        contacts, across = self.contacts.copy(), self.contacts_across.copy()
+        return replace(self, risk=self.risk.copy(), contacts=contacts, contacts_across=across)
 
     @property
     def turned(self) -> Ground:
         """The same with rows and columns exchanged, so that what lies across the tracks runs up the rows. Flying the
         one flies the other."""
-        return replace(self, risk=self.risk.T, look=self.look.T, weights=self.weights.T, is_seen=self.is_seen.T)
+        return replace(
+            self,
+            risk=self.risk.T,
+            look=self.look.T,
+            weights=self.weights.T,
+            is_seen=self.is_seen.T,
+            contacts=None if self.contacts_across is None else self.contacts_across.T,
+            contacts_across=None if self.contacts is None else self.contacts.T,
+        )
 
     def in_blocks(self, block: int) -> Ground:
         """The same by blocks of so many cells a side, of which the last may have fewer: what a look removes of a block,
@@ -70,6 +86,8 @@ class Ground:
             look=removed / np.where(at_risk > 0, at_risk, 1.0),
             weights=weights_of,
             is_seen=seen > weights_of / 2,
+            contacts=None if self.contacts is None else _sums(self.contacts, block),
+            contacts_across=None if self.contacts_across is None else _sums(self.contacts_across, block),
         )
 
     def fly(self, window: Window, share: float = 1.0) -> None:
@@ -78,6 +96,9 @@ class Ground:
         cells = window.cells
         risk = self.risk[cells]
         risk *= 1.0 - (self.look[cells] if share == 1.0 else share * self.look[cells])
+        for contacts in (self.contacts, self.contacts_across):
+            if contacts is not None:
+                contacts[cells] *= 1.0 - share
 
     def left_m2(self) -> float:
         """What is left of the objective (residual risk times m2): the worst 30 % as they are now, not by the
@@ -89,6 +110,8 @@ class Ground:
             worst_from = _worst_from(risk)
             above_m2 = float((weights * np.maximum(risk - worst_from, 0.0)).sum())
             left_m2 += self.objective.worst * (worst_from * float(weights.sum()) + above_m2 / WORST)
+        if self.contacts is not None and self.contacts_across is not None:
+            left_m2 += float(np.maximum(self.contacts, self.contacts_across).sum())
         return left_m2
 
     def worst_from(self) -> float:
@@ -116,6 +139,8 @@ class Ground:
             above *= self.objective.worst / WORST
             worth += above
         worth *= self.weights[cells]
+        if self.contacts is not None:
+            worth += self.contacts[cells]
         return worth
 
 

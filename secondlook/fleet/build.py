@@ -272,6 +272,7 @@ def _targets(targets: Targets) -> TargetsConfig:
         correlation=targets.correlation or 0.0,
         aspect_rad=None if targets.aspect_deg is None else math.radians(targets.aspect_deg),
         kinds=targets.kinds or ALIKE,
+        clutter_per_km2=targets.clutter_per_km2 or 0.0,
     )
 
 
@@ -357,6 +358,7 @@ def _coordinator_config(scenario: Scenario) -> CoordinatorConfig:
         separation_m=scenario.mission.separation_m,
         flows=flows_of(scenario),
         priorities=_priorities(scenario),
+        contacts=scenario.looks_at_contacts,
         goal=None if scenario.mission.goal is None else scenario.mission.goal.goal,
     )
 

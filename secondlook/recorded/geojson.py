@@ -152,6 +152,17 @@ def _targets(mission: RecordedMission) -> Iterator[Feature]:
                 "found_s": contact.found_s,
             },
         )
+    for one in mission.objects:
+        yield (
+            one.point,
+            {
+                "kind": "object",
+                "contacts": one.contacts,
+                "sigma_m": round(one.sigma_m, 3),
+                "mine_chance": round(one.mine_chance, 3),
+                "listed": one.listed,
+            },
+        )
     for target in mission.targets:
         if target.found_by is None:
             yield target.point, {"kind": "missed_target", "number": target.number, "evaluation": True}

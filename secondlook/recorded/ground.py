@@ -17,6 +17,7 @@ from shapely.geometry.base import BaseGeometry
 
 from comms.node import Received
 from comms.said.messages import Contact, TruthLook, TruthTargets
+from planner.contacts import LISTED_FROM, SeenObjects
 from planner.risk import RiskStatistics, risk_statistics
 from planner.types import BoolArray, FloatArray, GridSpec, PriorityGround
 from secondlook.errors import UserError
@@ -187,6 +188,34 @@ def contacts(said: Iterable[Received[Contact]]) -> list[ContactRecord]:
         )
         for one in first.values()
     ]
+
+
+@dataclass(frozen=True)
+class ObjectRecord:
+    """What lies on the seabed by the contacts that are joined to it: where, mission frame, with the standard deviation
+    of that, of how many `contacts`, with which chance it is a mine, and whether it is listed as one."""
+
+    contacts: int
+    sigma_m: float
+    mine_chance: float
+    listed: bool
+    point: shapely.Point
+
+
+def objects(seen: SeenObjects, chances: FloatArray) -> list[ObjectRecord]:
+    """All of them, those first that are mines most likely. `chances`: that each is a mine."""
+    found = [
+        ObjectRecord(round(contacts), sigma_m, chance, chance >= LISTED_FROM, shapely.Point(x_m, y_m))
+        for contacts, sigma_m, chance, x_m, y_m in zip(
+            seen.contacts.tolist(),
+            seen.sigma_m.tolist(),
+            chances.tolist(),
+            seen.x_m.tolist(),
+            seen.y_m.tolist(),
+            strict=True,
+        )
+    ]
+    return sorted(found, key=lambda one: -one.mine_chance)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from comms.said.messages import (
 )
 from comms.strip_books import StripBooks
 from planner.clearance import MinesLeft, mines_left_by, scatter_of_all
-from planner.contacts import Objects
+from planner.contacts import LISTED_FROM, Objects, SeenObjects
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
@@ -132,7 +132,8 @@ class Metrics:
         elif isinstance(message, CoverageTile):
             self._hear_tile(received, message)
         elif isinstance(message, Contact):
-            self.objects.hear(message.x_m, message.y_m, message.sigma_m, message.score)
+            number = received.vehicle, received.header.incarnation, received.number
+            self.objects.hear(message.x_m, message.y_m, message.sigma_m, message.score, number)
         elif isinstance(message, Curve) and message.track > 0 and message.detection_curve is not None:
             self.curves.setdefault(received.vehicle, {})[message.track] = message.detection_curve
         elif isinstance(message, Plan) and vehicle is not None:
@@ -221,10 +222,8 @@ class Metrics:
         assert self.targets is not None
         x_m = np.array([target.x_m for target in self.targets.targets])
         y_m = np.array([target.y_m for target in self.targets.targets])
-        across, along = grid.frame.to_sweep(x_m, y_m)
-        columns = np.clip(np.rint(across / grid.cell_m).astype(int), 0, grid.columns - 1)
-        rows = np.clip(np.floor(along / grid.cell_m).astype(int), 0, grid.rows - 1)
-        return rows, columns
+        rows, columns = grid.cells_of(x_m, y_m)
+        return np.clip(rows, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)
 
     def mines_left(self, place: BoolArray | None = None) -> MinesLeft | None:
         """How many mines may be left in the area, or in some of its cells, by the map and by what was found anywhere;
@@ -232,7 +231,13 @@ class Metrics:
         if self.map is None:
             return None
         scatter = scatter_of_all(list(one.values()) for one in self.curves.values())
-        return mines_left_by(self.map, self.inside, self.objects.mines, scatter, place)
+        return mines_left_by(self.map, self.inside, float(self.mine_chances()[1].sum()), scatter, place)
+
+    def mine_chances(self) -> tuple[SeenObjects, FloatArray]:
+        """What contacts have told of, and with which chance each is a mine, shape (objects,)."""
+        seen = self.objects.seen()
+        nats = np.zeros(len(self.objects)) if self.map is None else self.map.nats_at(seen.x_m, seen.y_m)
+        return seen, seen.chances(nats)[:, 0]
 
     def close(self) -> None:
         """The mission has ended: vehicles were where their last courses led until now, and times that were not reached
@@ -341,6 +346,7 @@ class Metrics:
             return None
         return {
             "objects": len(self.objects),
+            "listed": int((self.mine_chances()[1] >= LISTED_FROM).sum()),
             "found": left.found,
             "left": left.mean,
             "left_low": left.low,
@@ -357,6 +363,23 @@ class Metrics:
             "targets": risk.size,
             "missed_share": float(missed.mean()),
             "predicted_missed_share": float(risk.mean()),
+            **self._truth_of_list(missed),
+        }
+
+    def _truth_of_list(self, missed: BoolArray) -> dict[str, float | None]:
+        """How right the list of mines is: the share of the targets that somebody has detected of which something
+        listed lies within reach, and how much is listed that is no target, a square kilometre of the area."""
+        assert self.map is not None
+        assert self.targets is not None
+        seen, chances = self.mine_chances()
+        listed = chances >= LISTED_FROM
+        x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
+        apart_m = np.hypot(seen.x_m[listed, np.newaxis] - x_m, seen.y_m[listed, np.newaxis] - y_m)
+        there = apart_m <= seen.gate_m[listed, np.newaxis]
+        area_km2 = float(self.inside.sum()) * self.map.grid.cell_area_m2 / 1e6
+        return {
+            "listed_share": None if missed.all() else float(there.any(axis=0)[~missed].mean()),
+            "false_listed_per_km2": float((~there.any(axis=1)).sum()) / area_km2,
         }
 
     def _strip_summary(self) -> dict[str, Any]:

@@ -44,7 +44,16 @@ from planner.types import PriorityGround
 from secondlook.errors import UserError
 from secondlook.geography import GeographicOrigin
 from secondlook.recorded.closest_approach import Closest
-from secondlook.recorded.ground import ContactRecord, RiskMap, TargetRecord, contacts, priorities, targets
+from secondlook.recorded.ground import (
+    ContactRecord,
+    ObjectRecord,
+    RiskMap,
+    TargetRecord,
+    contacts,
+    objects,
+    priorities,
+    targets,
+)
 from secondlook.recorded.kept_out import Entered
 from secondlook.recorded.message_records import Damage
 from secondlook.recorded.metrics import Metrics
@@ -220,6 +229,11 @@ class Mission(ABC):
     def contacts(self) -> list[ContactRecord]:
         """What the vehicles took for targets, in the order of finding."""
         return contacts(self.said(Contact))
+
+    @cached_property
+    def objects(self) -> list[ObjectRecord]:
+        """What lies on the seabed by all contacts together, those first that are mines most likely."""
+        return objects(*self._figures.mine_chances())
 
     @cached_property
     def targets(self) -> list[TargetRecord]:

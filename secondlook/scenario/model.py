@@ -173,6 +173,10 @@ class Coordinator(Mapping):
     sector rests on what lies in it and on its team; who is free joins another team where it is needed more."""
     switch_margin: Annotated[float, Field(ge=0, le=100)] = 0.2
     """A helper is turned round for a plan that is better by at least this share."""
+    contacts: bool | None = None
+    """Whether contacts that may be mines or not are looked at again, beside badly seen ground: where that makes it as
+    much surer for its time how many mines there are. Left out, they are where there is clutter or sensors raise false
+    alarms, and no `link`, as contacts do not cross the water."""
     platform: Annotated[str, Field(max_length=LONGEST_NAME)] | None = None
     """Where it is, which matters with a `link`: on a `ship`, or aboard a vehicle, by its id. Left out, on the ship."""
     position: Position | None = None
@@ -222,6 +226,14 @@ class Scenario(Mapping):
     link: Link | None = None
     """How platforms talk. Left out, everybody hears everybody, at once."""
 
+    @property
+    def looks_at_contacts(self) -> bool:
+        """Whether contacts are looked at again."""
+        if self.coordinator.contacts is not None or self.link is not None:
+            return bool(self.coordinator.contacts)
+        alarms = any(one.sensor.false_alarms_per_km2 for one in self.vehicles.values())
+        return alarms or self.targets.clutter_per_km2 is not None
+
     @field_validator("mission")
     @classmethod
     def _check_lane(cls, mission: Mission, info: ValidationInfo) -> Mission:
@@ -249,6 +261,8 @@ class Scenario(Mapping):
             raise refused("must be left out beside mission.goal, as contacts do not cross the water")
         vehicles: dict[str, Vehicle] = info.data.get("vehicles", {})
         coordinator: Coordinator | None = info.data.get("coordinator")
+        if coordinator is not None and coordinator.contacts:
+            raise refused("must be left out beside coordinator.contacts, as contacts do not cross the water")
         ship = coordinator is not None and coordinator.platform in (None, SHIP)
         if ship and SHIP in vehicles:
             raise refused(f"must stand with no vehicle called {SHIP}, as the coordinator is on a ship of that name")

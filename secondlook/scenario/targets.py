@@ -101,6 +101,13 @@ class Targets(Mapping):
     """`alike`: every target is seen as P_d says, which is what the map believes. `mines`: cylinders, truncated cones
     and wedges, turned and buried as it happens; some are seen better than P_d says, others worse."""
 
+    clutter_per_km2: Annotated[float | None, Field(ge=0, le=1000), AfterValidator(lambda one: one or None)] = Field(
+        default=None, json_schema_extra={"default": 0}
+    )
+    """How many things are expected to lie there, a square kilometre, that are seen as often as targets and are none:
+    rocks and debris. The recogniser gives most of their contacts lower scores, as it does for false alarms
+    (`sensor.false_alarms_per_km2`), but these are nothing, and each is raised once."""
+
     @field_validator("count")
     @classmethod
     def _check_count(cls, count: int, info: ValidationInfo) -> int:

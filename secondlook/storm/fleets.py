@@ -51,6 +51,10 @@ def draw_fleet(number: int) -> Scenario:
         **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
     drawn |= _link(number, drawn)
+    if number % 4 == 1:
+        drawn["targets"]["clutter_per_km2"] = 500
+    if number % 8 == 5 and "link" not in drawn:
+        drawn["mission"]["goal"] = {"kind": "cleared", "clearance": 0.6, "chance": 0.8}
     if helpers > 1:
         drawn["coordinator"]["helpers_a_team"] = 1 + number % 3
     _move_apart(vehicles, drawn["mission"].get("separation_m", 0.0))

@@ -41,11 +41,14 @@ FIGURES: Mapping[str, Any] = {
     "risk_primary_alone": _RISK,
     "risk_at": {"0": _RISK_AT, "1": _RISK_AT},
     "mines": {
-        **dict.fromkeys(("objects", "left_low", "left_high"), WHOLE),
+        **dict.fromkeys(("objects", "listed", "left_low", "left_high"), WHOLE),
         **dict.fromkeys(("found", "left", "none_left", "clearance"), REAL),
     },
     "goal": {"reached": YES_NO, "chance": REAL, "true": YES_NO},
-    "truth": {"targets": WHOLE, "missed_share": REAL, "predicted_missed_share": REAL},
+    "truth": {
+        "targets": WHOLE,
+        **dict.fromkeys(("missed_share", "predicted_missed_share", "listed_share", "false_listed_per_km2"), REAL),
+    },
     "hotspots": {
         **dict.fromkeys(("published", "places", "revisited", "left", "withdrawn", "failed"), WHOLE),
         **dict.fromkeys(("foreseen", "foreseen_revisited"), WHOLE),

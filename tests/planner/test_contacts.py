@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.contacts import LEAST_GATE_M, Objects, likelihood_ratio
+from planner.contacts import LEAST_GATE_M, Objects, likelihood_ratio, surer_by
 
 
 def test_a_contact_near_another_is_of_the_same_object_and_one_farther_off_is_not() -> None:
@@ -71,16 +71,88 @@ def test_a_ratio_is_that_of_the_densities_of_mines_and_of_false_alarms() -> None
     assert likelihood_ratio(0.0) == likelihood_ratio(1.0) == 0.0
 
 
-@pytest.mark.parametrize(("mines", "false"), [(60, 0), (60, 60), (20, 200), (0, 40)])
-def test_as_many_are_expected_to_be_mines_as_are(mines: int, false: int) -> None:
-    rng = np.random.default_rng(5)
+def test_what_was_heard_before_is_not_heard_again() -> None:
     objects = Objects()
-    scores = [*(0.5 + 0.5 * rng.beta(2, 2, mines)), *(0.75 * rng.beta(2, 3, false))]
-    for place, score in enumerate(scores):
-        objects.hear(10.0 * place, 0.0, 0.0, float(score))
-    assert len(objects) == mines + false
-    assert objects.mines == pytest.approx(mines, abs=4.0)
+    assert objects.hear(0.0, 0.0, 1.0, 0.8, ("primary", 1))
+    assert not objects.hear(0.0, 0.0, 1.0, 0.8, ("primary", 1))
+    assert objects.hear(0.0, 0.0, 1.0, 0.8, ("helper", 1))
+    assert objects.seen().contacts.tolist() == [2.0]
+
+
+def test_it_is_told_from_where_an_object_was_seen() -> None:
+    objects = Objects()
+    objects.hear(0.0, 0.0, 1.0, 0.8)
+    objects.hear(100.0, 0.0, 1.0, 0.8, across=True)
+    objects.hear(0.5, 0.0, 1.0, 0.8, across=True)
+    seen = objects.seen()
+    assert dict(zip(seen.x_m.tolist(), zip(seen.along.tolist(), seen.across.tolist(), strict=True), strict=True)) == {
+        0.25: (True, True),
+        100.0: (False, True),
+    }
+
+
+@pytest.mark.parametrize(
+    ("mines", "clutter", "alarms"), [(60, 0, 0), (60, 60, 0), (60, 0, 100), (20, 60, 100), (0, 40, 40)]
+)
+def test_as_many_are_expected_to_be_mines_as_are(mines: int, clutter: int, alarms: int) -> None:
+    """In a world as it is taken for: each is passed by looks that see 1.2 nats in all."""
+    rng, objects, found = np.random.default_rng(5), Objects(), 0
+    for place in range(mines + clutter + alarms):
+        is_mine = place < mines
+        often = rng.poisson(1.2) if place < mines + clutter else 1
+        found += is_mine and often > 0
+        for _ in range(often):
+            score = 0.5 + 0.5 * rng.beta(2, 2) if is_mine else 0.75 * rng.beta(2, 3)
+            objects.hear(10.0 * place, 0.0, 0.0, float(score))
+    seen = objects.seen()
+    chances = seen.chances(np.full(seen.x_m.shape, 1.2))
+    assert chances.sum(axis=1) == pytest.approx(1.0)
+    assert chances[:, 0].sum() == pytest.approx(found, abs=4.0)
+
+
+def test_who_is_looked_at_and_not_seen_again_is_less_likely_to_lie_there() -> None:
+    objects = Objects()
+    for place in range(60):
+        objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+        if place % 6 == 0:
+            objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+    seen = objects.seen()
+    once = seen.contacts == 1
+    poorly, well = seen.chances(np.full(60, 0.3)), seen.chances(np.where(once, 3.0, 0.3))
+    assert well[once, 2].mean() > poorly[once, 2].mean() + 0.2
+    assert (poorly[~once, 2] < 0.05).all()
 
 
 def test_nothing_heard_is_no_mine() -> None:
-    assert (len(Objects()), Objects().mines) == (0, 0.0)
+    objects = Objects()
+    assert len(objects) == 0
+    assert objects.seen().chances(np.zeros(0)).shape == (0, 3)
+
+
+def test_a_look_at_what_is_sure_makes_nothing_surer() -> None:
+    sure = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.5, 0.0]])
+    assert surer_by(sure, 2.0)[:3] == pytest.approx(0.0, abs=1e-9)
+    assert surer_by(sure, 0.0) == pytest.approx(0.0, abs=1e-9)  # nor one that sees nothing
+
+
+def test_a_look_that_sees_all_tells_mines_from_nothing() -> None:
+    # A half chance has a variance of 0.25; where the other half is nothing, to see it or not tells all.
+    assert surer_by(np.array([[0.5, 0.0, 0.5]]), 40.0) == pytest.approx(0.25)
+    # Where it is clutter its score must tell: by the overlap of the two densities less is learned.
+    (by_score,) = surer_by(np.array([[0.5, 0.5, 0.0]]), 40.0)
+    assert 0.15 < by_score < 0.25
+
+
+@given(
+    parts=st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3).filter(lambda some: sum(some) > 0.01),
+    nats=st.floats(0.0, 6.0),
+    more=st.floats(0.0, 3.0),
+)
+def test_a_better_look_makes_it_no_less_sure_and_none_more_than_it_can(
+    parts: list[float], nats: float, more: float
+) -> None:
+    chances = np.array([parts]) / sum(parts)
+    (by,), (by_more,) = surer_by(chances, nats), surer_by(chances, nats + more)
+    mine = chances[0, 0]
+    assert 0.0 <= by <= by_more + 1e-9
+    assert by_more <= mine * (1.0 - mine) + 1e-9

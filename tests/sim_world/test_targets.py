@@ -11,7 +11,7 @@ from planner.types import DetectionCurve, SonarShape
 from sim_world.area import Ground
 from sim_world.config import TargetsConfig
 from sim_world.footprints.side import SideSwath
-from sim_world.targets import Passed, Recogniser, make_targets
+from sim_world.targets import NO_TARGETS, Passed, Recogniser, make_clutter, make_targets
 
 AREA = ((0.0, 0.0), (1000.0, 0.0), (1000.0, 400.0), (0.0, 400.0))
 CURVE = DetectionCurve(np.array([0.0, 20.0, 30.0, 70.0, 130.0, 140.0]), np.array([0.0, 0.0, 0.2, 0.5, 0.1, 0.0]))
@@ -124,3 +124,23 @@ def test_a_sonar_that_sees_nothing_raises_no_false_alarms() -> None:
     blind = Recogniser(DetectionCurve(np.array([0.0, 100.0]), np.zeros(2)), false_alarms_per_km2=1e6)
     look = SideSwath.over(SHAPE, (0.0, 0.0), 0.0, 0.0, 4, (5.0, 5.0))
     assert blind.false_alarms(look, np.random.default_rng(1)) == []
+
+
+def test_clutter_is_as_dense_as_told_and_lies_elsewhere_than_targets() -> None:
+    counts = [len(make_clutter(100.0, AREA, seed).truth().targets) for seed in range(200)]
+    assert np.mean(counts) == pytest.approx(40.0, abs=4 * math.sqrt(40.0 / 200))  # 4 standard deviations
+    assert np.var(counts) == pytest.approx(40.0, abs=20.0)
+    assert make_clutter(0.0, AREA, 1) is NO_TARGETS
+    targets = {(one.x_m, one.y_m) for one in make_targets(TargetsConfig(50), AREA, 1).truth().targets}
+    assert not targets & {(one.x_m, one.y_m) for one in make_clutter(100.0, AREA, 1).truth().targets}
+
+
+def test_clutter_is_detected_as_targets_are_and_looks_as_false_alarms_do() -> None:
+    recogniser = Recogniser(CURVE, false_alarms_per_km2=0.0)
+    chances = np.full(4000, 0.4)
+    as_target, mines = recogniser.detect(passed(4000), chances, np.random.default_rng(1))
+    as_clutter, others = recogniser.detect(passed(4000), chances, np.random.default_rng(1), clutter=True)
+    assert as_target.tolist() == as_clutter.tolist()
+    assert all(0.5 <= one.score <= 1.0 for one in mines)
+    assert all(0.0 <= one.score <= 0.75 for one in others)
+    assert np.mean([one.score for one in others]) == pytest.approx(0.75 * 0.4, abs=0.02)

@@ -175,6 +175,7 @@ def coordinator(
     separation_m: float = 0.0,
     lost_after_ms: int = 30_000,
     goal: Goal | None = None,
+    contacts: bool = False,
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
     one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration.
@@ -197,6 +198,7 @@ def coordinator(
         ahead_ms=ahead_ms,
         separation_m=separation_m,
         goal=goal,
+        contacts=contacts,
     )
     told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
     run = run_info(400, 400, vehicles=vehicles)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -125,3 +127,34 @@ def test_from_which_risk_on_it_is_of_the_worst_is_a_quantile(size: int) -> None:
     risk = np.random.default_rng(size).uniform(0.01, 1.0, (1, size))
     assert ground(risk).worst_from() == np.quantile(risk, 0.7)
     assert ground(np.zeros((1, size))).worst_from() == 0.0
+
+
+class TestContacts:
+    """What a look at objects counts beside the risk, from along the tracks and from across."""
+
+    ALONG, ACROSS = np.array([[0.0, 4.0], [0.0, 1.0]]), np.array([[0.0, 6.0], [2.0, 0.0]])
+
+    def with_contacts(self) -> Ground:
+        risk = np.array([[0.8, 0.4], [0.4, 0.0]])
+        return replace(ground(risk), contacts=self.ALONG.copy(), contacts_across=self.ACROSS.copy())
+
+    def test_it_is_added_to_the_worth_of_each_cell_by_where_the_strip_runs(self) -> None:
+        one, plain = self.with_contacts(), ground(np.array([[0.8, 0.4], [0.4, 0.0]]))
+        assert one.worth() == pytest.approx(plain.worth() + self.ALONG)
+        assert one.turned.worth() == pytest.approx((plain.worth() + self.ACROSS).T)
+        assert one.turned.turned.worth() == pytest.approx(one.worth())
+        assert one.in_blocks(2).worth() == pytest.approx(plain.in_blocks(2).worth() + 5.0)
+
+    def test_looked_at_it_counts_no_more(self) -> None:
+        one = self.with_contacts()
+        other = one.copy()
+        before_m2 = one.left_m2()
+        assert before_m2 == pytest.approx(25 * 1.6 + 6.0 + 2.0 + 1.0)
+        one.fly(Window(0, 1, 0, 2))
+        assert one.contacts is not None
+        assert one.contacts.tolist() == [[0.0, 0.0], [0.0, 1.0]]
+        assert one.left_m2() == pytest.approx(25 * (0.4 + 0.2 + 0.4) + 2.0 + 1.0)
+        assert other.left_m2() == before_m2
+        other.turned.fly(Window(0, 1, 0, 2), share=0.5)  # the first column, half of it
+        assert other.contacts_across is not None
+        assert other.contacts_across.tolist() == [[0.0, 6.0], [1.0, 0.0]]

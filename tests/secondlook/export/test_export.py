@@ -82,6 +82,7 @@ def test_gdal_finds_everything_where_it_was_to_the_millimetre(exported: Path, mi
         "hotspot": [one.polygon for one in mission.hotspots],
         "strip": [one.polygon for one in mission.strips],
         "contact": [one.point for one in mission.contacts],
+        "object": [one.point for one in mission.objects],
         "missed_target": [one.point for one in mission.targets if one.found_by is None],
     }
     assert by_kind.keys() == {*wanted, "path"}
@@ -112,7 +113,17 @@ def test_times_are_told_in_utc_where_the_mission_has_a_start(exported: Path, mis
 def test_gdal_reads_the_kml_folder_by_folder(exported: Path, mission: RecordedMission) -> None:
     path = exported / "mission.kml"
     layers = {str(name) for name, _ in pyogrio.list_layers(path)}
-    assert layers == {"areas", "priorities", "tracks", "paths", "hotspots", "strips", "contacts", "missed targets"}
+    assert layers == {
+        "areas",
+        "priorities",
+        "tracks",
+        "paths",
+        "hotspots",
+        "strips",
+        "contacts",
+        "objects",
+        "missed targets",
+    }
     strips = features(path, "strips")
     assert [int(str(one["number"])) for _, one in strips] == [one.number for one in mission.strips]
     assert [one["state"] for _, one in strips] == [

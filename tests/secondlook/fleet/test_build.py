@@ -205,13 +205,29 @@ def test_the_world_is_told_what_is_true_and_each_vehicle_how_it_errs() -> None:
         load_scenario(
             "tellaro",
             [
-                "targets={count: 7, correlation: 0.4, aspect_deg: 45, kinds: mines}",
+                "targets={count: 7, correlation: 0.4, aspect_deg: 45, kinds: mines, clutter_per_km2: 40}",
                 f"vehicles.primary.sensor.estimate={estimate}, noise_along_m: 60}}",
                 "vehicles.helper.sensor.false_alarms_per_km2=8",
             ],
         )
     )
-    assert odd.targets == TargetsConfig(7, correlation=0.4, aspect_rad=math.pi / 4, kinds="mines")
+    assert odd.targets == TargetsConfig(7, correlation=0.4, aspect_rad=math.pi / 4, kinds="mines", clutter_per_km2=40.0)
     primary, helper = odd.vehicles
     assert primary.sensor.estimate == EstimateConfig(0.1, 0.2, 0.3, 40.0, True, 0.5, 60.0)
     assert (primary.sensor.false_alarms_per_km2, helper.sensor.false_alarms_per_km2) == (0.0, 8.0)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "looks"),
+    [
+        ((), False),
+        (("targets.clutter_per_km2=5",), True),
+        (("vehicles.helper.sensor.false_alarms_per_km2=5",), True),
+        (("targets.clutter_per_km2=5", "coordinator.contacts=false"), False),
+        (("coordinator.contacts=true",), True),
+        (("targets.clutter_per_km2=5", "link.profile=micromodem-1"), False),
+    ],
+)
+def test_contacts_are_looked_at_again_where_some_are_of_no_target(overrides: tuple[str, ...], looks: bool) -> None:
+    fleet = build_fleet(load_scenario("tellaro", overrides), record=False)
+    assert fleet.specs["coordinator"].config.contacts is looks

@@ -45,6 +45,7 @@ def test_every_kind_is_there_and_every_ring_is_closed_and_counterclockwise(
         "hotspot": len(mission.hotspots),
         "strip": len(mission.strips),
         "contact": len(mission.contacts),
+        "object": len(mission.objects),
         "missed_target": sum(target.found_by is None for target in mission.targets),
     }
     assert not any(key.endswith("_utc") for feature in collection["features"] for key in feature["properties"])

@@ -1,0 +1,112 @@
+"""What a second look at contacts is worth, by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from by_hand import PRIMARY
+from coordinator_by_hand import GRID, OPEN, Told, coordinator
+
+from comms.said.messages import Contact
+from coordinator.coordinator import Coordinator
+from coordinator.cut.window import Window
+from coordinator.expect.contacts import KnownContacts
+from planner.clearance import PRIOR_MINES
+from planner.contacts import surer_by
+
+WHOLE = Window(0, GRID.rows, 0, GRID.columns)
+LOOK, ONES = np.full(GRID.shape, 0.5), np.ones(GRID.shape)
+DOUBTFUL = 0.62  # a score that some mines have and some others, too
+
+
+def hear(
+    told: Told, *places: tuple[float, float], score: float = DOUBTFUL, name: str = PRIMARY, first: int = 1
+) -> None:
+    for number, place in enumerate(places, first):
+        told.node.hear(f"agent/{name}/contact/{number}", Contact(*place, 1.0, score, number))
+
+
+def known(told: Told) -> KnownContacts:
+    node = told.node.node
+    assert isinstance(node, Coordinator)
+    return node._contacts
+
+
+def fleet_with_contacts(risk: float = 0.3) -> Told:
+    """Twenty mines and twenty others that are known as such, and the ground seen so far."""
+    told = coordinator(contacts=True, idle=())
+    told.layer(PRIMARY, np.full(GRID.shape, risk))
+    hear(told, *((20.0 * number, 300.0) for number in range(20)), score=0.9)
+    hear(told, *((20.0 * number, 350.0) for number in range(20)), score=0.1, first=21)
+    return told
+
+
+def test_it_is_by_how_much_it_makes_the_number_of_mines_surer_over_how_dense_they_lie() -> None:
+    told = fleet_with_contacts()
+    hear(told, (200.0, 102.5), first=41)
+    contacts = known(told)
+    seen, chances = contacts.objects()
+    (place,) = np.flatnonzero(np.abs(seen.y_m - 102.5) < 1.0)
+    by = float(surer_by(chances[place : place + 1], np.log(2.0))[0])  # a look that takes half sees ln 2 nats
+    assert by > 0.03
+    density_m2 = (chances[:, 0].sum() + PRIOR_MINES) / (0.7 * GRID.columns * GRID.rows * GRID.cell_area_m2)
+    worth = contacts.worth(WHOLE, LOOK, ONES)
+    assert worth is not None
+    about = np.s_[19:22, 39:42]  # row 20 and column 40, and the cells about them
+    assert worth[0][about] == pytest.approx(by / density_m2 / 9, rel=0.01)
+    assert worth[0][np.s_[0:40, :]].sum() == pytest.approx(by / density_m2, rel=0.01)
+    np.testing.assert_array_equal(*worth)  # looks are independent for the map: the aspect does not matter
+
+
+def test_what_is_known_for_sure_counts_next_to_nothing() -> None:
+    told = fleet_with_contacts()
+    worth = known(told).worth(WHOLE, LOOK, ONES)
+    assert worth is not None
+    sure_m2 = worth[0].sum()
+    hear(told, (200.0, 102.5), first=41)
+    worth = known(told).worth(WHOLE, LOOK, ONES)
+    assert worth is not None
+    assert worth[0].sum() > 50.0 * sure_m2
+
+
+def test_where_no_second_look_goes_and_beyond_the_window_nothing_counts() -> None:
+    told = fleet_with_contacts()
+    hear(told, (200.0, 102.5), first=41)
+    assert known(told).worth(Window(0, 10, 0, 10), LOOK[:10, :10], ONES[:10, :10]) is None
+    nowhere = known(told).worth(WHOLE, np.zeros(GRID.shape), ONES)
+    assert nowhere is not None
+    assert not nowhere[0].any()
+
+
+def test_a_contact_that_comes_twice_is_one() -> None:
+    told = fleet_with_contacts()
+    before = known(told).mines
+    hear(told, (0.0, 300.0), score=0.1)  # its number was said before, with another score
+    assert known(told).mines == pytest.approx(before)
+
+
+def test_a_strip_is_cut_where_contacts_may_be_mines() -> None:
+    for contacts, expected in ((True, 1), (False, 0)):
+        told = coordinator(contacts=contacts, idle=())
+        told.layer(PRIMARY, np.full(GRID.shape, 0.05))  # too well seen for any look to be worth flying there
+        hear(told, *((20.0 * number, 300.0) for number in range(10)), score=0.9)
+        hear(told, *((20.0 * number, 350.0) for number in range(20)), score=0.1, first=21)
+        hear(told, *((200.0 + 3.0 * number, 100.0 + 20.0 * number) for number in range(4)), first=51)
+        told.plan(100.0, 300.0)
+        told.keep_alive((PRIMARY,), 125)
+        strips = told.strips()
+        assert len(strips) == expected
+        for strip in strips.values():
+            assert strip.state is OPEN
+            assert strip.start_x_m - strip.width_m / 2 < 200.0 < strip.start_x_m + strip.width_m / 2
+            assert strip.why.endswith("; 4 contacts that may be mines")
+
+
+def test_where_looks_are_alike_for_the_map_one_from_another_aspect_counts_more() -> None:
+    told = fleet_with_contacts()
+    known(told)._fleet.map.rho = 0.75
+    hear(told, (200.0, 102.5), first=41)  # by the primary, along its track
+    worth = known(told).worth(WHOLE, LOOK, ONES)
+    assert worth is not None
+    along, across = (one[19:22, 39:42].sum() for one in worth)
+    assert along == pytest.approx(0.25 * across)
