@@ -24,6 +24,7 @@ from typing import Any
 
 import secondlook
 from bench import calibration, compared, link_share
+from secondlook.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "figures"
@@ -51,6 +52,26 @@ CALIBRATED_BY = (
     *("seed", "failure", "risk.mean", "risk.worst30_mean", "truth.targets", "truth.missed_share"),
     *("mines.left", "mines.left_low", "mines.left_high"),
 )
+
+HELPERS_TWICE = "mission.deadline_factor=2"
+GOALS: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("tellaro", ("mission.goal={kind: cleared, clearance: 0.6}",)),
+    ("patchy", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.6}")),
+    ("two-helpers", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.9}")),
+    ("two-helpers", (HELPERS_TWICE, "targets.count=10", "mission.goal={kind: none_left, chance: 0.5}")),
+    (
+        "two-helpers",
+        (
+            "targets.count=20",
+            "mission.goal={kind: lane, lane_m: [[600, 20], [600, 380]], width_m: 30, risk: 0.1}",
+        ),
+    ),
+)
+"""What missions are flown for, and what they need to reach it."""
+
+CLUTTERED = ("tellaro", "two-helpers", "patchy", "clear")
+CLUTTER = ("targets.count=20", "targets.clutter_per_km2=100")
+FALSE_ALARMS = "vehicles.{}.sensor.false_alarms_per_km2=20"
 
 Document = dict[str, Any]
 
@@ -135,13 +156,34 @@ def _first_linked(document: Document) -> Mission:
 
 
 def _fly_calibrated(folder: Path) -> Document:
+    return _fly_overridden(folder, CALIBRATED, "1..40", CALIBRATED_BY)
+
+
+def _fly_goals(folder: Path) -> Document:
+    return _fly_overridden(folder, GOALS, "1..60", calibration.GOAL_FIGURES)
+
+
+def _fly_cluttered(folder: Path) -> Document:
+    flown = []
+    for scenario in CLUTTERED:
+        alarms = [FALSE_ALARMS.format(name) for name in load_scenario(scenario).vehicles]
+        all_of_it = (*CLUTTER, *alarms)
+        flown += [(scenario, (*all_of_it, f"coordinator.contacts={told}")) for told in ("false", "true")]
+    return _fly_overridden(folder, flown, "1..20", calibration.CONTACT_FIGURES)
+
+
+def _fly_overridden(
+    folder: Path, flown: Iterable[tuple[str, tuple[str, ...]]], seeds: str, figures: Iterable[str]
+) -> Document:
+    """Flies scenarios, each with its overrides, and keeps some figures of each mission."""
     rows = []
-    for place, (scenario, overrides) in enumerate(CALIBRATED):
+    for place, (scenario, overrides) in enumerate(flown):
         out = folder / str(place)
         set_ = [word for one in overrides for word in ("--set", one)]
-        _secondlook("sweep", scenario, "--seeds", "1..40", *set_, "--out", str(out))
+        _secondlook("sweep", scenario, "--seeds", seeds, *set_, "--out", str(out))
         swept = secondlook.load_sweep(out).table.to_pylist()
-        rows += [{"scenario": scenario, "overrides": " ".join(overrides), **_some(row, CALIBRATED_BY)} for row in swept]
+        told = {"scenario": scenario, "overrides": list(overrides)}
+        rows += [{**told, **_some(row, figures)} for row in swept]
     return {"rows": rows}
 
 
@@ -152,7 +194,8 @@ def _some(row: Document, names: Iterable[str]) -> Document:
 
 def _first_calibrated(document: Document) -> Mission:
     row = next(row for row in document["rows"] if row["overrides"])
-    overrides = tuple(row["overrides"].split(" "))
+    overrides = row["overrides"].split(" ") if isinstance(row["overrides"], str) else row["overrides"]
+    overrides = tuple(overrides)
     return Mission(row["scenario"], overrides, row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
 
 
@@ -167,6 +210,18 @@ TABLES: dict[str, Table] = {
         page="docs/clearance.md",
         fly=_fly_calibrated,
         lines=lambda document: calibration.table(document["rows"], ("scenario", "overrides")),
+        first=_first_calibrated,
+    ),
+    "goals": Table(
+        page="docs/clearance.md",
+        fly=_fly_goals,
+        lines=lambda document: calibration.goal_table(document["rows"], ("scenario", "overrides")),
+        first=_first_calibrated,
+    ),
+    "contacts": Table(
+        page="docs/clearance.md",
+        fly=_fly_cluttered,
+        lines=lambda document: calibration.contact_table(document["rows"], ("scenario", "coordinator.contacts")),
         first=_first_calibrated,
     ),
     "across-the-water": Table(

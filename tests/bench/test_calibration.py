@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bench.calibration import main, share_interval, table
+from bench.calibration import contact_table, goal_table, main, share_interval, table
 
 
 def row(left: int, low: int, high: int, **varied: Any) -> dict[str, Any]:
@@ -36,3 +36,23 @@ def test_the_interval_of_a_share_is_wilsons() -> None:
 def test_what_is_no_sweep_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([str(tmp_path)]) == 2
     assert "is not the folder of a sweep" in capsys.readouterr().err
+
+
+def test_of_goals_it_is_told_how_often_they_are_reached_and_are_so() -> None:
+    goal = {"failure": None, "goal.reached": True, "goal.true": True, "time.mission_s": 1000.0, "scenario": "tellaro"}
+    rows = [goal, {**goal, "time.mission_s": 2000.0}, {**goal, "goal.true": False, "time.mission_s": 3000.0}]
+    rows += [{**goal, "goal.reached": False, "overrides": ["a=1", "b=2"]}, {**goal, "goal.reached": None}]
+    head, _, flown, other = goal_table(rows, ["scenario", "overrides"])
+    assert head == "| `scenario` | `overrides` | missions | reached it | after, s | true | 95 % of that |"
+    assert flown == "| `tellaro` | `-` | 3 | 3 | 2000 | 66.7% | 20.8% to 93.9% |"
+    assert other == "| `tellaro` | `a=1` `b=2` | 1 | 0 | - | - | - |"
+    assert goal_table([{**goal, "goal.reached": None}], ["scenario"]) == []
+
+
+def test_of_contacts_it_is_told_how_right_the_list_of_mines_is() -> None:
+    one = {"failure": None, "risk.mean": 0.1, "truth.missed_share": 0.2, "truth.listed_share": 0.9}
+    one |= {"truth.false_listed_per_km2": 1.0, "scenario": "clear", "overrides": ["x=1", "coordinator.contacts=true"]}
+    other = {**one, "risk.mean": 0.2, "truth.listed_share": 0.8, "truth.false_listed_per_km2": 2.0}
+    rows = [one, other, {**one, "truth.listed_share": None}]
+    *_, line = contact_table(rows, ["scenario", "coordinator.contacts"])
+    assert line == "| `clear` | `true` | 2 | 0.150 | 0.80 | 0.85 | 1.50 |"
