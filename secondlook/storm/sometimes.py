@@ -200,6 +200,7 @@ REASONS: Mapping[str, str] = MappingProxyType(
 WHYS: Mapping[str, str] = MappingProxyType(
     {f"a strip lies at: {one}": one for one in (NADIR_GAP, RANGE_END, BEYOND, BEST)}
     | {"a strip is seen badly by a track": "seen badly by ", "a strip is foreseen beside a track": "expected beside "}
+    | {"a strip lies at contacts that may be mines": " that may be mines"}
 )
 REFUSALS: Mapping[str, str] = MappingProxyType(
     {
@@ -214,6 +215,7 @@ DISK_FULL = "a mission fails as its disk is full"
 ENDINGS: Mapping[str, str] = MappingProxyType(
     {
         "the mission ends with nothing left": "every primary has finished and no strip is left",
+        "the mission ends with its goal": "the goal is reached: ",
         "the mission ends by the clock": "the deadline is reached",
         "the mission ends by the last primary's end": " times the last primary's end is reached",
         "the mission ends before the survey does": ", the survey is not finished",
