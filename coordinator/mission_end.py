@@ -18,6 +18,9 @@ from coordinator.vehicles import KnownVehicle
 ASK_AFTER_MS, ASK_EVERY_MS = 1000, 10_000  # what is under way may take a little longer than the state that tells of it
 SAY_AGAIN_AFTER_MS = (*range(10, 100, 10), *range(1000, 10_000, 1000))
 
+GOAL_REACHED = "the goal is reached"
+"""What the reason begins with where it is that."""
+
 
 class MissionEnd:
     """The mission is over when every primary has finished, all of which states tell has arrived and was cut by, no
@@ -57,7 +60,7 @@ class MissionEnd:
             cut_short = f"; the survey of {early} has ended early, as the battery lasted for no more" if early else ""
             reason = f"every primary has finished and no strip is left{cut_short}"
         elif goal := self._goal.find(now_ms):
-            reason = f"the goal is reached: {goal}, {len(left)} strips are left"
+            reason = f"{GOAL_REACHED}: {goal}, {len(left)} strips are left"
         elif now_ms >= self.deadline_ms():
             by_the_clock = math.isfinite(self._config.deadline_s)
             end = "the deadline" if by_the_clock else f"{self._config.deadline_factor:g} times the last primary's end"

@@ -30,6 +30,7 @@ from comms.said.routing import Routing
 from comms.said.topics import Topic
 from comms.strip_books import GONE, LEFT, StripBooks
 from coordinator.ledger import ALLOWED
+from coordinator.mission_end import GOAL_REACHED
 from coordinator.reasons import BEST, BEYOND, NADIR_GAP, RANGE_END
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.storm.witness import NOTED, Witness
@@ -215,7 +216,7 @@ DISK_FULL = "a mission fails as its disk is full"
 ENDINGS: Mapping[str, str] = MappingProxyType(
     {
         "the mission ends with nothing left": "every primary has finished and no strip is left",
-        "the mission ends with its goal": "the goal is reached: ",
+        "the mission ends with its goal": GOAL_REACHED,
         "the mission ends by the clock": "the deadline is reached",
         "the mission ends by the last primary's end": " times the last primary's end is reached",
         "the mission ends before the survey does": ", the survey is not finished",

@@ -19,6 +19,7 @@ from comms.said.messages import (
     TaskStatus,
 )
 from coordinator.ledger import NUMBERS_A_SECOND, WITH_A_VEHICLE
+from coordinator.mission_end import GOAL_REACHED
 from secondlook.fleet.link import answer_within_ms_of, lost_after_ms_of, silent_after_ms_of
 from secondlook.testing.flight import Flight, fail_if, lives, reached
 
@@ -91,6 +92,8 @@ def _lost(flight: Flight, said: Received[StripStatus]) -> str | None:
 
 def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) -> list[str]:
     overs = flight.said(MissionOver)
+    if flight.scenario.mission.goal is not None and overs and overs[0].message.reason.startswith(GOAL_REACHED):
+        return []
     over_ms = overs[0].header.sent_ms if overs else 0
     surveyed_ms = _surveyed_ms(flight, over_ms)
     if surveyed_ms is None or over_ms >= int(flight.scenario.mission.ends_s(surveyed_ms / 1000) * 1000):

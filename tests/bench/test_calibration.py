@@ -39,7 +39,13 @@ def test_what_is_no_sweep_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 def test_of_goals_it_is_told_how_often_they_are_reached_and_are_so() -> None:
-    goal = {"failure": None, "goal.reached": True, "goal.true": True, "time.mission_s": 1000.0, "scenario": "tellaro"}
+    goal: dict[str, Any] = {
+        "failure": None,
+        "goal.reached": True,
+        "goal.true": True,
+        "time.mission_s": 1000.0,
+        "scenario": "tellaro",
+    }
     rows = [goal, {**goal, "time.mission_s": 2000.0}, {**goal, "goal.true": False, "time.mission_s": 3000.0}]
     rows += [{**goal, "goal.reached": False, "overrides": ["a=1", "b=2"]}, {**goal, "goal.reached": None}]
     head, _, flown, other = goal_table(rows, ["scenario", "overrides"])
@@ -50,7 +56,7 @@ def test_of_goals_it_is_told_how_often_they_are_reached_and_are_so() -> None:
 
 
 def test_of_contacts_it_is_told_how_right_the_list_of_mines_is() -> None:
-    one = {"failure": None, "risk.mean": 0.1, "truth.missed_share": 0.2, "truth.listed_share": 0.9}
+    one: dict[str, Any] = {"failure": None, "risk.mean": 0.1, "truth.missed_share": 0.2, "truth.listed_share": 0.9}
     one |= {"truth.false_listed_per_km2": 1.0, "scenario": "clear", "overrides": ["x=1", "coordinator.contacts=true"]}
     other = {**one, "risk.mean": 0.2, "truth.listed_share": 0.8, "truth.false_listed_per_km2": 2.0}
     rows = [one, other, {**one, "truth.listed_share": None}]

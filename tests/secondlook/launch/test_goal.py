@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,7 +18,7 @@ from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.recorded.metrics import Metrics
 from secondlook.report import report_page
 from secondlook.scenario import load_scenario
-from secondlook.testing import Fleet, assert_repeats
+from secondlook.testing import Fleet, assert_no_strip_lost, assert_repeats
 
 SOME = "mission.goal={kind: cleared, clearance: 0.3}"
 ALL = "mission.goal={kind: none_left, chance: 0.99}"
@@ -104,3 +105,12 @@ def test_check_flies_it_to_see_whether_it_is_reached(called: Call) -> None:
     assert err.startswith(
         "mission.goal: no mine left with a chance of 0.99 is reached in 0 of 3 missions flown to try it; missed: the "
     )
+
+
+def test_strips_that_are_open_when_the_goal_is_reached_are_not_lost(tmp_path: Path) -> None:
+    flight = Fleet(load_scenario(str(BRIEF), [SOME]), folder=tmp_path).run()
+    assert flight.summary["hotspots"]["left"] > 0
+    assert_no_strip_lost(flight)
+    early = replace(flight, scenario=load_scenario(str(BRIEF)))  # without a goal they would be
+    with pytest.raises(AssertionError, match="when the mission was over at .* s, before its deadline"):
+        assert_no_strip_lost(early)
