@@ -64,7 +64,8 @@ class AdaptiveSpacing:
     """Algorithm 1 of the paper, run again after every pair on the width beyond the covered edge.
 
     Where r_eff falls below 3 r_min, pairs do not close their nadir gaps (equation 1). From then on the fewest single
-    tracks are laid over all that is left, before and behind.
+    tracks are laid over all that is left, before and behind. Without a nadir gap there is none to close, and they are
+    laid from the first: a pair covers 3 r, two single tracks 4 r.
 
     `nadir_gap_m`: r_min. `told_range_m`: the upper limit until the first pair is flown; then r_eff takes its place.
     """
@@ -79,6 +80,9 @@ class AdaptiveSpacing:
         note = ""
         if r_eff_m is not None and r_eff_m < highest_m:
             note = f"r_eff {r_eff_m} m is nothing to plan with: planning with {highest_m:g} m, gaps remain"
+        if self.nadir_gap_m == 0.0:
+            found = fewest_tracks([(covered_m, width_m)], 0.0, highest_m)
+            return SpacingDecision(found.range_m, found.offsets_m, replans=True, note=note, singles=True)
         choice = adapt_range(width_m - covered_m, self.nadir_gap_m, lowest_m, highest_m)
         offsets = track_offsets(width_m, self.nadir_gap_m, choice.range_m, covered_m=covered_m)
         return SpacingDecision(choice.range_m, tuple(offsets), replans=True, note=note)
@@ -91,10 +95,11 @@ class AdaptiveSpacing:
         if not goes_on and not (covers and r_eff_m < pairs_m):
             return None
         left = spans_left(width_m, self.nadir_gap_m, [(track.across_m, track.range_m) for track in flown])
-        found = fewest_tracks(left, self.nadir_gap_m, r_eff_m if covers else pairs_m)
+        planned_m = r_eff_m if covers else counted_range_m(r_eff_m, self.nadir_gap_m, self.told_range_m)
+        found = fewest_tracks(left, self.nadir_gap_m, planned_m)
         many = "the fewest" if found.fewest else "few"
         if not covers:
-            note = f"r_eff {r_eff_m} m is nothing to plan with: {many} single tracks for {pairs_m} m, gaps remain"
+            note = f"r_eff {r_eff_m} m is nothing to plan with: {many} single tracks for {planned_m:g} m, gaps remain"
         elif r_eff_m < pairs_m:
             note = f"r_eff {r_eff_m} m is below 3 r_min: {many} single tracks over all that is left"
         else:

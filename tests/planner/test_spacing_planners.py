@@ -94,15 +94,25 @@ class TestAdaptiveSpacing:
 
     def test_without_a_nadir_gap_every_range_can_be_planned_with(self) -> None:
         planner = AdaptiveSpacing(0, 50)
-        assert planner.decide(90, 0, None) == SpacingDecision(30, (30, 60), replans=True)
+        assert planner.decide(90, 0, None) == SpacingDecision(45, (45,), replans=True, singles=True)
         assert planner.decide(90, 0, 10).note == ""
-        assert planner.decide(90, 0, 10).range_m == 10
+        assert planner.decide(90, 0, 10).range_m == 9  # five tracks see 18 m each
+
+    def test_without_a_nadir_gap_single_tracks_are_a_quarter_fewer_than_pairs(self) -> None:
+        planner, widths_m = AdaptiveSpacing(0, 73), range(200, 1000, 10)
+        singles = sum(len(planner.decide(width_m, 0, None).offsets_m) for width_m in widths_m)
+        assert singles == sum(math.ceil(width_m / (2 * 73)) for width_m in widths_m)
+        assert singles < 0.76 * sum(track_count(width_m, 0, 73) for width_m in widths_m)
 
     def test_a_track_without_a_nadir_gap_that_saw_nothing_tells_no_range(self) -> None:
         planner = AdaptiveSpacing(0, 50)
         decision = planner.decide(90, 0, 0)
-        assert (decision.range_m, decision.offsets_m) == (30, (30, 60))
+        assert (decision.range_m, decision.offsets_m) == (45, (45,))
         assert decision.note == "r_eff 0 m is nothing to plan with: planning with 50 m, gaps remain"
+        going_on = planner.cover(200, [FlownTrack(45.0, 45.0, single=True)], 0)
+        assert going_on is not None
+        assert (going_on.range_m, going_on.offsets_m) == (28, (118, 172))  # 110 m are left
+        assert going_on.note == "r_eff 0 m is nothing to plan with: the fewest single tracks for 50 m, gaps remain"
 
     @given(
         width_m=st.floats(1, 5000),

@@ -260,8 +260,8 @@ class TestSpacingAtItsLimits:
         ("nadir_gap_m", "p_detect", "second"),
         [
             (40.2, flat(0.3, 25, 30), 121),  # 3 r_min is 120.6 m: no whole metre
-            (0.0, flat(0.3, 0, 60), 58),  # beyond 234 + 60 m: two pairs of 174 m and a single of 58 m
-            (0.0, flat(0.0, 0, 60), 117),  # nothing admissible and no nadir gap: up to 145 m, as told
+            (0.0, flat(0.3, 0, 60), 58),  # 700 m in three tracks for 117 m; beyond two of them 232 m, in two
+            (0.0, flat(0.0, 0, 60), 116),  # nothing admissible and no nadir gap: in one, up to 145 m as told
         ],
     )
     def test_any_nadir_gap_can_be_planned_with(self, nadir_gap_m: float, p_detect: P_Detect, second: int) -> None:
