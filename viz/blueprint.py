@@ -28,11 +28,12 @@ def mission_blueprint(extent: Extent, run: RunInfo, *, has_link: bool = False) -
         below = rrb.Tabs(_ranges_view(), curves)
         beside = rrb.Vertical(_ages_view(), rrb.Tabs(_bytes_view(), _shares_view()), row_shares=[4, 3])
     log = _log_view()
+    over_time = rrb.Tabs(_metrics_view(), _mines_view())
     if wide:
         layout: rrb.Container = rrb.Vertical(
             area,
             rrb.Horizontal(
-                rrb.Vertical(_metrics_view(), below, row_shares=[4, 3]),
+                rrb.Vertical(over_time, below, row_shares=[4, 3]),
                 beside,
                 rrb.Vertical(_activity_view(), _tasks_view()),
                 log,
@@ -42,7 +43,7 @@ def mission_blueprint(extent: Extent, run: RunInfo, *, has_link: bool = False) -
         )
     else:
         column = rrb.Vertical(
-            rrb.Horizontal(rrb.Vertical(_metrics_view(), below, row_shares=[4, 3]), beside),
+            rrb.Horizontal(rrb.Vertical(over_time, below, row_shares=[4, 3]), beside),
             rrb.Horizontal(_activity_view(), _tasks_view()),
             log,
             row_shares=[5, 4, 4],
@@ -115,6 +116,10 @@ def _series_view(
 
 def _metrics_view() -> rrb.TimeSeriesView:
     return _series_view(paths.METRICS, "Risk and coverage over time", rrb.Corner2D.LeftBottom, are_shares=True)
+
+
+def _mines_view() -> rrb.TimeSeriesView:
+    return _series_view(paths.MINES, "Mines found, and left", rrb.Corner2D.LeftTop)
 
 
 def _log_view() -> rrb.TextLogView:

@@ -30,6 +30,7 @@ from viz.canvas import Canvas
 from viz.curves import Curves
 from viz.fleet import Fleet
 from viz.link import Link
+from viz.mines import Mines
 from viz.recorder_config import LogLine, RecorderConfig
 from viz.risk_map import RiskMap, put_priorities
 from viz.second_looks import SecondLooks
@@ -82,6 +83,7 @@ class _Mission:
         canvas.present(run.scenario, mission_blueprint(extent, run, has_link=config.link is not None), told)
         self._map = RiskMap(canvas, run, extent, round(config.draw_every_s * 1000))
         put_priorities(canvas, config.priorities)
+        self._mines = Mines(canvas, self._map.map, self._map.inside)
         self._story = config.story()
         self._table = TaskTable(canvas, run)
         self._second_looks = SecondLooks(canvas, extent)
@@ -95,9 +97,9 @@ class _Mission:
             Plan: (fleet.on_plan, curves.on_plan),
             AgentState: (fleet.on_state,),
             TaskStatus: (fleet.on_task_status, self._table.on_task_status),
-            Contact: (fleet.on_contact,),
+            Contact: (fleet.on_contact, self._mines.on_contact),
             Hotspot: (self._second_looks.on_hotspot,),
-            Curve: (curves.on_curve,),
+            Curve: (curves.on_curve, self._mines.on_curve),
             TruthTargets: (truth.on_targets,),
             TruthLook: (truth.on_look,),
             TruthPose: (truth.on_pose,),
@@ -120,6 +122,7 @@ class _Mission:
         self._time_ms = time_ms
         self._fleet.advance(time_ms)
         self._truth.advance(time_ms)
+        self._mines.advance(time_ms)
         self._map.advance(time_ms)
         self._second_looks.advance(time_ms)
         self._table.advance(time_ms)
@@ -130,6 +133,7 @@ class _Mission:
         self._fleet.finish(self._time_ms)
         self._truth.finish(self._time_ms)
         self._map.finish()
+        self._mines.finish(self._time_ms)
         self._second_looks.finish()
         self._table.finish()
         if self._link is not None:

@@ -135,10 +135,10 @@ class RiskMap:
 
     def __init__(self, canvas: Canvas, run: RunInfo, extent: Extent, draw_every_ms: int) -> None:
         self._canvas = canvas
-        self._map = FleetMap(run.grid.spec, run.rho)
-        self._inside = _inside(run)
+        self.map = FleetMap(run.grid.spec, run.rho)
+        self.inside = _inside(run)
         self._blocks = Blocks(run.grid.spec)
-        self._whole = {index for index, block in enumerate(self._blocks.all) if self._inside[block.window].all()}
+        self._whole = {index for index, block in enumerate(self._blocks.all) if self.inside[block.window].all()}
         self._tally = RiskTally(len(self._blocks.all))
         self._pace = Pace(max(draw_every_ms, LARGE_EVERY_MS if self._blocks.are_large else 0))
         self._tellers: defaultdict[int, set[str]] = defaultdict(set)  # who has told of a block
@@ -152,7 +152,7 @@ class RiskMap:
         self._put_frame(run, extent)
         for index, block in enumerate(self._blocks.all):
             self._put_place(block, run.grid.spec.cell_m)
-            nobody, certain = self._map.levels_within(block.window, ())
+            nobody, certain = self.map.levels_within(block.window, ())
             self._count(index, nobody, certain)
             self._cover_block(0, block, nobody)
         self._add_statistics(0)
@@ -160,7 +160,7 @@ class RiskMap:
     def on_tile(self, received: Received, tile: CoverageTile) -> None:
         """Takes a tile; one that does not lie on the grid is left out."""
         try:
-            news = self._map.join(received.vehicle, received.header.incarnation, tile)
+            news = self.map.join(received.vehicle, received.header.incarnation, tile)
         except ValueError:
             return
         if news:
@@ -189,7 +189,7 @@ class RiskMap:
 
     def _draw_block(self, time_ms: int, index: int) -> None:
         block = self._blocks.all[index]
-        levels, risk = self._map.levels_within(block.window, self._tellers[index])
+        levels, risk = self.map.levels_within(block.window, self._tellers[index])
         # The first row of an image is drawn at the far end of the along axis.
         image = np.rint(risk * 255).astype(np.uint8).take(levels)[::-1]
         self._canvas.put(time_ms, f"{paths.RISK}/{block.name}", rr.GridMap.from_fields(data=image.tobytes()))
@@ -198,13 +198,13 @@ class RiskMap:
 
     def _count(self, index: int, levels: NDArray[np.intp], risk: FloatArray) -> bool:
         """Counts a block's risk; whether another number of its cells is seen now."""
-        inside = self._inside[self._blocks.all[index].window]
+        inside = self.inside[self._blocks.all[index].window]
         counting = levels.ravel() if index in self._whole else levels[inside]
         return self._tally.replace(index, np.bincount(counting, minlength=len(risk)), risk)
 
     def _cover_block(self, time_ms: int, block: Block, levels: NDArray[np.intp]) -> None:
         unseen = np.where(levels == 0, _UNSEEN, _CLEAR)
-        cover = np.where(self._inside[block.window], unseen, _OUTSIDE)[::-1]  # cells outside count for nothing
+        cover = np.where(self.inside[block.window], unseen, _OUTSIDE)[::-1]  # cells outside count for nothing
         self._canvas.put(time_ms, f"{paths.UNSEEN}/{block.name}", rr.GridMap.from_fields(data=cover.tobytes()))
 
     def _add_statistics(self, time_ms: int) -> None:
@@ -233,7 +233,7 @@ class RiskMap:
         self._put_scale(extent)
 
     def _put_place(self, block: Block, cell_m: float) -> None:
-        rows, columns = self._inside[block.window].shape
+        rows, columns = self.inside[block.window].shape
         place = rr.Transform3D(translation=[block.first_column * cell_m, block.first_row * cell_m, 0.0])
         self._canvas.put_static(f"{paths.RISK}/{block.name}", place, _levels(columns, rows, cell_m))
         self._canvas.put_static(f"{paths.UNSEEN}/{block.name}", place, _cover(columns, rows, cell_m))

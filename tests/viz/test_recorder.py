@@ -26,6 +26,7 @@ from comms.node import Received
 from comms.said.announcement import Hole, RunInfo, Vertex
 from comms.said.messages import (
     AgentState,
+    Contact,
     CoverageTile,
     Curve,
     Hotspot,
@@ -45,6 +46,7 @@ from comms.said.topics import TOPICS
 from comms.strip_books import state_in_words
 from planner.region import Region
 from planner.types import PriorityGround
+from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.story import Story
 from tests.viz.mission_stream import HELPER, PRIMARY, mission
 from tests.viz.recordings import entities, rows, rows_so_far, static, timelines, verify
@@ -282,6 +284,30 @@ def test_cells_outside_the_area_count_for_nothing(messages: list[Received], reco
         assert told == pytest.approx(at_last(risk_of(messages, time_ms)[inside]))
 
 
+def test_mines_are_those_that_contacts_and_map_tell(messages: list[Received], recording: Path) -> None:
+    drawn = {
+        name: rows(recording, f"/mines/{name}", "Scalars:scalars")
+        for name in ("found", "left", "left_low", "left_high")
+    }
+    times_ms = [time_ms for time_ms, _ in drawn["found"]]
+    first_ms, last_ms = of(messages, Contact)[0][0], messages[-1].header.sent_ms
+    assert times_ms == [*range(first_ms - first_ms % 120_000 + 120_000, last_ms, 120_000), last_ms]
+    for at_ms, until_ms in ((times_ms[3], times_ms[3] - 1), (last_ms, last_ms)):
+        told = Metrics()
+        for one in messages:
+            if one.header.sent_ms <= until_ms:
+                told.hear(one)
+        left = told.mines_left()
+        assert left is not None
+        values = {name: dict(row)[at_ms][0] for name, row in drawn.items()}
+        assert values == {
+            "found": pytest.approx(left.found),
+            "left": pytest.approx(left.mean),
+            "left_low": left.low,
+            "left_high": left.high,
+        }
+
+
 def changes(said: list[tuple[int, Any]], value: Callable[[Any], str]) -> list[tuple[int, list[str]]]:
     found: list[tuple[int, list[str]]] = []
     for time_ms, message in said:
@@ -335,7 +361,8 @@ def test_the_log_names_who_speaks(recording: Path) -> None:
 def test_entities_are_known_and_looks_are_left_out(recording: Path) -> None:
     roots = {path.split("/")[1] for path in entities(recording)}
     assert roots == {
-        "activity", "area", "contacts", "curve", "fleet", "flown", "hotspots", "log", "metrics", "plan", "ranges",
+        "activity", "area", "contacts", "curve", "fleet", "flown", "hotspots", "log", "metrics", "mines", "plan",
+        "ranges",
         "strips", "tasks", "truth",
     }  # fmt: skip
     assert timelines(recording) == {"sim_time"}

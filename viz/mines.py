@@ -1,0 +1,66 @@
+"""How many mines may be left, over time: the mean and the 90 % interval, and how many are found."""
+
+from __future__ import annotations
+
+import rerun as rr
+
+from comms.node import Received
+from comms.said.messages import Contact, Curve
+from planner.clearance import mines_left_by, scatter_of_all
+from planner.contacts import Objects
+from planner.fleet_map import FleetMap
+from planner.types import BoolArray, DetectionCurve
+from viz import palette, paths
+from viz.canvas import Canvas
+
+DRAW_EVERY_MS = 120_000
+SERIES = {
+    paths.MINES_FOUND: ("found", palette.COVERED, 2.0),
+    paths.MINES_LEFT: ("may be left", palette.WORST_RISK, 2.0),
+    paths.MINES_LEFT_LOW: ("at least, with 95 %", palette.WORST_RISK, 0.75),
+    paths.MINES_LEFT_HIGH: ("at most, with 95 %", palette.WORST_RISK, 0.75),
+}
+
+
+class Mines:
+    """Draws them every DRAW_EVERY_MS of the mission from what contacts, P(y) and the map, with the area's cells
+    `inside`, tell then; nothing before the first contact."""
+
+    def __init__(self, canvas: Canvas, map_: FleetMap, inside: BoolArray) -> None:
+        self._canvas, self._map, self._inside = canvas, map_, inside
+        self._objects = Objects()
+        self._curves: dict[str, dict[int, DetectionCurve]] = {}
+        self._due_ms = DRAW_EVERY_MS
+        for path, (name, colour, width) in SERIES.items():
+            canvas.put_static(path, rr.SeriesLines(colors=[colour], names=[name], widths=[width]))
+
+    def on_contact(self, received: Received, contact: Contact) -> None:
+        """Joins a contact."""
+        number = received.vehicle, received.header.incarnation, received.number
+        self._objects.hear(contact.x_m, contact.y_m, contact.sigma_m, contact.score, number)
+
+    def on_curve(self, received: Received, curve: Curve) -> None:
+        """Notes what a track has measured."""
+        if curve.track > 0 and curve.detection_curve is not None:
+            self._curves.setdefault(received.vehicle, {})[curve.track] = curve.detection_curve
+
+    def advance(self, time_ms: int) -> None:
+        """Time passes to this one."""
+        if time_ms >= self._due_ms:
+            self._draw(self._due_ms)
+            self._due_ms = time_ms - time_ms % DRAW_EVERY_MS + DRAW_EVERY_MS
+
+    def finish(self, time_ms: int) -> None:
+        """Draws how it ends."""
+        self._draw(time_ms)
+
+    def _draw(self, time_ms: int) -> None:
+        if not len(self._objects):
+            return
+        seen = self._objects.seen()
+        found = float(seen.chances(self._map.nats_at(seen.x_m, seen.y_m))[:, 0].sum())
+        scatter = scatter_of_all(list(one.values()) for one in self._curves.values())
+        left = mines_left_by(self._map, self._inside, found, scatter)
+        if left is not None:
+            for path, value in zip(SERIES, (found, left.mean, left.low, left.high), strict=True):
+                self._canvas.put(time_ms, path, rr.Scalars(float(value)))
