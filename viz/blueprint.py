@@ -119,7 +119,7 @@ def _metrics_view() -> rrb.TimeSeriesView:
 
 
 def _mines_view() -> rrb.TimeSeriesView:
-    return _series_view(paths.MINES, "Mines found, and left", rrb.Corner2D.LeftTop)
+    return _series_view(paths.MINES, "Mines", rrb.Corner2D.RightTop)
 
 
 def _log_view() -> rrb.TextLogView:
