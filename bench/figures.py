@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import secondlook
-from bench import calibration, compared, link_share
+from bench import calibration, compared, link_share, predicted_risk
 from secondlook.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
@@ -69,6 +69,23 @@ GOALS: tuple[tuple[str, tuple[str, ...]], ...] = (
 )
 """What missions are flown for, and what they need to reach it."""
 
+SHARED = "targets.correlation={0} mission.rho={0}"
+_BOTH = ("primary", "helper")
+RELIABLE: tuple[tuple[str, str], ...] = (
+    ("tellaro", ""),
+    ("tellaro", SHARED.format(0.5)),
+    ("tellaro", SHARED.format(1)),
+    ("two-helpers", ""),
+    ("patchy", ""),
+    ("tellaro", "mission.rho=1"),
+    ("tellaro", " ".join(f"vehicles.{one}.sensor.estimate.bias=0.2" for one in _BOTH)),
+    ("tellaro", " ".join(f"vehicles.{one}.position_error_m=10" for one in _BOTH)),
+    ("patchy", "vehicles.primary.sensor.estimate.blind_to_seabed=true"),
+)
+"""Scenarios, and what is true or believed otherwise than in them: right, and wrong."""
+RELIABLE_MISSIONS, RELIABLE_TARGETS = 60, "targets.count=1000"
+RELIABILITY_FILE = ROOT / "docs" / "reliability.png"
+
 CLUTTERED = ("tellaro", "two-helpers", "patchy", "clear")
 CLUTTER = ("targets.count=20", "targets.clutter_per_km2=100")
 FALSE_ALARMS = "vehicles.{}.sensor.false_alarms_per_km2=20"
@@ -89,12 +106,13 @@ class Mission:
 @dataclass(frozen=True)
 class Table:
     """A table of a `page`. `fly`: flies its missions, with files in a folder, and returns what is to be kept;
-    `lines`: makes the table of that; `first`: one of its missions."""
+    `lines`: makes the table of that; `first`: one of its missions; `draw`: draws a picture of it when it is flown."""
 
     page: str
     fly: Callable[[Path], Document]
     lines: Callable[[Document], list[str]]
     first: Callable[[Document], Mission]
+    draw: Callable[[Document], None] | None = None
 
 
 def _secondlook(*arguments: str) -> None:
@@ -172,6 +190,44 @@ def _fly_cluttered(folder: Path) -> Document:
     return _fly_overridden(folder, flown, "1..20", calibration.CONTACT_FIGURES)
 
 
+def _fly_reliable(folder: Path) -> Document:
+    rows = []
+    for scenario, told in RELIABLE:
+        overrides = [RELIABLE_TARGETS, *told.split()]
+        met = predicted_risk.fly_all(scenario, overrides, RELIABLE_MISSIONS)
+        bins = [[round(one.predicted, DIGITS), round(one.missed, DIGITS), one.targets] for one in met.bins]
+        left = {"risk.mean": round(met.left[0], DIGITS), "risk.worst30_mean": round(met.left[1], DIGITS)}
+        rows.append({"scenario": scenario, "overrides": overrides, "seed": 1, **left, "bins": bins})
+    return {"rows": rows}
+
+
+def reliability_bins(row: Document) -> list[predicted_risk.Bin]:
+    """What is kept of a case."""
+    return [predicted_risk.Bin(*one) for one in row["bins"]]
+
+
+def draw_reliability(document: Document) -> None:
+    """The diagrams of all cases."""
+    cases = {
+        "\n".join([row["scenario"], *row["overrides"][1:]]) + "\n": reliability_bins(row) for row in document["rows"]
+    }
+    predicted_risk.draw(cases, across=3).savefig(RELIABILITY_FILE, dpi=70)
+
+
+def reliability_lines(document: Document) -> list[str]:
+    """A line for each case."""
+    lines = ["| `scenario` | otherwise | missed | predicted | calibration error |", f"|{'---|' * 5}"]
+    for row in document["rows"]:
+        bins = reliability_bins(row)
+        count = sum(one.targets for one in bins)
+        missed, predicted = (sum(one[at] * one.targets for one in bins) / count for at in (1, 0))
+        told = [one for one in row["overrides"] if one != RELIABLE_TARGETS]
+        error = predicted_risk.calibration_error(bins)
+        words = " ".join(f"`{one}`" for one in told) or "-"
+        lines.append(f"| `{row['scenario']}` | {words} | {missed:.3f} | {predicted:.3f} | {error:.3f} |")
+    return lines
+
+
 def _fly_overridden(
     folder: Path, flown: Iterable[tuple[str, tuple[str, ...]]], seeds: str, figures: Iterable[str]
 ) -> Document:
@@ -224,6 +280,13 @@ TABLES: dict[str, Table] = {
         lines=lambda document: calibration.contact_table(document["rows"], ("scenario", "coordinator.contacts")),
         first=_first_calibrated,
     ),
+    "reliability": Table(
+        page="docs/clearance.md",
+        fly=_fly_reliable,
+        lines=reliability_lines,
+        first=_first_calibrated,
+        draw=draw_reliability,
+    ),
     "across-the-water": Table(
         page="docs/across-the-water.md",
         fly=_fly_linked,
@@ -266,6 +329,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             document = TABLES[name].fly(Path(folder))
         KEPT.mkdir(exist_ok=True)
         keep(name, document)
+        if (draw := TABLES[name].draw) is not None:
+            draw(document)
     for name, table in TABLES.items():
         (ROOT / table.page).write_text(written(name))
 

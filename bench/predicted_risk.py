@@ -8,9 +8,13 @@ draws them by predicted risk.
 from __future__ import annotations
 
 import argparse
+import math
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -41,26 +45,67 @@ class _Watcher:
         self.metrics.close()
 
 
-def fly(scenario: str, seed: int) -> tuple[FloatArray, BoolArray]:
-    """One mission: of each target its predicted risk, and whether it was missed."""
-    fleet, watcher = build_fleet(load_scenario(scenario, (), seed), record=False), _Watcher()
+@dataclass(frozen=True)
+class Met:
+    """What came of a mission, or of several: of each target its predicted risk, and whether it was missed, both of
+    shape (targets,); the residual risk at the end of the first, mean and over the worst 30 %."""
+
+    risk: FloatArray
+    missed: BoolArray
+    left: tuple[float, float]
+
+    @cached_property
+    def bins(self) -> list[Bin]:
+        """By predicted risk, in bins of as many targets each."""
+        parts = np.array_split(np.argsort(self.risk, kind="stable"), BINS)
+        return [Bin(float(self.risk[one].mean()), float(self.missed[one].mean()), one.size) for one in parts]
+
+
+class Bin(NamedTuple):
+    """Some targets: the mean of their predicted risks, and the share of them that was missed."""
+
+    predicted: float
+    missed: float
+    targets: int
+
+
+def calibration_error(bins: Sequence[Bin]) -> float:
+    """The mean over targets of how far in its bin the share missed is from the one predicted (M. P. Naeini, G. F.
+    Cooper and M. Hauskrecht, AAAI 2015: the expected calibration error)."""
+    count = sum(one.targets for one in bins)
+    return sum(abs(one.missed - one.predicted) * one.targets for one in bins) / count
+
+
+def fly(scenario: str, overrides: Sequence[str], seed: int) -> Met:
+    """One mission."""
+    fleet, watcher = build_fleet(load_scenario(scenario, overrides, seed), record=False), _Watcher()
     nodes = {node_id: spec.make for node_id, spec in fleet.specs.items()}
     run_local(Routing(fleet.roster), nodes, {"observer": watcher}, fleet.run_info, fleet.time_limit_ms)
-    return watcher.metrics.targets_met()
+    left = watcher.metrics.risk()
+    assert left is not None
+    return Met(*watcher.metrics.targets_met(), (left.mean, left.worst30_mean))
 
 
-def draw(risk: FloatArray, missed: BoolArray) -> Figure:
-    """Share missed over predicted risk, in bins of as many targets each."""
-    figure = Figure(figsize=(5, 4.2), layout="constrained")
-    panel = figure.subplots()
-    bins = np.array_split(np.argsort(risk, kind="stable"), BINS)
-    predicted = np.array([risk[one].mean() for one in bins])
-    shares = np.array([missed[one].mean() for one in bins])
-    errors = np.array([STANDARD_ERRORS * np.sqrt(s * (1 - s) / one.size) for s, one in zip(shares, bins, strict=True)])
-    panel.plot([0, 1], [0, 1], color="0.6", linewidth=0.8)
-    panel.errorbar(predicted, shares, errors, fmt="o", markersize=4, capsize=2)
-    panel.set(xlim=(0, 1), ylim=(0, 1), xlabel="predicted residual risk", ylabel="share of targets missed")
-    panel.set_title(f"{risk.size} targets, two standard errors", fontsize=9)
+def fly_all(scenario: str, overrides: Sequence[str], missions: int, jobs: int = 2) -> Met:
+    """Missions with the seeds from 1 on."""
+    with ProcessPoolExecutor(max_workers=jobs) as pool:
+        flown = list(pool.map(partial(fly, scenario, overrides), range(1, missions + 1)))
+    risk, missed = (np.concatenate(parts) for parts in zip(*((one.risk, one.missed) for one in flown), strict=True))
+    return Met(risk, missed, flown[0].left)
+
+
+def draw(cases: Mapping[str, Sequence[Bin]], across: int = 1) -> Figure:
+    """Of each case the share missed over predicted risk, so many cases beside each other."""
+    rows = -(-len(cases) // across)
+    figure = Figure(figsize=(4.2 * across if across > 1 else 5, 4.2 * rows), layout="constrained")
+    panels = figure.subplots(rows, across, squeeze=False).ravel()
+    for panel, (name, bins) in zip(panels, cases.items(), strict=False):
+        predicted, shares = [one.predicted for one in bins], [one.missed for one in bins]
+        errors = [STANDARD_ERRORS * math.sqrt(one.missed * (1 - one.missed) / one.targets) for one in bins]
+        panel.plot([0, 1], [0, 1], color="0.6", linewidth=0.8)
+        panel.errorbar(predicted, shares, errors, fmt="o", markersize=4, capsize=2)
+        panel.set(xlim=(0, 1), ylim=(0, 1), xlabel="predicted residual risk", ylabel="share of targets missed")
+        panel.set_title(f"{name}{sum(one.targets for one in bins)} targets, two standard errors", fontsize=9)
     return figure
 
 
@@ -71,15 +116,14 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=FIGURE_FILE)
     options = parser.parse_args()
 
-    with ProcessPoolExecutor(max_workers=2) as pool:
-        flown = list(pool.map(partial(fly, options.scenario), range(1, options.missions + 1)))
-    risk, missed = np.concatenate([one[0] for one in flown]), np.concatenate([one[1] for one in flown])
-    share, predicted = float(missed.mean()), float(risk.mean())
+    met = fly_all(options.scenario, (), options.missions)
+    missed, share, predicted = met.missed, float(met.missed.mean()), float(met.risk.mean())
     error = np.sqrt(share * (1 - share) / missed.size)
     print(f"{options.scenario}: {options.missions} missions, {missed.size} targets")
     print(f"missed {share:.4f} ± {error:.4f}, predicted {predicted:.4f}, difference {share - predicted:+.4f}")
+    print(f"expected calibration error {calibration_error(met.bins):.4f}")
     options.out.parent.mkdir(parents=True, exist_ok=True)
-    draw(risk, missed).savefig(options.out, dpi=110)
+    draw({"": met.bins}).savefig(options.out, dpi=110)
 
 
 if __name__ == "__main__":
