@@ -86,7 +86,7 @@ class Coordinator:
         """Finds who is lost and what is late, does what is due, and finds whether the mission is over."""
         if self.has_begun and self._end.over is None:
             self._strips.find_overdue(self.fleet.find_lost(now_ms), now_ms)
-            if now_ms < self._end.deadline_ms():  # what is offered then is left in the same breath
+            if now_ms < self._end.may_end_ms():  # what is offered then would be left in the same breath
                 self._do_what_is_due(now_ms)
             self._end.find(now_ms)
         elif self._agenda.strike(Item.SAY_OVER, now_ms):

@@ -107,6 +107,11 @@ class MissionEnd:
             if again_ms is not None:
                 self._agenda.add(Item.SAY_OVER, again_ms)
 
+    def may_end_ms(self) -> float:
+        """When the mission is over at the latest, or before that may be, as its goal is looked at."""
+        look_ms = self._agenda.deadline_ms(Item.GOAL)
+        return self.deadline_ms() if look_ms is None else min(look_ms, self.deadline_ms())
+
     def deadlines_ms(self) -> list[int]:
         """When the mission is over at the latest, if that is known already."""
         deadline_ms = self.deadline_ms()

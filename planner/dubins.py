@@ -22,6 +22,9 @@ _ANGLE_TOLERANCE_RAD = 1e-10
 """A turn that is short of a full one by no more is none: rounding must not add a loop to a path."""
 _TOLERANCE = 1e-9
 """In turn radii: what differs by no more is decided by the order of the words, not by rounding."""
+TIE_M = 0.02
+"""So much longer at most may the path be that first turns to port: of two that mirror each other, as to the line it came
+along, a pose that is told in centimetres and microradians must not decide, or others expect it on the other side."""
 
 
 class Pose(NamedTuple):
@@ -118,7 +121,7 @@ def compass_rad(angle_rad: float) -> float:
 def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
     """The shortest path from one pose to another for a vehicle that only goes ahead.
 
-    Of two paths equally long the one that first turns to port is taken.
+    Of two paths equally long, to within TIE_M, the one that first turns to port is taken.
 
     Args:
         start: where the path begins.
@@ -140,7 +143,7 @@ def shortest_path(start: Pose, end: Pose, turn_radius_m: float) -> DubinsPath:
     best, turns, arcs = math.inf, (-1, 0, -1), (0.0, 0.0, 0.0)
     for side in (-1, 1):
         for total, middle, last, word in _words(distance, -side * alpha, -side * beta):
-            if total < best - _TOLERANCE:
+            if total < best - (_TOLERANCE if side == turns[0] else TIE_M / turn_radius_m):
                 best, turns, arcs = total, (side, side * middle, side * last), word
     first, second, third = arcs
     return DubinsPath(

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.dubins import Pose, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, Pose, path_lengths_m, shortest_path
 
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -225,4 +225,19 @@ def test_the_lengths_of_many_paths_are_those_of_each(starts: list[Pose], ends: l
     lengths_m = path_lengths_m(np.array(starts), np.array(ends), radius_m)
     for row, start in zip(lengths_m, starts, strict=True):
         for length_m, end in zip(row, ends, strict=True):
-            assert length_m == pytest.approx(shortest_path(start, end, radius_m).length_m, abs=1e-6)
+            assert -1e-6 <= shortest_path(start, end, radius_m).length_m - length_m <= TIE_M + 1e-6
+
+
+@given(
+    turned_rad=st.floats(-math.pi, math.pi),
+    ahead_m=st.floats(30.0, 200.0),
+    off_m=st.lists(st.floats(-0.002, 0.002), min_size=4, max_size=4),
+    off_rad=st.lists(st.floats(-1e-6, 1e-6), min_size=2, max_size=2),
+)
+def test_who_turns_round_on_its_line_does_so_to_port_however_that_is_rounded(
+    turned_rad: float, ahead_m: float, off_m: list[float], off_rad: list[float]
+) -> None:
+    x_m, y_m = ahead_m * math.sin(turned_rad), ahead_m * math.cos(turned_rad)
+    start = Pose(off_m[0], off_m[1], turned_rad + off_rad[0])
+    end = Pose(x_m + off_m[2], y_m + off_m[3], turned_rad + math.pi + off_rad[1])
+    assert shortest_path(start, end, 12.0).turns[0] == -1
