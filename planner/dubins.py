@@ -23,8 +23,9 @@ _ANGLE_TOLERANCE_RAD = 1e-10
 _TOLERANCE = 1e-9
 """In turn radii: what differs by no more is decided by the order of the words, not by rounding."""
 TIE_M = 0.02
-"""So much longer at most may the path be that first turns to port: of two that mirror each other, as to the line it came
-along, a pose that is told in centimetres and microradians must not decide, or others expect it on the other side."""
+"""So much longer at most may the path be that first turns to port: of two that mirror each other, as to the line it
+came along, a pose that is told in centimetres and microradians must not decide, or others expect it on the other side.
+"""
 
 
 class Pose(NamedTuple):
