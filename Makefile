@@ -26,6 +26,7 @@ CHROMIUM ?= chromium
 pictures: .venv/.test-ready
 	@$(BIN)/secondlook paper --out docs/paper
 	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
+	@$(BIN)/python -m bench.link_curve docs/figures/link-curve.json docs/link-curve.png
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run tellaro --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import secondlook
-from bench import calibration, compared, link_share, predicted_risk
+from bench import calibration, compared, link_curve, link_share, predicted_risk
 from secondlook.scenario import load_scenario
 
 ROOT = Path(__file__).parents[1]
@@ -33,7 +33,14 @@ DIGITS = 6  # of what is kept: more than tables tell
 CONTENDERS = ("plan", "lawnmower", "across", "beforehand", "second_survey", "greedy", "nearest", "cbba")
 COMPARED = ("tellaro", "two-helpers", "patchy", "clear")
 LINKED = ("tellaro", "two-helpers", "patchy")
-PROFILES = ("ideal", "radio", "micromodem-6", "micromodem-1", "micromodem-0", "janus")
+LINKED_SEEDS = "1001..1010"
+HELPERS = {"tellaro": ("helper",), "two-helpers": ("west", "east"), "patchy": ("helper",)}
+LOST, AWAY = "20 % lost", "away a third of the time"
+LINKS = (
+    *(("ideal", "-"), ("micromodem-6", "-"), ("micromodem-1", "-"), ("micromodem-0", "-"), ("janus", "-")),
+    *(("micromodem-1", LOST), ("micromodem-1", AWAY)),
+)
+"""Profiles, each with what else is wrong with the link."""
 
 CALIBRATED: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("tellaro", ()),
@@ -148,18 +155,32 @@ def _first_compared(document: Document) -> Mission:
 
 def _fly_linked(folder: Path) -> Document:
     rows = []
-    for scenario in LINKED:
-        out = folder / scenario
-        profiles, platforms = f"link.profile={','.join(PROFILES)}", "coordinator.platform=ship,primary"
-        varied = ("--vary", profiles, "--vary", platforms)
-        _secondlook("sweep", scenario, "--seeds", "1001..1004", *varied, "--out", str(out))
-        rows += linked_kept(scenario, secondlook.load_sweep(out).table.to_pylist())
-    return {"varied": ["link.profile", "coordinator.platform"], "rows": rows}
+    for profile, also in LINKS:
+        for scenario in LINKED:
+            out = folder / "-".join((scenario, profile, also.replace(" ", "_")))
+            set_ = [word for one in _of_link(scenario, profile, also) for word in ("--set", one)]
+            varied = ("--vary", "coordinator.platform=ship,primary")
+            _secondlook("sweep", scenario, "--seeds", LINKED_SEEDS, *set_, *varied, "--out", str(out))
+            link = {"link.profile": profile, "link.also": also}
+            swept = secondlook.load_sweep(out).table.to_pylist()
+            rows += linked_kept(scenario, [row | link for row in swept])
+    return {"varied": ["link.profile", "link.also", "coordinator.platform"], "rows": rows}
+
+
+def _of_link(scenario: str, profile: str, also: str) -> tuple[str, ...]:
+    """The overrides of one of LINKS. Away is whoever is silent for 5 minutes in every 15, the first time after 5."""
+    if also == LOST:
+        return f"link.profile={profile}", "link.loss=0.2"
+    if also == AWAY:
+        times = range(300, 9300, 900)
+        away = [f"{{platform: {one}, from_s: {at_s}, for_s: 300}}" for one in HELPERS[scenario] for at_s in times]
+        return f"link.profile={profile}", f"link.outages=[{', '.join(away)}]"
+    return (f"link.profile={profile}",)
 
 
 def linked_kept(scenario: str, rows: Sequence[Document]) -> list[Document]:
     """What is kept of a sweep's rows: what shares and ages are reckoned from."""
-    names = ("seed", "failure", "link.profile", "coordinator.platform", "link.bytes_per_s")
+    names = ("seed", "failure", "link.profile", "link.also", "coordinator.platform", "link.bytes_per_s")
     kept = []
     for row in rows:
         figures = (name for name in row if name.startswith(("risk.", "risk_primary")) or name.endswith(".mean_s"))
@@ -169,8 +190,14 @@ def linked_kept(scenario: str, rows: Sequence[Document]) -> list[Document]:
 
 def _first_linked(document: Document) -> Mission:
     row = next(row for row in document["rows"] if row["link.profile"] != "ideal")
-    overrides = tuple(f"{key}={row[key]}" for key in document["varied"])
+    link = _of_link(row["scenario"], row["link.profile"], row["link.also"])
+    overrides = (*link, f"coordinator.platform={row['coordinator.platform']}")
     return Mission(row["scenario"], overrides, row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
+
+
+def _first_of_curve(document: Document) -> Mission:
+    row = document["rows"][0]
+    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
 
 
 def _fly_calibrated(folder: Path) -> Document:
@@ -292,6 +319,12 @@ TABLES: dict[str, Table] = {
         fly=_fly_linked,
         lines=lambda document: link_share.table(document["rows"], document["varied"]),
         first=_first_linked,
+    ),
+    "link-curve": Table(
+        page="docs/across-the-water.md",
+        fly=lambda folder: link_curve.fly(),
+        lines=lambda document: link_curve.table(document["rows"]),
+        first=_first_of_curve,
     ),
 }
 

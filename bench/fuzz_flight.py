@@ -183,7 +183,7 @@ class Flight:
     def _seat_lockstep(self) -> None:
         """As `secondlook run` does, in each of its processes."""
         fleet, drive, setup = self._fleet, Lockstep(), self._setup
-        in_hub, hosts = hosts_of_run(fleet.roster, None)
+        in_hub, hosts = hosts_of_run(fleet.roster, None, modems_in_hub=drive.modems_in_hub)
         hub = drive.hub(
             self._water.session(), setup, hosts, self._nodes(in_hub), carry_out=lambda change, host: None,
             alive=lambda now_ms: None,

@@ -18,7 +18,7 @@ import secondlook
 
 Row = dict[str, Any]
 LINK, IDEAL = "link.profile", "ideal"
-NAMED = {"coordinator.platform": "coordinator on"}
+NAMED = {"coordinator.platform": "coordinator on", "link.also": "and"}
 
 
 def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tuple[Row, float]]]:
@@ -64,13 +64,13 @@ def main(folders: list[str]) -> None:
 
 def table(rows: list[Row], varied: list[str]) -> list[str]:
     """The lines of the table, as Markdown. Raises ValueError as `shares` does."""
-    names = [f"`{key}`" if key.startswith("link.") else NAMED.get(key, f"`{key}`") for key in varied]
+    names = [NAMED.get(key, f"`{key}`") for key in varied]
     heads = [*names, "missions", "share kept", "least", "bytes a second", "age in s"]
     lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
     for values, missions in shares(rows, varied).items():
         kept = [share for _, share in missions]
         bytes_per_s, age_s = (fmean(of(row) for row, _ in missions) for of in (_bytes_per_s, _age_s))
-        told = " | ".join(f"`{one}`" for one in values)
+        told = " | ".join(one if " " in one or one == "-" else f"`{one}`" for one in values)
         lines.append(
             f"| {told} | {len(kept)} | {fmean(kept):.3f} | {min(kept):.3f} | {bytes_per_s:.1f} | {age_s:.0f} |"
         )

@@ -206,27 +206,28 @@ class Water:
     def __init__(self, turns: Turns, tap: Callable[[str, bytes], None]) -> None:
         self.tap = tap
         self.turns = turns
-        self._hear: list[tuple[zenoh.KeyExpr, Callable[[Any], None]]] = []
+        self._hear: list[tuple[zenoh.KeyExpr, Callable[[Any], None], _Session]] = []
         self._answer: list[tuple[zenoh.KeyExpr, Callable[[Any], None]]] = []
         self._watch: list[tuple[zenoh.KeyExpr, Callable[[Any], None]]] = []
         self._tokens: list[str] = []
-        self._heard_by: dict[str, list[Callable[[Any], None]]] = {}
+        self._heard_by: dict[str, list[tuple[Callable[[Any], None], _Session]]] = {}
 
     def session(self) -> Any:
         """One more session."""
         return _Session(self)
 
-    def put(self, key: str, payload: bytes) -> None:
-        """Carries a message."""
+    def put(self, key: str, payload: bytes, but_for: Any = None) -> None:
+        """Carries a message, to all sessions but one."""
         if key not in self._heard_by:
             if len(self._heard_by) > MOST_MATCHES:
                 self._heard_by.clear()
-            self._heard_by[key] = [hear for expression, hear in self._hear if _fits(expression, key)]
-        for hear in self._heard_by[key]:
-            hear(_sample(key, payload))
+            self._heard_by[key] = [(hear, its) for expression, hear, its in self._hear if _fits(expression, key)]
+        for hear, its in self._heard_by[key]:
+            if its is not but_for:
+                hear(_sample(key, payload))
 
-    def subscribe(self, expression: Any, hear: Callable[[Any], None]) -> None:
-        self._hear.append((zenoh.KeyExpr(str(expression)), hear))
+    def subscribe(self, expression: Any, hear: Callable[[Any], None], session: _Session) -> None:
+        self._hear.append((zenoh.KeyExpr(str(expression)), hear, session))
         self._heard_by.clear()
 
     def offer_answers(self, expression: str, answer: Callable[[Any], None]) -> None:
@@ -294,19 +295,19 @@ class _Session:
     def __init__(self, water: Water) -> None:
         self._water = water
 
-    def put(self, key: str, payload: bytes, **_: Any) -> None:
+    def put(self, key: str, payload: bytes, *, allowed_destination: Any = zenoh.Locality.ANY, **_: Any) -> None:
         self._water.tap(key, payload)
-        self._water.put(key, payload)
+        self._water.put(key, payload, self if allowed_destination == zenoh.Locality.REMOTE else None)
 
     def get(self, expression: str, handler: Any, *, timeout: float, **_: Any) -> None:
         self._water.ask(expression, handler.callback, handler.drop, timeout)
 
     def declare_subscriber(self, expression: Any, handler: Any) -> Any:
         if hasattr(handler, "callback"):
-            self._water.subscribe(expression, handler.callback)
+            self._water.subscribe(expression, handler.callback, self)
             return None
         waiting: deque[Any] = deque()
-        self._water.subscribe(expression, waiting.append)
+        self._water.subscribe(expression, waiting.append, self)
         return SimpleNamespace(try_recv=lambda: waiting.popleft() if waiting else None)
 
     def declare_queryable(self, expression: str, handler: Any) -> Any:

@@ -79,7 +79,8 @@ class ListeningHost(Host, Protocol):
 class Drive(Protocol):
     """`mode`: as it is announced. `factor`: by how much mission time runs faster than the wall clock; None where nobody
     can say, as in lockstep. `keeps_going`: whether a run goes on without a process that dies until that is started
-    again, which is for the launcher to do."""
+    again, which is for the launcher to do. `modems_in_hub`: whether modems are in the hub's process, with the world
+    that carries their packets, rather than with their platforms' nodes."""
 
     @property
     def mode(self) -> ClockMode:
@@ -91,6 +92,10 @@ class Drive(Protocol):
 
     @property
     def keeps_going(self) -> bool:
+        """See the class."""
+
+    @property
+    def modems_in_hub(self) -> bool:
         """See the class."""
 
     def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:

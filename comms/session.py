@@ -121,18 +121,20 @@ def read_where_packets_are_awaited() -> None:
     os.environ.setdefault("ZENOH_RUNTIME", "(rx: (handover: app))")
 
 
-def put(session: zenoh.Session, key: str, payload: bytes, *, at_once: bool = True) -> None:
+def put(session: zenoh.Session, key: str, payload: bytes, *, at_once: bool = True, away_only: bool = False) -> None:
     """Publishes reliably. No declared publisher: one would drop what it sends before it has heard of a subscriber,
     while a plain put always goes to the hub.
 
     `at_once`: whether it goes out in a packet of its own, with what still waits before it. What is not may share its
-    packet with what is put right after it, and so what a packet costs its receiver: most of what a message costs."""
+    packet with what is put right after it, and so what a packet costs its receiver: most of what a message costs.
+    `away_only`: whether it does not come to who subscribes to it by the same session."""
     session.put(
         key,
         payload,
         congestion_control=zenoh.CongestionControl.BLOCK,
         priority=zenoh.Priority.REAL_TIME,
         express=at_once,
+        allowed_destination=zenoh.Locality.REMOTE if away_only else zenoh.Locality.ANY,
     )
 
 

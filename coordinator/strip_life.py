@@ -179,7 +179,8 @@ class StripLife:
                 late = f"{record.vehicle} has not served it, which was expected by {offer.service.ends_s:.0f} s"
                 self.ask_back(record.strip, vehicle, now_ms)
                 vehicle.note_failure(record.window)
-                self._move(record, StripState.OPEN, now_ms, late)
+                if record.state in TAKEN:  # what it was to do next is open again by that it is asked back
+                    self._move(record, StripState.OPEN, now_ms, late)
                 self._sectors.cut_by(now_ms, [record.window])
 
     def deadlines_ms(self) -> Iterator[int]:

@@ -79,7 +79,8 @@ class ModemConfig:
     north-east corner of the box in which all places lie that are told. `polls`: where the coordinator's platform polls
     the others, instead of slots. `deck_ms`: before this all are on deck, and what is said goes from hand to hand at
     once, not through the water. `answer_ms`: for so long the coordinator waits for the answer to an offer, which is not
-    said any more then.
+    said any more then. `by_age`: what has waited longest is said first, whatever it is worth. `tells_tiles`: coverage
+    crosses as tiles, not as stretches; not in small frames.
 
     Raises ValueError where these do not go together.
     """
@@ -96,6 +97,8 @@ class ModemConfig:
     polls: PollTimes | None = None
     deck_ms: int = 0
     answer_ms: int = 10**9
+    by_age: bool = False
+    tells_tiles: bool = False
 
     def __post_init__(self) -> None:
         if not 2 <= len(set(self.platforms)) == len(self.platforms) <= MOST_PLATFORMS:
@@ -108,6 +111,12 @@ class ModemConfig:
             raise ValueError(
                 f"link.profile: frames of {self.frame_bits} bits are too small for {len(self.platforms)} platforms; "
                 "must be larger, or the platforms fewer"
+            )
+
+        if self.tells_tiles and self.is_small:
+            raise ValueError(
+                f"link.maps: tiles do not cross in frames of {self.frame_bits} bits; must be stretches with fewer than "
+                f"{SMALL_BITS}"
             )
 
     @property

@@ -35,10 +35,11 @@ from comms.said.topics import (
 )
 from comms.said.wire import WireError
 from modem.config import ModemConfig
+from modem.plain_tiles import PlainTile
 from modem.stretches import Stretch
 
 CROSSING: tuple[Topic | None, ...] = (*(topic for topic in TOPICS if topic.crossing is not None), None)
-"""What may be said; None for a stretch."""
+"""What may be said; None for a piece of a map: a stretch, or a tile."""
 KIND_BITS = (len(CROSSING) - 1).bit_length()
 BY_COORDINATOR = (TASK, MISSION_OVER)
 BY_VEHICLES: tuple[Topic | None, ...] = (TASK_STATUS, STATE, None, CURVE, PLAN, HOTSPOT)
@@ -55,7 +56,7 @@ LARGEST_NUMBER = 999_999_999
 
 
 class Said(NamedTuple):
-    """A message as it was said: under which key (below the run id), by whom and when; of a stretch the key is ""."""
+    """A message as it was said: under which key (below the run id), by whom and when; of a piece of a map it is ""."""
 
     key: str
     header: Header
@@ -121,7 +122,8 @@ class Letters:
         number = sequence % (LARGEST_NUMBER + 1)
         if topic is not None and self._has_its_number(topic) and (number := reader.read_count(4)) > LARGEST_NUMBER:
             raise WireError(f"{number} is no number of a key")
-        message = get_message(reader, Stretch if topic is None else topic.message, self._around(sent_s * 1000))
+        of_map = PlainTile if self.config.tells_tiles else Stretch
+        message: Any = get_message(reader, of_map if topic is None else topic.message, self._around(sent_s * 1000))
         key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
         return topic, Said(
             key, Header(COORDINATOR if by_coordinator else vehicle, incarnation, sequence, sent_s * 1000), message

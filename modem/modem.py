@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 from comms.node import Publication, Received, Step
@@ -19,6 +20,7 @@ from comms.said.codec import LARGEST_INCARNATION, Header, body_of, packed
 from comms.said.messages import (
     MOST_FRAMES,
     AgentState,
+    CoverageTile,
     Curve,
     Heard,
     Look,
@@ -37,12 +39,13 @@ from modem.contents import Letter, PieceFor, parts_of
 from modem.frames import FrameForm, start_number
 from modem.layers import Layers
 from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
-from modem.packets import STRETCH, Packets, Stream
+from modem.packets import OF_MAP, Packets, Stream
+from modem.plain_tiles import PlainTile, plain, told
 from modem.presence import REPORT_MS, Presence, seldom_ms
 from modem.streams import STREAMS, Receiving, Sending
 from modem.stretches import Gathering, Stretch, Told
 from modem.turns import turns_of
-from modem.waiting import Queue, Waiting
+from modem.waiting import Queue, Waiting, by_age
 from planner.keep_out import KeepOut
 
 log = logging.getLogger("secondlook.modem")
@@ -159,7 +162,8 @@ class Modem:
         known = self.config.others if self.config.is_hub else (self.config.platform,)
         self._presences = {one.vehicle: Presence(one, keep_out) for one in run.vehicles if one.vehicle in known}
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
-        if entry is not None and not self.config.is_hub:
+        self._grid = run.grid.spec
+        if entry is not None and not self.config.is_hub and not self.config.tells_tiles:
             self._gathering = Gathering(entry)
 
     def _receive_anew(self, other: str) -> None:
@@ -174,6 +178,8 @@ class Modem:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
         topic, message = received.topic, received.message
         is_hub = self.config.is_hub
+        if isinstance(message, CoverageTile) and self.config.tells_tiles and not is_hub:
+            self._enqueue_of_map(plain(message, self._grid), received.header, now_ms, received.key)
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
         if topic.crossing.is_fine and self.config.is_small:
@@ -243,8 +249,11 @@ class Modem:
             self._enqueue_stretch(stretch, now_ms)
 
     def _enqueue_stretch(self, stretch: Stretch, now_ms: int) -> None:
-        header = Header(self.config.platform, self._incarnation, 0, now_ms)
-        self._enqueue(None, STRETCH, Said("", header, stretch), self.config.hub, now_ms)
+        self._enqueue_of_map(stretch, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
+
+    def _enqueue_of_map(self, piece: Stretch | PlainTile, header: Header, now_ms: int, about: str = "") -> None:
+        crossing = OF_MAP if isinstance(piece, Stretch) else replace(OF_MAP, newest_only=True)
+        self._enqueue(None, crossing, Said("", header, piece), self.config.hub, now_ms, about)
 
     def _enqueue(
         self, topic: Topic | None, crossing: Crossing, said: Said, platform: str, now_ms: int, about: str = ""
@@ -262,6 +271,10 @@ class Modem:
         else:
             is_offer = isinstance(said.message, Task) and said.message.action.is_offer
             until_ms = now_ms + self.config.answer_ms if is_offer else math.inf
+            if self.config.by_age:
+                if not crossing.acknowledged:
+                    until_ms = now_ms + crossing.ttl_s * 1000
+                crossing = by_age(crossing, bits.bits)
             self._queue.add(Waiting(about, platform, crossing, bits, now_ms, until_ms))
 
     def _drop(self, why: str, detail: str) -> None:
@@ -352,7 +365,9 @@ class Modem:
             self._tell_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
         if topic is not None:
             self._say_here(said.key, header, message)
-        if isinstance(message, Curve | Stretch) and platform != self.config.hub:
+        if isinstance(message, PlainTile):
+            self._tell_tiles(platform, header, [told(message, self._grid, header.sequence)])
+        elif isinstance(message, Curve | Stretch) and platform != self.config.hub:
             self._tell_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
 
     def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:

@@ -16,9 +16,10 @@ from comms.said.topics import Crossing
 from modem.config import LEAST_PIECE_BITS, ModemConfig
 from modem.frames import FrameForm
 from modem.streams import STREAM_BITS, Piece, Receiving, Sending
-from modem.waiting import Queue, Waiting, worth
+from modem.waiting import PIECES_TTL_S, Queue, Waiting, worth
 
-STRETCH = Crossing(3000, 300, is_long=True)
+OF_MAP = Crossing(3000, PIECES_TTL_S, is_long=True)
+"""How a stretch, or a tile, goes."""
 LEFT_OUT = 2
 """So often in a row small frames may go without the acknowledgements that are owed, where there is something to say."""
 
@@ -161,11 +162,11 @@ class Packets:
                 if only_ends and not piece.last:
                     continue
                 is_due = not form.is_small or self._now_ms - under.said_ms > LEFT_OUT * self._config.cycle_ms
-                its_worth = worth(under.worth_now, STRETCH.ttl_s, under.queued_ms, self._now_ms)
+                its_worth = worth(under.worth_now, PIECES_TTL_S, under.queued_ms, self._now_ms)
                 choices.append(_Choice(is_due, its_worth, stream, number))
             if sending.rest.bits and self._can_cut(sending, sending.rest, left, only_ends=only_ends):
                 bit_value, queued_ms = sending.about_rest
-                choices.append(_Choice(True, worth(bit_value, STRETCH.ttl_s, queued_ms, self._now_ms), stream))
+                choices.append(_Choice(True, worth(bit_value, PIECES_TTL_S, queued_ms, self._now_ms), stream))
         best = max(choices, key=lambda one: one[:2], default=None)
         for one in self._queue.best_first(self._now_ms):
             its_worth = one.worth(self._now_ms)

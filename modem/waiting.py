@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from comms.said.bits import BitWriter
 from comms.said.topics import Crossing
+
+PIECES_TTL_S = 300.0
+"""A piece of a message that has waited for so long is worth twice as much."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +33,12 @@ class Waiting:
 def worth(value: float, ttl_s: float, queued_ms: int, now_ms: int) -> float:
     """What something is worth that has waited since a time."""
     return value * (1.0 + (now_ms - queued_ms) / 1000 / ttl_s)
+
+
+def by_age(crossing: Crossing, bits: int) -> Crossing:
+    """How a message of so many bits goes where what has waited longest is said first: a bit of each is worth the same,
+    and of pieces as well."""
+    return replace(crossing, value=float(bits), ttl_s=PIECES_TTL_S)
 
 
 class Queue:

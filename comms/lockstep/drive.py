@@ -33,6 +33,7 @@ class Lockstep:
     mode = ClockMode.LOCKSTEP
     factor = None
     keeps_going = False
+    modems_in_hub = True
 
     def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:
         """One for each node to which something is to happen, and one more for each time that it joins."""

@@ -6,7 +6,7 @@ import bisect
 import contextlib
 import queue
 import time
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
 
@@ -18,7 +18,7 @@ from comms.lockstep.arrivals import Arrivals
 from comms.lockstep.clock import Grant, Sent
 from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import NodeGroup
-from comms.lockstep.parcels import publish, unpacked
+from comms.lockstep.parcels import publish, publish_parcels, unpacked
 from comms.lockstep.words import pack_answers, unpack_grants
 from comms.memory.store import Store
 from comms.node import Listener, Node, Received
@@ -95,7 +95,10 @@ class _Line:
 
 
 class ServedNodes:
-    """The nodes of one process: what is sent to them over Zenoh, and what they say, with how long strips wait."""
+    """The nodes of one process: what is sent to them over Zenoh, and what they say, with how long strips wait.
+
+    `fills_parcels`: whether `send_parcels` is called from time to time, so that parcels may hold what was said in many
+    rounds."""
 
     def __init__(
         self,
@@ -106,16 +109,39 @@ class ServedNodes:
         faults: Faults,
         incarnation: int = 0,
         stores: Mapping[str, Store] = MappingProxyType({}),
+        *,
+        fills_parcels: bool = False,
     ) -> None:
         self.group = NodeGroup(nodes, routing, faults, incarnation, stores=stores)
         self._session = session
         self._keys = keys
+        self._fills_parcels = fills_parcels
+        self._held: dict[str, list[Outgoing]] = {}
         self._latency = StripLatency()
         self._coordinators = {node.node_id for node in routing.roster if node.role is Role.COORDINATOR}
 
     def receive(self, key: str, payload: bytes) -> None:
         """A message has come, under its key below the run id. Raises NodeError for a flood."""
-        received = self.group.receive(key, payload)
+        self._note(self.group.receive(key, payload))
+
+    def send(self, sender: str, outgoing: Sequence[Outgoing]) -> None:
+        """Sends what one of this process says: what nodes here read comes to them at once, and not by Zenoh; what is
+        for those that only listen goes with what follows, where that `fills_parcels`. Raises NodeError for a flood."""
+        for one in outgoing:
+            self._note(self.group.take(one))
+        publish(self._session, self._keys, outgoing, self.group.runners)
+        if self._fills_parcels:
+            self._held.setdefault(sender, []).extend(outgoing)
+        else:
+            publish_parcels(self._session, self._keys, sender, outgoing)
+
+    def send_parcels(self) -> None:
+        """Sends what was held for those that only listen."""
+        held, self._held = self._held, {}
+        for sender, outgoing in held.items():
+            publish_parcels(self._session, self._keys, sender, outgoing)
+
+    def _note(self, received: Received | None) -> None:
         if received is not None and self.group.holds(self._coordinators):
             self._latency.arrived(received, time.perf_counter())
 
@@ -126,7 +152,7 @@ class ServedNodes:
             wake_ms, outgoing = self.group.runners[grant.node_id].act(now_ms, start=grant.start)
             if grant.node_id in self._coordinators:
                 self._latency.sending(outgoing, time.perf_counter())
-            publish(self._session, self._keys, grant.node_id, outgoing)
+            self.send(grant.node_id, outgoing)
             yield grant.node_id, wake_ms, outgoing
 
     def last_word(self) -> LastWord:

@@ -12,7 +12,7 @@ from typing import Any
 import zenoh
 
 from comms.awake_clock import AwakeClock
-from comms.errors import FleetError, HostLostError, NodeError, WordsError, one_line
+from comms.errors import FleetError, HostLostError, NodeError, RunawayError, WordsError, one_line
 from comms.keys import HostSpec, RunKeys
 from comms.lockstep.clock import Grant, LockstepClock, Round, result_of
 from comms.lockstep.events import JOINER_DELAY_MS, Change, Happening, NodeEvent
@@ -20,11 +20,10 @@ from comms.lockstep.faults import NO_FAULTS, Faults
 from comms.lockstep.group import JoinerMail
 from comms.lockstep.host import ServedNodes
 from comms.lockstep.pacing import MOST_BEHIND_BYTES, Pacing
-from comms.lockstep.parcels import publish
 from comms.lockstep.words import pack_grants, unpack_answers
 from comms.node import Node
 from comms.result import BusResult, LastWord
-from comms.runner import OVERHEAD_BYTES, Stamp
+from comms.runner import OVERHEAD_BYTES, Outgoing, Stamp
 from comms.said.announcement import RunInfo
 from comms.said.codec import CLOCK
 from comms.said.routing import Routing
@@ -32,6 +31,7 @@ from comms.said.topics import RUN
 from comms.session import PATIENCE_S, SIGN_OF_LIFE_EVERY_S, put, subscribe
 from comms.words import pack, unpack, unpack_last_word
 
+PARCELS_EVERY_S = 0.05  # of the wall clock: so much of what nodes here say is lost, at most, where the hub dies
 MOST_WAITING_BYTES = 128 << 20  # in the hub's queue; a round has far less
 
 
@@ -70,10 +70,10 @@ class Hub:
         self._patience_s = patience_s
         self._alive = alive
         self._now = AwakeClock(held=held)
-        self._alive_at_s = time.monotonic()
+        self._alive_at_s = self._parcels_at_s = time.monotonic()
         self._change = carry_out
         self._clock = LockstepClock(routing, time_limit_ms, events)
-        self._nodes = ServedNodes(session, keys, nodes, routing, faults)
+        self._nodes = ServedNodes(session, keys, nodes, routing, faults, fills_parcels=True)
         self._kept = {node_id: JoinerMail(node_id, routing) for node_id in self._clock.said_to_joiners}
         listening = {node.node_id for node in routing.roster if node.listens_only}
         self._host_of = {node: spec.host for spec in hosts for node in spec.nodes if not spec.joins}
@@ -106,17 +106,32 @@ class Hub:
         stamp = Stamp(CLOCK, self._routing)
         announced = stamp(RUN.key(), run_info, 0)
         self._clock.publish(CLOCK, [announced])
-        publish(self._session, self._keys, CLOCK, [announced])
-        while (turn := self._clock.next_round()) is not None:
-            self._show_life()
-            while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
-                self._handle(*self._queue.get())
-            for happening in turn.happenings:
-                self._happen(happening)
-            self._carry_out(turn)
-            if self._pacing.next_mark(time.monotonic()):
-                self._mark_listeners()
+        self._keep([announced])
+        self._nodes.send(CLOCK, [announced])
+        try:
+            while (turn := self._clock.next_round()) is not None:
+                self._go_round(turn)
+        except (NodeError, RunawayError):
+            self._nodes.send_parcels()
+            raise
         return self._finish()
+
+    def _go_round(self, turn: Round) -> None:
+        self._show_life()
+        while not self._queue.empty():  # also where no answer is waited for, a death is to be noticed
+            self._handle(*self._queue.get())
+        for happening in turn.happenings:
+            self._happen(happening)
+        self._carry_out(turn)
+        now_s = time.monotonic()
+        if self._pacing.next_mark(now_s):
+            self._mark_listeners()
+        elif now_s - self._parcels_at_s >= PARCELS_EVERY_S:
+            self._send_parcels()
+
+    def _send_parcels(self) -> None:
+        self._parcels_at_s = time.monotonic()
+        self._nodes.send_parcels()
 
     def _carry_out(self, turn: Round) -> None:
         group = self._nodes.group
@@ -134,6 +149,7 @@ class Hub:
             self._wait(lambda: group.has_all(here), lambda: f"mail is missing: {group.missing(here)}")
             for node_id, wake_ms, outgoing in self._nodes.act(here, turn.now_ms):
                 self._clock.answer(node_id, wake_ms, outgoing)
+                self._keep(outgoing)
         self._wait(lambda: not self._asked, lambda: _no("answer", self._asked))
 
     def _happen(self, happening: Happening) -> None:
@@ -169,6 +185,7 @@ class Hub:
         put(self._session, self._keys.to_host(host), words)
 
     def _mark_listeners(self) -> None:
+        self._send_parcels()
         for node, host in self._listeners.items():
             self._say(host, pack("mark", self._pacing.mark, self._clock.now_ms, dict(self._clock.watched[node])))
         self._wait(
@@ -177,6 +194,7 @@ class Hub:
         )
 
     def _finish(self) -> BusResult:
+        self._send_parcels()
         for host in self._frozen:
             self._change(Change.THAW, host)
         for host in self._hosts - self._killed:
@@ -191,6 +209,8 @@ class Hub:
 
     def _wait(self, done: Callable[[], bool], missing: Callable[[], str]) -> None:
         """Handles what arrives until `done()`; FleetError when nothing arrives for too long."""
+        if done():
+            return
         heard_at_s = self._now()
         while not done():
             try:
@@ -236,12 +256,20 @@ class Hub:
     def _take(self, key: str, payload: bytes) -> None:
         """Takes a message, for nodes here and for those that are to join."""
         try:
-            for joiner, kept in self._kept.items():
-                kept.arrived.are_told(self._clock.said_to_joiners[joiner])
-                kept.add(key, payload)
+            self._keep_one(key, payload)
             self._nodes.receive(key, payload)
         except NodeError as error:
             raise FleetError(str(error)) from error
+
+    def _keep(self, outgoing: Iterable[Outgoing]) -> None:
+        """Keeps what was said in this process for nodes that are to join."""
+        for one in outgoing if self._kept else ():
+            self._keep_one(one.key, one.payload)
+
+    def _keep_one(self, key: str, payload: bytes) -> None:
+        for joiner, kept in self._kept.items():
+            kept.arrived.are_told(self._clock.said_to_joiners[joiner])
+            kept.add(key, payload)
 
     def _hear_words(self, host: str, words: list[Any]) -> None:
         match words:

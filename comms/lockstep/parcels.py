@@ -3,7 +3,7 @@ listen, as a parcel costs its way as much as a message."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator
 
 import zenoh
 
@@ -47,10 +47,15 @@ def unpacked(parcel: bytes) -> Iterator[tuple[str, bytes]]:
     return zip(keys, payloads, strict=True)
 
 
-def publish(session: zenoh.Session, keys: RunKeys, sender: str, outgoing: Sequence[Outgoing]) -> None:
-    """Sends messages of one node; they go out with the next word at the latest."""
+def publish(session: zenoh.Session, keys: RunKeys, outgoing: Iterable[Outgoing], here: Container[str] = ()) -> None:
+    """Sends messages of one node to the acting nodes that are not `here`; they go out with the next word at the
+    latest."""
     for one in outgoing:
-        if one.route.readers:
-            put(session, keys.topic(one.key), one.payload, at_once=False)
+        if any(reader not in here for reader in one.route.readers):
+            put(session, keys.topic(one.key), one.payload, at_once=False, away_only=True)
+
+
+def publish_parcels(session: zenoh.Session, keys: RunKeys, sender: str, outgoing: Iterable[Outgoing]) -> None:
+    """Sends messages of one node to those that only listen; likewise."""
     for watchers, parcel in parcels(outgoing):
         put(session, keys.parcel(watchers, sender), parcel, at_once=False)

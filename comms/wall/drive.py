@@ -34,6 +34,7 @@ class ByWallClock:
     may_be_late_s: float = math.inf
 
     mode = ClockMode.WALL
+    modems_in_hub = False
 
     def hosts_apart(self, routing: Routing) -> tuple[HostSpec, ...]:
         """None: nothing is planned to happen to anyone."""

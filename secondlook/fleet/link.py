@@ -150,8 +150,8 @@ def reach_m_of(scenario: Scenario, link: Link) -> float:
 
 def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
     """What each modem is told, by its platform; none where everybody hears everybody."""
-    times = link_times(scenario)
-    if times is None:
+    times, link = link_times(scenario), scenario.link
+    if times is None or link is None:
         return {}
     x_m, y_m = zip(*_places(scenario), strict=True)
     return {
@@ -168,6 +168,8 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             deck_ms=times.deck_ms,
             answer_ms=answer_within_ms_of(scenario),
             polls=times.polls,
+            by_age=link.order == "age",
+            tells_tiles=link.maps == "tiles",
         )
         for platform in times.platforms
     }

@@ -96,17 +96,24 @@ def make_nodes(specs: Mapping[str, NodeSpec]) -> dict[str, Any]:
 
 
 def hosts_of_run(
-    roster: tuple[RosterNode, ...], processes: int | None, apart: tuple[HostSpec, ...] = ()
+    roster: tuple[RosterNode, ...],
+    processes: int | None,
+    apart: tuple[HostSpec, ...] = (),
+    *,
+    modems_in_hub: bool = False,
 ) -> tuple[list[str], tuple[HostSpec, ...]]:
     """Which nodes live in the hub's process of `secondlook run`, and all other processes, each under a name of its own.
 
-    `processes`: over how many processes the acting nodes are spread, the hub's included; None: one a node, and modems
-    with the first node of their platform. Those that only listen have a process each. `apart`: processes of nodes that
-    must be alone (`comms.drive.Drive.hosts_apart`).
+    `processes`: over how many processes the acting nodes are spread, the hub's included; None: one a node. Those that
+    only listen have a process each. `apart`: processes of nodes that must be alone (`comms.drive.Drive.hosts_apart`).
+    `modems_in_hub`: all other modems are with the world, which has most to do with them; else with the first node of
+    their platform.
     """
     alone = {node_id for spec in apart for node_id in spec.nodes}
     acting = [one for one in roster if not one.listens_only]
     own = [one for one in acting if NODES[one.role].run is Process.OWN and one.node_id not in alone]
+    here = [one.node_id for one in own if modems_in_hub and one.role is Role.MODEM]
+    own = [one for one in own if one.node_id not in here]
     beside = _modems_beside(own)
     others = [one.node_id for one in own if one.node_id not in beside.values()]
     count = len(others) if processes is None else min(processes - 1, len(others))
@@ -114,7 +121,7 @@ def hosts_of_run(
     names = [_name(group) for group in groups]
     groups = [[*group, *(beside[one] for one in group if one in beside)] for group in groups]
     listeners = [one.node_id for one in roster if one.listens_only]
-    return [HUB] if groups else [HUB, *others, *beside.values()], (
+    return [HUB, *here] if groups else [HUB, *here, *others, *beside.values()], (
         *(HostSpec(name, tuple(group)) for name, group in zip(names, groups, strict=True)),
         *apart,
         *(HostSpec(name, (name,)) for name in listeners),

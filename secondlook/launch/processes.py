@@ -65,7 +65,9 @@ class Processes:
         state = logs.with_name(STATE)
         self._setup = Setup(run, fleet.roster, fleet.run_info, fleet.time_limit_ms, patience_s, state)
         routing = self._setup.routing()
-        self._in_hub, self._hosts = hosts_of_run(fleet.roster, processes, drive.hosts_apart(routing))
+        self._in_hub, self._hosts = hosts_of_run(
+            fleet.roster, processes, drive.hosts_apart(routing), modems_in_hub=drive.modems_in_hub
+        )
         self._here = {one.node_id for one in fleet.roster if NODES[one.role].run is Process.LAUNCHER}
         self._to_join = {spec.host for spec in self._hosts if spec.joins}
         self._killed: set[str] = set()

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from comms.said.routing import driver_of, modem_of
-from modem.config import MOST_PLATFORMS, least_frame_bits
+from modem.config import MOST_PLATFORMS, SMALL_BITS, least_frame_bits
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
@@ -399,6 +399,8 @@ def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> N
         raise refused(
             f"a frame must have {least} bits or more with {len(platforms)} platforms", ("profile", "frame_bits")
         )
+    if link.maps == "tiles" and profile.frame_bits < SMALL_BITS:
+        raise refused(f"must be stretches with frames of fewer than {SMALL_BITS} bits", ("maps",))
     frame_s = profile.preamble_s + profile.frame_bits / profile.rate_bps
     if mission is not None and frame_s * len(platforms) > mission.time_limit_s:
         most_s = mission.time_limit_s / len(platforms)

@@ -17,7 +17,8 @@ _LONGEST_S = 400.0  # that drawn surveys take, about: a storm is to fly in half 
 LINK_SHARE = 0.2  # of fleets
 FAST_LINKS = ("radio", "unet-data", "micromodem-6")
 SLOW_LINKS = ("micromodem-0", "micromodem-1", "unet-control")
-MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey; JANUS is not drawn yet
+MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey
+JANUS, JANUS_SHARE = "janus", 0.25  # of fleets that a slow link may have
 SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
 
 
@@ -140,6 +141,8 @@ def _link(number: int, drawn: dict[str, Any]) -> dict[str, Any]:
         return {}
     profiles = FAST_LINKS if len(vehicles) > MOST_BY_SLOW_LINK else FAST_LINKS + SLOW_LINKS
     link: dict[str, Any] = {"profile": rng.choice(profiles)}
+    if len(vehicles) <= MOST_BY_SLOW_LINK and Random(f"janus {number}").random() < JANUS_SHARE:
+        link["profile"] = JANUS
     if rng.random() < 0.5:
         link["loss"] = _m(rng.uniform(0, 0.3))
     if rng.random() < 0.2:

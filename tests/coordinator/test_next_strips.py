@@ -214,3 +214,14 @@ def test_the_end_leaves_it() -> None:
     told.keep_alive((HELPER,), 60)
     assert told.states()[2] in (OPEN, WITHDRAWN)
     assert told.strips()[2].vehicle == ""
+
+
+def test_a_next_one_that_is_late_by_itself_is_asked_back_and_open_again() -> None:
+    told = with_a_next_at_once(20_000, lost_after_ms=10_000_000)
+    told.status(HELPER, 2, TaskState.NEXT)
+    told.layer(HELPER, looked())
+    told.status(HELPER, 1, TaskState.DONE)  # and from then on is not heard
+    told.keep_alive((PRIMARY,), 600)
+    second = [one.message for one in told.node.said if isinstance(one.message, StripStatus) and one.number == 2]
+    assert (HELPER, TaskAction.GIVE_BACK, 2) in told.tasks()
+    assert any(one.reason == f"{HELPER} is told to give strip 2 back" for one in second)

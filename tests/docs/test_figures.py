@@ -58,9 +58,10 @@ def test_what_is_kept_is_rounded_and_no_more_than_tables_need() -> None:
 
 def test_of_a_sweep_the_figures_that_shares_are_reckoned_from() -> None:
     row = {"seed": 1, "failure": None, "link.profile": "janus", "coordinator.platform": "ship", "digest": "ab"}
+    row |= {"link.also": "-"}
     figures_of_it = {"risk.mean": 1 / 3, "link.bytes_per_s": 1.0, "link.age.helper.mean_s": None, "time.wall_s": 3.0}
     (found,) = linked_kept("toy", [row | figures_of_it])
     assert found == {
-        "scenario": "toy", "seed": 1, "failure": None, "link.profile": "janus", "coordinator.platform": "ship",
-        "link.bytes_per_s": 1.0, "risk.mean": 0.333333, "link.age.helper.mean_s": None,
+        "scenario": "toy", "seed": 1, "failure": None, "link.profile": "janus", "link.also": "-",
+        "coordinator.platform": "ship", "link.bytes_per_s": 1.0, "risk.mean": 0.333333, "link.age.helper.mean_s": None,
     }  # fmt: skip

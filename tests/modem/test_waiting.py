@@ -6,7 +6,7 @@ import math
 
 from comms.said.bits import BitWriter
 from comms.said.topics import Crossing
-from modem.waiting import Queue, Waiting
+from modem.waiting import Queue, Waiting, by_age
 
 
 def waiting(key: str, *, bits: int = 8, queued_ms: int = 0, until_ms: float = math.inf, **terms: bool) -> Waiting:
@@ -45,3 +45,13 @@ def test_what_waits_about_something_may_be_forgotten() -> None:
         queue.add(one)
     queue.forget("a")
     assert keys(queue, 0) == ["b"]
+
+
+def test_by_age_what_waits_longest_goes_first_whatever_it_is_worth_and_however_long_it_is() -> None:
+    crossings = [Crossing(1000, 60), Crossing(1, 600, newest_only=True), Crossing(10, 30)]
+    queue = Queue()
+    for key, crossing, bits, queued_ms in zip("abc", crossings, (70, 2000, 8), (2000, 1000, 3000), strict=True):
+        said = BitWriter()
+        said.write(0, bits)
+        queue.add(Waiting(key, "alpha", by_age(crossing, bits), said, queued_ms))
+    assert keys(queue, 4000) == ["b", "a", "c"]

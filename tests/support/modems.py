@@ -44,6 +44,8 @@ def config_of(
     polls: PollTimes | None = None,
     deck_ms: int = 0,
     answer_ms: int = 10**9,
+    by_age: bool = False,
+    tells_tiles: bool = False,
 ) -> ModemConfig:
     """A modem's configuration in a fleet of alpha and beta with a ship."""
     return ModemConfig(
@@ -59,6 +61,8 @@ def config_of(
         polls,
         deck_ms,
         answer_ms,
+        by_age,
+        tells_tiles,
     )
 
 

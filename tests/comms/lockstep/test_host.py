@@ -19,7 +19,7 @@ from comms.errors import NodeError
 from comms.keys import HostSpec
 from comms.lockstep.clock import Grant
 from comms.lockstep.host import ListenerHost, NodeHost
-from comms.lockstep.parcels import publish
+from comms.lockstep.parcels import publish, publish_parcels
 from comms.lockstep.words import pack_grants, unpack_answers
 from comms.runner import Outgoing, Stamp
 from comms.said.announcement import Role
@@ -55,7 +55,7 @@ class HubByHand:
         put(self.session, KEYS.topic(one.key), one.payload, at_once=False)
 
     def sends_parcels(self, *said: Outgoing) -> None:
-        publish(self.session, KEYS, "world", said)
+        publish_parcels(self.session, KEYS, "world", said)
 
     def welcomes(self, host: str) -> None:
         self.hears("hello")
@@ -197,11 +197,25 @@ def test_a_listener_hears_what_it_shares_with_others_and_what_it_does_not(hub: H
 
 def test_what_only_listeners_read_goes_out_in_a_parcel_alone(monkeypatch: pytest.MonkeyPatch, hub: HubByHand) -> None:
     keys: list[str] = []
-    monkeypatch.setattr("comms.lockstep.parcels.put", lambda session, key, payload, at_once: keys.append(key))
+    monkeypatch.setattr("comms.lockstep.parcels.put", lambda session, key, payload, **how: keys.append(key))
     stamp = Stamp("world", WATCHED)
     pose = stamp(TRUTH_POSE.key(vehicle="alpha"), TruthPose(0, 0, 0), 0)
-    publish(hub.session, KEYS, "world", [pose, stamp(NAV.key(vehicle="alpha"), nav(), 0)])
+    said = [pose, stamp(NAV.key(vehicle="alpha"), nav(), 0)]
+    publish(hub.session, KEYS, said)
+    publish_parcels(hub.session, KEYS, "world", said)
     assert keys == [KEYS.topic("veh/alpha/nav"), KEYS.parcel(("observer", "recorder"), "world")]
+
+
+def test_what_all_readers_have_at_once_is_not_sent(monkeypatch: pytest.MonkeyPatch, hub: HubByHand) -> None:
+    keys: list[str] = []
+    monkeypatch.setattr("comms.lockstep.parcels.put", lambda session, key, payload, **how: keys.append(key))
+    said = [Stamp("world", WATCHED)(NAV.key(vehicle="alpha"), nav(), 0)]
+    readers = WATCHED.route("veh/alpha/nav")
+    assert readers is not None
+    publish(hub.session, KEYS, said, readers.readers)
+    assert keys == []
+    publish(hub.session, KEYS, said, ["world"])
+    assert keys == [KEYS.topic("veh/alpha/nav")]
 
 
 def test_a_grant_that_comes_before_its_mail_is_carried_out_when_all_is_there(hub: HubByHand, takes: list[None]) -> None:

@@ -8,6 +8,7 @@ from flights import BRIEF
 from hypothesis import given
 from hypothesis import strategies as st
 
+from comms.keys import HostSpec
 from comms.said.announcement import Role
 from comms.said.routing import RosterNode
 from secondlook.fleet.build import Fleet, build_fleet
@@ -48,6 +49,28 @@ def test_nodes_are_spread_over_so_many_processes(
     here, plans = hosts_of_run(fleet.roster, processes)
     assert here == in_hub
     assert {plan.host: plan.nodes for plan in plans} == {**hosts, "recorder": ("recorder",), "observer": ("observer",)}
+
+
+@pytest.mark.parametrize(
+    ("processes", "in_hub", "hosts"),
+    [
+        (None, ["world", "modem-helper"], {"coordinator", "primary", "helper", "modem-ship", "modem-primary"}),
+        (2, ["world", "modem-helper"], {"primary+helper+coordinator", "modem-ship", "modem-primary"}),
+        (
+            1,
+            ["world", "modem-helper", "coordinator", "primary", "helper"],
+            {"modem-ship", "modem-primary"},
+        ),
+    ],
+)
+def test_modems_are_with_the_world_but_for_those_to_which_something_happens(
+    processes: int | None, in_hub: list[str], hosts: set[str]
+) -> None:
+    fleet = build_fleet(load_scenario(str(BRIEF), ["link.profile=micromodem-1"]), record=True)
+    apart = tuple(HostSpec(name, (name,)) for name in ("modem-ship", "modem-primary"))
+    here, plans = hosts_of_run(fleet.roster, processes, apart, modems_in_hub=True)
+    assert sorted(here) == sorted(in_hub)
+    assert {plan.host for plan in plans} - {"recorder", "observer"} == hosts
 
 
 @given(st.lists(ids, unique=True, max_size=8), st.integers(1, 12))

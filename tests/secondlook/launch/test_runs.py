@@ -270,8 +270,8 @@ def test_the_digest_is_the_same_with_a_recorder_that_cannot_keep_up(tmp_path: Pa
 def test_the_digest_is_the_same_in_whatever_order_processes_start(
     tmp_path: Path, digest: str, monkeypatch: pytest.MonkeyPatch, turn: int
 ) -> None:
-    def turned(*arguments: Any) -> tuple[list[str], tuple[HostSpec, ...]]:
-        in_hub, plans = hosts_of_run(*arguments)
+    def turned(*arguments: Any, **more: Any) -> tuple[list[str], tuple[HostSpec, ...]]:
+        in_hub, plans = hosts_of_run(*arguments, **more)
         order = [*plans[turn:], *plans[:turn]]
         return in_hub, tuple(order[::-1])
 
