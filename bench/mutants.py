@@ -1,0 +1,367 @@
+"""Which changes of the core no test notices: a sample of mutants, each tried against the tests that are about its file.
+
+python -m bench.mutants [--sample N] [--seed S] [--only PATH ...] [--again] [--processes N]
+
+A mutant is the program with one place changed, as cosmic-ray's operators do it and two of ours. It is tried against the
+tests named as its file, then, if it survives these, against the others of its room and the recorded mission that every
+node has to say again. Not tried: what is no behaviour (annotations, decorators, what only type checkers see, `strict=`
+of zip) and operators that no reader would mistake (one partner for each: + and -, * and /, < and <=, < and >=).
+
+Mutants are tried in copies of this folder below `runs/mutants/`, where results are kept: an interrupted run goes on.
+`--again` tries those that survived anew, after a new test. What is said of a survivor stands in
+`tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import hashlib
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from itertools import count, islice
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import yaml
+from cosmic_ray import plugins
+from cosmic_ray.ast import ast_nodes, get_ast
+from cosmic_ray.mutating import mutate_and_test, mutate_code
+from cosmic_ray.work_db import WorkDB
+from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome, WorkItem, WorkResult
+
+ROOT = Path(__file__).parents[1]
+HOME = ROOT / "runs" / "mutants"
+JUDGED = ROOT / "tests" / "mutants" / "judged.yaml"
+CORE = (
+    *("planner/**/*.py", "coordinator/**/*.py", "vehicle_agent/coverage.py", "vehicle_agent/part_survey.py"),
+    *("vehicle_agent/survey.py", "comms/lockstep/clock.py", "comms/lockstep/events.py", "comms/lockstep/faults.py"),
+    *("sim_world/estimates.py", "sim_world/looks.py", "sim_world/sonar.py", "sim_world/footprints/*.py"),
+    "secondlook/recorded/metrics.py",
+)
+GOLDEN = "tests/secondlook/recorded/test_golden_replay.py"
+WIRED = ("test_zenoh_fleet", "test_host", "wall/")
+"""Of the wider tests those that wait for a wire or a clock are left out."""
+FIRST_S, WIDER_S = 120, 900
+"""Longer than any of these tests take on a busy machine: who takes longer does not end."""
+
+SWAPPED = {
+    **{"Add": ["Sub"], "Sub": ["Add"], "Mul": ["Div"], "Div": ["Mul"], "FloorDiv": ["Div"], "Mod": ["FloorDiv"]},
+    **{"Pow": ["Mul"], "BitOr": ["BitAnd"], "BitAnd": ["BitOr"], "BitXor": ["BitAnd"], "LShift": ["RShift"]},
+    **{"RShift": ["LShift"], "Lt": ["LtE", "GtE"], "LtE": ["Lt", "Gt"], "Gt": ["GtE", "LtE"], "GtE": ["Gt", "Lt"]},
+    **{"Eq": ["NotEq"], "NotEq": ["Eq"], "Is": ["IsNot"], "IsNot": ["Is"]},
+}
+PLAIN = {
+    *("ReplaceUnaryOperator_Delete_Not", "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Invert"),
+    *("AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
+    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer"),
+    "ZeroIterationForLoop",
+}
+
+
+class OtherFunction:
+    """Calls the function that is easily mistaken for the one that is called."""
+
+    PAIRS = (("min", "max"), ("minimum", "maximum"), ("any", "all"), ("floor", "ceil"), ("sin", "cos"))
+    OTHER = {one: two for pair in PAIRS for one, two in (pair, pair[::-1])}
+
+    def mutation_positions(self, node: Any) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+        following = node.get_next_leaf() if node.type == "name" and node.value in self.OTHER else None
+        if following is not None and following.value == "(":
+            yield node.start_pos, node.end_pos
+
+    def mutate(self, node: Any, index: int) -> Any:
+        node.value = self.OTHER[node.value]
+        return node
+
+
+class LeftOut:
+    """Does nothing where something was called, added to or assigned to an attribute or an item."""
+
+    def mutation_positions(self, node: Any) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
+        if node.type != "simple_stmt":
+            return
+        does = node.children[0]
+        called = does.type in {"atom_expr", "power"} and does.children[-1].type == "trailer"
+        assigned = does.type == "expr_stmt" and (
+            does.children[0].type in {"atom_expr", "power"} or getattr(does.children[1], "value", "=") != "="
+        )
+        if called or assigned:
+            yield does.start_pos, does.end_pos
+
+    def mutate(self, node: Any, index: int) -> Any:
+        first = node.get_first_leaf()
+        node.children[0] = get_ast(first.prefix + "pass").children[0]
+        return node
+
+
+OURS = {"OtherFunction": OtherFunction, "LeftOut": LeftOut}
+plugins.OPERATOR_PROVIDERS["ours"] = OURS
+
+
+def operator_names() -> list[str]:
+    """The operators that are tried, with the name of who provides them."""
+    found = []
+    for name in plugins.operator_names():
+        plain = name.partition("/")[2]
+        replaced = re.fullmatch(r"Replace(?:Binary|Comparison)Operator_(\w+)_(\w+)", plain)
+        if plain in PLAIN or plain in OURS or (replaced and replaced[2] in SWAPPED.get(replaced[1], ())):
+            found.append(name)
+    return found
+
+
+@dataclass(frozen=True)
+class Mutant:
+    """The `occurrence`-th place in a file at which the operator can change something; `rank` draws the sample."""
+
+    file: str
+    operator: str
+    occurrence: int
+    start: tuple[int, int]
+    end: tuple[int, int]
+    rank: str
+
+    def job(self, source: str) -> str:
+        """What its result is kept by: another source is another mutant."""
+        return hashlib.sha256(f"{source}|{self.file}|{self.operator}|{self.occurrence}".encode()).hexdigest()[:32]
+
+    def spec(self) -> MutationSpec:
+        return MutationSpec(self.file, self.operator, self.occurrence, self.start, self.end)
+
+
+def no_behaviour(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
+    """From where to where in a source nothing happens that a test could see."""
+    found: list[ast.AST | None] = []
+    for node in ast.walk(ast.parse(source)):
+        match node:
+            case ast.arg():
+                found.append(node.annotation)
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                found += [node.returns, *node.decorator_list]
+            case ast.ClassDef():
+                found += node.decorator_list
+            case ast.AnnAssign():
+                found.append(node.annotation)
+            case ast.If(test=ast.Name(id="TYPE_CHECKING")):
+                found.append(node)
+            case ast.keyword(arg="strict"):
+                found.append(node)
+    spans = []
+    for one in found:
+        if isinstance(one, ast.expr | ast.keyword | ast.stmt):
+            ends = one.end_lineno or one.lineno, one.end_col_offset or one.col_offset
+            spans.append(((one.lineno, one.col_offset), ends))
+    return spans
+
+
+def mutants_of(file: str, source: str, seed: int) -> list[Mutant]:
+    """All of a file. The rank is by what is changed, not by where, so that an edit leaves the sample elsewhere as it is."""
+    tree, silent, lines = get_ast(source), no_behaviour(source), source.splitlines()
+    nodes = list(ast_nodes(tree))
+    times: dict[tuple[str, str], Iterator[int]] = {}
+    found = []
+    for name in operator_names():
+        operator = plugins.get_operator(name)()
+        places = ((node, place) for node in nodes for place in operator.mutation_positions(node))
+        for occurrence, (node, (start, end)) in enumerate(places):
+            line = lines[start[0] - 1].strip()
+            nth = next(times.setdefault((name, line), count()))
+            signature = node.parent is not None and node.parent.type == "parameters"  # its bare * or /
+            if not signature and not any(begins <= start and end <= ends for begins, ends in silent):
+                rank = hashlib.sha256(f"{seed}|{file}|{name}|{line}|{nth}".encode()).hexdigest()
+                found.append(Mutant(file, name, occurrence, start, end, rank))
+    return found
+
+
+def tests_of(file: str, root: Path = ROOT) -> tuple[list[str], list[str]]:
+    """The tests that are about a file of the core, and the wider ones to which its survivors are given."""
+    path = Path(file)
+    folder = root / "tests" / path.parent
+    room = folder if path.parts[0] in {"comms", "secondlook"} else root / "tests" / path.parts[0]
+    imports = re.compile(rf"{'.'.join(path.with_suffix('').parts)}\b|from {'.'.join(path.parts[:-1])} import .*\b{path.stem}\b")
+    first = (
+        sorted(folder.glob(f"test_{path.stem}.py"))
+        or [one for one in sorted(folder.rglob("test_*.py")) if imports.search(one.read_text(encoding="utf-8"))]
+        or sorted(folder.glob("test_*.py"))
+    )
+    wider = [one for one in sorted(room.rglob("test_*.py")) if one not in first]
+    if path.parts[0] == "comms":
+        wider += sorted((root / "tests" / "comms").glob("test_*buses.py"))
+    told = [str(one.relative_to(root)) for one in wider if not any(word in str(one) for word in WIRED)]
+    return [str(one.relative_to(root)) for one in first], [one for one in told if one != GOLDEN] + [GOLDEN]
+
+
+def command(tests: Iterable[str]) -> str:
+    return f"{sys.executable} -m pytest -x -q -p no:cacheprovider --hypothesis-profile=mutants {' '.join(tests)}"
+
+
+# What follows runs in the processes, each with a copy of the folder of its own.
+
+
+def set_up(numbers: Any) -> None:
+    """A copy of what is here, changed or not, and this process within it."""
+    copy = HOME / f"copy-{numbers.get()}"
+    shutil.rmtree(copy, ignore_errors=True)
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0"):
+        if name and (ROOT / name).is_file():
+            (copy / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(ROOT / name, copy / name)
+    os.chdir(copy)
+    os.environ["PYTHONPATH"] = str(copy)
+    os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+
+
+def unchanged(tests: Sequence[str]) -> str:
+    """What the tests say of the program as it is, if they do not pass."""
+    done = subprocess.run(command(tests).split(), capture_output=True, text=True, check=False)
+    return done.stdout if done.returncode else ""
+
+
+def tried(mutant: Mutant) -> WorkResult:
+    """What came of it: against its own tests, then against the wider ones."""
+    first, wider = tests_of(mutant.file, Path.cwd())
+    result = mutate_and_test([mutant.spec()], command(first), FIRST_S)
+    if result.test_outcome == TestOutcome.SURVIVED:
+        result = mutate_and_test([mutant.spec()], command(wider), WIDER_S)
+    return result
+
+
+# The judged survivors, and the report.
+
+
+@dataclass(frozen=True)
+class Judged:
+    """`verdict`: `same`, behaviour does not change, or `untested`; `because` says why."""
+
+    file: str
+    was: str
+    becomes: str
+    verdict: str
+    because: str
+
+
+def judged() -> list[Judged]:
+    return [Judged(**entry) for entry in yaml.safe_load(JUDGED.read_text(encoding="utf-8")) or []]
+
+
+def changed(diff: str) -> tuple[str, str]:
+    """The lines as they were and as they are, without what surrounds them."""
+    lines = [line for line in diff.splitlines() if not line.startswith(("---", "+++"))]
+    was, becomes = (" ".join(line[1:].strip() for line in lines if line.startswith(sign)) for sign in "-+")
+    return was, becomes
+
+
+def share(some: int, of: int) -> str:
+    return f"{100 * some / of:.1f} %" if of else "-"
+
+
+def report(tried_ones: Sequence[tuple[Mutant, WorkResult]]) -> tuple[str, int]:
+    """As Markdown, and how many survivors are not judged."""
+    known = {(one.file, one.was, one.becomes): one for one in judged()}
+    rows: dict[str, list[int]] = {}
+    told: dict[str, list[str]] = {"not judged yet": [], "untested": [], "same": []}
+    for mutant, result in sorted(tried_ones, key=lambda one: (one[0].file, one[0].start)):
+        row = rows.setdefault(mutant.file, [0, 0, 0])
+        row[0] += 1
+        if result.test_outcome == TestOutcome.SURVIVED:
+            verdict = known.get((mutant.file, *changed(result.diff or "")))
+            row[1] += 1
+            row[2] += verdict is not None and verdict.verdict == "same"
+            diff = "\n".join((result.diff or "").splitlines()[1:])
+            because = f"{verdict.because}\n\n" if verdict else ""
+            told[verdict.verdict if verdict else "not judged yet"].append(f"{because}```diff\n{diff}\n```\n")
+    tried_count, survived, same = (sum(row[n] for row in rows.values()) for n in range(3))
+    timed_out = sum(result.output == "timeout" for _, result in tried_ones)
+    lines = [
+        f"{tried_count} mutants: {tried_count - survived} killed ({timed_out} of these as they did not end), {survived} "
+        f"survived ({share(survived, tried_count)}), of which {same} behave the same, {len(told['untested'])} are not "
+        f"tested and {len(told['not judged yet'])} are not judged. Of those that change behaviour survived: "
+        f"{share(survived - same, tried_count - same)}.",
+        "",
+        "| file | mutants | survived | share | behave the same |",
+        "|---|---|---|---|---|",
+        *(f"| {file} | {n} | {left} | {share(left, n)} | {alike} |" for file, (n, left, alike) in sorted(rows.items())),
+    ]
+    for heading, diffs in told.items():
+        lines += ["", f"## {heading}: {len(diffs)}", "", *diffs]
+    return "\n".join(lines) + "\n", len(told["not judged yet"])
+
+
+def sampled(seed: int, size: int, only: Sequence[str]) -> list[tuple[Mutant, str]]:
+    """The mutants of a sample, each with the source of its file."""
+    files = sorted({path.relative_to(ROOT).as_posix() for pattern in CORE for path in ROOT.glob(pattern)})
+    found = []
+    for file in files:
+        if not only or any(file.startswith(one) for one in only):
+            source = (ROOT / file).read_text(encoding="utf-8")
+            found += [(mutant, source) for mutant in mutants_of(file, source, seed)]
+    ranked = iter(sorted(found, key=lambda one: one[0].rank))
+    return list(islice((one for one in ranked if compiles(*one)), size))
+
+
+def compiles(mutant: Mutant, source: str) -> bool:
+    """Whether it is a program at all: ** in a dict's display is none of the operators that it looks like."""
+    changed_source = mutate_code(source, plugins.get_operator(mutant.operator)(), mutant.occurrence)
+    try:
+        return changed_source is not None and ast.dump(ast.parse(changed_source)) != ast.dump(ast.parse(source))
+    except SyntaxError:
+        return False
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--sample", type=int, default=350, help="how many mutants")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", nargs="*", default=(), help="how paths of files begin")
+    parser.add_argument("--again", action="store_true", help="try those that survived anew")
+    parser.add_argument("--processes", type=int, default=os.cpu_count() or 1)
+    asked = parser.parse_args()
+    HOME.mkdir(parents=True, exist_ok=True)
+    results = WorkDB(HOME / "results.sqlite", WorkDB.Mode.create)
+    sample = [(mutant, mutant.job(source)) for mutant, source in sampled(asked.seed, asked.sample, asked.only)]
+    known = {item.job_id: result for item, result in results.completed_work_items}
+    here = {item.job_id for item in results.work_items}
+    results.add_work_items([WorkItem.single(job, mutant.spec()) for mutant, job in sample if job not in here])
+    survived = TestOutcome.SURVIVED if asked.again else None
+    missing = [(one, job) for one, job in sample if job not in known or known[job].test_outcome == survived]
+    if missing:
+        run(missing, known, results, asked.processes)
+    text, left = report([(mutant, known[job]) for mutant, job in sample])
+    (HOME / "report.md").write_text(text, encoding="utf-8")
+    print(text)
+    return 1 if left else 0
+
+
+def run(
+    missing: Sequence[tuple[Mutant, str]], known: dict[str, WorkResult], results: WorkDB, processes: int
+) -> None:
+    """Tries them, and keeps each result as it comes."""
+    spawning = get_context("spawn")
+    numbers = spawning.Queue()
+    for number in range(processes):
+        numbers.put(number)
+    with ProcessPoolExecutor(processes, spawning, set_up, (numbers,)) as pool:
+        files = {mutant.file for mutant, _ in missing}
+        if said := pool.submit(unchanged, sorted({test for file in files for test in tests_of(file)[0]})).result():
+            sys.exit(f"the tests do not pass of the program as it is:\n{said}")
+        at_work = {pool.submit(tried, mutant): (mutant, job) for mutant, job in missing}
+        for number, done in enumerate(as_completed(at_work), 1):
+            (mutant, job), result = at_work[done], done.result()
+            if result.worker_outcome != WorkerOutcome.NORMAL or result.test_outcome == TestOutcome.INCOMPETENT:
+                sys.exit(f"{mutant} could not be tried: {result.output}")
+            known[job] = result
+            results.set_result(job, result)
+            outcome = result.test_outcome.value
+            print(f"{number}/{len(missing)} {outcome} {mutant.file}:{mutant.start[0]} {mutant.operator}", flush=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
