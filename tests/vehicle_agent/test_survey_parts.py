@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -26,6 +27,10 @@ from vehicle_agent.survey import SurveyAgent
 
 SEES_TO_130_M = flat(0.3, 25, 130)
 L_SHAPE = Region(((0.0, 0.0), (800.0, 0.0), (800.0, 300.0), (300.0, 300.0), (300.0, 600.0), (0.0, 600.0)))
+STEPS = Region(
+    ((0.0, 0.0), (450.0, 0.0), (450.0, 500.0), (900.0, 500.0))
+    + ((900.0, 1100.0), (450.0, 1100.0), (450.0, 600.0), (0.0, 600.0))
+)
 WITH_ROCKS = Region(L_SHAPE.outline, (((100.0, 100.0), (160.0, 100.0), (160.0, 160.0), (100.0, 160.0)),))
 
 
@@ -74,6 +79,13 @@ def node_of(agent: OneNode) -> SurveyAgent:
     return agent.node
 
 
+def assert_each_begins_at_its_nearer_end(tracks: Sequence[PlannedTrack]) -> None:
+    for before, after in pairwise(tracks):
+        end = (before.end_x_m, before.end_y_m)
+        to_start_m = math.dist(end, (after.start_x_m, after.start_y_m))
+        assert to_start_m <= math.dist(end, (after.end_x_m, after.end_y_m))
+
+
 class TestPartByPart:
     def test_each_part_is_planned_in_turn_with_what_was_learned(self) -> None:
         agent = surveyor(announced(L_SHAPE))
@@ -91,14 +103,24 @@ class TestPartByPart:
         assert [track.number for track in agent.last(Plan).tracks] == list(range(1, 7))
         assert agent.last(AgentState).mode is Mode.FINISHED
 
-    def test_the_second_part_is_begun_from_the_nearer_end(self) -> None:
-        agent = surveyor(announced(L_SHAPE))
-        fly_all(agent, SEES_TO_130_M)
+    @pytest.mark.parametrize(
+        ("region", "far_m", "first", "begins_at_m"),
+        [
+            (L_SHAPE, 130, 3, 0),  # after two tracks at the near side
+            (L_SHAPE, 100, 6, 300),  # after five at the far side, against the part's heading
+            (STEPS, 140, 4, 500),  # after three at the far side, where the next part begins: along its heading
+        ],
+    )
+    def test_the_second_part_is_begun_from_the_nearer_end(
+        self, region: Region, far_m: float, first: int, begins_at_m: float
+    ) -> None:
+        agent = surveyor(announced(region))
+        fly_all(agent, flat(0.3, 25, far_m))
         tracks = agent.last(Plan).tracks
-        for before, after in pairwise(tracks):
-            end = (before.end_x_m, before.end_y_m)
-            to_start_m = math.dist(end, (after.start_x_m, after.start_y_m))
-            assert to_start_m <= math.dist(end, (after.end_x_m, after.end_y_m))
+        numbers = [track.number for track in tracks if track.start_x_m > (450 if region is STEPS else 300)]
+        assert numbers == list(range(first, len(tracks) + 1))
+        assert tracks[first - 1].start_y_m == begins_at_m
+        assert_each_begins_at_its_nearer_end(tracks)
 
     def test_below_three_nadir_gaps_the_next_part_begins_with_single_tracks(self) -> None:
         agent = surveyor(announced(L_SHAPE))
@@ -201,6 +223,7 @@ class TestGroundToKeepOutOf:
         node, tracks = self.flown(zone, self.FIELD)
         assert [track.number for track in tracks] == list(range(1, len(tracks) + 1))
         assert all(track.flown for track in tracks)
+        assert_each_begins_at_its_nearer_end(tracks)
         pieces = [track for track in tracks if abs(track.across_m - across_m) < 1e-6]
         # Grown it is 11 m wide. A circle of 20 m beside the track touches its corner, 5.5 m to the side, where it
         # begins sqrt(20^2 - 14.5^2) = 13.8 m before it; before that come 20 m of run-out. Looked for metre by metre.
@@ -209,6 +232,17 @@ class TestGroundToKeepOutOf:
         fly_all(free, SEES_TO_130_M)
         assert len(tracks) == len(free.last(Plan).tracks) + 1
         assert len(node.r_adpt_m) == len(node_of(free).r_adpt_m)
+
+    def test_each_part_to_come_is_planned_from_where_the_one_before_it_ends(self) -> None:
+        # Two tracks from the near side and back, one to the far side of a part 400 m long, and then from there.
+        field = ((0.0, 0.0), (700.0, 0.0), (700.0, 600.0), (400.0, 600.0))
+        region = Region((*field, (400.0, 400.0), (300.0, 400.0), (300.0, 600.0), (0.0, 600.0)))
+        far_off = (Zone((Vertex(2000, 2000), Vertex(2010, 2000), Vertex(2010, 2010))),)
+        agent = surveyor(replace(announced(region), keep_out=far_off, keep_out_margin_m=1.5))
+        tracks = agent.last(Plan).tracks
+        begins = [(track.number, track.start_y_m) for track in tracks]
+        assert begins == [(1, 0.0), (2, 600.0), (3, 0.0), (4, 600.0), (5, 0.0)]
+        assert_each_begins_at_its_nearer_end(tracks)
 
     def test_no_track_enters_it_where_it_divides_the_area(self) -> None:
         lane = ((-50.0, 250.0), (950.0, 250.0), (950.0, 310.0), (-50.0, 310.0))
