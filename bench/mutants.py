@@ -181,21 +181,25 @@ def mutants_of(file: str, source: str, seed: int) -> list[Mutant]:
 
 
 def tests_of(file: str, root: Path = ROOT) -> tuple[list[str], list[str]]:
-    """The tests that are about a file of the core, and the wider ones to which its survivors are given."""
+    """The tests that are about a file of the core, and the wider ones to which its survivors are given, those first
+    that are likely to tell: of its folder, that import it, the recorded mission."""
     path = Path(file)
     folder = root / "tests" / path.parent
     room = folder if path.parts[0] in {"comms", "secondlook"} else root / "tests" / path.parts[0]
-    imports = re.compile(rf"{'.'.join(path.with_suffix('').parts)}\b|from {'.'.join(path.parts[:-1])} import .*\b{path.stem}\b")
+    module, package = ".".join(path.with_suffix("").parts), ".".join(path.parts[:-1])
+    imported = re.compile(rf"{module}\b|from {package} import .*\b{path.stem}\b")
+    importing = {one for one in room.rglob("test_*.py") if imported.search(one.read_text(encoding="utf-8"))}
     first = (
         sorted(folder.glob(f"test_{path.stem}.py"))
-        or [one for one in sorted(folder.rglob("test_*.py")) if imports.search(one.read_text(encoding="utf-8"))]
+        or sorted(one for one in importing if one.is_relative_to(folder))
         or sorted(folder.glob("test_*.py"))
     )
-    wider = [one for one in sorted(room.rglob("test_*.py")) if one not in first]
+    near = [] if folder == room else sorted(folder.glob("test_*.py"))
+    around = [*near, *sorted(importing), root / GOLDEN, *sorted(room.rglob("test_*.py"))]
     if path.parts[0] == "comms":
-        wider += sorted((root / "tests" / "comms").glob("test_*buses.py"))
-    told = [str(one.relative_to(root)) for one in wider if not any(word in str(one) for word in WIRED)]
-    return [str(one.relative_to(root)) for one in first], [one for one in told if one != GOLDEN] + [GOLDEN]
+        around += (root / "tests" / "comms").glob("test_*buses.py")
+    told = [str(one.relative_to(root)) for one in dict.fromkeys(around) if one not in first]
+    return [str(one.relative_to(root)) for one in first], [one for one in told if not any(word in one for word in WIRED)]
 
 
 def command(tests: Iterable[str]) -> str:
@@ -353,14 +357,17 @@ def run(
         if said := pool.submit(unchanged, sorted({test for file in files for test in tests_of(file)[0]})).result():
             sys.exit(f"the tests do not pass of the program as it is:\n{said}")
         at_work = {pool.submit(tried, mutant): (mutant, job) for mutant, job in missing}
-        for number, done in enumerate(as_completed(at_work), 1):
-            (mutant, job), result = at_work[done], done.result()
-            if result.worker_outcome != WorkerOutcome.NORMAL or result.test_outcome == TestOutcome.INCOMPETENT:
-                sys.exit(f"{mutant} could not be tried: {result.output}")
-            known[job] = result
-            results.set_result(job, result)
-            outcome = result.test_outcome.value
-            print(f"{number}/{len(missing)} {outcome} {mutant.file}:{mutant.start[0]} {mutant.operator}", flush=True)
+        try:
+            for number, done in enumerate(as_completed(at_work), 1):
+                (mutant, job), result = at_work[done], done.result()
+                if result.worker_outcome != WorkerOutcome.NORMAL or result.test_outcome == TestOutcome.INCOMPETENT:
+                    sys.exit(f"{mutant} could not be tried: {result.output}")
+                known[job] = result
+                results.set_result(job, result)
+                outcome = result.test_outcome.value
+                print(f"{number}/{len(missing)} {outcome} {mutant.file}:{mutant.start[0]} {mutant.operator}", flush=True)
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 if __name__ == "__main__":
