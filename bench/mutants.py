@@ -4,8 +4,7 @@ python -m bench.mutants [--sample N] [--seed S] [--only PATH ...] [--again] [--p
 
 A mutant is the program with one place changed, as cosmic-ray's operators do it and two of ours. It is tried against the
 tests named as its file, then, if it survives these, against the others of its room and the recorded mission that every
-node has to say again. Not tried: what is no behaviour (annotations, decorators, what only type checkers see, `strict=`
-of zip) and operators that no reader would mistake (one partner for each: + and -, * and /, < and <=, < and >=).
+node has to say again. Which there are: `bench.mutant_kinds`.
 
 Mutants are tried in copies of this folder below `runs/mutants/`, where results are kept: an interrupted run goes on.
 `--again` tries those that survived anew, after a new test. What is said of a survivor stands in
@@ -15,27 +14,25 @@ Mutants are tried in copies of this folder below `runs/mutants/`, where results 
 from __future__ import annotations
 
 import argparse
-import ast
-import hashlib
 import os
 import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from itertools import count, islice
+from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import yaml
-from cosmic_ray import plugins
-from cosmic_ray.ast import ast_nodes, get_ast
-from cosmic_ray.mutating import mutate_and_test, mutate_code
+from cosmic_ray.mutating import mutate_and_test
 from cosmic_ray.work_db import WorkDB
-from cosmic_ray.work_item import MutationSpec, TestOutcome, WorkerOutcome, WorkItem, WorkResult
+from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkItem, WorkResult
+
+from bench.mutant_kinds import Mutant, compiles, mutants_of
 
 ROOT = Path(__file__).parents[1]
 HOME = ROOT / "runs" / "mutants"
@@ -52,135 +49,8 @@ WIRED = ("test_zenoh_fleet", "test_host", "wall/")
 FIRST_S, WIDER_S = 120, 900
 """Longer than any of these tests take on a busy machine: who takes longer does not end."""
 
-SWAPPED = {
-    **{"Add": ["Sub"], "Sub": ["Add"], "Mul": ["Div"], "Div": ["Mul"], "FloorDiv": ["Div"], "Mod": ["FloorDiv"]},
-    **{"Pow": ["Mul"], "BitOr": ["BitAnd"], "BitAnd": ["BitOr"], "BitXor": ["BitAnd"], "LShift": ["RShift"]},
-    **{"RShift": ["LShift"], "Lt": ["LtE", "GtE"], "LtE": ["Lt", "Gt"], "Gt": ["GtE", "LtE"], "GtE": ["Gt", "Lt"]},
-    **{"Eq": ["NotEq"], "NotEq": ["Eq"], "Is": ["IsNot"], "IsNot": ["Is"]},
-}
-PLAIN = {
-    *("ReplaceUnaryOperator_Delete_Not", "ReplaceUnaryOperator_Delete_USub", "ReplaceUnaryOperator_Delete_Invert"),
-    *("AddNot", "ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
-    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "NumberReplacer"),
-    "ZeroIterationForLoop",
-}
 
-
-class OtherFunction:
-    """Calls the function that is easily mistaken for the one that is called."""
-
-    PAIRS = (("min", "max"), ("minimum", "maximum"), ("any", "all"), ("floor", "ceil"), ("sin", "cos"))
-    OTHER = {one: two for pair in PAIRS for one, two in (pair, pair[::-1])}
-
-    def mutation_positions(self, node: Any) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-        following = node.get_next_leaf() if node.type == "name" and node.value in self.OTHER else None
-        if following is not None and following.value == "(":
-            yield node.start_pos, node.end_pos
-
-    def mutate(self, node: Any, index: int) -> Any:
-        node.value = self.OTHER[node.value]
-        return node
-
-
-class LeftOut:
-    """Does nothing where something was called, added to or assigned to an attribute or an item."""
-
-    def mutation_positions(self, node: Any) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-        if node.type != "simple_stmt":
-            return
-        does = node.children[0]
-        called = does.type in {"atom_expr", "power"} and does.children[-1].type == "trailer"
-        assigned = does.type == "expr_stmt" and (
-            does.children[0].type in {"atom_expr", "power"} or getattr(does.children[1], "value", "=") != "="
-        )
-        if called or assigned:
-            yield does.start_pos, does.end_pos
-
-    def mutate(self, node: Any, index: int) -> Any:
-        first = node.get_first_leaf()
-        node.children[0] = get_ast(first.prefix + "pass").children[0]
-        return node
-
-
-OURS = {"OtherFunction": OtherFunction, "LeftOut": LeftOut}
-plugins.OPERATOR_PROVIDERS["ours"] = OURS
-
-
-def operator_names() -> list[str]:
-    """The operators that are tried, with the name of who provides them."""
-    found = []
-    for name in plugins.operator_names():
-        plain = name.partition("/")[2]
-        replaced = re.fullmatch(r"Replace(?:Binary|Comparison)Operator_(\w+)_(\w+)", plain)
-        if plain in PLAIN or plain in OURS or (replaced and replaced[2] in SWAPPED.get(replaced[1], ())):
-            found.append(name)
-    return found
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """The `occurrence`-th place in a file at which the operator can change something; `rank` draws the sample."""
-
-    file: str
-    operator: str
-    occurrence: int
-    start: tuple[int, int]
-    end: tuple[int, int]
-    rank: str
-
-    def job(self, source: str) -> str:
-        """What its result is kept by: another source is another mutant."""
-        return hashlib.sha256(f"{source}|{self.file}|{self.operator}|{self.occurrence}".encode()).hexdigest()[:32]
-
-    def spec(self) -> MutationSpec:
-        return MutationSpec(self.file, self.operator, self.occurrence, self.start, self.end)
-
-
-def no_behaviour(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]:
-    """From where to where in a source nothing happens that a test could see."""
-    found: list[ast.AST | None] = []
-    for node in ast.walk(ast.parse(source)):
-        match node:
-            case ast.arg():
-                found.append(node.annotation)
-            case ast.FunctionDef() | ast.AsyncFunctionDef():
-                found += [node.returns, *node.decorator_list]
-            case ast.ClassDef():
-                found += node.decorator_list
-            case ast.AnnAssign():
-                found.append(node.annotation)
-            case ast.If(test=ast.Name(id="TYPE_CHECKING")):
-                found.append(node)
-            case ast.keyword(arg="strict"):
-                found.append(node)
-    spans = []
-    for one in found:
-        if isinstance(one, ast.expr | ast.keyword | ast.stmt):
-            ends = one.end_lineno or one.lineno, one.end_col_offset or one.col_offset
-            spans.append(((one.lineno, one.col_offset), ends))
-    return spans
-
-
-def mutants_of(file: str, source: str, seed: int) -> list[Mutant]:
-    """All of a file. The rank is by what is changed, not by where, so that an edit leaves the sample elsewhere as it is."""
-    tree, silent, lines = get_ast(source), no_behaviour(source), source.splitlines()
-    nodes = list(ast_nodes(tree))
-    times: dict[tuple[str, str], Iterator[int]] = {}
-    found = []
-    for name in operator_names():
-        operator = plugins.get_operator(name)()
-        places = ((node, place) for node in nodes for place in operator.mutation_positions(node))
-        for occurrence, (node, (start, end)) in enumerate(places):
-            line = lines[start[0] - 1].strip()
-            nth = next(times.setdefault((name, line), count()))
-            signature = node.parent is not None and node.parent.type == "parameters"  # its bare * or /
-            if not signature and not any(begins <= start and end <= ends for begins, ends in silent):
-                rank = hashlib.sha256(f"{seed}|{file}|{name}|{line}|{nth}".encode()).hexdigest()
-                found.append(Mutant(file, name, occurrence, start, end, rank))
-    return found
-
-
-def tests_of(file: str, root: Path = ROOT) -> tuple[list[str], list[str]]:
+def tried_against(file: str, root: Path) -> tuple[list[str], list[str]]:
     """The tests that are about a file of the core, and the wider ones to which its survivors are given, those first
     that are likely to tell: of its folder, that import it, the recorded mission."""
     path = Path(file)
@@ -198,8 +68,9 @@ def tests_of(file: str, root: Path = ROOT) -> tuple[list[str], list[str]]:
     around = [*near, *sorted(importing), root / GOLDEN, *sorted(room.rglob("test_*.py"))]
     if path.parts[0] == "comms":
         around += (root / "tests" / "comms").glob("test_*buses.py")
-    told = [str(one.relative_to(root)) for one in dict.fromkeys(around) if one not in first]
-    return [str(one.relative_to(root)) for one in first], [one for one in told if not any(word in one for word in WIRED)]
+    wider = [str(one.relative_to(root)) for one in dict.fromkeys(around) if one not in first]
+    unwired = [one for one in wider if not any(word in one for word in WIRED)]
+    return [str(one.relative_to(root)) for one in first], unwired
 
 
 def command(tests: Iterable[str]) -> str:
@@ -231,7 +102,7 @@ def unchanged(tests: Sequence[str]) -> str:
 
 def tried(mutant: Mutant) -> WorkResult:
     """What came of it: against its own tests, then against the wider ones."""
-    first, wider = tests_of(mutant.file, Path.cwd())
+    first, wider = tried_against(mutant.file, Path.cwd())
     result = mutate_and_test([mutant.spec()], command(first), FIRST_S)
     if result.test_outcome == TestOutcome.SURVIVED:
         result = mutate_and_test([mutant.spec()], command(wider), WIDER_S)
@@ -285,10 +156,10 @@ def report(tried_ones: Sequence[tuple[Mutant, WorkResult]]) -> tuple[str, int]:
     tried_count, survived, same = (sum(row[n] for row in rows.values()) for n in range(3))
     timed_out = sum(result.output == "timeout" for _, result in tried_ones)
     lines = [
-        f"{tried_count} mutants: {tried_count - survived} killed ({timed_out} of these as they did not end), {survived} "
-        f"survived ({share(survived, tried_count)}), of which {same} behave the same, {len(told['untested'])} are not "
-        f"tested and {len(told['not judged yet'])} are not judged. Of those that change behaviour survived: "
-        f"{share(survived - same, tried_count - same)}.",
+        f"{tried_count} mutants: {tried_count - survived} killed ({timed_out} of these as they did not end), "
+        f"{survived} survived ({share(survived, tried_count)}), of which {same} behave the same, "
+        f"{len(told['untested'])} are not tested and {len(told['not judged yet'])} are not judged. "
+        f"Of those that change behaviour survived: {share(survived - same, tried_count - same)}.",
         "",
         "| file | mutants | survived | share | behave the same |",
         "|---|---|---|---|---|",
@@ -309,15 +180,6 @@ def sampled(seed: int, size: int, only: Sequence[str]) -> list[tuple[Mutant, str
             found += [(mutant, source) for mutant in mutants_of(file, source, seed)]
     ranked = iter(sorted(found, key=lambda one: one[0].rank))
     return list(islice((one for one in ranked if compiles(*one)), size))
-
-
-def compiles(mutant: Mutant, source: str) -> bool:
-    """Whether it is a program at all: ** in a dict's display is none of the operators that it looks like."""
-    changed_source = mutate_code(source, plugins.get_operator(mutant.operator)(), mutant.occurrence)
-    try:
-        return changed_source is not None and ast.dump(ast.parse(changed_source)) != ast.dump(ast.parse(source))
-    except SyntaxError:
-        return False
 
 
 def main() -> int:
@@ -344,9 +206,7 @@ def main() -> int:
     return 1 if left else 0
 
 
-def run(
-    missing: Sequence[tuple[Mutant, str]], known: dict[str, WorkResult], results: WorkDB, processes: int
-) -> None:
+def run(missing: Sequence[tuple[Mutant, str]], known: dict[str, WorkResult], results: WorkDB, processes: int) -> None:
     """Tries them, and keeps each result as it comes."""
     spawning = get_context("spawn")
     numbers = spawning.Queue()
@@ -354,7 +214,8 @@ def run(
         numbers.put(number)
     with ProcessPoolExecutor(processes, spawning, set_up, (numbers,)) as pool:
         files = {mutant.file for mutant, _ in missing}
-        if said := pool.submit(unchanged, sorted({test for file in files for test in tests_of(file)[0]})).result():
+        tests = sorted({test for file in files for test in tried_against(file, ROOT)[0]})
+        if said := pool.submit(unchanged, tests).result():
             sys.exit(f"the tests do not pass of the program as it is:\n{said}")
         at_work = {pool.submit(tried, mutant): (mutant, job) for mutant, job in missing}
         try:
@@ -364,8 +225,8 @@ def run(
                     sys.exit(f"{mutant} could not be tried: {result.output}")
                 known[job] = result
                 results.set_result(job, result)
-                outcome = result.test_outcome.value
-                print(f"{number}/{len(missing)} {outcome} {mutant.file}:{mutant.start[0]} {mutant.operator}", flush=True)
+                outcome, place = result.test_outcome.value, f"{mutant.file}:{mutant.start[0]}"
+                print(f"{number}/{len(missing)} {outcome} {place} {mutant.operator}", flush=True)
         finally:
             pool.shutdown(cancel_futures=True)
 

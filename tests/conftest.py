@@ -17,9 +17,8 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("secondlook", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 # For `make mutants`: the same examples each time, and no search for a smaller one that fails.
-settings.register_profile(
-    "mutants", settings.get_profile("secondlook"), derandomize=True, database=None, phases=[Phase.explicit, Phase.generate]
-)
+MUTANTS = settings(settings.get_profile("secondlook"), derandomize=True, database=None)
+settings.register_profile("mutants", MUTANTS, phases=[Phase.explicit, Phase.generate])
 settings.load_profile("secondlook")
 
 

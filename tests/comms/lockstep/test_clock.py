@@ -199,7 +199,9 @@ class TestRunaway:
         assert clock.rounds == 9
         clock = started()
         wake_world(clock, [999, 1000, 1001, 1002, 1003], 1, 1, 2, 1)
-        with pytest.raises(RunawayError, match=r"^more than 3 rounds within simulated second 1; messages in it: nav 4$"):
+        with pytest.raises(
+            RunawayError, match=r"^more than 3 rounds within simulated second 1; messages in it: nav 4$"
+        ):
             clock.next_round()
 
     def test_messages_are_counted_second_by_second(self, monkeypatch: pytest.MonkeyPatch) -> None:

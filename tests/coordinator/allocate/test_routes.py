@@ -170,6 +170,20 @@ class TestWhatIsPromising:
         ]
         assert still_m2[0] == pytest.approx(expected)
 
+    @pytest.mark.parametrize(
+        ("counts_m2", "best"), [([5, 7, 7, 3, 7 + 1e-7], 1), ([5, 7, 7, 3, 7.1], 4), ([5, 4, 3, 2, 1], 0)]
+    )
+    def test_of_plans_that_hardly_differ_that_of_an_earlier_beam_is_taken(
+        self, counts_m2: list[float], best: int
+    ) -> None:
+        assert allocate.routes._best(np.array(counts_m2), [3, 2]) == best
+
+    def test_what_the_deadline_cuts_off_takes_no_time(self) -> None:
+        # By 200 s the near one brings 700 m2 in 152.5 s, the long one more than twice as much in 200 s.
+        long = open_strip(strip(1, x_m=0, y_m=-200, length_m=2000, heading_rad=math.pi), 20_000)
+        found = plan_routes([NEAR, long], [helper()], 200, 1)
+        assert found.strips == {"alpha": (1,)}
+
     def test_plans_that_serve_the_same_strips_and_end_at_the_same_places_are_one(self) -> None:
         turns = np.array([[0, -1, 1], [1, -1, 0], [-1, 0, 1], [0, 1, -1]])
         nodes = np.array([[4], [4], [4], [4]])
