@@ -293,6 +293,14 @@ class TestSilence:
         told.settle()
         assert told.states() == left
 
+    def test_what_another_says_that_has_no_work_is_no_word_on_it(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
+        for _ in range(3):
+            told.state(SECOND_HELPER, Mode.IDLE)
+            told.settle()
+        assert told.states() == {1: UNDER_WAY}
+        assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)]
+
     def test_a_word_that_comes_late_counts_and_an_idle_state_before_it_does_not(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)
         told.layer(HELPER, looked())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import astuple, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,7 +18,9 @@ from regions import regions
 
 from comms.said.announcement import Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState, Mode, Plan, PlannedTrack
+from planner.footprints.footprint import Footprint
 from planner.footprints.side import SideLooking
+from planner.footprints.wedge import ForwardLooking
 from planner.region import Region
 from planner.spacing_planners import AdaptiveSpacing
 from planner.types import Point, SonarShape
@@ -48,12 +50,14 @@ def announced(region: Region, heading_rad: float = 0.0, cell_m: float = 10) -> R
     )
 
 
-def surveyor(run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145) -> OneNode:
+def surveyor(
+    run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145, footprint: Footprint | None = None
+) -> OneNode:
     """A survey agent told of the run and of where its vehicle is."""
     config = SurveyConfig(
         vehicle=PRIMARY,
         spacing=AdaptiveSpacing(nadir_gap_m, range_m),
-        footprint=SideLooking(SonarShape("side", nadir_gap_m, range_m)),
+        footprint=footprint or SideLooking(SonarShape("side", nadir_gap_m, range_m)),
         nadir_gap_m=nadir_gap_m,
         range_m=range_m,
         threshold=0.05,
@@ -166,6 +170,17 @@ class TestPartByPart:
         fly_all(agent, SEES_TO_130_M)
         share = float(agent.last(Plan).note.split(" ")[3].rstrip("%,"))
         assert 10 < share < 60
+
+
+def test_what_a_sonar_that_looks_ahead_may_still_see_of_a_track() -> None:
+    # It sees 50 m ahead, and its swath begins 30 m ahead: a track of 400 m is flown from 30 m before it to 30 m before
+    # its end, from where it sees 20 m beyond.
+    wedge = ForwardLooking(SonarShape("wedge", 3, 50, math.pi / 4, 10))
+    node = node_of(surveyor(run_info(100, 400), nadir_gap_m=0, range_m=30, footprint=wedge))
+    north, south = node.ahead[:2]
+    assert (north.start[1], south.start[1]) == (0, 400)
+    assert astuple(node._still_ahead(north)) == pytest.approx((north.across_m, -30, 420))
+    assert astuple(node._still_ahead(south)) == pytest.approx((south.across_m, -20, 430))
 
 
 class TestAnyArea:

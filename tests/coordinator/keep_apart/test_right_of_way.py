@@ -138,6 +138,14 @@ class TestCheck:
         fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]
         assert right_of_way().check(fleet, 0.0) == []
 
+    def test_who_does_something_else_is_checked_at_once(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]
+        right = right_of_way()
+        right.check(fleet, 100.0)
+        assert right.check_s > 100
+        right.changed("helper")
+        assert right.check_s == 0
+
     def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
         to = strip(7, 0, 20, length_m=100)
         at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, 140, 7)
