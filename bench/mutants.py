@@ -3,17 +3,18 @@
 python -m bench.mutants [--sample N] [--seed S] [--only PATH ...] [--again] [--processes N]
 
 A mutant is the program with one place changed, as cosmic-ray's operators do it and two of ours. It is tried against the
-tests named as its file, then, if it survives these, against the others of its room and the recorded mission that every
-node has to say again. Which there are: `bench.mutant_kinds`.
+tests named as its file, then, if it survives these, against those nearby and the recorded mission that every node has
+to say again. Which there are: `bench.mutant_kinds`.
 
 Mutants are tried in copies of this folder below `runs/mutants/`, where results are kept: an interrupted run goes on.
-`--again` tries those that survived anew, after a new test. What is said of a survivor stands in
-`tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
+`--again` tries those that survived anew, after a new test, and against all tests of their room. What is said of a
+survivor stands in `tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import re
 import shutil
@@ -46,31 +47,34 @@ CORE = (
 GOLDEN = "tests/secondlook/recorded/test_golden_replay.py"
 WIRED = ("test_zenoh_fleet", "test_host", "wall/")
 """Of the wider tests those that wait for a wire or a clock are left out."""
-FIRST_S, WIDER_S = 120, 900
+LIMITS_S = (120, 300, 900)
 """Longer than any of these tests take on a busy machine: who takes longer does not end."""
 
 
-def tried_against(file: str, root: Path) -> tuple[list[str], list[str]]:
-    """The tests that are about a file of the core, and the wider ones to which its survivors are given, those first
-    that are likely to tell: of its folder, that import it, the recorded mission."""
+def tried_against(file: str, root: Path) -> tuple[list[str], list[str], list[str]]:
+    """The tests that are about a file of the core, those nearby to which its survivors are given, of its folder, that
+    import it, and the recorded mission, and the others of its room."""
     path = Path(file)
     folder = root / "tests" / path.parent
     room = folder if path.parts[0] in {"comms", "secondlook"} else root / "tests" / path.parts[0]
     module, package = ".".join(path.with_suffix("").parts), ".".join(path.parts[:-1])
     imported = re.compile(rf"{module}\b|from {package} import .*\b{path.stem}\b")
-    importing = {one for one in room.rglob("test_*.py") if imported.search(one.read_text(encoding="utf-8"))}
+    importing = sorted(one for one in room.rglob("test_*.py") if imported.search(one.read_text(encoding="utf-8")))
     first = (
         sorted(folder.glob(f"test_{path.stem}.py"))
-        or sorted(one for one in importing if one.is_relative_to(folder))
+        or [one for one in importing if one.is_relative_to(folder)]
         or sorted(folder.glob("test_*.py"))
     )
-    near = [] if folder == room else sorted(folder.glob("test_*.py"))
-    around = [*near, *sorted(importing), root / GOLDEN, *sorted(room.rglob("test_*.py"))]
+    nearby = [*importing, root / GOLDEN]
     if path.parts[0] == "comms":
-        around += (root / "tests" / "comms").glob("test_*buses.py")
-    wider = [str(one.relative_to(root)) for one in dict.fromkeys(around) if one not in first]
-    unwired = [one for one in wider if not any(word in one for word in WIRED)]
-    return [str(one.relative_to(root)) for one in first], unwired
+        nearby += (root / "tests" / "comms").glob("test_*buses.py")
+    if folder != room:
+        nearby += sorted(folder.glob("test_*.py"))
+    others = sorted(room.rglob("test_*.py"))
+    told = ([one for one in dict.fromkeys(nearby) if one not in first], [one for one in others if one not in nearby])
+    nearby, others = ([one for one in some if not any(word in str(one) for word in WIRED)] for some in told)
+    names = [[one.relative_to(root).as_posix() for one in some] for some in (first, nearby, others)]
+    return names[0], names[1], [one for one in names[2] if one not in names[0]]
 
 
 def command(tests: Iterable[str]) -> str:
@@ -80,18 +84,29 @@ def command(tests: Iterable[str]) -> str:
 # What follows runs in the processes, each with a copy of the folder of its own.
 
 
+def files_here() -> list[str]:
+    """What is here, committed or not, and is no product."""
+    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    told = subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
+    return [name for name in told if name and (ROOT / name).is_file()]
+
+
 def set_up(numbers: Any) -> None:
     """A copy of what is here, changed or not, and this process within it."""
     copy = HOME / f"copy-{numbers.get()}"
     shutil.rmtree(copy, ignore_errors=True)
-    listed = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
-    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0"):
-        if name and (ROOT / name).is_file():
-            (copy / name).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(ROOT / name, copy / name)
+    for name in files_here():
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(ROOT / name, copy / name)
     os.chdir(copy)
     os.environ["PYTHONPATH"] = str(copy)
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+
+
+def of_all_here(tests: Sequence[str]) -> str:
+    """Another one where these tests may say something else of the program as it is."""
+    code = [(ROOT / name).read_bytes() for name in files_here() if name.endswith((".py", ".yaml", ".toml"))]
+    return hashlib.sha256(b"\0".join([*map(str.encode, tests), *code])).hexdigest()[:16]
 
 
 def unchanged(tests: Sequence[str]) -> str:
@@ -100,12 +115,12 @@ def unchanged(tests: Sequence[str]) -> str:
     return done.stdout if done.returncode else ""
 
 
-def tried(mutant: Mutant) -> WorkResult:
-    """What came of it: against its own tests, then against the wider ones."""
-    first, wider = tried_against(mutant.file, Path.cwd())
-    result = mutate_and_test([mutant.spec()], command(first), FIRST_S)
-    if result.test_outcome == TestOutcome.SURVIVED:
-        result = mutate_and_test([mutant.spec()], command(wider), WIDER_S)
+def tried(mutant: Mutant, *, by_all: bool) -> WorkResult:
+    """What came of it: against its own tests, then against those nearby, and `by_all` of its room."""
+    for tests, limit_s in zip(tried_against(mutant.file, Path.cwd())[: 3 if by_all else 2], LIMITS_S, strict=False):
+        result = mutate_and_test([mutant.spec()], command(tests), limit_s)
+        if result.test_outcome != TestOutcome.SURVIVED:
+            break
     return result
 
 
@@ -199,14 +214,21 @@ def main() -> int:
     survived = TestOutcome.SURVIVED if asked.again else None
     missing = [(one, job) for one, job in sample if job not in known or known[job].test_outcome == survived]
     if missing:
-        run(missing, known, results, asked.processes)
+        run(missing, known, results, asked.processes, by_all=asked.again)
     text, left = report([(mutant, known[job]) for mutant, job in sample])
     (HOME / "report.md").write_text(text, encoding="utf-8")
     print(text)
     return 1 if left else 0
 
 
-def run(missing: Sequence[tuple[Mutant, str]], known: dict[str, WorkResult], results: WorkDB, processes: int) -> None:
+def run(
+    missing: Sequence[tuple[Mutant, str]],
+    known: dict[str, WorkResult],
+    results: WorkDB,
+    processes: int,
+    *,
+    by_all: bool,
+) -> None:
     """Tries them, and keeps each result as it comes."""
     spawning = get_context("spawn")
     numbers = spawning.Queue()
@@ -215,9 +237,11 @@ def run(missing: Sequence[tuple[Mutant, str]], known: dict[str, WorkResult], res
     with ProcessPoolExecutor(processes, spawning, set_up, (numbers,)) as pool:
         files = {mutant.file for mutant, _ in missing}
         tests = sorted({test for file in files for test in tried_against(file, ROOT)[0]})
-        if said := pool.submit(unchanged, tests).result():
-            sys.exit(f"the tests do not pass of the program as it is:\n{said}")
-        at_work = {pool.submit(tried, mutant): (mutant, job) for mutant, job in missing}
+        if not (passed := HOME / f"passed-{of_all_here(tests)}").exists():
+            if said := pool.submit(unchanged, tests).result():
+                sys.exit(f"the tests do not pass of the program as it is:\n{said}")
+            passed.touch()
+        at_work = {pool.submit(tried, mutant, by_all=by_all): (mutant, job) for mutant, job in missing}
         try:
             for number, done in enumerate(as_completed(at_work), 1):
                 (mutant, job), result = at_work[done], done.result()

@@ -55,12 +55,12 @@ def test_what_an_edit_leaves_is_drawn_as_before() -> None:
     assert not before & {one.rank for one in mutants_of("a.py", SOURCE, 2)}
 
 
-def test_a_file_is_tried_against_the_tests_of_its_name_then_those_of_its_room() -> None:
-    first, wider = tried_against("coordinator/cut/strips.py", ROOT)
+def test_a_file_is_tried_against_the_tests_of_its_name_then_those_nearby_then_those_of_its_room() -> None:
+    first, nearby, others = tried_against("coordinator/cut/strips.py", ROOT)
     assert first == ["tests/coordinator/cut/test_strips.py"]
-    assert wider[0].startswith("tests/coordinator/cut/")
-    assert "tests/coordinator/test_coordinator.py" in wider
-    assert not set(first) & set(wider)
+    assert {"tests/coordinator/cut/test_bands.py", mutants.GOLDEN} <= set(nearby)
+    assert "tests/coordinator/test_coordinator.py" in others
+    assert len({*first, *nearby, *others}) == len(first) + len(nearby) + len(others)
     # It has no test of its name.
     assert tried_against("coordinator/allocate/team.py", ROOT)[0] == ["tests/coordinator/allocate/test_routes.py"]
 

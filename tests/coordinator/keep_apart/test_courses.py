@@ -173,18 +173,18 @@ class TestTooClose:
         assert found.distance_m == pytest.approx(4)
 
     def test_at_once_they_may_as_near_as_they_are_told(self) -> None:
-        # 15 cm nearer a second: by 1 m at 6.7 s, to 8 m at 13.3 s. For six steps, 12 s, 8 m count, and then 9 m.
-        one, other = ahead(0, 0, NORTH, 2), ahead(10, 0, -math.asin(0.15 / 2), 2)
+        # 12 cm nearer a second: by 1 m at 8.3 s, to 8 m at 16.7 s. For six steps, 12 s, 8 m count, and then 9 m.
+        one, other = ahead(0, 0, NORTH, 2), ahead(10, 0, -math.asin(0.12 / 2), 2)
         found = too_close(one, other, 20, 0, 30)
         assert found is not None
-        assert found.time_s == 6
+        assert found.time_s == 8
         found = too_close(one, other, 20, 0, 30, soon_m=8)
         assert found is not None
         assert found.time_s == 12
         assert too_close(one, other, 20, 0, 10, soon_m=8) is None
         found = too_close(one, other, 20, 0, 30, soon_m=9.9)  # more than that is no matter
         assert found is not None
-        assert found.time_s == 6
+        assert found.time_s == 8
 
     def test_nor_meet_again(self) -> None:
         # One sails away and circles back past where the other lies still.
