@@ -41,6 +41,11 @@ class TestCourses:
         later = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 55]
         assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
 
+    def test_in_a_current_it_is_where_what_it_makes_good_takes_it(self) -> None:
+        with_it = course(Pose(0, 0, EAST), 5, Sailing(2, 1, EAST), 10, [straight(Pose(0, 0, EAST), 300, 10)])
+        assert with_it.at(25) == pytest.approx((60, 0, EAST))  # 20 s at 3 m/s
+        assert with_it.arrives_s == pytest.approx(105)
+
     def test_a_sweep_ends_when_and_where_its_service_does(self) -> None:
         one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
