@@ -40,6 +40,8 @@ class TestCourses:
         assert laid.arrives_s == 55
         later = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 55]
         assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
+        # All the time: 4 m on the circle from each step to the next.
+        assert np.hypot(*np.diff(later[:, :2], axis=0).T) == pytest.approx(2 * 10 * math.sin(0.2))
 
     def test_in_a_current_it_is_where_what_it_makes_good_takes_it(self) -> None:
         with_it = course(Pose(0, 0, EAST), 5, Sailing(2, 1, EAST), 10, [straight(Pose(0, 0, EAST), 300, 10)])

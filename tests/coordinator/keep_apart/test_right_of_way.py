@@ -96,6 +96,15 @@ class TestDepartures:
         # Southwards over the strip it would meet the primary at about 40 s.
         assert self.wait_s(right_of_way(), [primary(0), me], to) > 0
 
+    @pytest.mark.parametrize(("beside_m", "sets_out"), [(31.2, True), (30.8, False)])
+    def test_a_way_that_is_offered_keeps_16_m_farther_off_than_the_separation(
+        self, beside_m: float, sets_out: bool
+    ) -> None:
+        # It overtakes the primary, 0.5 m/s faster, 40 s from now.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, -20)
+        waits_s = self.wait_s(right_of_way(), [primary(-beside_m), me], strip(1, 0, 30, length_m=250))
+        assert (waits_s == 0) is sets_out
+
     def test_a_free_helper_in_the_way_makes_room(self) -> None:
         right = right_of_way()
         me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
@@ -145,6 +154,16 @@ class TestCheck:
         assert right.check_s > 100
         right.changed("helper")
         assert right.check_s == 0
+
+    @pytest.mark.parametrize("now_s", [0.0, 10.0])
+    def test_two_are_checked_when_they_may_be_near_enough(self, now_s: float) -> None:
+        # Heard 400 m apart at 0 s, closing at 2 and 1.5 m/s at most: one that is free stands aside for what is expected
+        # within 90 s, 135 m of the primary's way and a circle of 12 m; one at work gives way 50 s before, 175 m.
+        for strip_, near_m in ((None, 147.0), (strip(7, 400, 20, length_m=100), 175.0)):
+            me = known("helper", Role.REVISIT, Mode.IDLE if strip_ is None else Mode.TRANSIT, 400, 0)
+            right = right_of_way()
+            assert right.check([Underway(primary(0), None), Underway(me, strip_)], now_s) == []
+            assert right.check_s == pytest.approx((400 - near_m - 15 - 11) / 3.5)
 
     def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
         to = strip(7, 0, 20, length_m=100)

@@ -112,6 +112,17 @@ def test_until_it_is_heard_there_a_helper_circles_where_it_was_sent() -> None:
     assert course.at(50.0) == pytest.approx((0, 190, NORTH))
 
 
+def test_what_was_heard_before_it_was_sent_or_on_its_way_changes_nothing() -> None:
+    traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+    traffic.sent_aside(one, None, (0.0, 200.0), 12.0)  # heard at 0 s, it has circled since then
+    sent = traffic.course(one, None, 14.0)
+    assert sent is not None
+    assert sent.start_s == 12.0
+    heard = sent.at(20.0)
+    one.heard_ms, one.state = 20_000, AgentState(Mode.IDLE, 0, 1, 0, *heard)
+    assert traffic.course(one, None, 21.0) is sent
+
+
 def test_a_helper_that_took_another_way_is_expected_on_it() -> None:
     traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
     traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
