@@ -50,7 +50,5 @@ def test_one_value_out_of_order_is_told_with_its_range(wrong: float, told: str) 
 
 
 def test_an_answer_of_another_shape_is_refused() -> None:
-    with pytest.raises(
-        ValueError, match=r"^the sonar model of primary, .* answers in the shape \(2,\) .* \(3,\)$"
-    ):
+    with pytest.raises(ValueError, match=r"^the sonar model of primary, .* answers in the shape \(2,\) .* \(3,\)$"):
         CheckedSonar(Answers(0.5, 0.5), "primary").p_detect(RANGE_M, 0.0, 15, PLACE, 0)
