@@ -171,6 +171,20 @@ class TestCheck:
         (told,) = right_of_way().check([Underway(primary(0), None), Underway(at_work, to)], 0.0)
         assert (told.name, told.gives_back) == ("helper", to)
 
+    def test_it_does_not_before_it_is_50_s_from_there_or_begins_to_sweep(self) -> None:
+        # It is at the strip's northern end in about 60 s, and meets the primary on it some 14 s later.
+        to = strip(7, 10, 60, length_m=100)
+        at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 120, 150, 7)
+        fleet = [Underway(primary(0), None), Underway(at_work, to)]
+        right = right_of_way()
+        assert right.check(fleet, 0.0) == []
+        its, mine = (right._traffic.course(one.vehicle, one.strip, 0.0) for one in fleet)
+        assert its is not None
+        assert mine is not None
+        approach = too_close(mine, its, 15 + 11, 0, 200)
+        assert approach is not None
+        assert approach.time_s > 60
+
     def test_of_two_at_work_the_one_sent_later(self) -> None:
         right = right_of_way()
         first = known("helper", Role.REVISIT, Mode.IDLE, -60, 0)
