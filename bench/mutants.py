@@ -7,7 +7,7 @@ tests named as its file, then, if it survives these, against those nearby and th
 to say again. Which there are: `bench.mutant_kinds`.
 
 Mutants are tried in copies of this folder below `runs/mutants/`, where results are kept: an interrupted run goes on.
-`--again` tries those that survived anew, after a new test, and against all tests of their room. What is said of a
+`--again` tries those that survived and may be killed anew, after a new test, against all tests of their room. What is said of a
 survivor stands in `tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
 """
 
@@ -149,6 +149,12 @@ def changed(diff: str) -> tuple[str, str]:
     return was, becomes
 
 
+def is_open(mutant: Mutant, result: WorkResult) -> bool:
+    """Whether a test might kill it that has survived: it is not known to behave the same."""
+    same = {(one.file, one.was, one.becomes) for one in judged() if one.verdict == "same"}
+    return result.test_outcome == TestOutcome.SURVIVED and (mutant.file, *changed(result.diff or "")) not in same
+
+
 def share(some: int, of: int) -> str:
     return f"{100 * some / of:.1f} %" if of else "-"
 
@@ -211,8 +217,8 @@ def main() -> int:
     known = {item.job_id: result for item, result in results.completed_work_items}
     here = {item.job_id for item in results.work_items}
     results.add_work_items([WorkItem.single(job, mutant.spec()) for mutant, job in sample if job not in here])
-    survived = TestOutcome.SURVIVED if asked.again else None
-    missing = [(one, job) for one, job in sample if job not in known or known[job].test_outcome == survived]
+    again = {job for one, job in sample if job in known and is_open(one, known[job])} if asked.again else set[str]()
+    missing = [(one, job) for one, job in sample if job not in known or job in again]
     if missing:
         run(missing, known, results, asked.processes, by_all=asked.again)
     text, left = report([(mutant, known[job]) for mutant, job in sample])

@@ -17,7 +17,16 @@ from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import expected_service, sweeps
 from coordinator.allocate.situation import OpenStrip
-from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close
+from coordinator.keep_apart.courses import (
+    STEP_S,
+    Course,
+    course,
+    run_out_left_m,
+    straight,
+    survey_course,
+    sweep_course,
+    too_close,
+)
 from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.sweep import shortest_sweep
@@ -76,6 +85,21 @@ class TestCourses:
         found = too_close(laid, crossing, 10, 0, crosses_s + 100)
         assert found is not None
         assert found.time_s == pytest.approx(crosses_s, abs=20)
+
+    @pytest.mark.parametrize(
+        ("pose", "left_m"),
+        [
+            (Pose(0, 90, NORTH), 10),
+            (Pose(0, 99.5, NORTH), 0.5),
+            (Pose(0, 100, NORTH), 0),
+            (Pose(0, 101, NORTH), 0),
+            (Pose(0, 90, 0.2), 0),  # it has turned
+            (Pose(60, 90, NORTH), 0),
+            (Pose(0, -100, NORTH), 0),
+        ],
+    )
+    def test_what_is_left_of_a_run_out(self, pose: Pose, left_m: float) -> None:
+        assert run_out_left_m(Pose(0, 100, NORTH), pose, 20) == pytest.approx(left_m)
 
     def test_a_track_under_way_ends_when_the_primary_says(self) -> None:
         entry = vehicle("primary", Role.SURVEY)
