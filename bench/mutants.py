@@ -7,8 +7,8 @@ tests named as its file, then, if it survives these, against those nearby and th
 to say again. Which there are: `bench.mutant_kinds`.
 
 Mutants are tried in copies of this folder below `runs/mutants/`, where results are kept: an interrupted run goes on.
-`--again` tries those that survived and may be killed anew, after a new test, against all tests of their room. What is said of a
-survivor stands in `tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
+`--again` tries those that survived and may be killed anew, after a new test, against all tests of their room. What is
+said of a survivor stands in `tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
 """
 
 from __future__ import annotations
