@@ -60,7 +60,7 @@ golden: .venv/.run-ready
 	@$(BIN)/python -m bench --steps
 
 # Which changes of the core no test notices: SAMPLE mutants, drawn by SEED, an hour on two cores that do nothing else.
-# An interrupted run goes on; MUTANTS_ARGS=--again tries those that survived anew.
+# An interrupted run goes on; MUTANTS_ARGS=--again tries those anew that survived and are not judged.
 SAMPLE ?= 350
 SEED ?= 1
 MUTANTS_ARGS ?=

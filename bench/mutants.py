@@ -7,8 +7,8 @@ tests named as its file, then, if it survives these, against those nearby and th
 to say again. Which there are: `bench.mutant_kinds`.
 
 Mutants are tried in copies of this folder below `runs/mutants/`, where results are kept: an interrupted run goes on.
-`--again` tries those that survived and may be killed anew, after a new test, against all tests of their room. What is
-said of a survivor stands in `tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
+What is said of a survivor stands in `tests/mutants/judged.yaml`; the exit code is 1 where one is not judged yet.
+`--again` tries these anew, after a new test, against all tests of their room.
 """
 
 from __future__ import annotations
@@ -150,9 +150,9 @@ def changed(diff: str) -> tuple[str, str]:
 
 
 def is_open(mutant: Mutant, result: WorkResult) -> bool:
-    """Whether a test might kill it that has survived: it is not known to behave the same."""
-    same = {(one.file, one.was, one.becomes) for one in judged() if one.verdict == "same"}
-    return result.test_outcome == TestOutcome.SURVIVED and (mutant.file, *changed(result.diff or "")) not in same
+    """Whether it has survived and is not judged."""
+    known = {(one.file, one.was, one.becomes) for one in judged()}
+    return result.test_outcome == TestOutcome.SURVIVED and (mutant.file, *changed(result.diff or "")) not in known
 
 
 def share(some: int, of: int) -> str:

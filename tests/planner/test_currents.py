@@ -200,7 +200,7 @@ class TestFlowsFromPlaceToPlace:
         assert homes[0] == pytest.approx(homes[1], rel=1e-6)
 
     @given(
-        st.lists(st.floats(-1, 1), min_size=24, max_size=24),
+        st.lists(st.floats(-1, 1), min_size=36, max_size=36),
         st.floats(-50, 150),
         st.floats(-50, 150),
         st.floats(-10, 20),
@@ -209,8 +209,8 @@ class TestFlowsFromPlaceToPlace:
     def test_it_is_never_faster_than_at_some_place_and_one_by_one_is_as_many_at_once(
         self, flows: list[float], x_m: float, y_m: float, time_s: float, course_rad: float
     ) -> None:
-        east_mps, north_mps = np.array(flows).reshape(2, 2, 2, 3)
-        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 100.0]), np.array([0.0, 10.0])
+        east_mps, north_mps = np.array(flows).reshape(2, 2, 3, 3)
+        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 60.0, 100.0]), np.array([0.0, 10.0])
         grid = FlowGrid(*axes, east_mps, north_mps)
         east, north = grid.flow_mps(time_s, (x_m, y_m))
         assert math.hypot(east, north) <= grid.fastest_mps + 1e-9

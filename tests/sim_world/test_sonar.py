@@ -49,6 +49,16 @@ def test_one_value_out_of_order_is_told_with_its_range(wrong: float, told: str) 
         sonar.p_detect(RANGE_M, 0.0, 15, PLACE, 0)
 
 
+@pytest.mark.parametrize("answer", ["seen", {"p_detect": 0.5}])
+def test_an_answer_that_holds_no_numbers_is_refused(answer: object) -> None:
+    class Tells:
+        def p_detect(self, *asked: object) -> FloatArray:
+            return answer  # type: ignore[return-value]
+
+    with pytest.raises(ValueError, match=r"^the sonar model of primary, .* must answer with an array of P_d, not "):
+        CheckedSonar(Tells(), "primary").p_detect(RANGE_M, 0.0, 15, PLACE, 0)
+
+
 def test_an_answer_of_another_shape_is_refused() -> None:
     with pytest.raises(ValueError, match=r"^the sonar model of primary, .* answers in the shape \(2,\) .* \(3,\)$"):
         CheckedSonar(Answers(0.5, 0.5), "primary").p_detect(RANGE_M, 0.0, 15, PLACE, 0)
