@@ -150,6 +150,17 @@ class TestFlowsFromPlaceToPlace:
         # A quarter east and half north: 1.25 in the south, 3.5 in the north.
         assert grid.flow_mps(0, (2.5, 5)) == pytest.approx((2.375, -2.375))
 
+    def test_along_an_axis_of_one_place_it_is_the_same_everywhere(self) -> None:
+        flows = np.array([[[1.0, 2.0]]])
+        row = FlowGrid(np.array([0.0, 10.0]), np.array([3.0]), np.array([0.0]), flows, -flows)
+        column = FlowGrid(
+            np.array([3.0]), np.array([0.0, 10.0]), np.array([0.0]), flows.reshape(1, 2, 1), np.zeros((1, 2, 1))
+        )
+        for y_m in (-5.0, 3.0, 50.0):
+            assert row.flow_mps(0, (5, y_m)) == pytest.approx((1.5, -1.5))
+            assert row.flows_mps(np.array(5.0), np.array(y_m))[:, 0] == pytest.approx([1.5, -1.5])
+            assert column.flows_mps(np.array(y_m), np.array(5.0))[:, 0] == pytest.approx([1.5, 0.0])
+
     def test_along_the_shear_and_across_it(self) -> None:
         sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
         assert sailing.straight_s(130, Pose(0, 50, EAST)) == pytest.approx(130 / 3.25)
