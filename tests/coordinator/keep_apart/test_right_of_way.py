@@ -105,6 +105,16 @@ class TestDepartures:
         waits_s = self.wait_s(right_of_way(), [primary(-beside_m), me], strip(1, 0, 30, length_m=250))
         assert (waits_s == 0) is sets_out
 
+    def test_who_is_let_through_is_in_the_others_way_until_all_are_judged_anew(self) -> None:
+        # Northwards along x = 0, and eastwards across that at 150 m, both there after about 75 s.
+        one, other = known("helper", Role.REVISIT, Mode.IDLE, 0, 0), known("second", Role.REVISIT, Mode.IDLE, -150, 150)
+        north, east = open_strip(strip(1, 0, 50, length_m=250)), open_strip(strip(2, -60, 150, 200, math.pi / 2))
+        departures = right_of_way().departures([Underway(one, None), Underway(other, None)], 0.0)
+        assert departures.wait_s(helper("second"), east) == 0
+        assert departures.wait_s(helper("helper"), north) > 0
+        departures.begin()
+        assert departures.wait_s(helper("helper"), north) == 0
+
     def test_a_free_helper_in_the_way_makes_room(self) -> None:
         right = right_of_way()
         me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
