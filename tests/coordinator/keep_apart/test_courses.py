@@ -29,6 +29,7 @@ from coordinator.keep_apart.courses import (
 )
 from planner.currents import Sailing
 from planner.dubins import Pose
+from planner.keep_out import KeepOut
 from planner.sweep import shortest_sweep
 
 EAST, NORTH, SOUTH = math.pi / 2, 0.0, math.pi
@@ -51,6 +52,15 @@ class TestCourses:
         assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
         # All the time: 4 m on the circle from each step to the next.
         assert np.hypot(*np.diff(later[:, :2], axis=0).T) == pytest.approx(2 * 10 * math.sin(0.2))
+
+    def test_where_there_is_room_to_neither_side_it_is_expected_to_starboard_all_the_same(self) -> None:
+        walls = KeepOut(
+            tuple(((x_m, -500.0), (x_m + 32, -500.0), (x_m + 32, 900.0), (x_m, 900.0)) for x_m in (-40.0, 8.0))
+        )
+        start = Pose(0, 0, NORTH)
+        laid = course(start, 0, Sailing(2), 10, [straight(start, 100, 10)], walls)
+        circling = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 50]
+        assert np.hypot(circling[:, 0] - 10, circling[:, 1] - 100) == pytest.approx(10)
 
     def test_in_a_current_it_is_where_what_it_makes_good_takes_it(self) -> None:
         with_it = course(Pose(0, 0, EAST), 5, Sailing(2, 1, EAST), 10, [straight(Pose(0, 0, EAST), 300, 10)])
