@@ -109,6 +109,15 @@ def test_passes_past_a_zone_take_the_way_round_it() -> None:
     assert 50 + taut_m / 4 < EASTWARD.passes_s(passes, 10, keep_out=zone) < 50 + 1.2 * taut_m / 2
 
 
+@pytest.mark.parametrize(("time_s", "east_mps"), [(50, 0.0), (150, 1.5), (250, 0.0), (350, -1.5), (83.333333, 0.75)])
+def test_a_tide_turns_towards_its_heading_at_slack_water_and_is_as_it_was_a_period_later(
+    time_s: float, east_mps: float
+) -> None:
+    tide = Current(1.5, EAST, period_s=400.0, slack_s=50.0)
+    for later_s in (0, 400, 4000):
+        assert tide.flow_mps(time_s + later_s) == pytest.approx((east_mps, 0.0), abs=1e-6)
+
+
 # It flows east, not at all in the south and at 1.5 m/s 100 m further north; an hour later the other way.
 SHEAR = FlowGrid(
     np.array([0.0, 400.0]),

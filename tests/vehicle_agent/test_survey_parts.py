@@ -172,6 +172,23 @@ class TestPartByPart:
         assert 10 < share < 60
 
 
+def test_hotspots_are_looked_for_each_30_s_where_there_were_looks() -> None:
+    agent = surveyor(announced(L_SHAPE))
+    node, maneuver = node_of(agent), to_follow(agent)
+    assert maneuver is not None
+    fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+    due_ms = node._hotspots_due_ms
+    for now_ms, new_looks, then_ms in (
+        (due_ms - 1, True, due_ms),
+        (due_ms, False, due_ms),
+        (due_ms, True, due_ms + 30_000),
+        (due_ms + 31_000, True, due_ms + 61_000),
+    ):
+        node._new_looks = new_looks
+        node.report(now_ms)
+        assert node._hotspots_due_ms == then_ms
+
+
 def test_what_a_sonar_that_looks_ahead_may_still_see_of_a_track() -> None:
     # It sees 50 m ahead, and its swath begins 30 m ahead: a track of 400 m is flown from 30 m before it to 30 m before
     # its end, from where it sees 20 m beyond.

@@ -143,6 +143,15 @@ class TestCheck:
         assert mine is not None
         assert too_close(mine, its, 15, 0, 180) is None
 
+    @pytest.mark.parametrize("far_m", [52.5, 75.0])
+    def test_the_place_is_three_and_a_half_times_the_separation_away_or_where_there_is_none_five_times(
+        self, far_m: float
+    ) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        (told,) = RightOfWay(15, lambda place: math.dist(place, (3, 90)) > far_m - 1).check(fleet, 0.0)
+        assert told.place is not None
+        assert math.dist(told.place, (3, 90)) == pytest.approx(far_m)
+
     def test_none_is_sent_dead_astern_as_it_may_turn_to_either_side(self) -> None:
         me = known("helper", Role.REVISIT, Mode.IDLE, 10, 90)
         assert me.state is not None
