@@ -55,6 +55,13 @@ def test_what_is_asked_and_not_seen_is_lost() -> None:
     assert beyond.worth([10]).lost_m == 10
 
 
+def test_tracks_lie_within_the_width_or_no_farther_outside_than_those_that_are_asked_for() -> None:
+    ground = across(width_m=40.0)
+    assert (ground._first, ground._last) == (0, 40)
+    ground.ask_for([Measured(-3.5, HALF, 10.0), Measured(20.0, HALF, 10.0), Measured(43.5, HALF, 10.0)])
+    assert (ground._first, ground._last) == (-3, 43)
+
+
 def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed() -> None:
     wide = across(10.0, width_m=40.0)
     assert wide.with_one_more([]) == [32]
