@@ -202,4 +202,4 @@ def test_where_tracks_may_lie_is_across_them_and_of_those_askew_across_the_grid(
     nats[40, 40] = 1.0
     rows, columns = np.nonzero(_shifted(GRID, Plan(1, tracks, (), (), ""), nats) > 1e-9)
     spread = np.arange(30, 51).tolist()
-    assert (set(rows), set(columns)) == (({40}, set(spread)) if along else (set(spread), {40}))
+    assert (set(rows.tolist()), set(columns.tolist())) == (({40}, set(spread)) if along else (set(spread), {40}))
