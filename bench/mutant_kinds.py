@@ -51,7 +51,8 @@ class OtherFunction:
 
 
 class LeftOut:
-    """Does nothing where something was called, added to or assigned to an attribute or an item."""
+    """Leaves out a statement that calls something, adds to it, or assigns to an attribute or an item, where a block
+    has others."""
 
     def mutation_positions(self, node: Any) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
         if node.type != "simple_stmt":
@@ -65,8 +66,7 @@ class LeftOut:
             yield does.start_pos, does.end_pos
 
     def mutate(self, node: Any, index: int) -> Any:
-        first = node.get_first_leaf()
-        node.children[0] = get_ast(first.prefix + "pass").children[0]
+        del node.children[0]
         return node
 
 
