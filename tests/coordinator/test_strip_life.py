@@ -32,6 +32,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from coordinator.coordinator import Coordinator
 
 
 def with_a_late_answer() -> Told:
@@ -198,6 +199,18 @@ class TestSilence:
         assert [one.state for one in said if isinstance(one, StripStatus)] == [OPEN, OFFERED]
         assert f"no answer from {HELPER}" in [one.reason for one in said if isinstance(one, StripStatus)]
         assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)] * 2
+
+    def test_who_answers_by_its_state_has_left_nothing_unanswered(self) -> None:
+        told = coordinator()
+        told.hotspot()
+        told.settle()
+        told.node.wait(10)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        helper = node.fleet.vehicles[HELPER]
+        assert helper.unanswered == 1
+        told.state(HELPER, Mode.TRANSIT, 1)
+        assert helper.unanswered == 0
 
     def test_a_state_that_tells_of_the_work_is_an_answer_too(self) -> None:
         told = coordinator()

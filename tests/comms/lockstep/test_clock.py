@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from comms.errors import RunawayError
 from comms.lockstep import clock as lockstep_clock
 from comms.lockstep.clock import Grant, LockstepClock, Round, Sent
+from comms.lockstep.events import Join, Kill
 from comms.said.routing import Routing
 
 RUN = Sent("run", 300)
@@ -189,6 +190,23 @@ def wake_world(clock: LockstepClock, times_ms: Sequence[int], *said: int) -> Non
     for next_ms, positions in zip(times_ms[1:], said, strict=True):
         clock.next_round()
         clock.answer("world", next_ms, [NAV] * positions)
+
+
+def test_to_who_comes_back_only_what_is_sent_since_then_is_counted() -> None:
+    clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("coordinator", 25), Join("coordinator", 50)))
+    told = []
+    while (turn := clock.next_round()) is not None:
+        for grant in turn.grants:
+            says = grant.node_id == "alpha" and grant.wake
+            wake_ms = {0: 20, 20: 60}.get(turn.now_ms) if says else None
+            clock.answer(grant.node_id, wake_ms, [STATE] if says else [])
+            told += [(turn.now_ms, grant.expected)] if grant.node_id == "coordinator" else []
+    # Sent at 0, 20 and 60 ms; it is killed after the second and has joined before the third.
+    assert [(now_ms, expected["alpha"]) for now_ms, expected in told if "alpha" in expected] == [
+        (1, 1),
+        (21, 2),
+        (61, 1),
+    ]
 
 
 class TestRunaway:
