@@ -201,6 +201,8 @@ def test_to_who_comes_back_only_what_is_sent_since_then_is_counted() -> None:
             wake_ms = {0: 20, 20: 60}.get(turn.now_ms) if says else None
             clock.answer(grant.node_id, wake_ms, [STATE] if says else [])
             told += [(turn.now_ms, grant.expected)] if grant.node_id == "coordinator" else []
+    # Started, and 1 ms later given what was kept for it.
+    assert [now_ms for now_ms, _ in told] == [0, 1, 21, 50, 51, 61]
     # Sent at 0, 20 and 60 ms; it is killed after the second and has joined before the third.
     assert [(now_ms, expected["alpha"]) for now_ms, expected in told if "alpha" in expected] == [
         (1, 1),
