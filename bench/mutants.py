@@ -20,7 +20,7 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Container, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from itertools import islice
@@ -149,9 +149,8 @@ def changed(diff: str) -> tuple[str, str]:
     return was, becomes
 
 
-def is_open(mutant: Mutant, result: WorkResult) -> bool:
-    """Whether it has survived and is not judged."""
-    known = {(one.file, one.was, one.becomes) for one in judged()}
+def is_open(mutant: Mutant, result: WorkResult, known: Container[tuple[str, str, str]]) -> bool:
+    """Whether it has survived and is not among those that are judged."""
     return result.test_outcome == TestOutcome.SURVIVED and (mutant.file, *changed(result.diff or "")) not in known
 
 
@@ -217,8 +216,10 @@ def main() -> int:
     known = {item.job_id: result for item, result in results.completed_work_items}
     here = {item.job_id for item in results.work_items}
     results.add_work_items([WorkItem.single(job, mutant.spec()) for mutant, job in sample if job not in here])
-    again = {job for one, job in sample if job in known and is_open(one, known[job])} if asked.again else set[str]()
-    missing = [(one, job) for one, job in sample if job not in known or job in again]
+    told = {(one.file, one.was, one.becomes) for one in judged()}
+    missing = [
+        (one, job) for one, job in sample if job not in known or (asked.again and is_open(one, known[job], told))
+    ]
     if missing:
         run(missing, known, results, asked.processes, by_all=asked.again)
     text, left = report([(mutant, known[job]) for mutant, job in sample])
