@@ -15,7 +15,7 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 INSTALL_PROJECT := $(PIP) install --quiet --no-deps --no-build-isolation --editable .
 
-.PHONY: run test docs docs-figures example pictures golden lock release clean
+.PHONY: run test docs docs-figures example pictures golden mutants lock release clean
 .DELETE_ON_ERROR:
 
 run: .venv/.run-ready
@@ -59,6 +59,14 @@ golden: .venv/.run-ready
 	@cp runs/golden/scenario.yaml $(GOLDEN)
 	@gzip --best --no-name --stdout runs/golden/messages.mpk >$(GOLDEN)/messages.mpk.gz
 	@$(BIN)/python -m bench --steps
+
+# Which changes of the core no test notices: SAMPLE mutants, drawn by SEED, an hour on two cores that do nothing else.
+# An interrupted run goes on; MUTANTS_ARGS=--again tries those anew that survived and are not judged.
+SAMPLE ?= 350
+SEED ?= 1
+MUTANTS_ARGS ?=
+mutants: .venv/.test-ready
+	@$(BIN)/python -m bench.mutants --sample $(SAMPLE) --seed $(SEED) $(MUTANTS_ARGS)
 
 # Three tests at a time, as many wait for a clock or a process. The processes they start, some hundreds, are not to compile
 # each module anew.

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 import pytest
-from hypothesis import HealthCheck, settings
+from hypothesis import HealthCheck, Phase, settings
 
 # Whoever starts the tests in the background may have made them deaf to Ctrl-C and hang-ups, and what they start too.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -16,6 +16,9 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 # How long one example takes says more about the machine than about the code.
 settings.register_profile("secondlook", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# For `make mutants`: the same examples each time, and no search for a smaller one that fails.
+MUTANTS = settings(settings.get_profile("secondlook"), derandomize=True, database=None)
+settings.register_profile("mutants", MUTANTS, phases=[Phase.explicit, Phase.generate])
 settings.load_profile("secondlook")
 
 

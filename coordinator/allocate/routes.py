@@ -221,7 +221,7 @@ class _Plans:
         gained_m2 *= team.worth_m2.take(one, axis=0)
         home_s = team.home_s.take(at, axis=0)
         home_s += ends_s
-        may = home_s <= np.where(self.is_done[rows, one], -np.inf, team.lasts_s.take(one))[:, np.newaxis]
+        may = home_s <= team.lasts_s.take(one)[:, np.newaxis]
         may &= self.turn < 0
         np.putmask(gained_m2, ~may, 0.0)
         ends_s += team.run_out_s.take(one)[:, np.newaxis]

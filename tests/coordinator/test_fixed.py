@@ -11,7 +11,7 @@ from by_hand import HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
 from coordinator_by_hand import DONE, ELSEWHERE, GRID, HOT, OFFERED, OPEN, TWO_HELPERS, WITHDRAWN, Told, coordinator
 
 from comms.said.announcement import Role
-from comms.said.messages import Mode, StripStatus, TaskState
+from comms.said.messages import AgentState, Mode, StripStatus, TaskState
 from planner.region import Region
 from planner.types import BoolArray
 
@@ -135,6 +135,16 @@ class TestSharing:
         told = coordinator((TWO_HELPERS[0], west, TWO_HELPERS[2]), idle=("west", SECOND_HELPER), strips="lanes")
         places_m = {name: told.strips()[number].start_x_m for name, _, number in told.tasks()}
         assert places_m == {"west": 172.5, SECOND_HELPER: 377.5}
+
+    @pytest.mark.parametrize(("strips", "first"), [("lanes", HELPER), ("lanes_across", SECOND_HELPER)])
+    def test_who_has_the_first_lanes_lies_west_or_across_the_tracks_south(
+        self, strips: Literal["lanes", "lanes_across"], first: str
+    ) -> None:
+        told = coordinator(TWO_HELPERS, idle=(), strips=strips)
+        for name, x_m, y_m in ((HELPER, 100.0, 300.0), (SECOND_HELPER, 300.0, 100.0)):
+            told.node.hear(f"agent/{name}/state", AgentState(Mode.IDLE, 0, 1, 0, x_m, y_m, 0, 0, 0))
+        told.settle()
+        assert min(told.tasks(), key=lambda task: task[2])[0] == first
 
     def test_each_flies_its_own(self) -> None:
         told = coordinator(TWO_HELPERS, idle=BOTH, strips="lanes")

@@ -111,6 +111,16 @@ class TestTheEnd:
             "as the battery lasted for no more"
         )
 
+    def test_what_was_heard_and_is_to_be_cut_by_within_a_minute_is_cut_by_at_once(self) -> None:
+        told = coordinator(deadline_s=1000)
+        told.state(HELPER, Mode.RETURNING, at_ms=9_000)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
+        told.node.wait(2)
+        told.layer(HELPER, np.full(GRID.shape, 0.9))
+        told.state(HELPER, Mode.HOME, tiles_told=ALL_TILES)
+        over = next(one for one in told.node.wait(1) if isinstance(one.message, MissionOver))
+        assert over.at_ms < 12_100
+
     def test_it_is_not_over_before_a_helper_is_home_that_goes_there(self) -> None:
         told = coordinator()
         told.state(HELPER, Mode.RETURNING, at_ms=10_000)

@@ -160,6 +160,22 @@ class TestWhereSomethingMatters:
         assert not laid.north.expected.hotspots.drawn()[0].any()
 
 
+@pytest.mark.parametrize(
+    ("place", "way_m"),
+    [
+        ((200, 75), 0),
+        ((100, 75), 50),
+        ((300, 75), 50),
+        ((200, 30), 20),
+        ((200, 120), 20),
+        ((100, 30), np.hypot(50, 20)),
+    ],
+)
+def test_how_far_a_place_lies_from_a_sector(place: Point, way_m: float) -> None:
+    # From 150 m to 250 m across, from 50 m to 100 m along.
+    assert Laid().sectors._way_m(Window(10, 20, 30, 50), place) == pytest.approx(way_m)
+
+
 class TestTeams:
     def better(self, laid: Laid, now_s: float = 100.0, y_m: float = 50.0) -> int | None:
         """Where alpha, of the south, is better off with 1000 s at 2 m/s left."""

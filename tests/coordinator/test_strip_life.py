@@ -32,6 +32,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from coordinator.coordinator import Coordinator
 
 
 def with_a_late_answer() -> Told:
@@ -199,6 +200,18 @@ class TestSilence:
         assert f"no answer from {HELPER}" in [one.reason for one in said if isinstance(one, StripStatus)]
         assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)] * 2
 
+    def test_who_answers_by_its_state_has_left_nothing_unanswered(self) -> None:
+        told = coordinator()
+        told.hotspot()
+        told.settle()
+        told.node.wait(10)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        helper = node.fleet.vehicles[HELPER]
+        assert helper.unanswered == 1
+        told.state(HELPER, Mode.TRANSIT, 1)
+        assert helper.unanswered == 0
+
     def test_a_state_that_tells_of_the_work_is_an_answer_too(self) -> None:
         told = coordinator()
         told.hotspot()
@@ -292,6 +305,14 @@ class TestSilence:
         told.keep_alive([PRIMARY, HELPER], 10)
         told.settle()
         assert told.states() == left
+
+    def test_what_another_says_that_has_no_work_is_no_word_on_it(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
+        for _ in range(3):
+            told.state(SECOND_HELPER, Mode.IDLE)
+            told.settle()
+        assert told.states() == {1: UNDER_WAY}
+        assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)]
 
     def test_a_word_that_comes_late_counts_and_an_idle_state_before_it_does_not(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from planner.across import MEAN_WEIGHT, Across, HelperLooks, Measured
@@ -55,6 +55,13 @@ def test_what_is_asked_and_not_seen_is_lost() -> None:
     assert beyond.worth([10]).lost_m == 10
 
 
+def test_tracks_lie_within_the_width_or_no_farther_outside_than_those_that_are_asked_for() -> None:
+    ground = across(width_m=40.0)
+    assert (ground._first, ground._last) == (0, 40)
+    ground.ask_for([Measured(-3.5, HALF, 10.0), Measured(20.0, HALF, 10.0), Measured(43.5, HALF, 10.0)])
+    assert (ground._first, ground._last) == (-3, 43)
+
+
 def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed() -> None:
     wide = across(10.0, width_m=40.0)
     assert wide.with_one_more([]) == [32]
@@ -98,3 +105,29 @@ def test_moving_makes_nothing_worse(
     assert len(found) == len(bins)
     assert found == ground.refined(bins)
     assert ground.worth(found) <= ground.worth(bins)
+
+
+@settings(max_examples=50)
+@given(
+    flown=st.lists(st.integers(-20, 220), max_size=3),
+    bins=st.lists(st.integers(-20, 220), min_size=1, max_size=3),
+    asked=st.lists(st.integers(-20, 220), max_size=3),
+)
+# Each is a survey in which a step that is left out, or another, leaves a track where it could be moved.
+@example([], [199], [99, 51])
+@example([], [180, 72], [28, 214, 194])
+@example([-8], [105, 127, 198], [180, 42])
+@example([100], [48], [128, 120])
+@example([130, 198, -12], [42, 170], [86, 150, 24])
+@example([-13, 208, 193], [90, 135], [])
+@example([174, 95, 100], [77, 181, 33], [])
+def test_no_track_can_be_moved_by_a_step_for_the_better(flown: list[int], bins: list[int], asked: list[int]) -> None:
+    ground = Across(200.0, [Measured(float(one), GAPPED, 30.0) for one in flown], GAPPED, 30.0, 5.0)
+    ground.ask_for([Measured(float(one), GAPPED, 30.0) for one in asked])
+    found = ground.refined(bins)
+    worth = ground.worth(found)
+    for step in (1, 2, 4, 8, 16, 32):
+        for shift in (-step, step):
+            for place, at in enumerate(found):
+                moved = min(max(at + shift, ground._first), ground._last)
+                assert not ground.worth([*found[:place], moved, *found[place + 1 :]]).is_better(worth)

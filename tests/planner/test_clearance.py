@@ -61,6 +61,15 @@ def test_what_was_found_elsewhere_tells_of_a_place_and_a_place_well_seen_is_clea
     assert left_of(risk, 9, place=unseen).clearance == 0.0
 
 
+def test_a_place_may_be_smaller_than_a_square_metre() -> None:
+    one = np.zeros(ALL.shape, dtype=np.bool_)
+    one[0, 0] = True
+    told = mines_left(np.full(ALL.shape, 0.25), ALL, one, 0.5, 7.5, 0.0)
+    assert told is not None
+    assert told.clearance == pytest.approx(0.75)
+    assert told.mean == pytest.approx(8.0 / 80 / 3)
+
+
 def test_where_mines_lie_denser_more_are_left() -> None:
     weights = np.ones(ALL.shape)
     weights[:, :5] = 3.0

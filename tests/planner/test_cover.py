@@ -78,6 +78,12 @@ class TestByHand:
         assert fewest_tracks([(0, 320)], 40, 100).offsets_m == (100, 160, 220)
         assert fewest_tracks([(500, 820)], 40, 100).offsets_m == (600, 660, 720)
 
+    def test_an_only_group_wider_than_what_is_left_is_centred_on_it_and_the_last_of_several_pulled_in(self) -> None:
+        # 317 m: to 99 m three tracks cover 316 m, to 100 m 320 m, 2 m of these before and 1 m behind.
+        assert fewest_tracks([(500, 817)], 40, 100).offsets_m == (598, 658, 718)
+        # 637 m: twice three; the second three end where it ends.
+        assert fewest_tracks([(500, 1137)], 40, 100).offsets_m == (600, 660, 720, 917, 977, 1037)
+
     def test_two_gaps_behind_take_one_track_where_one_sees_both(self) -> None:
         # 140 m apart, as the two sides of one track are.
         found = fewest_tracks([(0, 30), (140, 170)], 40, 100)

@@ -109,6 +109,15 @@ def test_passes_past_a_zone_take_the_way_round_it() -> None:
     assert 50 + taut_m / 4 < EASTWARD.passes_s(passes, 10, keep_out=zone) < 50 + 1.2 * taut_m / 2
 
 
+@pytest.mark.parametrize(("time_s", "east_mps"), [(50, 0.0), (150, 1.5), (250, 0.0), (350, -1.5), (83.333333, 0.75)])
+def test_a_tide_turns_towards_its_heading_at_slack_water_and_is_as_it_was_a_period_later(
+    time_s: float, east_mps: float
+) -> None:
+    tide = Current(1.5, EAST, period_s=400.0, slack_s=50.0)
+    for later_s in (0, 400, 4000):
+        assert tide.flow_mps(time_s + later_s) == pytest.approx((east_mps, 0.0), abs=1e-6)
+
+
 # It flows east, not at all in the south and at 1.5 m/s 100 m further north; an hour later the other way.
 SHEAR = FlowGrid(
     np.array([0.0, 400.0]),
@@ -149,6 +158,17 @@ class TestFlowsFromPlaceToPlace:
         grid = FlowGrid(np.array([0.0, 10.0]), np.array([0.0, 10.0]), np.array([0.0]), corners, -corners)
         # A quarter east and half north: 1.25 in the south, 3.5 in the north.
         assert grid.flow_mps(0, (2.5, 5)) == pytest.approx((2.375, -2.375))
+
+    def test_along_an_axis_of_one_place_it_is_the_same_everywhere(self) -> None:
+        flows = np.array([[[1.0, 2.0]]])
+        row = FlowGrid(np.array([0.0, 10.0]), np.array([3.0]), np.array([0.0]), flows, -flows)
+        column = FlowGrid(
+            np.array([3.0]), np.array([0.0, 10.0]), np.array([0.0]), flows.reshape(1, 2, 1), np.zeros((1, 2, 1))
+        )
+        for y_m in (-5.0, 3.0, 50.0):
+            assert row.flow_mps(0, (5, y_m)) == pytest.approx((1.5, -1.5))
+            assert row.flows_mps(np.array(5.0), np.array(y_m))[:, 0] == pytest.approx([1.5, -1.5])
+            assert column.flows_mps(np.array(y_m), np.array(5.0))[:, 0] == pytest.approx([1.5, 0.0])
 
     def test_along_the_shear_and_across_it(self) -> None:
         sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
@@ -200,7 +220,7 @@ class TestFlowsFromPlaceToPlace:
         assert homes[0] == pytest.approx(homes[1], rel=1e-6)
 
     @given(
-        st.lists(st.floats(-1, 1), min_size=24, max_size=24),
+        st.lists(st.floats(-1, 1), min_size=36, max_size=36),
         st.floats(-50, 150),
         st.floats(-50, 150),
         st.floats(-10, 20),
@@ -209,8 +229,8 @@ class TestFlowsFromPlaceToPlace:
     def test_it_is_never_faster_than_at_some_place_and_one_by_one_is_as_many_at_once(
         self, flows: list[float], x_m: float, y_m: float, time_s: float, course_rad: float
     ) -> None:
-        east_mps, north_mps = np.array(flows).reshape(2, 2, 2, 3)
-        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 100.0]), np.array([0.0, 10.0])
+        east_mps, north_mps = np.array(flows).reshape(2, 2, 3, 3)
+        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 60.0, 100.0]), np.array([0.0, 10.0])
         grid = FlowGrid(*axes, east_mps, north_mps)
         east, north = grid.flow_mps(time_s, (x_m, y_m))
         assert math.hypot(east, north) <= grid.fastest_mps + 1e-9

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.dubins import TIE_M, Pose, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, Pose, compass_rad, path_lengths_m, shortest_path
 
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -104,6 +104,13 @@ class TestByHand:
     )
     def test_with_a_turn_radius_of_10(self, start: Pose, end: Pose, length_m: float) -> None:
         assert shortest_path(start, end, 10).length_m == pytest.approx(length_m, abs=1e-9)
+
+    @pytest.mark.parametrize(
+        ("angle_rad", "heading_rad"), [(0.0, 0.0), (-1e-20, 0.0), (-0.5, math.tau - 0.5), (7.0, 7.0 - math.tau)]
+    )
+    def test_a_heading_is_below_a_full_turn(self, angle_rad: float, heading_rad: float) -> None:
+        assert compass_rad(angle_rad) == pytest.approx(heading_rad, abs=1e-12)
+        assert 0.0 <= compass_rad(angle_rad) < math.tau
 
     def test_turns_and_lengths_of_a_track_change(self) -> None:
         path = shortest_path(Pose(0, 0, NORTH), Pose(80, 0, SOUTH), 15)

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from regions import regions
 
 from planner import convex_parts as cutting
+from planner.area import SurveyArea
 from planner.convex_parts import SHALLOW_M, convex_parts
-from planner.first_plan import best_heading, first_plan, in_order, parts_in_order
+from planner.first_plan import _entered, _sides, best_heading, first_plan, in_order, parts_in_order
 from planner.footprints.cells import look_on_grid, seen_cells
 from planner.footprints.footprint import Reach
 from planner.region import Region
@@ -217,6 +218,15 @@ class TestCoastOfManyCorners:
 
 
 class TestOrder:
+    def test_a_part_is_entered_in_the_middle_of_its_nearer_side(self) -> None:
+        part = SurveyArea(((50.0, 0.0), (150.0, 0.0), (150.0, 200.0), (50.0, 200.0)), 0.0)
+        assert _sides(part) == ((50, 100), (150, 100))
+        way_m, (entered,) = _entered([part], (0.0, 100.0))
+        assert (way_m, _sides(entered)) == (50, ((50, 100), (150, 100)))
+        way_m, (entered,) = _entered([part], (180.0, 140.0))
+        assert way_m == 50
+        assert np.array(_sides(entered)) == pytest.approx(np.array([(150, 100), (50, 100)]))
+
     def test_the_nearest_way_through_all(self) -> None:
         squares = [
             Region(((x, 0.0), (x + 100, 0.0), (x + 100, 100.0), (x, 100.0))).about(0) for x in (400.0, 0.0, 200.0)

@@ -8,13 +8,26 @@ import shapely
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from planner.outline import outline
+from planner.outline import Corner, _any_in_triangle, outline
 from planner.types import BoolArray
 
 
 def cells_of(picture: str) -> BoolArray:
     """A patch drawn with its first row at the bottom."""
     return np.array([[mark == "#" for mark in line] for line in reversed(picture.split())])
+
+
+corners = st.tuples(st.integers(0, 9), st.integers(0, 9))
+
+
+@given(st.tuples(corners, corners, corners), st.sets(corners, max_size=60))
+def test_whether_a_triangle_holds_any_vertex(triangle: tuple[Corner, Corner, Corner], vertices: set[Corner]) -> None:
+    area = shapely.Polygon(triangle)
+    assume(area.area > 0)
+    if area.exterior.is_ccw:
+        triangle = triangle[::-1]  # it bends right
+    holds = any(area.covers(shapely.Point(one)) for one in vertices - set(triangle))
+    assert _any_in_triangle(*triangle, dict.fromkeys(vertices, (0, 0))) == holds
 
 
 def fill_one_by_one(cells: BoolArray, most_vertices: int) -> shapely.Polygon:

@@ -69,6 +69,14 @@ class TestThePapersExperiments:
         assert len(decision.offsets_m) == 7
         assert worst30(138.0, *decision.offsets_m) < worst30(138.0, 236, 486, 566, 806, 886, 1012, 1092) - 0.04
 
+    @pytest.mark.parametrize(("before_m", "singles"), [(100, True), (None, False)])
+    def test_single_tracks_are_laid_from_the_first_where_it_was_measured_that_pairs_cannot(
+        self, before_m: int | None, singles: bool
+    ) -> None:
+        # r_eff of 100 m is below 3 r_min. From earlier missions alone it is not gone by before the first track.
+        so_far = PartSoFar(700.0, before_m, (), (), CURVE, 100)
+        assert laid(ProfileSpacing(40, 145), so_far).singles is singles
+
     def test_what_was_planned_is_as_good_a_start(self) -> None:
         first = laid(ProfileSpacing(40, 130), part()).offsets_m
         then = laid(ProfileSpacing(40, 130), part(first[0], planned_m=first[1:])).offsets_m

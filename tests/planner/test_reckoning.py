@@ -72,6 +72,16 @@ class TestATrace:
         assert found == [(1_400, turn.pose_at(1_400)), (2_400, turn.pose_at(2_400)), (3_400, turn.pose_at(3_400)),
                          (3_950, (1, 2, 3))]  # fmt: skip
 
+    @pytest.mark.parametrize(
+        ("speed_mps", "told"), [(0.0, []), (0.5, [(5_000, (10.0, -2.5, 0.0))]), (1.0, [(5_000, (10.0, 0.0, 0.0))])]
+    )
+    def test_it_ends_where_the_vehicle_is_by_then_unless_it_lies(
+        self, speed_mps: float, told: list[tuple[int, Pose]]
+    ) -> None:
+        trace = Trace()
+        trace.hear(Course(0, NORTH, speed_mps))
+        assert trace.end(5_000) == told
+
     def test_what_comes_about_a_second_later_is_waited_for(self) -> None:
         trace = Trace()
         trace.hear(Course(0, NORTH, 2.0, TURN))

@@ -15,6 +15,7 @@ from planner.risk import (
     LevelArray,
     RiskLayer,
     residual_risk,
+    risk_of_levels,
     risk_statistics,
     to_levels,
 )
@@ -120,6 +121,12 @@ class TestResidualRisk:
         assert residual_risk(sums, largest) == pytest.approx([1, math.exp(-1), math.exp(-1)])
         assert residual_risk(sums, largest, 0.5) == pytest.approx([1, math.exp(-1), math.exp(-0.7)])
         assert residual_risk(sums, largest, 1) == pytest.approx([1, math.exp(-1), math.exp(-0.4)])
+
+    def test_what_all_share_nobody_can_change(self) -> None:
+        shared = risk_of_levels(255)
+        assert shared is risk_of_levels(255)
+        with pytest.raises(ValueError, match="read-only"):
+            shared[0] = 0.5
 
     def test_sums_of_many_layers_may_be_larger_than_a_byte(self) -> None:
         sums, largest = np.array([400], dtype=np.int64), np.array([200], dtype=np.int64)

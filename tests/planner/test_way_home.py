@@ -43,6 +43,9 @@ class TestByHand:
 
     def test_who_is_there_has_no_way(self) -> None:
         assert WAY.from_pose(Pose(0.01, 0, SOUTH))[0] == 0.0
+        elsewhere = replace(WAY, home=(30.0, -40.0))
+        assert elsewhere.from_pose(Pose(30.01, -40, SOUTH))[0] == 0.0
+        assert elsewhere.from_pose(Pose(30, 40, SOUTH))[0] == pytest.approx(40.0)
 
     def test_many_at_once_are_as_one_by_one(self) -> None:
         poses = np.array([[40.0, 0.0, NORTH], [0.0, -100.0, SOUTH], [0.0, 0.0, EAST], [3.0, 4.0, EAST]])

@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 from comms.node import random_stream
 from planner.types import DetectionCurve, FloatArray
 from sim_world.config import EstimateConfig, SensorConfig
-from sim_world.estimates import LOWEST_SEEN, Estimates, PDetectEstimate
-from sim_world.sonar import HIGHEST_P_DETECT
+from sim_world.estimates import Estimates, PDetectEstimate
 
 TRUTHS = (0.05, 0.3, 0.49, 0.7, 0.9)
 
@@ -67,7 +66,13 @@ def test_unseen_stays_unseen_seen_stays_seen_and_nothing_is_certain() -> None:
     for seed in range(50):
         estimates = estimated(noise, cells, 0.0, np.random.default_rng(seed))
         assert estimates[0, 0, 0] == 0.0
-        assert np.all((estimates[0, 0, 1:] >= LOWEST_SEEN) & (estimates[0, 0, 1:] <= HIGHEST_P_DETECT))
+        assert np.all((estimates[0, 0, 1:] >= 0.0001) & (estimates[0, 0, 1:] <= 0.999))
+
+
+def test_what_is_hardly_seen_is_told_by_the_wires_least_step() -> None:
+    cells = np.array([[[1e-9, 0.00005, 0.00015]]])
+    told = estimated(PDetectEstimate(0.0, 0.0), cells, 0.0, np.random.default_rng(1))
+    assert told[0, 0] == pytest.approx([0.0001, 0.0001, 0.00015], rel=1e-6)
 
 
 def test_the_draws_do_not_depend_on_what_was_seen() -> None:
@@ -123,7 +128,7 @@ class TestWrongOnPurpose:
         assert published(EstimateConfig(bias=-0.5)) == pytest.approx(0.2)
 
     def test_nothing_is_told_to_be_certain(self) -> None:
-        assert published(EstimateConfig(bias=9.0)) == pytest.approx(HIGHEST_P_DETECT)
+        assert published(EstimateConfig(bias=9.0)) == pytest.approx(0.999)
 
     def test_a_share_that_grows_with_the_range(self) -> None:
         told = published(EstimateConfig(bias_at_reach=0.5))

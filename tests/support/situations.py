@@ -36,7 +36,7 @@ def situation(
     strips: list[OpenStrip], helpers: list[Helper], deadline_s: float = HOUR_S, now_s: float = 0
 ) -> Situation:
     """A situation at the mission's start, if not told otherwise."""
-    return Situation(0, deadline_s, tuple(strips), tuple(helpers))
+    return Situation(now_s, deadline_s, tuple(strips), tuple(helpers))
 
 
 def at_work(free: Helper, one: OpenStrip) -> Helper:

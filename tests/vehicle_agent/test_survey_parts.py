@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import astuple, replace
 from itertools import pairwise
 
 import numpy as np
@@ -17,7 +18,9 @@ from regions import regions
 
 from comms.said.announcement import Grid, Hole, Role, RunInfo, Vertex, Zone
 from comms.said.messages import AgentState, Hotspot, HotspotState, ManeuverState, Mode, Plan, PlannedTrack
+from planner.footprints.footprint import Footprint
 from planner.footprints.side import SideLooking
+from planner.footprints.wedge import ForwardLooking
 from planner.region import Region
 from planner.spacing_planners import AdaptiveSpacing
 from planner.types import Point, SonarShape
@@ -26,6 +29,12 @@ from vehicle_agent.survey import SurveyAgent
 
 SEES_TO_130_M = flat(0.3, 25, 130)
 L_SHAPE = Region(((0.0, 0.0), (800.0, 0.0), (800.0, 300.0), (300.0, 300.0), (300.0, 600.0), (0.0, 600.0)))
+STEPS = Region(
+    (
+        *((0.0, 0.0), (450.0, 0.0), (450.0, 500.0), (900.0, 500.0)),
+        *((900.0, 1100.0), (450.0, 1100.0), (450.0, 600.0), (0.0, 600.0)),
+    )
+)
 WITH_ROCKS = Region(L_SHAPE.outline, (((100.0, 100.0), (160.0, 100.0), (160.0, 160.0), (100.0, 160.0)),))
 
 
@@ -41,12 +50,14 @@ def announced(region: Region, heading_rad: float = 0.0, cell_m: float = 10) -> R
     )
 
 
-def surveyor(run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145) -> OneNode:
+def surveyor(
+    run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145, footprint: Footprint | None = None
+) -> OneNode:
     """A survey agent told of the run and of where its vehicle is."""
     config = SurveyConfig(
         vehicle=PRIMARY,
         spacing=AdaptiveSpacing(nadir_gap_m, range_m),
-        footprint=SideLooking(SonarShape("side", nadir_gap_m, range_m)),
+        footprint=footprint or SideLooking(SonarShape("side", nadir_gap_m, range_m)),
         nadir_gap_m=nadir_gap_m,
         range_m=range_m,
         threshold=0.05,
@@ -74,6 +85,13 @@ def node_of(agent: OneNode) -> SurveyAgent:
     return agent.node
 
 
+def assert_each_begins_at_its_nearer_end(tracks: Sequence[PlannedTrack]) -> None:
+    for before, after in pairwise(tracks):
+        end = (before.end_x_m, before.end_y_m)
+        to_start_m = math.dist(end, (after.start_x_m, after.start_y_m))
+        assert to_start_m <= math.dist(end, (after.end_x_m, after.end_y_m))
+
+
 class TestPartByPart:
     def test_each_part_is_planned_in_turn_with_what_was_learned(self) -> None:
         agent = surveyor(announced(L_SHAPE))
@@ -91,14 +109,24 @@ class TestPartByPart:
         assert [track.number for track in agent.last(Plan).tracks] == list(range(1, 7))
         assert agent.last(AgentState).mode is Mode.FINISHED
 
-    def test_the_second_part_is_begun_from_the_nearer_end(self) -> None:
-        agent = surveyor(announced(L_SHAPE))
-        fly_all(agent, SEES_TO_130_M)
+    @pytest.mark.parametrize(
+        ("region", "far_m", "first", "begins_at_m"),
+        [
+            (L_SHAPE, 130, 3, 0),  # after two tracks at the near side
+            (L_SHAPE, 100, 6, 300),  # after five at the far side, against the part's heading
+            (STEPS, 140, 4, 500),  # after three at the far side, where the next part begins: along its heading
+        ],
+    )
+    def test_the_second_part_is_begun_from_the_nearer_end(
+        self, region: Region, far_m: float, first: int, begins_at_m: float
+    ) -> None:
+        agent = surveyor(announced(region))
+        fly_all(agent, flat(0.3, 25, far_m))
         tracks = agent.last(Plan).tracks
-        for before, after in pairwise(tracks):
-            end = (before.end_x_m, before.end_y_m)
-            to_start_m = math.dist(end, (after.start_x_m, after.start_y_m))
-            assert to_start_m <= math.dist(end, (after.end_x_m, after.end_y_m))
+        numbers = [track.number for track in tracks if track.start_x_m > (450 if region is STEPS else 300)]
+        assert numbers == list(range(first, len(tracks) + 1))
+        assert tracks[first - 1].start_y_m == begins_at_m
+        assert_each_begins_at_its_nearer_end(tracks)
 
     def test_below_three_nadir_gaps_the_next_part_begins_with_single_tracks(self) -> None:
         agent = surveyor(announced(L_SHAPE))
@@ -142,6 +170,34 @@ class TestPartByPart:
         fly_all(agent, SEES_TO_130_M)
         share = float(agent.last(Plan).note.split(" ")[3].rstrip("%,"))
         assert 10 < share < 60
+
+
+def test_hotspots_are_looked_for_each_30_s_where_there_were_looks() -> None:
+    agent = surveyor(announced(L_SHAPE))
+    node, maneuver = node_of(agent), to_follow(agent)
+    assert maneuver is not None
+    fly(agent, PRIMARY, maneuver, SEES_TO_130_M)
+    due_ms = node._hotspots_due_ms
+    for now_ms, new_looks, then_ms in (
+        (due_ms - 1, True, due_ms),
+        (due_ms, False, due_ms),
+        (due_ms, True, due_ms + 30_000),
+        (due_ms + 31_000, True, due_ms + 61_000),
+    ):
+        node._new_looks = new_looks
+        node.report(now_ms)
+        assert node._hotspots_due_ms == then_ms
+
+
+def test_what_a_sonar_that_looks_ahead_may_still_see_of_a_track() -> None:
+    # It sees 50 m ahead, and its swath begins 30 m ahead: a track of 400 m is flown from 30 m before it to 30 m before
+    # its end, from where it sees 20 m beyond.
+    wedge = ForwardLooking(SonarShape("wedge", 3, 50, math.pi / 4, 10))
+    node = node_of(surveyor(run_info(100, 400), nadir_gap_m=0, range_m=30, footprint=wedge))
+    north, south = node.ahead[:2]
+    assert (north.start[1], south.start[1]) == (0, 400)
+    assert astuple(node._still_ahead(north)) == pytest.approx((north.across_m, -30, 420))
+    assert astuple(node._still_ahead(south)) == pytest.approx((south.across_m, -20, 430))
 
 
 class TestAnyArea:
@@ -201,6 +257,7 @@ class TestGroundToKeepOutOf:
         node, tracks = self.flown(zone, self.FIELD)
         assert [track.number for track in tracks] == list(range(1, len(tracks) + 1))
         assert all(track.flown for track in tracks)
+        assert_each_begins_at_its_nearer_end(tracks)
         pieces = [track for track in tracks if abs(track.across_m - across_m) < 1e-6]
         # Grown it is 11 m wide. A circle of 20 m beside the track touches its corner, 5.5 m to the side, where it
         # begins sqrt(20^2 - 14.5^2) = 13.8 m before it; before that come 20 m of run-out. Looked for metre by metre.
@@ -209,6 +266,17 @@ class TestGroundToKeepOutOf:
         fly_all(free, SEES_TO_130_M)
         assert len(tracks) == len(free.last(Plan).tracks) + 1
         assert len(node.r_adpt_m) == len(node_of(free).r_adpt_m)
+
+    def test_each_part_to_come_is_planned_from_where_the_one_before_it_ends(self) -> None:
+        # Two tracks from the near side and back, one to the far side of a part 400 m long, and then from there.
+        field = ((0.0, 0.0), (700.0, 0.0), (700.0, 600.0), (400.0, 600.0))
+        region = Region((*field, (400.0, 400.0), (300.0, 400.0), (300.0, 600.0), (0.0, 600.0)))
+        far_off = (Zone((Vertex(2000, 2000), Vertex(2010, 2000), Vertex(2010, 2010))),)
+        agent = surveyor(replace(announced(region), keep_out=far_off, keep_out_margin_m=1.5))
+        tracks = agent.last(Plan).tracks
+        begins = [(track.number, track.start_y_m) for track in tracks]
+        assert begins == [(1, 0.0), (2, 600.0), (3, 0.0), (4, 600.0), (5, 0.0)]
+        assert_each_begins_at_its_nearer_end(tracks)
 
     def test_no_track_enters_it_where_it_divides_the_area(self) -> None:
         lane = ((-50.0, 250.0), (950.0, 250.0), (950.0, 310.0), (-50.0, 310.0))

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import pytest
 from fleets import ROSTER
 from hypothesis import given
 from hypothesis import strategies as st
 
+from comms.errors import RunawayError
+from comms.lockstep import clock as lockstep_clock
 from comms.lockstep.clock import Grant, LockstepClock, Round, Sent
+from comms.lockstep.events import Join, Kill
 from comms.said.routing import Routing
 
 RUN = Sent("run", 300)
@@ -178,6 +182,59 @@ def test_a_key_that_the_sender_may_not_write_is_refused(key: str) -> None:
     clock = started()
     with pytest.raises(ValueError, match=f"^beta has published {key}, which it may not write$"):
         clock.answer("beta", None, [Sent(key, 10)])
+
+
+def wake_world(clock: LockstepClock, times_ms: Sequence[int], *said: int) -> None:
+    """Lets the world act at these times but the last, and say so many positions each time; 0 ms has been granted."""
+    answer_all(clock, world=(times_ms[0], []))
+    for next_ms, positions in zip(times_ms[1:], said, strict=True):
+        clock.next_round()
+        clock.answer("world", next_ms, [NAV] * positions)
+
+
+def test_to_who_comes_back_only_what_is_sent_since_then_is_counted() -> None:
+    clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("coordinator", 25), Join("coordinator", 50)))
+    told = []
+    while (turn := clock.next_round()) is not None:
+        for grant in turn.grants:
+            says = grant.node_id == "alpha" and grant.wake
+            wake_ms = {0: 20, 20: 60}.get(turn.now_ms) if says else None
+            clock.answer(grant.node_id, wake_ms, [STATE] if says else [])
+            told += [(turn.now_ms, grant.expected)] if grant.node_id == "coordinator" else []
+    # Started, and 1 ms later given what was kept for it.
+    assert [now_ms for now_ms, _ in told] == [0, 1, 21, 50, 51, 61]
+    # Sent at 0, 20 and 60 ms; it is killed after the second and has joined before the third.
+    assert [(now_ms, expected["alpha"]) for now_ms, expected in told if "alpha" in expected] == [
+        (1, 1),
+        (21, 2),
+        (61, 1),
+    ]
+
+
+class TestRunaway:
+    def test_rounds_are_counted_second_by_second(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(lockstep_clock, "MOST_ROUNDS_A_SECOND", 3)
+        clock = started()
+        wake_world(clock, [500, 999, 1000, 1001, 1999, 3000, 3001, 3002, 9000], *[1] * 8)  # with 0 ms 3 each
+        assert clock.rounds == 9
+        clock = started()
+        wake_world(clock, [999, 1000, 1001, 1002, 1003], 1, 1, 2, 1)
+        with pytest.raises(
+            RunawayError, match=r"^more than 3 rounds within simulated second 1; messages in it: nav 4$"
+        ):
+            clock.next_round()
+
+    def test_messages_are_counted_second_by_second(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr(lockstep_clock, "MOST_MESSAGES_A_SECOND", 4)
+        clock = started()
+        wake_world(clock, [500, 999, 1000, 1999, 2000, 2001, 9000], 2, 2, 3, 1, 4, 0)
+        assert clock.messages == {"nav": 12}
+        clock = started()
+        wake_world(clock, [999, 1000, 1001, 1002], 4, 3, 2)
+        with pytest.raises(
+            RunawayError, match=r"^more than 4 messages within simulated second 1; messages in it: nav 5$"
+        ):
+            clock.next_round()
 
 
 WRITES = {

@@ -69,6 +69,13 @@ def test_corruption_changes_one_byte(number: int, seed: int) -> None:
     assert sum(one != two for one, two in zip(before, delivery.payload, strict=True)) == 1
 
 
+def test_nothing_corrupted_is_as_it_was() -> None:
+    faults = Faults(1, [MessageFault(FaultKind.CORRUPT)])
+    for number in range(2000):  # each 255th is changed by the least that there is
+        (delivery,) = deliver(faults, NAV, number)
+        assert delivery.payload != payload_of(NAV, number, 0)
+
+
 def test_a_fault_by_chance_strikes_as_often_as_told_and_otherwise_for_another_seed() -> None:
     def struck(seed: int) -> list[int]:
         faults = Faults(seed, [MessageFault(FaultKind.DROP, probability=0.2)])

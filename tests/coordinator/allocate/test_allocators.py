@@ -14,6 +14,8 @@ from situations import at_work, helper, open_strip, situation, situations, strip
 from coordinator.allocate.allocators import ALLOCATORS
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
+from planner.currents import Sailing
+from planner.way_home import WayHome
 
 HELPER = helper()
 
@@ -110,6 +112,15 @@ class TestEveryAllocator:
     def test_the_battery_must_last(self, lasts_s: float, expected: dict[str, int], name: str) -> None:
         told = situation([open_strip(strip(1))], [replace(HELPER, lasts_until_s=lasts_s)])
         assert offers(name, told) == expected
+
+    @pytest.mark.parametrize(("spare_s", "expected"), [(0.1, {"alpha": 1}), (-0.1, {})])
+    def test_and_for_the_way_home(self, spare_s: float, expected: dict[str, int], name: str) -> None:
+        # Home lies at the start. Behind the strip, at 305 m headed north, it turns, with its circle's centre 6 m beside
+        # and 305 m from home; the run-out of 5 m before that is sailed, too.
+        home = WayHome((0.0, 0.0), Sailing(2.0), 6.0)
+        home_s = (6 * (math.pi + 2 * math.atan(6 / 305)) + 305) / 2 + 2.5
+        one = replace(HELPER, way_home=home, lasts_until_s=150 + home_s + spare_s)
+        assert offers(name, situation([open_strip(strip(1))], [one])) == expected
 
     def test_a_strip_that_cannot_be_reached_by_the_deadline_is_left(self, name: str) -> None:
         assert offers(name, situation([open_strip(strip(1))], [HELPER], deadline_s=49)) == {}

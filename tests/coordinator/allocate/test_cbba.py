@@ -13,6 +13,8 @@ from bench.planning_time import situation as large_situation
 from coordinator.allocate.cbba import BUNDLE, HALF_LIFE_S, NOBODY, Bidder, CbbaAllocator, Claims, agreed
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
+from planner.currents import Sailing
+from planner.way_home import WayHome
 
 CBBA = CbbaAllocator()
 
@@ -133,6 +135,15 @@ class TestConflicts:
         near = [open_strip(strip(number, x_m=60 * number), 5000) for number in range(1, BUNDLE + 1)]
         far = open_strip(strip(9, x_m=2000), 10)
         assert CBBA.assign(situation([*near, far], [helper(p_detect=0.2), helper("beta", p_detect=0.9)]))["alpha"] == 9
+
+    def test_what_the_battery_lasts_for_by_itself_but_not_behind_another_is_the_others(self) -> None:
+        # Home lies at alpha's start, in the middle: from either strip it is 165 s and more, which the next one adds to.
+        alpha = helper(way_home=WayHome((0.0, 0.0), Sailing(2.0), 6.0), lasts_until_s=900)
+        jobs = [open_strip(strip(1)), open_strip(strip(2, y_m=-600))]
+        lone = {one.strip.number: CBBA.assign(situation([one], [alpha])) for one in jobs}
+        assert lone == {1: {"alpha": 1}, 2: {"alpha": 2}}
+        one, _ = agreed(situation(jobs, [alpha, helper("beta", x_m=1500, y_m=-700)]), jobs)
+        assert one.path == [0]
 
     def test_of_equals_the_first_name(self) -> None:
         told = situation([open_strip(strip(1))], [helper("beta"), helper("alpha")])

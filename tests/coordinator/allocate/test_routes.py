@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import permutations, product
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -18,7 +19,7 @@ from coordinator.allocate.routes import BEAM, HORIZON_S, Routes, RoutesAllocator
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
-from coordinator.allocate.team import MOST_STRIPS
+from coordinator.allocate.team import MOST_STRIPS, Team
 
 PLAN = RoutesAllocator()
 NEAR, FAR = open_strip(strip(2, y_m=100)), open_strip(strip(1, y_m=600))
@@ -116,6 +117,15 @@ class TestOneHelper:
     def test_while_nobody_can_tell_when_the_mission_ends_it_plans_all_the_same(self) -> None:
         assert PLAN.assign(situation([FAR, NEAR], [helper()], deadline_s=math.inf)) == {"alpha": 2}
 
+    def test_it_then_plans_four_hours_ahead(self) -> None:
+        # A rich strip 30 km to the south, which the battery would last for, but not for both.
+        near, rich = open_strip(strip(1, y_m=4000)), open_strip(strip(2, y_m=-30_000), 1e6)
+        now_s = 10 * 3600.0
+        one = helper(free_s=now_s, lasts_until_s=now_s + 16_500)
+        assert PLAN.assign(situation([near, rich], [one], math.inf, now_s)) == {"alpha": 1}
+        assert PLAN.assign(situation([near, rich], [one], now_s + 16_500, now_s)) == {"alpha": 1}
+        assert routes([near, rich], [one], now_s + 16_500).strips == {"alpha": (2,)}
+
     def test_of_very_many_it_plans_with_those_that_bring_most(self) -> None:
         poor = {7, 20, 33}
         jobs = [
@@ -128,6 +138,60 @@ class TestOneHelper:
     def test_without_strips_or_helpers_there_are_no_routes(self) -> None:
         assert routes([], [helper()]) == Routes(0.0, {"alpha": ()}, {})
         assert routes([NEAR], []) == Routes(0.0, {}, {})
+
+
+class TestWhatIsPromising:
+    """What beams are chosen by."""
+
+    @pytest.mark.parametrize("deadline_s", [3600.0, 200.0])
+    def test_the_strips_left_bring_what_they_do_by_themselves_and_then_a_second_what_the_worst_does_by_half(
+        self, deadline_s: float
+    ) -> None:
+        poor = replace(FAR, risk_m2=500)
+        team = Team([NEAR, poor], [helper(), helper("beta", x_m=5000, free_s=100)], deadline_s)
+        assert team.alone_m2.tolist() == [350, 700]  # by number: the far one is 1
+        assert team.by_rate.tolist() == [1, 0]
+        assert team.later_m2ps == pytest.approx(0.5 * 350 / team.alone_s[0])
+        plan = allocate.routes._Plans.begun(team)
+        still_m2 = plan._still_m2(team, plan.ahead(team))
+
+        def brings(time_s: float, *left: int) -> float:
+            total_m2 = 0.0
+            for place in left:
+                share = min(1.0, time_s / team.alone_s[place])
+                total_m2, time_s = total_m2 + share * team.alone_m2[place], time_s - share * team.alone_s[place]
+            return total_m2 + time_s * team.later_m2ps
+
+        beta_s = deadline_s - 100
+        expected = [
+            brings(max(0.0, deadline_s - 402.5) + beta_s, 1),  # alpha at the far one until 402.5 s
+            brings(max(0.0, deadline_s - 152.5) + beta_s, 0),  # at the near one until 152.5 s
+            brings(beta_s, 1, 0),  # alpha leaves the rest to beta
+        ]
+        assert still_m2[0] == pytest.approx(expected)
+
+    @pytest.mark.parametrize(
+        ("counts_m2", "best"), [([5, 7, 7, 3, 7 + 1e-7], 1), ([5, 7, 7, 3, 7.1], 4), ([5, 4, 3, 2, 1], 0)]
+    )
+    def test_of_plans_that_hardly_differ_that_of_an_earlier_beam_is_taken(
+        self, counts_m2: list[float], best: int
+    ) -> None:
+        assert allocate.routes._best(np.array(counts_m2), [3, 2]) == best
+
+    def test_what_the_deadline_cuts_off_takes_no_time(self) -> None:
+        # By 200 s the near one brings 700 m2 in 152.5 s, the long one more than twice as much in 200 s.
+        long = open_strip(strip(1, x_m=0, y_m=-200, length_m=2000, heading_rad=math.pi), 20_000)
+        found = plan_routes([NEAR, long], [helper()], 200, 1)
+        assert found.strips == {"alpha": (1,)}
+
+    def test_plans_that_serve_the_same_strips_and_end_at_the_same_places_are_one(self) -> None:
+        turns = np.array([[0, -1, 1], [1, -1, 0], [-1, 0, 1], [0, 1, -1]])
+        nodes = np.array([[4], [4], [4], [4]])
+        plans = allocate.routes._Plans(nodes, np.zeros((4, 1)), np.zeros((4, 1), dtype=np.bool_), turns, np.zeros(4))
+        assert plans.first_that_differ(10).tolist() == [0, 2, 3]
+        assert plans.first_that_differ(2).tolist() == [0, 2]
+        plans.nodes[1], plans.is_done[3] = 5, True
+        assert plans.first_that_differ(10).tolist() == [0, 1, 2, 3]
 
 
 class TestSeveralHelpers:
@@ -227,6 +291,25 @@ class TestTurningRound:
     def test_once_it_is_sweeping_it_is_left_at_it(self) -> None:
         busy = replace(self.on_its_way(1000), sweeping=True)
         assert PLAN.assign(situation([open_strip(strip(1, y_m=-200), 9000)], [busy], deadline_s=260)) == {}
+
+    def test_it_is_for_what_lies_on_its_way_where_its_task_is_served_after_that(self) -> None:
+        # Strip 1 from 50 s to 150 s, then its task from 200 s to 300 s; the other way about there is no time for both.
+        told = situation([NEAR], [at_work(helper(), open_strip(strip(9, y_m=400)))], deadline_s=300)
+        assert PLAN.assign(told) == {"alpha": 2}
+
+    def test_it_is_not_for_what_is_offered_to_another(self) -> None:
+        # Each would better serve the strip 1500 m away that the other has, or is offered.
+        far = at_work(helper("beta", x_m=1500), open_strip(strip(9)))
+        told = situation([open_strip(strip(1, x_m=1500))], [helper(), far], deadline_s=820)
+        assert PLAN.assign(told) == {"alpha": 1}
+        assert PLAN.assign(replace(told, helpers=(far,))) == {"beta": 1}
+
+    def test_it_is_not_sent_to_the_task_that_it_has(self) -> None:
+        # By its own word it will be free 100 s later than reckoned, too late for another strip: it would seem better
+        # to be sent to its task anew.
+        busy = at_work(helper(), open_strip(strip(9)))
+        told = situation([FAR], [replace(busy, free_s=busy.free_s + 100)], deadline_s=400)
+        assert PLAN.assign(told) == {}
 
     def test_if_both_can_be_done_it_goes_on(self) -> None:
         told = situation([open_strip(strip(1, y_m=650), 1200)], [self.on_its_way(1000)])

@@ -10,9 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.allocate.service import StripTable, expected_service, removed_m2
+from coordinator.allocate.service import StripTable, can_fly, expected_service, removed_m2
 from coordinator.allocate.situation import Situation
 from planner.dubins import Pose
+from planner.keep_out import KeepOut
 
 
 @settings(max_examples=60, deadline=None)
@@ -45,6 +46,14 @@ def test_of_all_ways_the_shortest_is_the_one_that_is_expected(told: Situation) -
             for place, job in enumerate(told.strips):
                 ends_s = to_begin_s[row, place] + table.sonar_on_s[place]
                 assert ends_s.min() == pytest.approx(expected_service(job, there).ends_s)
+
+
+@pytest.mark.parametrize(("from_x_m", "can"), [(-30.0, False), (10.0, False), (50.0, True)])
+def test_what_lies_on_its_legs_keeps_a_helper_from_flying_a_strip(from_x_m: float, can: bool) -> None:
+    zone = KeepOut((tuple((from_x_m + x_m, y_m) for x_m, y_m in ((0, 150), (60, 150), (60, 160), (0, 160))),))
+    one = strip(1)  # along x = 0
+    assert can_fly(one, replace(helper(swath_m=30), keep_out=zone)) is can
+    assert can_fly(one, helper(swath_m=30))
 
 
 class TestByHand:

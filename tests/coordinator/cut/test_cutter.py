@@ -93,6 +93,12 @@ class TestTime:
         assert strips + SPARE_STRIPS <= len(cuts) < 12
         assert windows(cuts) == [lane(number) for number in range(len(cuts))]
 
+    def test_what_is_just_enough_is_enough(self) -> None:
+        # There is time for two: of the six that are worth much four are to spare, and none of those worth less.
+        rich_and_poor = ground(lanes(*[0.9] * 6, *[0.7] * 6))
+        cuts = cut(Cutter(GRID, RULES, LEAST), rich_and_poor, 2.0 * STRIP_M, (), ())
+        assert set(windows(cuts)) == {lane(number) for number in range(6)}
+
     @pytest.mark.parametrize("time_m", [40 * STRIP_M, math.inf])
     def test_where_there_is_time_for_all_all_are_cut_at_the_least_price(self, time_m: float) -> None:
         cutter = Cutter(GRID, RULES, LEAST, across=True)

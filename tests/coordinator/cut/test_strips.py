@@ -95,6 +95,12 @@ class TestByHand:
         assert len(cut(hot(np.s_[:, 15:19]))) == 1
         assert cut(hot(np.s_[:, 15:19]), replace(RULES, max_strip_m=60)) == []
 
+    def test_a_piece_that_brings_just_what_it_costs_is_left_out(self) -> None:
+        # Pieces of 20 rows; the second brings 3.5 a row and costs 2.5, 20 in all, which is what the way to it costs.
+        rules = replace(RULES, max_strip_m=100)
+        assert cut(hot(np.s_[:20, 10:20]) + hot(np.s_[20:40, 10:20], risk=0.35), rules) == [Window(0, 20, 10, 20)]
+        assert len(cut(hot(np.s_[:20, 10:20]) + hot(np.s_[20:40, 10:20], risk=0.3501), rules)) == 2
+
     def test_a_row_less_hot_than_it_costs_is_flown_only_on_the_way(self) -> None:
         # Five empty rows cost 1.25 between two runs that bring 0.75 a row.
         assert cut(hot(np.s_[5:20, 10:20], np.s_[25:40, 10:20])) == [Window(5, 40, 10, 20)]

@@ -11,7 +11,7 @@ from by_hand import PRIMARY, vehicle
 
 from comms.said.announcement import Role, RosterVehicle
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
-from coordinator.expect.tracks import ExpectedTracks, Tracks
+from coordinator.expect.tracks import ExpectedTracks, Tracks, _shifted
 from coordinator.vehicles import KnownVehicle
 from planner.footprints import footprint_of
 from planner.types import DetectionCurve, FloatArray, GridSpec, SweepFrame
@@ -186,3 +186,20 @@ class TestCurves:
     def test_that_of_earlier_missions_counts_until_there_is_another(self) -> None:
         assert p_detect(expected(primary(UP, curves={0: LINEAR})).ahead[0, 30]) == pytest.approx(0.25)
         assert p_detect(expected(primary(UP, curves={0: LINEAR, 1: HALF})).ahead[0, 30]) == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize(("end_x_m", "end_y_m", "along"), [(0, 300, True), (300, 300, True), (300, 0, False)])
+def test_where_tracks_may_lie_is_across_them_and_of_those_askew_across_the_grid(
+    end_x_m: int, end_y_m: int, along: bool
+) -> None:
+    # Two tracks 100 m apart: what one cell is expected to gain may lie up to 50 m, ten cells, to either side.
+    beside = (100, 0) if along else (0, 100)
+    tracks = (
+        PlannedTrack(1, 0, 0, 0, end_x_m, end_y_m, False),
+        PlannedTrack(2, 0, beside[0], beside[1], end_x_m + beside[0], end_y_m + beside[1], False),
+    )
+    nats = np.zeros(GRID.shape)
+    nats[40, 40] = 1.0
+    rows, columns = np.nonzero(_shifted(GRID, Plan(1, tracks, (), (), ""), nats) > 1e-9)
+    spread = np.arange(30, 51).tolist()
+    assert (set(rows.tolist()), set(columns.tolist())) == (({40}, set(spread)) if along else (set(spread), {40}))

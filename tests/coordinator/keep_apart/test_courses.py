@@ -17,9 +17,19 @@ from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.service import expected_service, sweeps
 from coordinator.allocate.situation import OpenStrip
-from coordinator.keep_apart.courses import STEP_S, Course, course, straight, survey_course, sweep_course, too_close
+from coordinator.keep_apart.courses import (
+    STEP_S,
+    Course,
+    course,
+    run_out_left_m,
+    straight,
+    survey_course,
+    sweep_course,
+    too_close,
+)
 from planner.currents import Sailing
 from planner.dubins import Pose
+from planner.keep_out import KeepOut
 from planner.sweep import shortest_sweep
 
 EAST, NORTH, SOUTH = math.pi / 2, 0.0, math.pi
@@ -40,6 +50,22 @@ class TestCourses:
         assert laid.arrives_s == 55
         later = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 55]
         assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
+        # All the time: 4 m on the circle from each step to the next.
+        assert np.hypot(*np.diff(later[:, :2], axis=0).T) == pytest.approx(2 * 10 * math.sin(0.2))
+
+    def test_where_there_is_room_to_neither_side_it_is_expected_to_starboard_all_the_same(self) -> None:
+        walls = KeepOut(
+            tuple(((x_m, -500.0), (x_m + 32, -500.0), (x_m + 32, 900.0), (x_m, 900.0)) for x_m in (-40.0, 8.0))
+        )
+        start = Pose(0, 0, NORTH)
+        laid = course(start, 0, Sailing(2), 10, [straight(start, 100, 10)], walls)
+        circling = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 50]
+        assert np.hypot(circling[:, 0] - 10, circling[:, 1] - 100) == pytest.approx(10)
+
+    def test_in_a_current_it_is_where_what_it_makes_good_takes_it(self) -> None:
+        with_it = course(Pose(0, 0, EAST), 5, Sailing(2, 1, EAST), 10, [straight(Pose(0, 0, EAST), 300, 10)])
+        assert with_it.at(25) == pytest.approx((60, 0, EAST))  # 20 s at 3 m/s
+        assert with_it.arrives_s == pytest.approx(105)
 
     def test_a_sweep_ends_when_and_where_its_service_does(self) -> None:
         one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
@@ -69,6 +95,21 @@ class TestCourses:
         found = too_close(laid, crossing, 10, 0, crosses_s + 100)
         assert found is not None
         assert found.time_s == pytest.approx(crosses_s, abs=20)
+
+    @pytest.mark.parametrize(
+        ("pose", "left_m"),
+        [
+            (Pose(0, 90, NORTH), 10),
+            (Pose(0, 99.5, NORTH), 0.5),
+            (Pose(0, 100, NORTH), 0),
+            (Pose(0, 101, NORTH), 0),
+            (Pose(0, 90, 0.2), 0),  # it has turned
+            (Pose(60, 90, NORTH), 0),
+            (Pose(0, -100, NORTH), 0),
+        ],
+    )
+    def test_what_is_left_of_a_run_out(self, pose: Pose, left_m: float) -> None:
+        assert run_out_left_m(Pose(0, 100, NORTH), pose, 20) == pytest.approx(left_m)
 
     def test_a_track_under_way_ends_when_the_primary_says(self) -> None:
         entry = vehicle("primary", Role.SURVEY)
@@ -171,6 +212,20 @@ class TestTooClose:
         found = too_close(ahead(0, 0, NORTH, 2), ahead(4, 15, SOUTH, 2), 20, 0, 300)
         assert found is not None
         assert found.distance_m == pytest.approx(4)
+
+    def test_at_once_they_may_as_near_as_they_are_told(self) -> None:
+        # 12 cm nearer a second: by 1 m at 8.3 s, to 8 m at 16.7 s. For six steps, 12 s, 8 m count, and then 9 m.
+        one, other = ahead(0, 0, NORTH, 2), ahead(10, 0, -math.asin(0.12 / 2), 2)
+        found = too_close(one, other, 20, 0, 30)
+        assert found is not None
+        assert found.time_s == 8
+        found = too_close(one, other, 20, 0, 30, soon_m=8)
+        assert found is not None
+        assert found.time_s == 12
+        assert too_close(one, other, 20, 0, 10, soon_m=8) is None
+        found = too_close(one, other, 20, 0, 30, soon_m=9.9)  # more than that is no matter
+        assert found is not None
+        assert found.time_s == 8
 
     def test_nor_meet_again(self) -> None:
         # One sails away and circles back past where the other lies still.

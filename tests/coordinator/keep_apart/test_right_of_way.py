@@ -96,6 +96,25 @@ class TestDepartures:
         # Southwards over the strip it would meet the primary at about 40 s.
         assert self.wait_s(right_of_way(), [primary(0), me], to) > 0
 
+    @pytest.mark.parametrize(("beside_m", "sets_out"), [(31.2, True), (30.8, False)])
+    def test_a_way_that_is_offered_keeps_16_m_farther_off_than_the_separation(
+        self, beside_m: float, sets_out: bool
+    ) -> None:
+        # It overtakes the primary, 0.5 m/s faster, 40 s from now.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, -20)
+        waits_s = self.wait_s(right_of_way(), [primary(-beside_m), me], strip(1, 0, 30, length_m=250))
+        assert (waits_s == 0) is sets_out
+
+    def test_who_is_let_through_is_in_the_others_way_until_all_are_judged_anew(self) -> None:
+        # Northwards along x = 0, and eastwards across that at 150 m, both there after about 75 s.
+        one, other = known("helper", Role.REVISIT, Mode.IDLE, 0, 0), known("second", Role.REVISIT, Mode.IDLE, -150, 150)
+        north, east = open_strip(strip(1, 0, 50, length_m=250)), open_strip(strip(2, -60, 150, 200, math.pi / 2))
+        departures = right_of_way().departures([Underway(one, None), Underway(other, None)], 0.0)
+        assert departures.wait_s(helper("second"), east) == 0
+        assert departures.wait_s(helper("helper"), north) > 0
+        departures.begin()
+        assert departures.wait_s(helper("helper"), north) == 0
+
     def test_a_free_helper_in_the_way_makes_room(self) -> None:
         right = right_of_way()
         me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
@@ -124,6 +143,15 @@ class TestCheck:
         assert mine is not None
         assert too_close(mine, its, 15, 0, 180) is None
 
+    @pytest.mark.parametrize("far_m", [52.5, 75.0])
+    def test_the_place_is_three_and_a_half_times_the_separation_away_or_where_there_is_none_five_times(
+        self, far_m: float
+    ) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        (told,) = RightOfWay(15, lambda place: math.dist(place, (3, 90)) > far_m - 1).check(fleet, 0.0)
+        assert told.place is not None
+        assert math.dist(told.place, (3, 90)) == pytest.approx(far_m)
+
     def test_none_is_sent_dead_astern_as_it_may_turn_to_either_side(self) -> None:
         me = known("helper", Role.REVISIT, Mode.IDLE, 10, 90)
         assert me.state is not None
@@ -138,11 +166,43 @@ class TestCheck:
         fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]
         assert right_of_way().check(fleet, 0.0) == []
 
+    def test_who_does_something_else_is_checked_at_once(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 200, 90), None)]
+        right = right_of_way()
+        right.check(fleet, 100.0)
+        assert right.check_s > 100
+        right.changed("helper")
+        assert right.check_s == 0
+
+    @pytest.mark.parametrize("now_s", [0.0, 10.0])
+    def test_two_are_checked_when_they_may_be_near_enough(self, now_s: float) -> None:
+        # Heard 400 m apart at 0 s, closing at 2 and 1.5 m/s at most: one that is free stands aside for what is expected
+        # within 90 s, 135 m of the primary's way and a circle of 12 m; one at work gives way 50 s before, 175 m.
+        for strip_, near_m in ((None, 147.0), (strip(7, 400, 20, length_m=100), 175.0)):
+            me = known("helper", Role.REVISIT, Mode.IDLE if strip_ is None else Mode.TRANSIT, 400, 0)
+            right = right_of_way()
+            assert right.check([Underway(primary(0), None), Underway(me, strip_)], now_s) == []
+            assert right.check_s == pytest.approx((400 - near_m - 15 - 11) / 3.5)
+
     def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
         to = strip(7, 0, 20, length_m=100)
         at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, 140, 7)
         (told,) = right_of_way().check([Underway(primary(0), None), Underway(at_work, to)], 0.0)
         assert (told.name, told.gives_back) == ("helper", to)
+
+    def test_it_does_not_before_it_is_50_s_from_there_or_begins_to_sweep(self) -> None:
+        # It is at the strip's northern end in about 60 s, and meets the primary on it some 14 s later.
+        to = strip(7, 10, 60, length_m=100)
+        at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 120, 150, 7)
+        fleet = [Underway(primary(0), None), Underway(at_work, to)]
+        right = right_of_way()
+        assert right.check(fleet, 0.0) == []
+        its, mine = (right._traffic.course(one.vehicle, one.strip, 0.0) for one in fleet)
+        assert its is not None
+        assert mine is not None
+        approach = too_close(mine, its, 15 + 11, 0, 200)
+        assert approach is not None
+        assert approach.time_s > 60
 
     def test_of_two_at_work_the_one_sent_later(self) -> None:
         right = right_of_way()

@@ -112,6 +112,17 @@ def test_until_it_is_heard_there_a_helper_circles_where_it_was_sent() -> None:
     assert course.at(50.0) == pytest.approx((0, 190, NORTH))
 
 
+def test_what_was_heard_before_it_was_sent_or_on_its_way_changes_nothing() -> None:
+    traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+    traffic.sent_aside(one, None, (0.0, 200.0), 12.0)  # heard at 0 s, it has circled since then
+    sent = traffic.course(one, None, 14.0)
+    assert sent is not None
+    assert sent.start_s == 12.0
+    heard = sent.at(20.0)
+    one.heard_ms, one.state = 20_000, AgentState(Mode.IDLE, 0, 1, 0, *heard)
+    assert traffic.course(one, None, 21.0) is sent
+
+
 def test_a_helper_that_took_another_way_is_expected_on_it() -> None:
     traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
     traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
@@ -122,10 +133,15 @@ def test_a_helper_that_took_another_way_is_expected_on_it() -> None:
     assert course.at(course.arrives_s)[:2] == pytest.approx((0, 200), abs=0.5)
     # It came there sooner than any way that is known to lead there: it circles from where it is.
     one.heard_ms = 20_000
-    course = traffic.course(at(one, Mode.IDLE, 195, x_m=12.0), None, 22.0)
+    for x_m in (12.0, 20.0):  # so far a circle of 6 m about the place may lead it, and 10 m farther
+        course = traffic.course(at(one, Mode.IDLE, 195, x_m=x_m), None, 22.0)
+        assert course is not None
+        assert course.at(20.0) == pytest.approx((x_m, 195, NORTH))
+        assert course.arrives_s == pytest.approx(20.0, abs=0.01)
+        one.heard_ms += 1  # it is not laid twice for one word
+    course = traffic.course(at(one, Mode.IDLE, 195, x_m=25.0), None, 22.0)
     assert course is not None
-    assert course.at(20.0) == pytest.approx((12, 195, NORTH))
-    assert course.arrives_s == 20.0
+    assert course.arrives_s > 21.0
 
 
 class TestGroundToKeepOutOf:

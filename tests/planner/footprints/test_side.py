@@ -26,8 +26,9 @@ def test_its_outline_leaves_out_the_nadir_gap() -> None:
 
 
 def test_a_pass_covers_one_side_where_there_is_a_nadir_gap_and_else_both() -> None:
-    gap, none = sonar(40, 130).reach, sonar(0, 25).reach
+    gap, narrow, none = sonar(40, 130).reach, sonar(0.5, 25).reach, sonar(0, 25).reach
     assert (gap.strip_width_m, gap.beside_m) == (90, 85)
+    assert (narrow.strip_width_m, narrow.beside_m) == (24.5, 12.75)
     assert (none.strip_width_m, none.beside_m) == (50, 0)
 
 

@@ -77,6 +77,11 @@ def test_places_are_seen_within_the_range_and_the_angle_on_either_side() -> None
         assert sonar(2, 50, QUARTER, 10).sees(ahead_m, side * lateral_m).tolist() == [True, False, False, False, False]
 
 
+def test_what_lies_on_an_edge_is_seen() -> None:
+    ahead_m, lateral_m = np.array([3.0, 3.01, 2.0, 50.0, 2.0]), np.array([3.0, 3.0, 0.0, 0.0, 2.01])
+    assert sonar(2, 50, QUARTER, 10).sees(ahead_m, lateral_m).tolist() == [True, True, True, True, False]
+
+
 class TestALook:
     LOOK = LookGeometry((0.0, 0.0), 0.0, 20.0, along_bin_m=5.0, range_bin_m=1.0, along_bins=12, range_bins=3)
 

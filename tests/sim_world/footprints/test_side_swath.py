@@ -47,3 +47,16 @@ def test_the_cells_lie_in_the_tracks_frame_where_the_look_says(heading_rad: floa
     along_m, lateral_m = cells.to_track(*cells.cell_centres())
     assert along_m == pytest.approx(np.broadcast_to(np.array([22.5, 27.5])[None, :, None], (2, 2, 4)))
     assert lateral_m == pytest.approx(np.broadcast_to(cells.lateral_m, (2, 2, 4)), abs=1e-9)
+
+
+def test_askew_it_sees_abeam_of_the_bow_and_not_beyond_the_tracks_ends() -> None:
+    # The bow 30 degrees to starboard of the way: a place 10 m to starboard, 50 m on, is abeam from 10 tan 30 = 5.77 m
+    # farther on, at 10 / cos 30 = 11.55 m.
+    along_m, lateral_m = (
+        np.array([50.0, 50.0, 95.0, 5.0, 0.0, 100.0]),
+        np.array([10.0, -10.0, 10.0, -10.0, 10.0, -10.0]),
+    )
+    range_m, bearing_rad, seen = swath(0.0).askew(along_m, lateral_m, math.pi / 6, 100.0)
+    assert range_m == pytest.approx(np.full(6, 11.547), abs=1e-3)
+    assert bearing_rad[:2] == pytest.approx([2 * math.pi / 3, -math.pi / 3])
+    assert seen.tolist() == [True, True, False, False, True, True]

@@ -1,0 +1,35 @@
+"""By what strips are cut: the helpers' swath and turns, and what a look must be worth."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+from coordinator_by_hand import RUN, coordinator
+from one_node import OneNode
+
+from comms.said.announcement import Role
+from coordinator.coordinator import Coordinator
+from coordinator.cut.cutter import Cutter
+from coordinator.cut.strips import CuttingRules
+
+
+def cutter(worth_risk: float) -> Cutter:
+    """Of a coordinator that was told of the run: cells of 5 m, a helper with a swath of 50 m, turns of 6 m, run-ins of
+    5 m, whose P_d is 0.7."""
+    example = coordinator().node.node
+    assert isinstance(example, Coordinator)
+    node = Coordinator(replace(example.config, worth_risk=worth_risk))
+    OneNode(node, Role.COORDINATOR).hear("run", RUN, at_ms=1)
+    return node._cutting[0]._cutter
+
+
+def test_a_way_to_a_strip_is_reckoned_as_a_turn_about_a_swath_and_two_run_ins() -> None:
+    rules = CuttingRules(swath_m=50, overhead_m=math.pi * 6 + 50 + 2 * 5, min_strip_m=30, max_strip_m=400)
+    assert cutter(0.3)._kept._rules == rules
+
+
+@pytest.mark.parametrize(("worth_risk", "least"), [(0.3, 0.3 * 0.7), (0.0, 0.001)])
+def test_a_metre_costs_at_least_what_a_look_is_to_be_worth_over_its_swath(worth_risk: float, least: float) -> None:
+    assert cutter(worth_risk).price == pytest.approx(least * 50)
