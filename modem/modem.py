@@ -330,6 +330,8 @@ class Modem:
                     self._open(letter, platform, now_ms)
             elif part.start == self._start:
                 self._sending[platform, part.stream].hear(part.turn, part.missing, part.come)
+                for number in range(STREAMS):  # also of what it has heard nothing of, as that was lost each time
+                    self._sending[platform, number].answered()
 
     def _open(self, reader: BitReader, platform: str, now_ms: int) -> None:
         second = now_ms // 1000

@@ -151,14 +151,17 @@ class Sending:
         self._next += 1
         return number, piece
 
+    def answered(self) -> None:
+        """The receiver has acknowledged something, of this stream or another: it is in reach."""
+        for one in self.unheard.values():
+            one.times = 0
+
     def hear(self, turn: int, told: int, come: int) -> None:
         """Hears an acknowledgement: the last bits of the first missing piece's number, and which behind it have
         come; one of pieces that were never said, or of another turn, is not heard."""
         window = self.window
         if turn != self.turn:
             return
-        for one in self.unheard.values():
-            one.times = 0
         low = min(self.unheard, default=self._next)
         missing = window.near(told, low)
         if missing > self._next:

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.currents import Sailing
-from planner.dubins import Pose, shortest_path
+from planner.dubins import TIE_M, Pose, shortest_path
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import pass_over
 from planner.way_home import WayHome
@@ -73,10 +73,10 @@ def test_a_vehicle_sent_to_the_pose_of_arrival_takes_as_long(x_m: float, y_m: fl
     time_s, arrival_rad = WAY.from_pose(pose)
     if math.hypot(x_m, y_m) > 1:
         there = shortest_path(pose, Pose(0, 0, arrival_rad), 10.0)
-        assert there.length_m <= 2 * time_s + 1e-3
+        assert there.length_m <= 2 * time_s + 1e-3 + TIE_M
         assert math.hypot(x_m, y_m) <= 2 * time_s + 1e-9
         if math.hypot(x_m, y_m) > 40:  # nearer by, three turns may be shorter than a turn and a straight
-            assert there.length_m == pytest.approx(2 * time_s, abs=1e-3)
+            assert there.length_m == pytest.approx(2 * time_s, abs=1e-3 + TIE_M)
 
 
 class TestPassesWithin:
