@@ -27,6 +27,7 @@ pictures: .venv/.test-ready
 	@$(BIN)/secondlook paper --out docs/paper
 	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 	@$(BIN)/python -m bench.link_curve docs/figures/link-curve.json docs/link-curve.png
+	@$(BIN)/python -m bench.figures --draw  # docs/reliability.png
 	@rm -rf runs/pictures
 	@$(BIN)/secondlook run tellaro --out runs/pictures
 	@$(BIN)/python -m viz.picture runs/pictures/mission.rrd --time 1650 --out docs/mission.png

@@ -113,7 +113,7 @@ class Mission:
 @dataclass(frozen=True)
 class Table:
     """A table of a `page`. `fly`: flies its missions, with files in a folder, and returns what is to be kept;
-    `lines`: makes the table of that; `first`: one of its missions; `draw`: draws a picture of it when it is flown."""
+    `lines`: makes the table of that; `first`: one of its missions; `draw`: draws a picture of it."""
 
     page: str
     fly: Callable[[Path], Document]
@@ -356,15 +356,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Flies what the command line names, and writes all tables into their pages."""
     parser = argparse.ArgumentParser(prog="python -m bench.figures", description=__doc__)
     parser.add_argument("--fly", nargs="+", default=[], choices=[*TABLES, "all"], metavar="NAME")
-    named = parser.parse_args(arguments).fly
+    parser.add_argument("--draw", action="store_true", help="draw pictures of what is kept, too")
+    options = parser.parse_args(arguments)
+    named = options.fly
     for name in TABLES if "all" in named else named:
         with tempfile.TemporaryDirectory() as folder:
             document = TABLES[name].fly(Path(folder))
         KEPT.mkdir(exist_ok=True)
         keep(name, document)
-        if (draw := TABLES[name].draw) is not None:
-            draw(document)
     for name, table in TABLES.items():
+        if table.draw is not None and (options.draw or named):
+            table.draw(kept(name))
         (ROOT / table.page).write_text(written(name))
 
 
