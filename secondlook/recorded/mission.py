@@ -233,7 +233,10 @@ class Mission(ABC):
     @cached_property
     def objects(self) -> list[ObjectRecord]:
         """What lies on the seabed by all contacts together, those first that are mines most likely."""
-        return objects(*self._figures.mine_chances())
+        metrics = Metrics()
+        for one in self.received(RunInfo, CoverageTile, Contact):
+            metrics.hear(one)
+        return objects(*metrics.mine_chances())
 
     @cached_property
     def targets(self) -> list[TargetRecord]:
