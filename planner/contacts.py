@@ -18,6 +18,7 @@ from itertools import product
 
 import numpy as np
 
+from planner.fleet_map import FleetMap
 from planner.types import BoolArray, FloatArray
 
 GATE_SIGMAS = 3.0
@@ -165,6 +166,40 @@ class SeenObjects:
             found = weighed / weighed.sum(axis=1, keepdims=True)
             shares = np.maximum(found.mean(axis=0), LEAST_SHARE)
         return found
+
+
+class ObjectsOnMap:
+    """Objects, and what each probably is by what a fleet's `map` has seen at its place; without a map as where next to
+    nothing was seen. What they probably are is worked out once for all who ask until there is news."""
+
+    def __init__(self, map_: FleetMap | None = None) -> None:
+        self.map = map_
+        self._objects = Objects()
+        self._heard = 0
+        self._known: tuple[tuple[int, FleetMap | None, int], SeenObjects, FloatArray] | None = None
+
+    def __len__(self) -> int:
+        return len(self._objects)
+
+    def hear(
+        self, x_m: float, y_m: float, sigma_m: float, score: float, number: Hashable = None, *, across: bool = False
+    ) -> None:
+        """See `Objects.hear`."""
+        self._heard += self._objects.hear(x_m, y_m, sigma_m, score, number, across=across)
+
+    def known(self) -> tuple[SeenObjects, FloatArray]:
+        """All objects, and with which chance each is a mine, clutter, nothing; shape (objects, 3)."""
+        as_of = self._heard, self.map, 0 if self.map is None else self.map.changes
+        if self._known is None or self._known[0] != as_of:
+            seen = self._objects.seen()
+            nats = np.zeros(len(self)) if self.map is None else self.map.nats_at(seen.x_m, seen.y_m)
+            self._known = as_of, seen, seen.chances(nats)
+        return self._known[1:]
+
+    @property
+    def mines(self) -> float:
+        """How many of them are expected to be mines."""
+        return float(self.known()[1][:, 0].sum())
 
 
 def surer_by(chances: FloatArray, nats: FloatArray | float) -> FloatArray:

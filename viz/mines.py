@@ -7,7 +7,7 @@ import rerun as rr
 from comms.node import Received
 from comms.said.messages import Contact, Curve
 from planner.clearance import mines_left_by, scatter_of_all
-from planner.contacts import Objects
+from planner.contacts import ObjectsOnMap
 from planner.fleet_map import FleetMap
 from planner.types import BoolArray, DetectionCurve
 from viz import palette, paths
@@ -28,7 +28,7 @@ class Mines:
 
     def __init__(self, canvas: Canvas, map_: FleetMap, inside: BoolArray) -> None:
         self._canvas, self._map, self._inside = canvas, map_, inside
-        self._objects = Objects()
+        self._objects = ObjectsOnMap(map_)
         self._curves: dict[str, dict[int, DetectionCurve]] = {}
         self._due_ms = DRAW_EVERY_MS
         for path, (name, colour, width) in SERIES.items():
@@ -57,8 +57,7 @@ class Mines:
     def _draw(self, time_ms: int) -> None:
         if not len(self._objects):
             return
-        seen = self._objects.seen()
-        found = float(seen.chances(self._map.nats_at(seen.x_m, seen.y_m))[:, 0].sum())
+        found = self._objects.mines
         scatter = scatter_of_all(list(one.values()) for one in self._curves.values())
         left = mines_left_by(self._map, self._inside, found, scatter)
         if left is not None:

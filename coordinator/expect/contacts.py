@@ -17,7 +17,7 @@ from comms.said.messages import Contact
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from planner.clearance import PRIOR_MINES
-from planner.contacts import Objects, SeenObjects, surer_by
+from planner.contacts import ObjectsOnMap, surer_by
 from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray
 
@@ -31,32 +31,21 @@ class KnownContacts:
     def __init__(self, fleet: KnownFleet, inside: BoolArray) -> None:
         self._fleet = fleet
         self._inside = inside
-        self._objects = Objects()
-        self._heard = 0
-        self._known: tuple[tuple[int, int], SeenObjects, FloatArray] | None = None
+        self._objects = ObjectsOnMap(fleet.map)
 
     def hear(self, received: Received, contact: Contact, *, across: bool) -> None:
         """Joins a contact. `across`: it was seen from a strip across the tracks."""
         number = received.vehicle, received.header.incarnation, received.number
         self._objects.hear(contact.x_m, contact.y_m, contact.sigma_m, contact.score, number, across=across)
-        self._heard += 1
-
-    def objects(self) -> tuple[SeenObjects, FloatArray]:
-        """All objects, and with which chance each is a mine, clutter, nothing; shape (objects, 3)."""
-        as_of = self._heard, self._fleet.map.changes
-        if self._known is None or self._known[0] != as_of:
-            seen = self._objects.seen()
-            self._known = as_of, seen, seen.chances(self._fleet.map.nats_at(seen.x_m, seen.y_m))
-        return self._known[1:]
 
     @property
     def mines(self) -> float:
         """How many of the objects are expected to be mines."""
-        return float(self.objects()[1][:, 0].sum())
+        return self._objects.mines
 
     def doubtful(self, window: Window) -> int:
         """How many objects lie in a window of the map of which nobody can tell whether they are mines."""
-        seen, chances = self.objects()
+        seen, chances = self._objects.known()
         rows, columns = self._fleet.map.grid.cells_of(seen.x_m, seen.y_m)
         there = (rows >= window.first_row) & (rows < window.end_row)
         there &= (columns >= window.first_column) & (columns < window.end_column)
@@ -71,7 +60,7 @@ class KnownContacts:
         before count less, as far as the map takes looks for alike (rho).
         """
         grid, map_ = self._fleet.map.grid, self._fleet.map
-        seen, chances = self.objects()
+        seen, chances = self._objects.known()
         rows, columns = grid.cells_of(seen.x_m, seen.y_m)
         rows, columns = rows - window.first_row, columns - window.first_column
         shape = look.shape
@@ -81,7 +70,7 @@ class KnownContacts:
         seen_m2 = float((1.0 - map_.risk)[self._inside].sum()) * grid.cell_area_m2
         if seen_m2 <= 0.0:
             return None
-        density_m2 = (float(chances[:, 0].sum()) + PRIOR_MINES) / seen_m2
+        density_m2 = (self.mines + PRIOR_MINES) / seen_m2
         rows, columns, of_those = rows[here], columns[here], np.flatnonzero(here)
         nats = -np.log1p(-np.minimum(look[rows, columns], 1.0 - 1e-9))
         counts = rounded(surer_by(chances[here], nats) / density_m2)

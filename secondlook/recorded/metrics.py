@@ -32,7 +32,7 @@ from comms.said.messages import (
 )
 from comms.strip_books import StripBooks
 from planner.clearance import MinesLeft, mines_left_by, scatter_of_all
-from planner.contacts import LISTED_FROM, Objects, SeenObjects
+from planner.contacts import LISTED_FROM, ObjectsOnMap, SeenObjects
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
 from planner.footprints.footprint import Footprint
@@ -109,7 +109,7 @@ class Metrics:
     entries: Entries = field(default_factory=lambda: Entries(()))
     misfits: int = 0
     books: StripBooks = field(default_factory=StripBooks)
-    objects: Objects = field(default_factory=Objects)
+    objects: ObjectsOnMap = field(default_factory=ObjectsOnMap)
     curves: dict[str, dict[int, DetectionCurve]] = field(default_factory=dict)
 
     def hear(self, received: Received) -> None:
@@ -231,13 +231,12 @@ class Metrics:
         if self.map is None:
             return None
         scatter = scatter_of_all(list(one.values()) for one in self.curves.values())
-        return mines_left_by(self.map, self.inside, float(self.mine_chances()[1].sum()), scatter, place)
+        return mines_left_by(self.map, self.inside, self.objects.mines, scatter, place)
 
     def mine_chances(self) -> tuple[SeenObjects, FloatArray]:
         """What contacts have told of, and with which chance each is a mine, shape (objects,)."""
-        seen = self.objects.seen()
-        nats = np.zeros(len(self.objects)) if self.map is None else self.map.nats_at(seen.x_m, seen.y_m)
-        return seen, seen.chances(nats)[:, 0]
+        seen, chances = self.objects.known()
+        return seen, chances[:, 0]
 
     def close(self) -> None:
         """The mission has ended: vehicles were where their last courses led until now, and times that were not reached
@@ -271,7 +270,7 @@ class Metrics:
     def _begin(self, run: RunInfo) -> None:
         self.run = run
         spec = run.grid.spec
-        self.map = FleetMap(spec, run.rho)
+        self.map = self.objects.map = FleetMap(spec, run.rho)
         self.inside = Region(run.outline, run.hole_outlines, run.keep_out_outlines).inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role, footprint_of(entry.sonar)) for entry in run.vehicles}
         self.approaches = ClosestApproaches(

@@ -45,7 +45,7 @@ def test_it_is_by_how_much_it_makes_the_number_of_mines_surer_over_how_dense_the
     told = fleet_with_contacts()
     hear(told, (200.0, 102.5), first=41)
     contacts = known(told)
-    seen, chances = contacts.objects()
+    seen, chances = contacts._objects.known()
     (place,) = np.flatnonzero(np.abs(seen.y_m - 102.5) < 1.0)
     by = float(surer_by(chances[place : place + 1], np.log(2.0))[0])  # a look that takes half sees ln 2 nats
     assert by > 0.03
