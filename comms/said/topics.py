@@ -58,12 +58,13 @@ class Crossing:
     """How messages of a topic cross the water by modem: what is worth most a bit, the longer it waits the more, is said
     first.
 
-    `value`: what one is worth beside those of other topics. `ttl_s`: what has waited for so long is worth twice as
-    much; what need not be acknowledged is then said no more. `newest_only`: a newer one takes the place of one that
-    waits, of the same key; of tasks and answers, of the same strip and action or state. `acknowledged`: it is said
-    again until it is known to have arrived, and of a key not once more where it is told again as it was. `is_long`: it
-    takes many bits, and what does not need not wait for it. `is_fine`: it is not said where words are to be short, as
-    what else is said tells as much.
+    `value`: what one is worth beside those of other topics. What a word on a task takes of the water is worth more than
+    what a map takes even when it is said again. `ttl_s`: what has waited for so long is worth twice as much; what need
+    not be acknowledged is then said no more. `newest_only`: a newer one takes the place of one that waits, of the same
+    key; of tasks and answers, of the same strip and action or state. `acknowledged`: it is said again until it is known
+    to have arrived, and of a key not once more where it is told again as it was. `is_long`: it takes many bits, and
+    what does not need not wait for it. `is_fine`: it is not said where words are to be short, as what else is said
+    tells as much.
     """
 
     value: float
@@ -202,17 +203,17 @@ STRIP = Topic(
 TASK = Topic(
     # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
     "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _MODEMS | _WATCHERS, 68, 0.1,
-    Keep.EVENTS, crosses_water=True, crossing=Crossing(1000, 60, newest_only=True),
+    Keep.EVENTS, crosses_water=True, crossing=Crossing(8000, 60, newest_only=True),
 )  # fmt: skip
 TASK_STATUS = Topic(
     "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
     _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
-    crossing=Crossing(500, 60, newest_only=True),
+    crossing=Crossing(8000, 60, newest_only=True),
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
     dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _MODEMS | _WATCHERS, 400, 0.1, Keep.LATEST,
-    crosses_water=True, crossing=Crossing(2000, 60, newest_only=True),
+    crosses_water=True, crossing=Crossing(8000, 60, newest_only=True),
 )  # fmt: skip
 MODEM_TX = Topic(
     "modem_tx", "modem/{platform}/tx", Packet, _MODEM_OWN, _CARRIERS | _WATCHERS, 300_000,

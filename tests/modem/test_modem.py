@@ -19,6 +19,7 @@ from comms.said.messages import (
     Curve,
     Hotspot,
     HotspotState,
+    Look,
     MissionOver,
     Mode,
     Packet,
@@ -108,6 +109,21 @@ def test_what_is_lost_is_said_again_until_it_is_known_to_have_arrived() -> None:
     betas = [at_ms for at_ms, platform, _ in waters.packets if platform == "beta"]
     assert ships[:4] == [0, 12_000, 24_000, 36_000]
     assert len(ships) == len(betas) + 3  # each that came was acknowledged, the last of these acknowledgements came
+
+
+def test_a_word_on_a_task_goes_before_maps_and_is_said_again_before_them() -> None:
+    waters = Waters(arrives=lambda platform, _, count: platform == "ship" or count > 5)  # those of beta
+    p_detect = np.full((2, 20, 26), 0.5)
+    for number in range(300):  # on a track each
+        look = Look(number, number, 50.0 + number, 50.0, 0.0, 0.0, 1.0, 1.0, p_detect, 5.0, 0.0, True, ())
+        waters.say("world", "veh/beta/look", look)
+    waters.run(40_000)
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 1.0, 40_000, ""))
+    waters.run(100_000)
+    words = heard(waters, "ship")
+    assert words[0] == ("agent/beta/task_status/1", "TaskStatus")
+    assert len(words) > 2
+    assert {kind for _, kind in words[1:]} == {"CoverageTile"}
 
 
 def test_the_end_of_the_mission_is_heard_by_all() -> None:
