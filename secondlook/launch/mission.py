@@ -17,7 +17,7 @@ import shapely
 from comms.drive import Drive, Setup
 from comms.errors import FleetError, NodeError, RunawayError
 from comms.lockstep.drive import Lockstep
-from comms.node import Node
+from comms.node import Listener, Node
 from comms.result import BusResult, Ending
 from comms.said.announcement import Role
 from comms.said.routing import Routing
@@ -30,7 +30,7 @@ from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node
 from secondlook.launch.processes import Processes, RunFailedError
 from secondlook.launch.run_display import ending_of
 from secondlook.launch.run_folder import log_to_file
-from secondlook.launch.signals import signals_interrupt
+from secondlook.launch.signals import Interruption, WholeMessages, signals_interrupt
 from secondlook.launch.watchdog import NoReturn, Watchdog, WatchedNode
 from secondlook.recorded.link_trace import LinkSeries
 from secondlook.recorded.observer import Observer, Progress, RunStopped, Watch
@@ -203,8 +203,8 @@ class _Run:
     def fly(self) -> tuple[BusResult | None, str, str | None]:
         """What the bus reports, where the run was not cut off; how it ended; and why it failed, if it has."""
         try:
-            with signals_interrupt():
-                result = self._on_local() if self._options.bus == "local" else self._on_zenoh()
+            with signals_interrupt() as interruption:
+                result = self._on_local(interruption) if self._options.bus == "local" else self._on_zenoh()
         except (FleetError, NodeError, RunawayError, RunFailedError) as error:
             return None, "failed", str(error)
         except RunStopped:
@@ -213,10 +213,10 @@ class _Run:
             return None, "interrupted", f"interrupted at {self._observer.metrics.now_ms / 1000:.0f} s of the mission"
         return result, result.ending.value, None if result.ending is Ending.OVER else not_over(result, self._scenario)
 
-    def _on_local(self) -> BusResult:
+    def _on_local(self, interruption: Interruption) -> BusResult:
         fleet, patience_s = self._fleet, self._options.patience_s
         specs = dict(fleet.specs)
-        listeners = {OBSERVER: self._observer}
+        listeners: dict[str, Listener] = {OBSERVER: self._observer}
         try:
             if RECORDER in specs:
                 listeners[RECORDER] = make_node(RECORDER, specs.pop(RECORDER))
@@ -230,7 +230,8 @@ class _Run:
                     node_id: partial(_make, node_id, spec, watchdog, self._options.made)
                     for node_id, spec in specs.items()
                 }
-                return self._options.drive.run_local(setup, makers, listeners)
+                whole = {name: WholeMessages(listener, interruption) for name, listener in listeners.items()}
+                return self._options.drive.run_local(setup, makers, whole)
         except NoReturn as error:
             log.error("%s; it was at", error, exc_info=error)
             raise RunFailedError(str(error)) from None
