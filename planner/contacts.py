@@ -32,7 +32,7 @@ ROUNDS = 200
 SURE = 50.0  # the logarithm of a ratio beyond which nothing is surer
 LEAST_SHARE = 1e-6
 LEAST_NATS = 1e-3  # of what was seen: a map may come later than a contact
-LISTED_FROM = 0.3
+LISTED_FROM = 0.35
 """Chance to be a mine from which an object is listed as one: a mine that is not on the list costs more than a stone
 that is."""
 COINCIDENCE = 1e-3  # how likely an alarm is raised again where one was, of nothing
