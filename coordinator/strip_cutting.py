@@ -114,8 +114,7 @@ class StripCutting:
             is_seen=expected.is_seen,
             objective=self._objective,
             threshold=self._cutter.threshold,
-            contacts=None if contacts is None else self._objective.mean * contacts[0],
-            contacts_across=None if contacts is None else self._objective.mean * contacts[1],
+            contacts=None if contacts is None else self._objective.mean * contacts,
         )
         claimed = [one.window.within(place) for one in ledger.in_state(*TAKEN) if one.window.shared(place)]
         unmatched = [one for one in ledger.in_state(StripState.OPEN) if sector.holds(one.window)]

@@ -37,9 +37,9 @@ class Ground:
     not on what is expected of tracks to come. `threshold`: residual risk above which a cell is expected to be of the
     worst 30 % in the end: what is above it, summed, is least for the right threshold and is then what the worst 30 %
     have beyond it (the conditional value at risk as Rockafellar and Uryasev write it, 2000).
-    `contacts`, `contacts_across`: what a look at the objects in a cell counts beside that (residual risk times m2),
-    from a strip along the tracks and from one across; None where contacts count for nothing. Looked at once they count
-    no more: what was found then tells anew.
+    `contacts`, shape (2, rows, columns): what a look at the objects in a cell counts beside that (residual risk times
+    m2), from a strip along the tracks and from one across; None where contacts count for nothing. Looked at once they
+    count no more: what was found then tells anew.
     """
 
     risk: FloatArray
@@ -49,14 +49,11 @@ class Ground:
     objective: Objective
     threshold: float
     contacts: FloatArray | None = None
-    contacts_across: FloatArray | None = None
 
     def copy(self) -> Ground:
         """One that may be flown."""
-        if self.contacts is None or self.contacts_across is None:
-            return replace(self, risk=self.risk.copy())
-        contacts, across = self.contacts.copy(), self.contacts_across.copy()
-        return replace(self, risk=self.risk.copy(), contacts=contacts, contacts_across=across)
+        contacts = None if self.contacts is None else self.contacts.copy()
+        return replace(self, risk=self.risk.copy(), contacts=contacts)
 
     @property
     def turned(self) -> Ground:
@@ -68,8 +65,7 @@ class Ground:
             look=self.look.T,
             weights=self.weights.T,
             is_seen=self.is_seen.T,
-            contacts=None if self.contacts_across is None else self.contacts_across.T,
-            contacts_across=None if self.contacts is None else self.contacts.T,
+            contacts=None if self.contacts is None else self.contacts[::-1].transpose(0, 2, 1),
         )
 
     def in_blocks(self, block: int) -> Ground:
@@ -86,8 +82,7 @@ class Ground:
             look=removed / np.where(at_risk > 0, at_risk, 1.0),
             weights=weights_of,
             is_seen=seen > weights_of / 2,
-            contacts=None if self.contacts is None else _sums(self.contacts, block),
-            contacts_across=None if self.contacts_across is None else _sums(self.contacts_across, block),
+            contacts=None if self.contacts is None else np.stack([_sums(one, block) for one in self.contacts]),
         )
 
     def fly(self, window: Window, share: float = 1.0) -> None:
@@ -96,9 +91,8 @@ class Ground:
         cells = window.cells
         risk = self.risk[cells]
         risk *= 1.0 - (self.look[cells] if share == 1.0 else share * self.look[cells])
-        for contacts in (self.contacts, self.contacts_across):
-            if contacts is not None:
-                contacts[cells] *= 1.0 - share
+        if self.contacts is not None:
+            self.contacts[:, *cells] *= 1.0 - share
 
     def left_m2(self) -> float:
         """What is left of the objective (residual risk times m2): the worst 30 % as they are now, not by the
@@ -110,8 +104,8 @@ class Ground:
             worst_from = _worst_from(risk)
             above_m2 = float((weights * np.maximum(risk - worst_from, 0.0)).sum())
             left_m2 += self.objective.worst * (worst_from * float(weights.sum()) + above_m2 / WORST)
-        if self.contacts is not None and self.contacts_across is not None:
-            left_m2 += float(np.maximum(self.contacts, self.contacts_across).sum())
+        if self.contacts is not None:
+            left_m2 += float(self.contacts.max(axis=0).sum())
         return left_m2
 
     def worst_from(self) -> float:
@@ -140,7 +134,7 @@ class Ground:
             worth += above
         worth *= self.weights[cells]
         if self.contacts is not None:
-            worth += self.contacts[cells]
+            worth += self.contacts[0, *cells]
         return worth
 
 

@@ -51,9 +51,9 @@ class KnownContacts:
         there &= (columns >= window.first_column) & (columns < window.end_column)
         return int((there & (np.abs(chances[:, 0] - 0.5) < DOUBTFUL)).sum())
 
-    def worth(self, window: Window, look: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray] | None:
+    def worth(self, window: Window, look: FloatArray, weights: FloatArray) -> FloatArray | None:
         """What a further look counts at the cells of a window of the map for the objects there, seen from along the
-        tracks and from across; each of the window's shape, residual risk times m2. None where that is nothing.
+        tracks and from across: shape (2, rows, columns), residual risk times m2. None where that is nothing.
 
         `look`: the share of a mine's chance to be missed that a look takes, and `weights`: what a cell's risk counts,
         as a multiple of their mean; both of the window's shape. Looks from an aspect from which the object was seen
@@ -74,7 +74,7 @@ class KnownContacts:
         rows, columns, of_those = rows[here], columns[here], np.flatnonzero(here)
         nats = -np.log1p(-np.minimum(look[rows, columns], 1.0 - 1e-9))
         counts = rounded(surer_by(chances[here], nats) / density_m2)
-        along, across = np.zeros((2, *shape))
+        worth = np.zeros((2, *shape))
         for row, column, place, count in zip(
             rows.tolist(), columns.tolist(), of_those.tolist(), counts.tolist(), strict=True
         ):
@@ -83,8 +83,8 @@ class KnownContacts:
                 slice(max(0, row - side), min(shape[0], row + side + 1)),
                 slice(max(0, column - side), min(shape[1], column + side + 1)),
             )
-            each = count / along[about].size
-            along[about] += each * (1.0 - map_.rho if seen.along[place] else 1.0)
-            across[about] += each * (1.0 - map_.rho if seen.across[place] else 1.0)
-        is_looked_at = weights * (look > 0.0)
-        return along * is_looked_at, across * is_looked_at
+            each = count / look[about].size
+            for aspect, was_seen in enumerate((seen.along[place], seen.across[place])):
+                worth[aspect, *about] += each * (1.0 - map_.rho if was_seen else 1.0)
+        worth *= weights * (look > 0.0)
+        return worth

@@ -136,7 +136,7 @@ class TestContacts:
 
     def with_contacts(self) -> Ground:
         risk = np.array([[0.8, 0.4], [0.4, 0.0]])
-        return replace(ground(risk), contacts=self.ALONG.copy(), contacts_across=self.ACROSS.copy())
+        return replace(ground(risk), contacts=np.stack([self.ALONG, self.ACROSS]))
 
     def test_it_is_added_to_the_worth_of_each_cell_by_where_the_strip_runs(self) -> None:
         one, plain = self.with_contacts(), ground(np.array([[0.8, 0.4], [0.4, 0.0]]))
@@ -152,9 +152,9 @@ class TestContacts:
         assert before_m2 == pytest.approx(25 * 1.6 + 6.0 + 2.0 + 1.0)
         one.fly(Window(0, 1, 0, 2))
         assert one.contacts is not None
-        assert one.contacts.tolist() == [[0.0, 0.0], [0.0, 1.0]]
+        assert one.contacts.tolist() == [[[0.0, 0.0], [0.0, 1.0]], [[0.0, 0.0], [2.0, 0.0]]]
         assert one.left_m2() == pytest.approx(25 * (0.4 + 0.2 + 0.4) + 2.0 + 1.0)
         assert other.left_m2() == before_m2
         other.turned.fly(Window(0, 1, 0, 2), share=0.5)  # the first column, half of it
-        assert other.contacts_across is not None
-        assert other.contacts_across.tolist() == [[0.0, 6.0], [1.0, 0.0]]
+        assert other.contacts is not None
+        assert other.contacts.tolist() == [[[0.0, 4.0], [0.0, 1.0]], [[0.0, 6.0], [1.0, 0.0]]]
