@@ -192,7 +192,9 @@ def path_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float) -
     lean = -side * np.arctan2(y, x) + np.arctan2(2, straight)
     other = _turns(lean + side * alpha) + straight + _turns(lean + side * beta)
     other[straight_squared < -_TOLERANCE] = np.inf
-    return rounded(np.minimum(same, other).min(axis=0) * turn_radius_m)
+    to_port, to_starboard = np.minimum(same, other)
+    shortest = np.where(to_starboard < to_port - TIE_M / turn_radius_m, to_starboard, to_port)
+    return rounded(shortest * turn_radius_m)
 
 
 def _turning_circles(

@@ -232,7 +232,16 @@ def test_the_lengths_of_many_paths_are_those_of_each(starts: list[Pose], ends: l
     lengths_m = path_lengths_m(np.array(starts), np.array(ends), radius_m)
     for row, start in zip(lengths_m, starts, strict=True):
         for length_m, end in zip(row, ends, strict=True):
-            assert -1e-6 <= shortest_path(start, end, radius_m).length_m - length_m <= TIE_M + 1e-6
+            assert length_m == pytest.approx(shortest_path(start, end, radius_m).length_m, abs=1e-6)
+
+
+@pytest.mark.parametrize(("heading_rad", "side"), [(0.0, -1), (-0.0005, -1), (0.0005, -1), (0.002, -1), (-0.002, 1)])
+def test_many_paths_turn_to_port_where_either_side_is_as_short(heading_rad: float, side: int) -> None:
+    behind = Pose(0, -100, heading_rad)  # by port 20 m times the heading shorter
+    one = shortest_path(Pose(0, 0, 0), behind, 10.0)
+    assert one.turns[0] == side
+    ((length_m,),) = path_lengths_m(np.zeros((1, 3)), np.array([behind]), 10.0)
+    assert length_m == pytest.approx(one.length_m, abs=1e-6)
 
 
 @given(
