@@ -56,6 +56,8 @@ FROM_DECK_MS = 10_000
 """For so long after it has left the deck it may still hear what was said there."""
 SILENT_CYCLES = 3
 """For so long a vehicle is silent at most while its agent says states, if these tell nothing new."""
+SILENT_REPORTS = 3
+"""An agent that has not told its state when it was due for so many times is taken to be gone."""
 DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
     "no frame of this run",
     "malformed frame",
@@ -98,7 +100,8 @@ class Modem:
         self._words: dict[str, tuple[int, int]] = {}  # of the newest words on tasks told here
         self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
         self._last_frames_ms = 0
-        self._is_alive = False  # whether its agent has said a state since it spoke
+        self._is_alive = False  # whether its agent has told its state since it spoke
+        self._state_ms: int | None = None  # when it last did
         self._incarnation = 0
 
     def start(self, now_ms: int) -> Step:
@@ -131,7 +134,9 @@ class Modem:
         publish: list[Publication] = []
         if now_ms < self.config.deck_ms:
             return self._step(now_ms)
-        if self._form is not None and self._turns.is_now(now_ms):
+        if self._form is not None and self._turns.is_now(now_ms) and self._has_nobody(now_ms):
+            self._turns.has_spoken(now_ms, 0)
+        elif self._form is not None and self._turns.is_now(now_ms):
             if (
                 self._gathering is not None
                 and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
@@ -148,6 +153,11 @@ class Modem:
                 publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
         step = self._step(now_ms)
         return Step((*publish, *step.publish), step.wake_ms, step.dropped)
+
+    def _has_nobody(self, now_ms: int) -> bool:
+        """Whether its vehicle's agent tells its state no more: then the modem is silent, too, as whoever is heard is
+        taken to be there."""
+        return self._state_ms is not None and now_ms - self._state_ms > SILENT_REPORTS * REPORT_MS
 
     def _begin(self, run: RunInfo, now_ms: int) -> None:
         self._turns.begin(max(now_ms, self.config.deck_ms))
@@ -188,6 +198,7 @@ class Modem:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
         if not is_hub:
             self._incarnation = received.header.incarnation
+            self._state_ms = now_ms if isinstance(message, AgentState) else self._state_ms
         if not is_hub and not self._is_news(received, now_ms):
             return
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done

@@ -199,6 +199,25 @@ def test_who_is_out_of_reach_does_not_keep_the_water_from_others() -> None:
     assert {key for key, _ in heard(waters, "beta")} == {"coord/task/beta/9", "coord/mission_over"}
 
 
+@pytest.mark.parametrize("polls", [None, PollTimes((2000,), 1000, 500)])
+def test_who_tells_its_state_no_more_is_not_taken_to_be_there_because_its_modem_is(polls: PollTimes | None) -> None:
+    waters = Waters(arrives=lambda *_: True, way_ms=1500, polls=polls)
+    for _ in range(6):
+        waters.say("beta", "agent/beta/state", state())
+        waters.run(waters.now_ms + 10_000)
+    told_ms = [at_ms for at_ms, to, one in waters.heard if to == "ship" and isinstance(one.message, AgentState)]
+    assert told_ms[-1] > 45_000
+    waters.say("coordinator", "coord/task/beta/1", TAKE)  # what is said to it is answered by nobody
+    waters.run(600_000)
+    told_ms = [at_ms for at_ms, to, one in waters.heard if to == "ship" and isinstance(one.message, AgentState)]
+    assert told_ms[-1] < 50_000 + 45_000
+    assert heard(waters, "beta")[-1] == ("coord/task/beta/1", "Task")
+    waters.say("beta", "agent/beta/state", state())
+    waters.run(700_000)
+    told_ms = [at_ms for at_ms, to, one in waters.heard if to == "ship" and isinstance(one.message, AgentState)]
+    assert told_ms[-1] > 600_000
+
+
 def test_large_pieces_are_said_though_something_is_to_be_acknowledged_each_time() -> None:
     deaf = {"alpha"}
     waters = Waters(arrives=lambda platform, to, _: to not in deaf, frame_bits=128)
@@ -214,7 +233,7 @@ def test_large_pieces_are_said_though_something_is_to_be_acknowledged_each_time(
 @pytest.mark.parametrize("seed", range(3))
 def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) -> None:
     lost = random.Random(f"{seed} {frame_bits}")
-    waters = Waters(arrives=lambda *_: lost.random() < 0.8, frame_bits=frame_bits)
+    waters = Waters(arrives=lambda *_: lost.random() < 0.8, frame_bits=frame_bits, reports=True)
     for number in range(1, 41):
         waters.say("coordinator", f"coord/task/beta/{number}", replace(TAKE, strip=number))
         waters.say("beta", "agent/beta/state", state())

@@ -34,8 +34,8 @@ IDLE = AgentState(Mode.IDLE, 0, 1.0, 0, 0.0, 0.0, 0.0)
 TRACKS = tuple(PlannedTrack(number, 100.0, 100.0, 0.0, 100.0, 400.0, False) for number in range(1, 30))
 
 
-def small_waters() -> Waters:
-    return Waters(frame_bits=34)
+def small_waters(*, reports: bool = False) -> Waters:
+    return Waters(frame_bits=34, reports=reports)
 
 
 def told(waters: Waters, platform: str, kind: type) -> list[tuple[int, object]]:
@@ -58,7 +58,7 @@ def test_a_word_on_a_task_takes_one_packet_and_a_task_three() -> None:
 
 
 def test_what_is_short_does_not_wait_for_what_is_long() -> None:
-    waters = small_waters()
+    waters = small_waters(reports=True)
     waters.say("alpha", "agent/alpha/plan", Plan(1, TRACKS, (), (), "", 0))
     waters.run(2 * CYCLE_MS)
     waters.say("alpha", "agent/alpha/state", IDLE)
@@ -94,7 +94,7 @@ def test_a_state_that_tells_nothing_new_is_not_said_but_that_the_vehicle_lives_i
 
 
 def test_what_was_seen_of_a_strip_that_is_done_follows_from_the_strip() -> None:
-    waters = small_waters()
+    waters = small_waters(reports=True)
     waters.say("beta", "agent/beta/state", IDLE)
     waters.say("coordinator", "coord/task/beta/1", TAKE)
     waters.run(10 * CYCLE_MS)

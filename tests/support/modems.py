@@ -11,11 +11,12 @@ from fleets import ROSTER, with_modems
 from comms.node import Received, Step
 from comms.runner import Intake, Stamp
 from comms.said.announcement import ClockMode, Grid, Role, RosterVehicle, RunInfo, Vertex
-from comms.said.messages import Heard, Packet
+from comms.said.messages import AgentState, Heard, Packet
 from comms.said.routing import Routing
 from comms.said.topics import HEARD, MODEM_RX, MODEM_TX, RUN
 from modem.config import ModemConfig, PollTimes
 from modem.modem import Modem
+from modem.presence import REPORT_MS
 
 SIDE_M = 400.0
 RUN_INFO = RunInfo(
@@ -68,10 +69,14 @@ def config_of(
 
 class Waters:
     """Three modems. `arrives(platform, to, count)`: whether a platform's packet of that count, from 0, reaches another;
-    `way_ms`: how long it takes."""
+    `way_ms`: how long it takes; `reports`: agents tell the last state they were made to say again every 10 s."""
 
     def __init__(
-        self, arrives: Callable[[str, str, int], bool] = lambda *_: True, way_ms: int = 3500, **terms: Any
+        self,
+        arrives: Callable[[str, str, int], bool] = lambda *_: True,
+        way_ms: int = 3500,
+        reports: bool = False,
+        **terms: Any,
     ) -> None:
         self.routing = Routing(with_modems(ROSTER))
         self.now_ms = 0
@@ -82,6 +87,8 @@ class Waters:
         self._stamps: dict[str, Stamp] = {}
         self._wakes: dict[str, int | None] = {}
         self._intake = Intake(self.routing)
+        self._reports = reports
+        self._states: dict[str, tuple[str, AgentState]] = {}
         self._on_the_way: list[tuple[int, int, str, Packet]] = []
         for platform in PLATFORMS:
             self.start(platform)
@@ -96,10 +103,19 @@ class Waters:
     def say(self, sender: str, key: str, message: Any) -> Step:
         """A node says something on its platform now; returns what its modem does."""
         platform = self.routing.nodes[sender].platform or self.routing.route(key).vehicle  # type: ignore[union-attr]
+        if isinstance(message, AgentState):
+            self._states[sender] = key, message
         return self._tell(platform, sender, key, message)
 
     def run(self, until_ms: int) -> None:
         """Lets time pass."""
+        while self._reports and self._states and self.now_ms + REPORT_MS < until_ms:
+            self._run(self.now_ms + REPORT_MS)
+            for sender, (key, message) in self._states.items():
+                self.say(sender, key, message)
+        self._run(until_ms)
+
+    def _run(self, until_ms: int) -> None:
         while True:
             arrival_ms = self._on_the_way[0][0] if self._on_the_way else until_ms + 1
             wakes = [(ms, name) for name, ms in self._wakes.items() if ms is not None]
