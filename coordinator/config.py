@@ -35,9 +35,10 @@ class CoordinatorConfig:
     """The mission ends at the latest at `deadline_factor` times the last primary's end, or at `deadline_s`; what does
     not hold is infinite.
     `silent_after_ms`: age of a vehicle's state from which it is offered nothing; `lost_after_ms`: from which it counts
-    as lost, and what it had is open again. `answer_within_ms`: age of an offer from
-    which no answer is expected any more. `ahead_ms`: so long before a vehicle is expected to be done with a strip it is
-    offered its next; 0 to wait until it is.
+    as lost, and what it had is open again. `answer_within_ms`: age of an offer from which no answer is expected any
+    more. `looks_within_ms`: for so long the looks over a strip may come later than the word that it is done; 0 where
+    they come before it. `ahead_ms`: so long before a vehicle is expected to be done with a strip it is offered its
+    next; 0 to wait until it is.
     `min_strip_m`, `max_strip_m`: length of a strip.
     `worth_risk`: mean residual risk over the swath from which a further metre of strip is worth flying, whatever time
     there is.
@@ -67,6 +68,7 @@ class CoordinatorConfig:
     priorities: tuple[PriorityGround, ...] = ()
     flows: FlowGrid | None = None
     answer_within_ms: int = ANSWER_WITHIN_MS
+    looks_within_ms: int = 0
     ahead_ms: int = 0
     contacts: bool = False
     goal: Goal | None = None

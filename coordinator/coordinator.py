@@ -115,7 +115,9 @@ class Coordinator:
         narrowest = min(helpers, key=lambda one: footprint_of(one.sonar).reach.strip_width_m, default=None)
         p_detect = 0.0 if narrowest is None else narrowest.p_detect
         self._sectors = sectors = Sectors(_sectors(config, fleet, in_reach, p_detect), run.grid.spec, agenda)
-        self._strips = strips = StripLife(ledger, fleet, inside, sectors, outbox, config.answer_within_ms)
+        self._strips = strips = StripLife(
+            ledger, fleet, inside, sectors, outbox, config.answer_within_ms, config.looks_within_ms
+        )
         self._contacts = contacts = KnownContacts(fleet, inside)
         goal = GoalWatch(config.goal, fleet, contacts, inside, agenda, now_ms)
         self._end = MissionEnd(config, fleet, strips, sectors, goal, agenda, outbox)

@@ -55,7 +55,8 @@ class MissionEnd:
         lacking = [] if surveying else self._fleet.lacking(now_ms)
         self._ask(lacking, now_ms)
         returning = any(one.is_returning for one in self._fleet.vehicles.values())
-        if not left and not surveying and not lacking and not returning and not self._cut_is_left(now_ms):
+        is_busy = bool(left or self._strips.awaited or surveying or lacking or returning)
+        if not is_busy and not self._cut_is_left(now_ms):
             early = ", ".join(name for name, one in self._fleet.primaries.items() if one.ended_early)
             cut_short = f"; the survey of {early} has ended early, as the battery lasted for no more" if early else ""
             reason = f"every primary has finished and no strip is left{cut_short}"

@@ -116,7 +116,8 @@ class StripCutting:
             threshold=self._cutter.threshold,
             contacts=None if contacts is None else self._objective.mean * contacts,
         )
-        claimed = [one.window.within(place) for one in ledger.in_state(*TAKEN) if one.window.shared(place)]
+        flown_anyway = [*ledger.in_state(*TAKEN), *self._strips.awaited]
+        claimed = [one.window.within(place) for one in flown_anyway if one.window.shared(place)]
         unmatched = [one for one in ledger.in_state(StripState.OPEN) if sector.holds(one.window)]
         opened = [record.window.within(place) for record in unmatched]
         situation = self._briefing.situation(now_ms, sector)

@@ -34,7 +34,8 @@ class StripLife:
     """Writes the `ledger`, and says each change of it; nobody else does.
 
     `inside`: the area's cells, shape of the grid. `sectors`: where strips lie; what is expected there learns from those
-    that are done. `answer_within_ms`: age of an offer from which no answer is expected any more.
+    that are done. `answer_within_ms`: age of an offer from which no answer is expected any more. `looks_within_ms`: for
+    so long the looks over a strip may come later than the word that it is done.
     """
 
     def __init__(
@@ -45,6 +46,7 @@ class StripLife:
         sectors: Sectors,
         outbox: Outbox,
         answer_within_ms: int = ANSWER_WITHIN_MS,
+        looks_within_ms: int = 0,
     ) -> None:
         self.ledger = ledger
         self._fleet = fleet
@@ -52,6 +54,8 @@ class StripLife:
         self._sectors = sectors
         self._outbox = outbox
         self._answer_within_ms = answer_within_ms
+        self._looks_within_ms = looks_within_ms
+        self._looks_due_ms: dict[int, int] = {}  # of strips that are done by word alone
         self._late_ms = LATE_MS + answer_within_ms - ANSWER_WITHIN_MS  # words that wait for slots are no delay of work
 
     def open(self, cut: Cut, now_ms: int, why: str) -> None:
@@ -139,6 +143,8 @@ class StripLife:
         if record is None or record.vehicle != name or record.state not in TAKEN:
             if status.state is TaskState.DONE:  # by one that counted as lost: the map tells what is left
                 self._sectors.cut_by(now_ms, None if record is None else [record.window])
+            elif status.state is not TaskState.REFUSED and record is not None and record.vehicle == name:
+                self._await_no_more(record, now_ms)
             return
         if status.state is TaskState.REFUSED:
             self._sectors.assign_by(now_ms, record.window)
@@ -160,7 +166,14 @@ class StripLife:
                 self._hear_done(record, vehicle, now_ms)
 
     def find_overdue(self, lost: Iterable[str], now_ms: int) -> None:
-        """Opens again what vehicles had that are `lost` now, have not answered, or are late."""
+        """Opens again what vehicles had that are `lost` now, have not answered, or are late; and finds whose looks over
+        a strip that they say is done have come, or are late."""
+        for record in self.awaited:
+            if self._seen_share(record) >= COVERED_SHARE:
+                del self._looks_due_ms[record.strip.number]
+                self._learn(record)
+            elif now_ms >= self._looks_due_ms[record.strip.number]:
+                self._await_no_more(record, now_ms)
         for name in lost:
             for record in self.ledger.in_state(*TAKEN):
                 if record.vehicle == name:
@@ -187,6 +200,7 @@ class StripLife:
         """When an answer, or a service, is overdue."""
         yield from (one.since_ms + self._answer_within_ms for one in self._unanswered())
         yield from (self._of(one)[1].due_ms for one in self._answered())
+        yield from self._looks_due_ms.values()
 
     def _unanswered(self) -> list[StripRecord]:
         offered = self.ledger.in_state(StripState.OFFERED, StripState.NEXT)
@@ -200,6 +214,12 @@ class StripLife:
         """Whether its vehicle has said that it does it next."""
         is_next = record.state is StripState.NEXT
         return is_next and self._fleet.vehicles[record.vehicle].agreed_next == record.strip.number
+
+    @property
+    def awaited(self) -> list[StripRecord]:
+        """The strips that are done by their vehicles' word, while the looks that tell so may still come: their ground
+        counts as seen."""
+        return [record for number in self._looks_due_ms if (record := self.ledger.get(number)) is not None]
 
     @property
     def unended(self) -> list[StripRecord]:
@@ -277,6 +297,8 @@ class StripLife:
             if other.state is not StripState.OFFERED and self._seen_share(other) >= COVERED_SHARE:
                 self._move(other, StripState.DONE, now_ms, f"seen by {name}, which is at strip {number}", name)
                 self._sectors.cut_by(now_ms, [other.window])
+            elif self._may_be_done(other, vehicle):
+                self._await_looks(other, now_ms, f"left by {name}, which is at strip {number}; its looks are to come")
             else:
                 self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
                 self._sectors.assign_by(now_ms, other.window)
@@ -291,6 +313,8 @@ class StripLife:
                 if self._seen_share(record) >= COVERED_SHARE:
                     vehicle.failures = 0
                     self._move(record, StripState.DONE, now_ms, f"seen by {name}, whose word on it was lost", name)
+                elif self._may_be_done(record, vehicle):
+                    self._await_looks(record, now_ms, f"left by {name}, which has no work; its looks are to come")
                 else:
                     vehicle.note_failure()
                     self._move(record, StripState.OPEN, now_ms, f"{name} has no work, its word on it was lost")
@@ -300,12 +324,35 @@ class StripLife:
         """What is left of a strip that its vehicle says is done is cut anew."""
         name, share = vehicle.entry.vehicle, self._seen_share(record)
         if share >= COVERED_SHARE:
-            vehicle.failures = 0
-            self._sectors.learn(record.window, name, self._of(record)[1].levels_before, vehicle.entry.p_detect)
+            self._learn(record)
             self._move(record, StripState.DONE, now_ms, f"{share:.0%} of it seen by {name}", name)
+        elif self._looks_within_ms:
+            self._await_looks(record, now_ms, f"{name} says so, its looks are to come")
         else:
             vehicle.note_failure(record.window)
             self._move(record, StripState.FAILED, now_ms, f"{name} says done, but saw {share:.0%} of it", name)
+
+    def _learn(self, record: StripRecord) -> None:
+        """The vehicle of a strip has seen it."""
+        vehicle, offer = self._of(record)
+        vehicle.failures = 0
+        self._sectors.learn(record.window, record.vehicle, offer.levels_before, vehicle.entry.p_detect)
+
+    def _may_be_done(self, record: StripRecord, vehicle: KnownVehicle) -> bool:
+        """Whether a vehicle that has left a strip may have said that it is done, and its looks be on their way."""
+        is_under_way = record.state is StripState.UNDER_WAY and vehicle.asked_back != record.strip.number
+        return self._looks_within_ms > 0 and is_under_way
+
+    def _await_looks(self, record: StripRecord, now_ms: int, reason: str) -> None:
+        self._looks_due_ms[record.strip.number] = now_ms + self._looks_within_ms
+        self._move(record, StripState.DONE, now_ms, reason, record.vehicle)
+        self._sectors.cut_by(now_ms, [record.window])
+
+    def _await_no_more(self, record: StripRecord, now_ms: int) -> None:
+        """What a vehicle was taken to have seen of a strip it has not: that is cut anew."""
+        if self._looks_due_ms.pop(record.strip.number, None) is not None:
+            self._fleet.vehicles[record.vehicle].note_failure(record.window)
+            self._sectors.cut_by(now_ms, [record.window])
 
     def _seen_share(self, record: StripRecord) -> float:
         """Share of a strip's cells that its vehicle has seen since it was offered the strip."""

@@ -17,6 +17,8 @@ from sim_world.channel_config import ChannelConfig, LossTable, Outage, Signal, S
 ANSWER_CYCLES, SILENT_CYCLES = 5, 6
 """After so many cycles of a link an offer is not answered, and a vehicle that is not heard of silent: a word waits for
 its slot, and may have to be said again. As many times as many where a word takes that many packets."""
+LOOKS_WITHIN_MS = 60_000
+"""So much later than an answer may come the looks over a strip that are said behind the word that it is done."""
 OUT_OF_REACH_MS = 600_000
 """Who is out of a link's reach goes on with what it has for so long, as far as is known; then it counts as lost."""
 ABOUT_M = 1000.0
@@ -137,6 +139,11 @@ def lost_after_ms_of(scenario: Scenario) -> int:
 def answer_within_ms_of(scenario: Scenario) -> int:
     """Age of an offer from which the coordinator expects no answer any more."""
     return max(ANSWER_WITHIN_MS, ANSWER_CYCLES * word_ms_of(scenario))
+
+
+def looks_within_ms_of(scenario: Scenario) -> int:
+    """For so long the looks over a strip may reach the coordinator later than the word that it is done."""
+    return 0 if scenario.link is None else LOOKS_WITHIN_MS + answer_within_ms_of(scenario)
 
 
 def reach_m_of(scenario: Scenario, link: Link) -> float:

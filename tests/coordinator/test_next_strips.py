@@ -225,3 +225,15 @@ def test_a_next_one_that_is_late_by_itself_is_asked_back_and_open_again() -> Non
     second = [one.message for one in told.node.said if isinstance(one.message, StripStatus) and one.number == 2]
     assert (HELPER, TaskAction.GIVE_BACK, 2) in told.tasks()
     assert any(one.reason == f"{HELPER} is told to give strip 2 back" for one in second)
+
+
+def test_who_is_at_its_next_has_left_the_other_done_where_words_and_looks_take_their_time() -> None:
+    told = with_a_next_at_once(30_000, looks_within_ms=100_000)
+    told.state(HELPER, Mode.TRANSIT, 2, ends_ms=90_000)
+    told.settle()
+    assert told.states() == {1: DONE, 2: ACCEPTED}
+    assert told.strips()[1].reason == f"left by {HELPER}, which is at strip 2; its looks are to come"
+    told.status(HELPER, 1, TaskState.DONE, at_ms=0)
+    told.layer(HELPER, looked())
+    told.keep_alive((PRIMARY, HELPER), 50)
+    assert told.states() == {1: DONE, 2: ACCEPTED}

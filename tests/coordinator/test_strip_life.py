@@ -25,6 +25,7 @@ from coordinator_by_hand import (
 from one_node import received
 
 from comms.said.messages import (
+    MissionOver,
     Mode,
     StripState,
     StripStatus,
@@ -321,3 +322,59 @@ class TestSilence:
         told.status(HELPER, 1, TaskState.DONE)
         told.keep_alive([PRIMARY, HELPER], 30)
         assert told.states() == {1: DONE}
+
+
+class TestLooksThatComeLater:
+    """By modem looks over a strip may come for 100 s after the word that it is done."""
+
+    @pytest.fixture
+    def told(self) -> Told:
+        return with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS, looks_within_ms=100_000)
+
+    def done_by_word(self, told: Told) -> None:
+        told.state(HELPER, Mode.IDLE)
+        told.status(HELPER, 1, TaskState.DONE)
+        told.keep_alive([PRIMARY, HELPER], 90)
+        assert told.states() == {1: DONE}  # its ground is not cut again
+        assert told.strips()[1].reason == f"{HELPER} says so, its looks are to come"
+
+    def test_its_ground_counts_as_seen_until_they_come(self, told: Told) -> None:
+        self.done_by_word(told)
+        told.layer(HELPER, looked())
+        told.keep_alive([PRIMARY, HELPER], 300)
+        assert told.states() == {1: DONE}
+        assert len(told.tasks()) == 1
+
+    def test_where_they_do_not_come_it_is_cut_anew_for_another(self, told: Told) -> None:
+        told.state(SECOND_HELPER, Mode.IDLE)
+        self.done_by_word(told)
+        told.keep_alive([PRIMARY, HELPER, SECOND_HELPER], 20)
+        assert told.states()[2] is OFFERED
+        assert told.tasks()[-1] == (SECOND_HELPER, TaskAction.TAKE, 2)
+
+    def test_who_has_no_work_any_more_has_left_it_done(self, told: Told) -> None:
+        told.state(HELPER, Mode.IDLE)
+        told.state(HELPER, Mode.IDLE)
+        told.settle()
+        assert told.states() == {1: DONE}
+        assert told.strips()[1].reason == f"left by {HELPER}, which has no work; its looks are to come"
+
+    def test_who_then_says_that_it_has_failed_has_not_seen_it(self, told: Told) -> None:
+        told.state(HELPER, Mode.IDLE)
+        told.state(HELPER, Mode.IDLE)
+        told.settle()
+        told.status(HELPER, 1, TaskState.FAILED, "the sonar is out")
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.settle()
+        assert told.states() == {1: DONE, 2: OFFERED}
+
+    def test_the_mission_is_not_over_before_that(self, told: Told) -> None:
+        self.done_by_word(told)
+        told.layer(PRIMARY, looked(0.9) * 0.1)
+        told.state(PRIMARY, Mode.FINISHED)
+        told.settle()
+        assert told.node.all(MissionOver) == []
+        told.layer(HELPER, looked())
+        told.settle()
+        told.node.wait(5)
+        assert told.node.all(MissionOver) != []

@@ -172,6 +172,7 @@ def coordinator(
     deadline_s: float | None = None,
     helpers_a_team: int = 3,
     ahead_ms: int = 0,
+    looks_within_ms: int = 0,
     separation_m: float = 0.0,
     lost_after_ms: int = 30_000,
     goal: Goal | None = None,
@@ -179,8 +180,8 @@ def coordinator(
 ) -> Told:
     """A coordinator that was told of the run; the primary surveys, and these helpers are free. `area`: the corners of
     one that is no full square. `deadline_s`: in place of 1.05 times the survey's duration.
-    `ahead_ms`: so long before its end a helper is offered the next strip. `lost_after_ms`: a vehicle is silent from
-    30 s on."""
+    `ahead_ms`: so long before its end a helper is offered the next strip. `looks_within_ms`: so much later than the
+    word that a strip is done looks may come. `lost_after_ms`: a vehicle is silent from 30 s on."""
     config = CoordinatorConfig(
         allocator=allocator or GreedyAllocator(),
         deadline_factor=1.05 if deadline_s is None else math.inf,
@@ -196,6 +197,7 @@ def coordinator(
         objective="mean",
         helpers_a_team=helpers_a_team,
         ahead_ms=ahead_ms,
+        looks_within_ms=looks_within_ms,
         separation_m=separation_m,
         goal=goal,
         contacts=contacts,
@@ -219,9 +221,10 @@ def with_a_helper(
     vehicles: tuple[RosterVehicle, ...] = FLEET,
     *,
     deadline_s: float | None = None,
+    looks_within_ms: int = 0,
 ) -> Told:
     """Strip 1 is with the helper, as far as this."""
-    told = coordinator(vehicles, deadline_s=deadline_s)
+    told = coordinator(vehicles, deadline_s=deadline_s, looks_within_ms=looks_within_ms)
     told.hotspot()
     told.settle()
     assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)]
