@@ -19,7 +19,7 @@ from itertools import takewhile
 from pathlib import Path
 
 import secondlook
-from bench import calibration, compared, link_curve, link_share, predicted_risk
+from bench import calibration, compared, link_curve, link_share, predicted_risk, scenario_tables
 from bench.flown import DIGITS, ROOT, Case, Document, Mission, Table, call_secondlook, fly_overridden, left_of, some
 from secondlook.scenario import load_scenario
 
@@ -252,6 +252,7 @@ TABLES: dict[str, Table] = {
         fly=lambda folder: link_curve.fly(),
         lines=lambda document: link_curve.table(document["rows"]),
     ),
+    **scenario_tables.TABLES,
 }
 
 

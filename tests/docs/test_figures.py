@@ -4,13 +4,17 @@ that."""
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bench import figures
-from bench.figures import TABLES, compared_kept, kept, linked_kept, written
+from bench.figures import TABLES, compared_kept, kept, linked_kept, reliability_lines, written
 from bench.flown import ROOT, Mission, Table
+from bench.rows import by
+from secondlook.compare.paired import interval_of_mean
 from secondlook.sweeps.rows import flat
 from secondlook.testing import Fleet
 
@@ -29,6 +33,26 @@ def test_a_mission_of_it_still_leaves_what_is_kept(name: str, tmp_path: Path) ->
     left = {name: round(row[name], 3) for name in mission.left}
     kept_of_it = {name: round(value, 3) for name, value in mission.left.items()}
     assert left == kept_of_it, f"stale: python -m bench.figures --fly {name}"
+
+
+def test_what_pages_say_beside_tables_is_what_is_kept() -> None:
+    missions = by(kept("helpers")["rows"], ("p_detect",), "risk.mean")
+    alone, left = (fmean(row[name] for row in missions["0.7",]) for name in ("risk_primary_alone.mean", "risk.mean"))
+    assert f"a chance of {alone:.2f} where the primary is alone, and of {left:.2f} where" in words_of("README.md")
+    better, worse = (np.array([row["risk.worst30_mean"] for row in missions[p,]]) for p in ("0.485", "0.7"))
+    low, high = interval_of_mean(worse - better)
+    less = f"it is {(worse - better).mean():.3f} less (95 % {low:.3f} to {high:.3f})"
+    assert less in words_of("docs/scenarios.md")
+    _, scenario, _, missed, predicted, *_ = (
+        cell.strip() for cell in reliability_lines(kept("reliability"))[2].split("|")
+    )
+    assert scenario == "`tellaro`"
+    assert f"missed {missed}, predicted {predicted}" in words_of("docs/paper.md")
+
+
+def words_of(page: str) -> str:
+    """A page's text without line breaks."""
+    return " ".join((ROOT / page).read_text().split())
 
 
 def test_a_table_is_put_in_the_place_of_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
