@@ -19,7 +19,7 @@ from itertools import takewhile
 from pathlib import Path
 
 import secondlook
-from bench import calibration, compared, link_curve, link_share, predicted_risk, scenario_tables
+from bench import calibration, compared, link_curve, link_share, position_errors, predicted_risk, scenario_tables
 from bench.flown import DIGITS, ROOT, Case, Document, Mission, Table, call_secondlook, fly_overridden, left_of, some
 from secondlook.scenario import load_scenario
 
@@ -251,6 +251,11 @@ TABLES: dict[str, Table] = {
         page="docs/across-the-water.md",
         fly=lambda folder: link_curve.fly(),
         lines=lambda document: link_curve.table(document["rows"]),
+    ),
+    "position-errors": Table(
+        page="docs/faults.md",
+        fly=lambda folder: position_errors.fly_all(),
+        lines=lambda document: position_errors.table(document["rows"]),
     ),
     **scenario_tables.TABLES,
 }

@@ -48,6 +48,9 @@ def test_what_pages_say_beside_tables_is_what_is_kept() -> None:
     )
     assert scenario == "`tellaro`"
     assert f"missed {missed}, predicted {predicted}" in words_of("docs/paper.md")
+    errors = by(kept("position-errors")["rows"], ("position_error_m",), "true.mean")["20",]
+    too_little = fmean(row["true.mean"] - row["risk.mean"] for row in errors)
+    assert f"at 20 m it tells {too_little:.3f} too little" in words_of("docs/faults.md")
 
 
 def words_of(page: str) -> str:
