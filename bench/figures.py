@@ -20,7 +20,18 @@ from pathlib import Path
 
 import secondlook
 from bench import calibration, compared, link_curve, link_share, position_errors, predicted_risk, scenario_tables
-from bench.flown import DIGITS, ROOT, Case, Document, Mission, Table, call_secondlook, fly_overridden, left_of, some
+from bench.flown import (
+    DIGITS,
+    ROOT,
+    Case,
+    Document,
+    Mission,
+    Table,
+    call_secondlook,
+    fly_overridden,
+    risk_and_truth,
+    some,
+)
 from secondlook.scenario import load_scenario
 
 KEPT = ROOT / "docs" / "figures"
@@ -155,7 +166,7 @@ def _first_linked(document: Document) -> Mission:
     row = next(row for row in document["rows"] if row["link.profile"] != "ideal")
     link = _of_link(row["scenario"], row["link.profile"], row["link.also"])
     overrides = (*link, f"coordinator.platform={row['coordinator.platform']}")
-    return Mission(row["scenario"], overrides, row["seed"], left_of(row))
+    return Mission(row["scenario"], overrides, row["seed"], risk_and_truth(row))
 
 
 def _fly_calibrated(folder: Path) -> Document:

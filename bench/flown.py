@@ -34,7 +34,7 @@ class Mission:
     left: Mapping[str, float]
 
 
-def left_of(row: Document) -> dict[str, float]:
+def risk_and_truth(row: Document) -> dict[str, float]:
     """What a row tells of the risk that was left, and of the truth."""
     return {name: value for name, value in row.items() if name.startswith(("risk", "priorities.", "truth."))}
 
@@ -43,7 +43,7 @@ def first_overridden(document: Document) -> Mission:
     """The first mission with an override, else the first."""
     rows = document["rows"]
     row = next((row for row in rows if row["overrides"]), rows[0])
-    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], left_of(row))
+    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], risk_and_truth(row))
 
 
 @dataclass(frozen=True)
