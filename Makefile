@@ -25,7 +25,6 @@ run: .venv/.run-ready
 CHROMIUM ?= chromium
 pictures: .venv/.test-ready
 	@$(BIN)/secondlook paper --out docs/paper
-	@$(BIN)/python -m bench.predicted_risk --out docs/paper/predicted-risk.png
 	@$(BIN)/python -m bench.link_curve docs/figures/link-curve.json docs/link-curve.png
 	@$(BIN)/python -m bench.figures --draw  # docs/reliability.png
 	@rm -rf runs/pictures

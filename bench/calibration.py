@@ -11,22 +11,26 @@ from __future__ import annotations
 
 import math
 import sys
-from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from operator import itemgetter
 from statistics import fmean
-from typing import Any
 
 import secondlook
+from bench.rows import MISSION, Column, Row, by, head, line, mean_table
 from secondlook.errors import UserError
 
-Row = dict[str, Any]
 HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer")
 GOAL_HEADS = ("missions", "reached it", "after, s", "true", "95 % of that")
-CONTACT_HEADS = ("missions", "residual risk", "detected", "of these listed", "listed falsely, a km²")
-_MISSION = ("seed", "failure", "risk.mean", "risk.worst30_mean")
-GOAL_FIGURES = (*_MISSION, "time.mission_s", "goal.reached", "goal.true")
-CONTACT_FIGURES = (*_MISSION, "truth.missed_share", "truth.listed_share", "truth.false_listed_per_km2")
-"""What the tables are made of, and what a mission is known again by."""
+CONTACT_COLUMNS = (
+    Column("residual risk", itemgetter("risk.mean")),
+    Column("detected", lambda row: 1 - row["truth.missed_share"], 2),
+    Column("of these listed", itemgetter("truth.listed_share"), 2),
+    Column("listed falsely, a km²", itemgetter("truth.false_listed_per_km2"), 2),
+)
+LEFT_FIGURES = (*MISSION, "truth.targets", "truth.missed_share", "mines.left", "mines.left_low", "mines.left_high")
+GOAL_FIGURES = (*MISSION, "time.mission_s", "goal.reached", "goal.true")
+CONTACT_FIGURES = (*MISSION, "truth.missed_share", "truth.listed_share", "truth.false_listed_per_km2")
+"""What the tables are made of."""
 
 
 def left_of(row: Row) -> int:
@@ -42,39 +46,10 @@ def share_interval(held: int, of: int) -> tuple[float, float]:
     return (middle - spread) / (1 + z * z / of), (middle + spread) / (1 + z * z / of)
 
 
-def _by(rows: Iterable[Row], varied: Sequence[str], figure: str) -> dict[tuple[str, ...], list[Row]]:
-    """The missions that have a figure, by what was varied in them."""
-    found = defaultdict[tuple[str, ...], list[Row]](list)
-    for row in rows:
-        if row["failure"] is None and row[figure] is not None:
-            found[tuple(_cell(row, key) for key in varied)].append(row)
-    return found
-
-
-def _cell(row: Row, key: str) -> str:
-    """What a mission was flown with: under a key, or of its `overrides` that of the key."""
-    value = row.get(key)
-    if value is None and key not in row:
-        told = [one.partition("=")[2] for one in row.get("overrides", ()) if one.partition("=")[0] == key]
-        value = told[0] if told else None
-    if isinstance(value, list):
-        value = "` `".join(value)
-    return "-" if value in (None, "") else str(value)
-
-
-def _head(varied: Sequence[str], heads: Sequence[str]) -> list[str]:
-    titles = [*(f"`{key}`" for key in varied), *heads]
-    return [f"| {' | '.join(titles)} |", f"|{'---|' * len(titles)}"]
-
-
-def _line(values: Sequence[str], figures: Sequence[str]) -> str:
-    return f"| {' | '.join([*(f'`{one}`' for one in values), *figures])} |"
-
-
 def table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     """The lines of the table, as Markdown; missions that failed, and such without targets, are left out."""
-    lines = _head(varied, HEADS)
-    for values, flown in _by(rows, varied, "mines.left").items():
+    lines = head(varied, HEADS)
+    for values, flown in by(rows, varied, "mines.left").items():
         missions = [row for row in flown if row["truth.targets"]]
         if not missions:
             continue
@@ -85,14 +60,14 @@ def table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
         low, high = share_interval(held, count)
         left, told = fmean(map(left_of, missions)), fmean(row["mines.left"] for row in missions)
         counts = f"{held / count:.0%}", f"{low:.0%} to {high:.0%}", str(more), str(fewer)
-        lines.append(_line(values, (str(count), f"{left:.1f}", f"{told:.1f}", *counts)))
+        lines.append(line(values, (str(count), f"{left:.1f}", f"{told:.1f}", *counts)))
     return lines
 
 
 def goal_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     """The lines of the table of missions flown for a goal; none where there are none."""
     lines = []
-    for values, missions in _by(rows, varied, "goal.reached").items():
+    for values, missions in by(rows, varied, "goal.reached").items():
         reached = [row for row in missions if row["goal.reached"]]
         figures = [str(len(missions)), str(len(reached)), "-", "-", "-"]
         if reached:
@@ -100,22 +75,13 @@ def goal_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
             low, high = share_interval(true, len(reached))
             ends_s = fmean(row["time.mission_s"] for row in reached)
             figures[2:] = f"{ends_s:.0f}", f"{true / len(reached):.1%}", f"{low:.1%} to {high:.1%}"
-        lines.append(_line(values, figures))
-    return _head(varied, GOAL_HEADS) + lines if lines else []
+        lines.append(line(values, figures))
+    return head(varied, GOAL_HEADS) + lines if lines else []
 
 
 def contact_table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     """The lines of the table of how right the list of mines is."""
-    lines = _head(varied, CONTACT_HEADS)
-    for values, missions in _by(rows, varied, "truth.listed_share").items():
-        figures = (
-            f"{fmean(row['risk.mean'] for row in missions):.3f}",
-            f"{1 - fmean(row['truth.missed_share'] for row in missions):.2f}",
-            f"{fmean(row['truth.listed_share'] for row in missions):.2f}",
-            f"{fmean(row['truth.false_listed_per_km2'] for row in missions):.2f}",
-        )
-        lines.append(_line(values, (str(len(missions)), *figures)))
-    return lines
+    return mean_table(rows, varied, CONTACT_COLUMNS, "truth.listed_share")
 
 
 def main(folders: Sequence[str]) -> int:

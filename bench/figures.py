@@ -13,22 +13,28 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
-import sys
 import tempfile
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import takewhile
 from pathlib import Path
-from typing import Any
 
 import secondlook
-from bench import calibration, compared, link_curve, link_share, predicted_risk
+from bench import calibration, compared, link_curve, link_share, position_errors, predicted_risk, scenario_tables
+from bench.flown import (
+    DIGITS,
+    ROOT,
+    Case,
+    Document,
+    Mission,
+    Table,
+    call_secondlook,
+    fly_overridden,
+    risk_and_truth,
+    some,
+)
 from secondlook.scenario import load_scenario
 
-ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "docs" / "figures"
-DIGITS = 6  # of what is kept: more than tables tell
 
 CONTENDERS = ("plan", "lawnmower", "across", "beforehand", "second_survey", "greedy", "nearest", "cbba")
 COMPARED = ("tellaro", "two-helpers", "patchy", "clear")
@@ -42,7 +48,7 @@ LINKS = (
 )
 """Profiles, each with what else is wrong with the link."""
 
-CALIBRATED: tuple[tuple[str, tuple[str, ...]], ...] = (
+CALIBRATED: tuple[Case, ...] = (
     ("tellaro", ()),
     ("two-helpers", ()),
     ("patchy", ()),
@@ -55,13 +61,9 @@ CALIBRATED: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("patchy", ("vehicles.primary.sensor.estimate.blind_to_seabed=true",)),
 )
 """What is true, or told of, otherwise than in a scenario as it is."""
-CALIBRATED_BY = (
-    *("seed", "failure", "risk.mean", "risk.worst30_mean", "truth.targets", "truth.missed_share"),
-    *("mines.left", "mines.left_low", "mines.left_high"),
-)
 
 HELPERS_TWICE = "mission.deadline_factor=2"
-GOALS: tuple[tuple[str, tuple[str, ...]], ...] = (
+GOALS: tuple[Case, ...] = (
     ("tellaro", ("mission.goal={kind: cleared, clearance: 0.6}",)),
     ("patchy", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.6}")),
     ("two-helpers", (HELPERS_TWICE, "mission.goal={kind: cleared, clearance: 0.9}")),
@@ -97,42 +99,13 @@ CLUTTERED = ("tellaro", "two-helpers", "patchy", "clear")
 CLUTTER = ("targets.count=20", "targets.clutter_per_km2=100")
 FALSE_ALARMS = "vehicles.{}.sensor.false_alarms_per_km2=20"
 
-Document = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Mission:
-    """One mission that a table rests on, to be flown again: the `risk` that it left, mean and over the worst 30 %."""
-
-    scenario: str
-    overrides: tuple[str, ...]
-    seed: int
-    risk: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table of a `page`. `fly`: flies its missions, with files in a folder, and returns what is to be kept;
-    `lines`: makes the table of that; `first`: one of its missions; `draw`: draws a picture of it."""
-
-    page: str
-    fly: Callable[[Path], Document]
-    lines: Callable[[Document], list[str]]
-    first: Callable[[Document], Mission]
-    draw: Callable[[Document], None] | None = None
-
-
-def _secondlook(*arguments: str) -> None:
-    program = "from secondlook.installed_command import main; main()"
-    subprocess.run([sys.executable, "-c", program, *arguments], check=True, cwd=ROOT)
-
 
 def _fly_compared(folder: Path) -> Document:
     kept = []
     for scenario in COMPARED:
         out = folder / scenario
         seeds = ("--first-seed", "1001", "--seeds", "50")
-        _secondlook("compare", scenario, "--allocators", ",".join(CONTENDERS), *seeds, "--out", str(out))
+        call_secondlook("compare", scenario, "--allocators", ",".join(CONTENDERS), *seeds, "--out", str(out))
         kept.append(compared_kept(json.loads((out / "compare.json").read_text())))
     return {"comparisons": kept}
 
@@ -150,7 +123,8 @@ def _first_compared(document: Document) -> Mission:
     told = document["comparisons"][0]
     first, left = told["first"], told["first"]["at_end"]
     overrides = (f"coordinator.allocator={first['contender']}",)
-    return Mission(told["scenario"], overrides, first["seed"], (left["mean"], left["worst30_mean"]))
+    risk = {f"risk.{name}": left[name] for name in ("mean", "worst30_mean")}
+    return Mission(told["scenario"], overrides, first["seed"], risk)
 
 
 def _fly_linked(folder: Path) -> Document:
@@ -160,7 +134,7 @@ def _fly_linked(folder: Path) -> Document:
             out = folder / "-".join((scenario, profile, also.replace(" ", "_")))
             set_ = [word for one in _of_link(scenario, profile, also) for word in ("--set", one)]
             varied = ("--vary", "coordinator.platform=ship,primary")
-            _secondlook("sweep", scenario, "--seeds", LINKED_SEEDS, *set_, *varied, "--out", str(out))
+            call_secondlook("sweep", scenario, "--seeds", LINKED_SEEDS, *set_, *varied, "--out", str(out))
             link = {"link.profile": profile, "link.also": also}
             swept = secondlook.load_sweep(out).table.to_pylist()
             rows += linked_kept(scenario, [row | link for row in swept])
@@ -184,7 +158,7 @@ def linked_kept(scenario: str, rows: Sequence[Document]) -> list[Document]:
     kept = []
     for row in rows:
         figures = (name for name in row if name.startswith(("risk.", "risk_primary")) or name.endswith(".mean_s"))
-        kept.append({"scenario": scenario, **_some(row, dict.fromkeys((*names, *figures)))})
+        kept.append({"scenario": scenario, **some(row, dict.fromkeys((*names, *figures)))})
     return kept
 
 
@@ -192,20 +166,15 @@ def _first_linked(document: Document) -> Mission:
     row = next(row for row in document["rows"] if row["link.profile"] != "ideal")
     link = _of_link(row["scenario"], row["link.profile"], row["link.also"])
     overrides = (*link, f"coordinator.platform={row['coordinator.platform']}")
-    return Mission(row["scenario"], overrides, row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
-
-
-def _first_of_curve(document: Document) -> Mission:
-    row = document["rows"][0]
-    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
+    return Mission(row["scenario"], overrides, row["seed"], risk_and_truth(row))
 
 
 def _fly_calibrated(folder: Path) -> Document:
-    return _fly_overridden(folder, CALIBRATED, "1..40", CALIBRATED_BY)
+    return fly_overridden(folder, CALIBRATED, "1..40", calibration.LEFT_FIGURES)
 
 
 def _fly_goals(folder: Path) -> Document:
-    return _fly_overridden(folder, GOALS, "1..60", calibration.GOAL_FIGURES)
+    return fly_overridden(folder, GOALS, "1..60", calibration.GOAL_FIGURES)
 
 
 def _fly_cluttered(folder: Path) -> Document:
@@ -214,7 +183,7 @@ def _fly_cluttered(folder: Path) -> Document:
         alarms = [FALSE_ALARMS.format(name) for name in load_scenario(scenario).vehicles]
         all_of_it = (*CLUTTER, *alarms)
         flown += [(scenario, (*all_of_it, f"coordinator.contacts={told}")) for told in ("false", "true")]
-    return _fly_overridden(folder, flown, "1..20", calibration.CONTACT_FIGURES)
+    return fly_overridden(folder, flown, "1..20", calibration.CONTACT_FIGURES)
 
 
 def _fly_reliable(folder: Path) -> Document:
@@ -255,33 +224,6 @@ def reliability_lines(document: Document) -> list[str]:
     return lines
 
 
-def _fly_overridden(
-    folder: Path, flown: Iterable[tuple[str, tuple[str, ...]]], seeds: str, figures: Iterable[str]
-) -> Document:
-    """Flies scenarios, each with its overrides, and keeps some figures of each mission."""
-    rows = []
-    for place, (scenario, overrides) in enumerate(flown):
-        out = folder / str(place)
-        set_ = [word for one in overrides for word in ("--set", one)]
-        _secondlook("sweep", scenario, "--seeds", seeds, *set_, "--out", str(out))
-        swept = secondlook.load_sweep(out).table.to_pylist()
-        told = {"scenario": scenario, "overrides": list(overrides)}
-        rows += [{**told, **_some(row, figures)} for row in swept]
-    return {"rows": rows}
-
-
-def _some(row: Document, names: Iterable[str]) -> Document:
-    """Some of a row's figures, rounded."""
-    return {name: round(row[name], DIGITS) if isinstance(row[name], float) else row[name] for name in names}
-
-
-def _first_calibrated(document: Document) -> Mission:
-    row = next(row for row in document["rows"] if row["overrides"])
-    overrides = row["overrides"].split(" ") if isinstance(row["overrides"], str) else row["overrides"]
-    overrides = tuple(overrides)
-    return Mission(row["scenario"], overrides, row["seed"], (row["risk.mean"], row["risk.worst30_mean"]))
-
-
 TABLES: dict[str, Table] = {
     "compared": Table(
         page="docs/comparing.md",
@@ -293,25 +235,21 @@ TABLES: dict[str, Table] = {
         page="docs/clearance.md",
         fly=_fly_calibrated,
         lines=lambda document: calibration.table(document["rows"], ("scenario", "overrides")),
-        first=_first_calibrated,
     ),
     "goals": Table(
         page="docs/clearance.md",
         fly=_fly_goals,
         lines=lambda document: calibration.goal_table(document["rows"], ("scenario", "overrides")),
-        first=_first_calibrated,
     ),
     "contacts": Table(
         page="docs/clearance.md",
         fly=_fly_cluttered,
         lines=lambda document: calibration.contact_table(document["rows"], ("scenario", "coordinator.contacts")),
-        first=_first_calibrated,
     ),
     "reliability": Table(
         page="docs/clearance.md",
         fly=_fly_reliable,
         lines=reliability_lines,
-        first=_first_calibrated,
         draw=draw_reliability,
     ),
     "across-the-water": Table(
@@ -324,8 +262,13 @@ TABLES: dict[str, Table] = {
         page="docs/across-the-water.md",
         fly=lambda folder: link_curve.fly(),
         lines=lambda document: link_curve.table(document["rows"]),
-        first=_first_of_curve,
     ),
+    "position-errors": Table(
+        page="docs/faults.md",
+        fly=lambda folder: position_errors.fly_all(),
+        lines=lambda document: position_errors.table(document["rows"]),
+    ),
+    **scenario_tables.TABLES,
 }
 
 
@@ -358,14 +301,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--fly", nargs="+", default=[], choices=[*TABLES, "all"], metavar="NAME")
     parser.add_argument("--draw", action="store_true", help="draw pictures of what is kept, too")
     options = parser.parse_args(arguments)
-    named = options.fly
-    for name in TABLES if "all" in named else named:
+    named = list(TABLES) if "all" in options.fly else options.fly
+    for name in named:
         with tempfile.TemporaryDirectory() as folder:
             document = TABLES[name].fly(Path(folder))
         KEPT.mkdir(exist_ok=True)
         keep(name, document)
     for name, table in TABLES.items():
-        if table.draw is not None and (options.draw or named):
+        if table.draw is not None and (options.draw or name in named):
             table.draw(kept(name))
         (ROOT / table.page).write_text(written(name))
 

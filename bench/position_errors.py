@@ -1,33 +1,41 @@
 """What is lost where helpers are not where they believe they are: the gain of second looks by true positions.
 
-python -m bench.position_errors [SCENARIO [SEEDS]]; prints a row for each error. The error is a constant distance in a
-random direction, or a drift that grows by so much an hour; the primaries' positions are right. `told` is the mean
-residual risk of the fleet's map, which holds what helpers believe to have seen; `true` is that of a map with cells of
-1 m in which each look lies where it was taken. The gain is what second looks take off the primaries' mean there.
+python -m bench.position_errors [SCENARIO [SEEDS]] prints the table, `python -m bench.figures --fly position-errors`
+writes that of docs/faults.md. The error is a constant distance in a random direction, or a drift that grows by so much
+an hour; the primaries' positions are right. Told is the mean residual risk of the fleet's map, which holds what helpers
+believe to have seen; truly it is that of a map with cells of 1 m in which each look lies where it was taken. The gain
+is what second looks take off the primaries' mean there.
 """
 
 from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
+from itertools import product
 from pathlib import Path
+from statistics import fmean
 
 import numpy as np
 
+from bench.flown import DIGITS, Document
+from bench.rows import Row, by, head, line
 from comms.node import Received
 from comms.said.announcement import Role, RunInfo
 from comms.said.messages import Look, Nav, TruthPose
 from planner.region import Region
 from planner.risk import residual_risk, risk_statistics
-from planner.types import GridSpec, Point
+from planner.types import FloatArray, GridSpec, Point
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import load_scenario
 from vehicle_agent.coverage import CoverageLayer
 
 ERRORS_M = (5, 10, 20)
 CELL_M = 1.0  # of the true map: a swath's edges fall on whole cells nowhere
-KEYS = {"m off": "position_error_m", "m/h drift": "position_drift_m_per_h"}
+KEYS = ("position_error_m", "position_drift_m_per_h")
 
 
 @dataclass
@@ -77,32 +85,53 @@ def finer(spec: GridSpec) -> GridSpec:
     return GridSpec(spec.frame, CELL_M, round((spec.columns - 1) * times) + 1, round(spec.rows * times))
 
 
-def fly(scenario: str, seed: int, error: str, size: int) -> tuple[float, float, float]:
-    """Mean residual risk of the fleet's map, and by true positions that of the fleet and of the primaries alone."""
-    helpers = load_scenario(scenario, (), seed).revisit_vehicles
-    settings = [f"vehicles.{name}.{error}={size}" for name in helpers]
+def fly(scenario: str, overrides: Sequence[str], seed: int) -> Row:
+    """One mission: beside its own figures the mean residual risk by true positions, that which the fleet leaves, and
+    the primaries alone."""
     truth = TrueMap()
     with tempfile.TemporaryDirectory() as folder:
         options = RunOptions(Path(folder), "local", None, record=False, watch=truth.hear)
-        told = run_mission(load_scenario(scenario, settings, seed), options)
-    return told["risk"]["mean"], truth.mean_risk(Role.SURVEY, Role.REVISIT), truth.mean_risk(Role.SURVEY)
+        told = run_mission(load_scenario(scenario, overrides, seed), options)["risk"]
+    true, alone = truth.mean_risk(Role.SURVEY, Role.REVISIT), truth.mean_risk(Role.SURVEY)
+    figures = {"risk.mean": told["mean"], "risk.worst30_mean": told["worst30_mean"]}
+    figures |= {"true.mean": true, "true_alone.mean": alone}
+    row = {"scenario": scenario, "overrides": list(overrides), "seed": seed, "failure": None}
+    return row | {name: round(value, DIGITS) for name, value in figures.items()}
+
+
+def fly_all(scenario: str = "tellaro", seeds: int = 6) -> Document:
+    """All missions: each error of all helpers, with the seeds from 0 on."""
+    helpers = load_scenario(scenario).revisit_vehicles
+    errors = [f"{key}={size}" for key in KEYS for size in ERRORS_M]
+    cases = [(), *(tuple(f"vehicles.{name}.{error}" for name in helpers) for error in errors)]
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        return {"rows": list(pool.map(partial(fly, scenario), *zip(*product(cases, range(seeds)), strict=True)))}
+
+
+def table(rows: Sequence[Row]) -> list[str]:
+    """The lines of the table, as Markdown."""
+    lines = head(KEYS, ("mean risk told", "truly", "gain", "of it lost", "least and most"))
+    found = by(rows, KEYS, "true.mean")
+    exact = _gains(found["-", "-"])
+    for values, missions in found.items():
+        gains = _gains(missions)
+        figures = [f"{fmean(row[name] for row in missions):.3f}" for name in ("risk.mean", "true.mean")]
+        figures += [f"{gains.mean():.3f}", "", ""]
+        if set(values) != {"-"}:
+            lost = 1 - gains / exact
+            figures[3:] = f"{1 - gains.sum() / exact.sum():.1%}", f"{lost.min():.1%} to {lost.max():.1%}"
+        lines.append(line(values, figures))
+    return lines
+
+
+def _gains(missions: Sequence[Row]) -> FloatArray:
+    """Of each mission what second looks take off."""
+    return np.array([row["true_alone.mean"] - row["true.mean"] for row in missions])
 
 
 def main(scenario: str, seeds: int) -> None:
     """Prints the table."""
-    rows = [("none", "position_error_m", 0)]
-    rows += [(f"{size} {what}", key, size) for what, key in KEYS.items() for size in ERRORS_M]
-    print(f"{scenario}, seeds 0 to {seeds - 1}")
-    print(f"{'error':>13} {'told':>7} {'true':>7} {'gain':>7} {'lost':>7}   least and most lost")
-    exact = np.zeros(0)
-    for what, key, size in rows:
-        told, true, alone = np.array([fly(scenario, seed, key, size) for seed in range(seeds)]).T
-        gain = alone - true
-        exact = gain if size == 0 else exact
-        lost = 1 - gain / exact
-        spread = f"{lost.min():7.1%} {lost.max():7.1%}"
-        print(f"{what:>13} {told.mean():7.4f} {true.mean():7.4f} {gain.mean():7.4f} "
-              f"{1 - gain.sum() / exact.sum():7.1%}   {spread}", flush=True)  # fmt: skip
+    print("\n".join(table(fly_all(scenario, seeds)["rows"])))
 
 
 if __name__ == "__main__":

@@ -1,19 +1,17 @@
-"""Is predicted risk true? `python -m bench.predicted_risk` flies many missions and counts the targets missed.
+"""Is predicted risk true? Many missions are flown, and the targets missed are counted.
 
 Each mission has a seed and targets of its own. A target's predicted chance of being missed is the fleet's residual risk
-of the cell it lies in, as it was published; whether it was missed, the simulated world knows. Prints both shares, and
-draws them by predicted risk.
+of the cell it lies in, as it was published; whether it was missed, the simulated world knows. `python -m bench.figures
+--fly reliability` flies them, and tells and draws both shares.
 """
 
 from __future__ import annotations
 
-import argparse
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property, partial
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +25,6 @@ from secondlook.fleet.build import build_fleet
 from secondlook.recorded.metrics import Metrics
 from secondlook.scenario import load_scenario
 
-FIGURE_FILE = Path("docs/paper/predicted-risk.png")
 BINS = 15
 STANDARD_ERRORS = 2.0
 
@@ -107,24 +104,3 @@ def draw(cases: Mapping[str, Sequence[Bin]], across: int = 1) -> Figure:
         panel.set(xlim=(0, 1), ylim=(0, 1), xlabel="predicted residual risk", ylabel="share of targets missed")
         panel.set_title(f"{name}{sum(one.targets for one in bins)} targets, two standard errors", fontsize=9)
     return figure
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--scenario", default="tellaro")
-    parser.add_argument("--missions", type=int, default=200)
-    parser.add_argument("--out", type=Path, default=FIGURE_FILE)
-    options = parser.parse_args()
-
-    met = fly_all(options.scenario, (), options.missions)
-    missed, share, predicted = met.missed, float(met.missed.mean()), float(met.risk.mean())
-    error = np.sqrt(share * (1 - share) / missed.size)
-    print(f"{options.scenario}: {options.missions} missions, {missed.size} targets")
-    print(f"missed {share:.4f} ± {error:.4f}, predicted {predicted:.4f}, difference {share - predicted:+.4f}")
-    print(f"expected calibration error {calibration_error(met.bins):.4f}")
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    draw({"": met.bins}).savefig(options.out, dpi=110)
-
-
-if __name__ == "__main__":
-    main()

@@ -4,18 +4,24 @@ that."""
 from __future__ import annotations
 
 from pathlib import Path
+from statistics import fmean
 from typing import Any
 
+import numpy as np
 import pytest
 
 from bench import figures
-from bench.figures import TABLES, compared_kept, kept, linked_kept, written
+from bench.figures import TABLES, compared_kept, kept, linked_kept, reliability_lines, written
+from bench.flown import ROOT, Mission, Table
+from bench.rows import by
+from secondlook.compare.paired import interval_of_mean
+from secondlook.sweeps.rows import flat
 from secondlook.testing import Fleet
 
 
 @pytest.mark.parametrize("name", TABLES)
 def test_a_page_has_the_table_that_what_is_kept_makes(name: str) -> None:
-    page = figures.ROOT / TABLES[name].page
+    page = ROOT / TABLES[name].page
     assert written(name) == page.read_text(), f"{TABLES[name].page} is stale: python -m bench.figures"
 
 
@@ -23,18 +29,40 @@ def test_a_page_has_the_table_that_what_is_kept_makes(name: str) -> None:
 def test_a_mission_of_it_still_leaves_what_is_kept(name: str, tmp_path: Path) -> None:
     mission = TABLES[name].first(kept(name))
     fleet = Fleet(mission.scenario, overrides=mission.overrides, seed=mission.seed, folder=tmp_path)
-    risk = fleet.run().summary["risk"]
-    left = (round(risk["mean"], 3), round(risk["worst30_mean"], 3))
-    assert left == tuple(round(one, 3) for one in mission.risk), f"stale: python -m bench.figures --fly {name}"
+    row = flat(fleet.run().summary)
+    left = {name: round(row[name], 3) for name in mission.left}
+    kept_of_it = {name: round(value, 3) for name, value in mission.left.items()}
+    assert left == kept_of_it, f"stale: python -m bench.figures --fly {name}"
+
+
+def test_what_pages_say_beside_tables_is_what_is_kept() -> None:
+    missions = by(kept("helpers")["rows"], ("p_detect",), "risk.mean")
+    alone, left = (fmean(row[name] for row in missions["0.7",]) for name in ("risk_primary_alone.mean", "risk.mean"))
+    assert f"a chance of {alone:.2f} where the primary is alone, and of {left:.2f} where" in words_of("README.md")
+    better, worse = (np.array([row["risk.worst30_mean"] for row in missions[p,]]) for p in ("0.485", "0.7"))
+    low, high = interval_of_mean(worse - better)
+    less = f"it is {(worse - better).mean():.3f} less (95 % {low:.3f} to {high:.3f})"
+    assert less in words_of("docs/scenarios.md")
+    _, scenario, _, missed, predicted, *_ = (
+        cell.strip() for cell in reliability_lines(kept("reliability"))[2].split("|")
+    )
+    assert scenario == "`tellaro`"
+    assert f"missed {missed}, predicted {predicted}" in words_of("docs/paper.md")
+    errors = by(kept("position-errors")["rows"], ("position_error_m",), "true.mean")["20",]
+    too_little = fmean(row["true.mean"] - row["risk.mean"] for row in errors)
+    assert f"at 20 m it tells {too_little:.3f} too little" in words_of("docs/faults.md")
+
+
+def words_of(page: str) -> str:
+    """A page's text without line breaks."""
+    return " ".join((ROOT / page).read_text().split())
 
 
 def test_a_table_is_put_in_the_place_of_the_old_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(figures, "ROOT", tmp_path)
     monkeypatch.setattr(figures, "KEPT", tmp_path)
-    mission = figures.Mission("toy", (), 1, (0.5, 0.5))
-    table = figures.Table(
-        "page.md", lambda _: {}, lambda document: ["| a |", f"| {document['a']} |"], lambda _: mission
-    )
+    mission = Mission("toy", (), 1, {"risk.mean": 0.5})
+    table = Table("page.md", lambda _: {}, lambda document: ["| a |", f"| {document['a']} |"], lambda _: mission)
     monkeypatch.setitem(figures.TABLES, "toy", table)
     (tmp_path / "toy.json").write_text('{"a": 2}')
     (tmp_path / "page.md").write_text("Before.\n\n<!-- figures: toy -->\n\n| a |\n| 1 |\n| 3 |\n\nAfter.\n")

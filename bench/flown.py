@@ -1,0 +1,82 @@
+"""Tables of the docs that missions are flown for: how their missions are flown, and what is kept of each.
+
+What is kept of a table is a document with `rows`, one for each mission: the scenario, the overrides and the seed it was
+flown with, and some of its figures.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import secondlook
+
+ROOT = Path(__file__).parents[1]
+DIGITS = 6  # of what is kept: more than tables tell
+
+Document = dict[str, Any]
+Case = tuple[str, tuple[str, ...]]
+"""A scenario, and the overrides that it is flown with."""
+
+
+@dataclass(frozen=True)
+class Mission:
+    """One mission that a table rests on, to be flown again. `left`: what is kept of the risk that it left and of the
+    truth, by column of a sweep."""
+
+    scenario: str
+    overrides: tuple[str, ...]
+    seed: int
+    left: Mapping[str, float]
+
+
+def risk_and_truth(row: Document) -> dict[str, float]:
+    """What a row tells of the risk that was left, and of the truth."""
+    return {name: value for name, value in row.items() if name.startswith(("risk", "priorities.", "truth."))}
+
+
+def first_overridden(document: Document) -> Mission:
+    """The first mission with an override, else the first."""
+    rows = document["rows"]
+    row = next((row for row in rows if row["overrides"]), rows[0])
+    return Mission(row["scenario"], tuple(row["overrides"]), row["seed"], risk_and_truth(row))
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a `page`. `fly`: flies its missions, with files in a folder, and returns what is to be kept;
+    `lines`: makes the table of that; `first`: one of its missions; `draw`: draws a picture of it."""
+
+    page: str
+    fly: Callable[[Path], Document]
+    lines: Callable[[Document], list[str]]
+    first: Callable[[Document], Mission] = first_overridden
+    draw: Callable[[Document], None] | None = None
+
+
+def call_secondlook(*arguments: str) -> None:
+    """Gives a command of the program, in a process of its own. Raises CalledProcessError where it fails."""
+    program = "from secondlook.installed_command import main; main()"
+    subprocess.run([sys.executable, "-c", program, *arguments], check=True, cwd=ROOT)
+
+
+def fly_overridden(folder: Path, flown: Iterable[Case], seeds: str, figures: Iterable[str]) -> Document:
+    """Flies scenarios, each with its overrides, and keeps some figures of each mission."""
+    rows = []
+    for place, (scenario, overrides) in enumerate(flown):
+        out = folder / str(place)
+        set_ = [word for one in overrides for word in ("--set", one)]
+        call_secondlook("sweep", scenario, "--seeds", seeds, *set_, "--out", str(out))
+        swept = secondlook.load_sweep(out).table.to_pylist()
+        told = {"scenario": scenario, "overrides": list(overrides)}
+        rows += [{**told, **some(row, figures)} for row in swept]
+    return {"rows": rows}
+
+
+def some(row: Document, names: Iterable[str]) -> Document:
+    """Some of a row's figures, rounded."""
+    return {name: round(row[name], DIGITS) if isinstance(row[name], float) else row[name] for name in names}
