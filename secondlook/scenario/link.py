@@ -200,7 +200,7 @@ class Link(Mapping):
     """The most frames said in a slot, no more than the profile's `frames`. Left out, as many as those."""
     reach_m: Reach | None = None
     """The distance over which slots allow for the sound's way. Left out, the largest between any two of the area's
-    corners, the vehicles' starts and homes, and the ship; at most how far the modem is heard."""
+    corners, the vehicles' starts and homes, and the ship. At most how far the modem is heard."""
     carried_by: Literal["world", "drivers"] = "world"
     """What carries frames from modem to modem: the simulated world, or `drivers`, programs of yours, one a platform."""
 

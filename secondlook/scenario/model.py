@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Sequence
 from typing import Annotated, Literal
 
@@ -13,6 +14,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from comms.said.routing import driver_of, modem_of
 from modem.config import MOST_PLATFORMS, SMALL_BITS, least_frame_bits
+from modem.letters import SECOND_BITS
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
@@ -263,7 +265,7 @@ class Scenario(Mapping):
         coordinator: Coordinator | None = info.data.get("coordinator")
         if coordinator is not None and coordinator.contacts:
             raise refused("must be left out beside coordinator.contacts, as contacts do not cross the water")
-        ship = coordinator is not None and coordinator.platform in (None, SHIP)
+        ship = coordinator is None or coordinator.platform in (None, SHIP)
         if ship and SHIP in vehicles:
             raise refused(f"must stand with no vehicle called {SHIP}, as the coordinator is on a ship of that name")
         external = [key for key, vehicle in vehicles.items() if vehicle.body == "external"]
@@ -280,6 +282,8 @@ class Scenario(Mapping):
                 raise refused(f"must be {_listed(platforms)}", ("outages", number, "platform"))
         if vehicles:
             _check_modem(link, platforms, info.data.get("mission"))
+            if coordinator is not None and "area" in info.data:
+                _check_ship(link, coordinator, info.data["area"])
         return link
 
     @field_validator("current")
@@ -385,6 +389,10 @@ class Scenario(Mapping):
         return dump(self.model_dump(mode="json", exclude_none=True))
 
 
+CYCLE_UNDER_S = 1 << SECOND_BITS
+"""Messages tell their second by so many bits alone."""
+
+
 def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> None:
     """Whether modems of the profile can talk in this fleet."""
     if not 2 <= len(platforms) <= MOST_PLATFORMS:
@@ -408,6 +416,33 @@ def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> N
             f"a frame must take {most_s:.6g} s or less, and not {frame_s:.6g} s, for each of {len(platforms)} "
             "platforms to have a turn within mission.time_limit_s",
             ("profile", "rate_bps"),
+        )
+    if link.reach_m is not None and link.reach_m > profile.max_range_m:
+        raise refused(f"must be at most {profile.max_range_m:g}, as far as the modem is heard", ("reach_m",))
+    guard_s = profile.guard_s if link.guard_s is None else link.guard_s
+    packet_s = profile.preamble_s + (link.slot_frames or profile.frames) * profile.frame_bits / profile.rate_bps
+    turn_s = packet_s + (link.reach_m or 0.0) / profile.speed_mps + guard_s
+    most_s = min(CYCLE_UNDER_S, math.inf if mission is None else mission.time_limit_s) / len(platforms)
+    if turn_s >= most_s:
+        raise refused(
+            f"a turn, the longest packet, the sound's way and the guard, must take less than {most_s:.6g} s, and not "
+            f"{turn_s:.6g} s, for each of {len(platforms)} platforms to have one within mission.time_limit_s and "
+            f"{CYCLE_UNDER_S} s",
+            ("guard_s",) if link.guard_s is not None and guard_s > packet_s else (),
+        )
+
+
+def _check_ship(link: Link, coordinator: Coordinator, area: Area) -> None:
+    """Whether a ship that is given a place is heard anywhere in the area."""
+    if coordinator.position is None:
+        return
+    ship = shapely.Point(coordinator.position.x_m, coordinator.position.y_m)
+    apart_m, most_m = ship.distance(shapely.Polygon(area.polygon_m)), link.modem.max_range_m
+    if apart_m > most_m:
+        raise refused(
+            f"must be heard farther than {most_m:g} m, or coordinator.position lie nearer to the area, from which it "
+            f"is {apart_m:.0f} m away",
+            ("profile",),
         )
 
 

@@ -533,7 +533,7 @@ moods: list[int] = []
          "own: of the frames 1.000 are lost at 0 m: nothing would ever be heard"),
         (OWN_MODEM | {"frame_bits": 20},
          "own: scenario: link.profile.frame_bits: 20 is not allowed; a frame must have 23"),
-        (OWN_MODEM | {"rate_bps": 0.15}, "own: 3 platforms speak once in 51"),
+        (OWN_MODEM | {"rate_bps": 0.15}, "own: scenario: link: {"),
         (OWN_MODEM | {"rate_bps": 0}, "own: scenario: link.profile.rate_bps: 0 is not allowed; must be at least 0.1"),
         ("ideal", "ideal: is the ideal link, which has no modems; must be a modem's profile"),
         ("none.yaml", "none.yaml: "),
