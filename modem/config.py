@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from modem.streams import STREAM_BITS, STREAMS, TURN_BITS, Window
 
@@ -79,8 +80,9 @@ class ModemConfig:
     north-east corner of the box in which all places lie that are told. `polls`: where the coordinator's platform polls
     the others, instead of slots. `deck_ms`: before this all are on deck, and what is said goes from hand to hand at
     once, not through the water. `answer_ms`: for so long the coordinator waits for the answer to an offer, which is not
-    said any more then. `by_age`: what has waited longest is said first, whatever it is worth. `tells_tiles`: coverage
-    crosses as tiles, not as stretches; not in small frames.
+    said any more then. `by_age`: what has waited longest is said first, whatever it is worth. `maps`: how
+    coverage crosses, as stretches, with corrections of what these tell where there is room, or as tiles; as the first
+    alone in small frames.
 
     Raises ValueError where these do not go together.
     """
@@ -98,7 +100,7 @@ class ModemConfig:
     deck_ms: int = 0
     answer_ms: int = 10**9
     by_age: bool = False
-    tells_tiles: bool = False
+    maps: Literal["stretches", "corrected", "tiles"] = "stretches"
 
     def __post_init__(self) -> None:
         if not 2 <= len(set(self.platforms)) == len(self.platforms) <= MOST_PLATFORMS:
@@ -113,11 +115,21 @@ class ModemConfig:
                 "must be larger, or the platforms fewer"
             )
 
-        if self.tells_tiles and self.is_small:
+        if self.maps != "stretches" and self.is_small:
             raise ValueError(
-                f"link.maps: tiles do not cross in frames of {self.frame_bits} bits; must be stretches with fewer than "
-                f"{SMALL_BITS}"
+                f"link.maps: {self.maps} do not cross in frames of {self.frame_bits} bits; must be stretches with "
+                f"fewer than {SMALL_BITS}"
             )
+
+    @property
+    def tells_tiles(self) -> bool:
+        """Whether coverage crosses as tiles, and not as stretches."""
+        return self.maps == "tiles"
+
+    @property
+    def corrects(self) -> bool:
+        """Whether what stretches tell is corrected."""
+        return self.maps == "corrected"
 
     @property
     def hub(self) -> str:

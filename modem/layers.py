@@ -9,6 +9,7 @@ from __future__ import annotations
 from comms.said.announcement import Role, RosterVehicle, RunInfo
 from comms.said.messages import Curve
 from modem.config import ModemConfig
+from modem.corrections import Correction
 from modem.stretches import LayerOf, Seen, Stretch, Told
 from planner.footprints import footprint_of
 from planner.sweep import legs_over_strip
@@ -26,9 +27,11 @@ class Layers:
         self._layers: dict[tuple[str, int], LayerOf] = {}
         self.by_strips = {one.vehicle for one in run.vehicles if config.is_small and _tells_by_strips(one)}
 
-    def hear(self, vehicle: str, incarnation: int, message: Curve | Stretch) -> list[Told]:
-        """Takes a vehicle's curve or stretch; returns the tiles that are others now."""
+    def hear(self, vehicle: str, incarnation: int, message: Curve | Stretch | Correction) -> list[Told]:
+        """Takes a vehicle's curve, stretch or correction; returns the tiles that are others now."""
         layer = self._layer(vehicle, incarnation)
+        if isinstance(message, Correction):
+            return layer.correct(message)
         return layer.hear(message) if isinstance(message, Stretch) else layer.hear_curve(message)
 
     def hear_done(self, vehicle: str, incarnation: int, strip: Strip | None) -> list[Told]:

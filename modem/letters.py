@@ -10,7 +10,7 @@ said, and count as said when they have come. Nor does the number of a key that o
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import shapely
 
@@ -35,11 +35,12 @@ from comms.said.topics import (
 )
 from comms.said.wire import WireError
 from modem.config import ModemConfig
+from modem.corrections import Correction
 from modem.plain_tiles import PlainTile
 from modem.stretches import Stretch
 
 CROSSING: tuple[Topic | None, ...] = (*(topic for topic in TOPICS if topic.crossing is not None), None)
-"""What may be said; None for a piece of a map: a stretch, or a tile."""
+"""What may be said; None for a piece of a map: a stretch, a correction, or a tile."""
 KIND_BITS = (len(CROSSING) - 1).bit_length()
 BY_COORDINATOR = (TASK, MISSION_OVER)
 BY_VEHICLES: tuple[Topic | None, ...] = (TASK_STATUS, STATE, None, CURVE, PLAN, HOTSPOT)
@@ -53,6 +54,9 @@ MOST_CORNERS = 10
 FIRST_TOLERANCE_M = 2.0
 LARGEST_NUMBER = 999_999_999
 """That a key may end in."""
+
+
+M = TypeVar("M")
 
 
 class Said(NamedTuple):
@@ -91,6 +95,8 @@ class Letters:
         if topic is not None and self._has_its_number(topic):
             writer.write_count(number_of(said.key), 4)
         message = said.message
+        if topic is None and self.config.corrects:
+            writer.write(isinstance(message, Correction), 1)
         if isinstance(message, Hotspot):
             message = replace(message, outline=with_fewer_corners(message.outline))
         elif isinstance(message, Plan) and is_short:  # the farthest range alone counts
@@ -122,12 +128,20 @@ class Letters:
         number = sequence % (LARGEST_NUMBER + 1)
         if topic is not None and self._has_its_number(topic) and (number := reader.read_count(4)) > LARGEST_NUMBER:
             raise WireError(f"{number} is no number of a key")
-        of_map = PlainTile if self.config.tells_tiles else Stretch
+        of_map: type[Any] = PlainTile if self.config.tells_tiles else Stretch
+        if topic is None and self.config.corrects and reader.read(1):
+            of_map = Correction
         message: Any = get_message(reader, of_map if topic is None else topic.message, self._around(sent_s * 1000))
         key = "" if topic is None else topic.key(vehicle=vehicle, number=number)
         return topic, Said(
             key, Header(COORDINATOR if by_coordinator else vehicle, incarnation, sequence, sent_s * 1000), message
         )
+
+    def as_it_crosses(self, message: M, now_ms: int) -> M:
+        """A message, or a piece of a map, as rounded as it comes out of the water."""
+        writer, around = BitWriter(), self._around(now_ms // 1000 * 1000)
+        put_message(writer, message, around)
+        return get_message(BitReader(writer.to_bytes()), type(message), around)
 
     def topic_of(self, reader: BitReader, platform: str) -> Topic | None:
         """The topic of a letter from a platform, of which no more is read. Raises WireError where it is none."""

@@ -36,6 +36,8 @@ from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, Crossing, 
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
+from modem.corrections import Correction
+from modem.finer import Finer
 from modem.frames import FrameForm, start_number
 from modem.layers import Layers
 from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
@@ -86,6 +88,8 @@ class Modem:
         self._form: FrameForm | None = None  # this and what follows: since the run's announcement
         self._run: RunInfo | None = None
         self._gathering: Gathering | None = None
+        self._finer: Finer | None = None
+        self._looked_ms = 0
         self._heard: list[Publication] = []
         self._on_deck: list[bytes] = []
         self._told = 0
@@ -122,6 +126,7 @@ class Modem:
         elif isinstance(message, Look):
             if self._gathering is not None:
                 self._say_stretch(self._gathering.add(message), now_ms)
+                self._looked_ms = now_ms
         else:
             self._take(received, now_ms)
         return self._step(now_ms)
@@ -142,6 +147,7 @@ class Modem:
                 and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
             ):
                 self._say_stretch(self._gathering.flush(), now_ms)
+                self._say_corrections(now_ms)
             silent_ms = self.config.cycle_ms * SILENT_CYCLES
             is_alive = self._is_alive and now_ms - self._last_frames_ms >= silent_ms
             frames = self._packets.next(
@@ -174,7 +180,9 @@ class Modem:
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         self._grid = run.grid.spec
         if entry is not None and not self.config.is_hub and not self.config.tells_tiles:
-            self._gathering = Gathering(entry)
+            self._gathering = Gathering(entry, self._start)
+            # Who was started anew does not know what of its map is told.
+            self._finer = None if self._start or not self.config.corrects else Finer(entry, run.grid.spec)
 
     def _receive_anew(self, other: str) -> None:
         """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is
@@ -190,13 +198,21 @@ class Modem:
         is_hub = self.config.is_hub
         if isinstance(message, CoverageTile) and self.config.tells_tiles and not is_hub:
             self._enqueue_of_map(plain(message, self._grid), received.header, now_ms, received.key)
+        elif isinstance(message, CoverageTile) and self._finer is not None:
+            if received.header.incarnation == self._incarnation:
+                self._finer.hear_tile(message, now_ms)
+            else:
+                self._finer = None  # its map begins anew
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
         if topic.crossing.is_fine and self.config.is_small:
             return
         if isinstance(message, Curve) and self._gathering is not None:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
+            self._note_said(message, now_ms)
         if not is_hub:
+            if received.header.incarnation != self._incarnation:
+                self._finer = None
             self._incarnation = received.header.incarnation
             self._state_ms = now_ms if isinstance(message, AgentState) else self._state_ms
         if not is_hub and not self._is_news(received, now_ms):
@@ -260,10 +276,34 @@ class Modem:
             self._enqueue_stretch(stretch, now_ms)
 
     def _enqueue_stretch(self, stretch: Stretch, now_ms: int) -> None:
+        self._note_said(stretch, now_ms)
         self._enqueue_of_map(stretch, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
 
-    def _enqueue_of_map(self, piece: Stretch | PlainTile, header: Header, now_ms: int, about: str = "") -> None:
-        crossing = OF_MAP if isinstance(piece, Stretch) else replace(OF_MAP, newest_only=True)
+    def _note_said(self, piece: Curve | Stretch, now_ms: int) -> None:
+        """What is told of its map, as rounded as it crosses."""
+        if self._finer is not None:
+            try:
+                crossing = self._letters.as_it_crosses(piece, now_ms)
+            except WireError:
+                return  # nor will it be said
+            if isinstance(crossing, Stretch):
+                self._finer.hear_stretch(crossing, self._looked_ms)
+            else:
+                self._finer.hear_curve(crossing)
+
+    def _say_corrections(self, now_ms: int) -> None:
+        """What of its map is wrong at the coordinator's, as far as there is room."""
+        assert self._form is not None
+        while self._finer is not None and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room:
+            correction = self._finer.next(now_ms)
+            if correction is None:
+                break
+            self._enqueue_of_map(correction, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
+
+    def _enqueue_of_map(
+        self, piece: Stretch | Correction | PlainTile, header: Header, now_ms: int, about: str = ""
+    ) -> None:
+        crossing = replace(OF_MAP, newest_only=True) if isinstance(piece, PlainTile) else OF_MAP
         self._enqueue(None, crossing, Said("", header, piece), self.config.hub, now_ms, about)
 
     def _enqueue(
@@ -380,7 +420,7 @@ class Modem:
             self._say_here(said.key, header, message)
         if isinstance(message, PlainTile):
             self._tell_tiles(platform, header, [told(message, self._grid, header.sequence)])
-        elif isinstance(message, Curve | Stretch) and platform != self.config.hub:
+        elif isinstance(message, Curve | Stretch | Correction) and platform != self.config.hub:
             self._tell_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
 
     def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:

@@ -19,14 +19,18 @@ from comms.said.bits import folded, unfolded
 from comms.said.messages import CoverageTile, Curve, Look
 from comms.said.over_water import Counted, Heading, Length, PlaceX, PlaceY
 from comms.said.wire import AtMost, Count, Metres, Radians
+from modem.corrections import Correction, Corrections
 from planner.footprints.cells import look_on_grid
-from planner.risk import HIGHEST_P_DETECT, RiskLayer
+from planner.risk import HIGHEST_P_DETECT, RiskLayer, to_levels
 from planner.tiles import Tile, tiles, tiles_within
 from planner.types import DetectionCurve, FloatArray, GridSpec, LookGeometry, SweepFrame
 
 CHUNK_M = 100.0
 """Along a stretch; of each it is told how much was seen on either side."""
 MOST_CHUNKS = 4
+STRETCHES_A_START = 4096
+MOST_AHEAD = 256
+"""Corrections that wait for stretches; of more the oldest are forgotten."""
 STEPS_TO_HALF = 4
 """Steps in which what was seen is told, down to half of what was expected."""
 LEAST_STEPS = -20
@@ -57,13 +61,14 @@ class Stretch:
 
 
 class Gathering:
-    """Gathers a vehicle's looks to stretches. `entry`: the vehicle as it was announced."""
+    """Gathers a vehicle's looks to stretches. `entry`: the vehicle as it was announced; `start`: of its modem, each of
+    which numbers its stretches by itself, as none may have the number of another."""
 
-    def __init__(self, entry: RosterVehicle) -> None:
+    def __init__(self, entry: RosterVehicle, start: int = 0) -> None:
         self._entry = entry
         self._looks: list[Look] = []
         self._curve: Curve | None = None
-        self._number = 0
+        self._number = start * STRETCHES_A_START
 
     def hear_curve(self, curve: Curve) -> Stretch | None:
         """From now on looks are told by this curve, if it is one; returns the stretch that was told by that before."""
@@ -164,35 +169,60 @@ class Told(NamedTuple):
 
 
 class LayerOf:
-    """The layer of one start of a vehicle, put together from its stretches."""
+    """The layer of one start of a vehicle, put together from its stretches and their corrections."""
 
     def __init__(self, entry: RosterVehicle, grid: GridSpec) -> None:
         self._entry = entry
         self._grid = grid
         self._tiles = tiles(grid)
         self._layer = RiskLayer(grid)
+        self.corrections = Corrections(grid)
         self._curves: dict[int, Curve] = {}
         self._come: set[int] = set()
-        self._waiting: list[Stretch] = []
+        self._waiting: list[Stretch] = []  # for their curves
+        self._added: set[int] = set()
+        self._last = 0  # stretches 1 to this were added
+        self._ahead: list[Correction] = []  # of stretches that have not come
         self._version = 0
 
     def hear_curve(self, curve: Curve) -> list[Told]:
         """Takes a curve; returns the tiles that are others by the stretches that have waited for it."""
         self._curves[curve.track + 1] = curve
         waiting, self._waiting = self._waiting, []
-        return [tile for stretch in waiting for tile in self._add(stretch)]
+        return [tile for stretch in waiting for tile in self._add(stretch)] + self._catch_up()
 
     def hear(self, stretch: Stretch) -> list[Told]:
         """Takes a stretch; returns the tiles that are others now, under their names."""
         if stretch.number in self._come:
             return []
         self._come.add(stretch.number)
-        return self._add(stretch)
+        return self._add(stretch) + self._catch_up()
+
+    def correct(self, correction: Correction) -> list[Told]:
+        """Takes a correction; returns the tile that is another by it. It waits for the stretches that it corrects: so
+        who was started anew, and knows of the first of them no more, corrects nothing twice. Raises WireError for one
+        of no tile."""
+        if correction.after > self._last:
+            self._ahead = [*self._ahead[1 - MOST_AHEAD :], correction]
+            return []
+        tile = self.corrections.take(correction)
+        return [] if tile is None else [self._told(tile)]
+
+    def _catch_up(self) -> list[Told]:
+        while self._last + 1 in self._added:
+            self._last += 1
+        ahead, self._ahead = self._ahead, []
+        return [tile for correction in ahead for tile in self.correct(correction)]
+
+    def sums(self, tile: Tile) -> FloatArray:
+        """What its stretches have seen of a tile: the sum over looks in nats, of the tile's shape."""
+        return self._layer.sum_nats[tile.window]
 
     def _add(self, stretch: Stretch) -> list[Told]:
         if stretch.curve and stretch.curve not in self._curves:
             self._waiting.append(stretch)
             return []
+        self._added.add(stretch.number)
         curve, changed = p_expected(self._entry, self._curves.get(stretch.curve)), set[Tile]()
         range_m = np.arange(0.0, max(self._entry.far_m, float(curve.range_m[-1])) + 1.0)
         nats = -np.log1p(-np.clip(curve.at(range_m), 0.0, HIGHEST_P_DETECT))
@@ -213,7 +243,11 @@ class LayerOf:
 
     def _told(self, tile: Tile) -> Told:
         self._version += 1
-        sums, largest = self._layer.sum_levels[tile.window], self._layer.largest_levels[tile.window]
+        sums, largest = self.sums(tile), self._layer.largest_nats[tile.window]
+        seen = self.corrections.corrected(tile, sums)
+        # Of one look all that was seen is the largest; of several the largest has its share.
+        largest = np.where(sums > 0.0, largest / np.where(sums > 0.0, sums, 1.0) * seen, seen)
         settled = np.zeros(sums.shape, dtype=np.bool_)
-        told = CoverageTile(self._version, tile.first_row, tile.first_column, sums.copy(), largest.copy(), settled)
+        levels = to_levels(seen), to_levels(largest)
+        told = CoverageTile(self._version, tile.first_row, tile.first_column, *levels, settled)
         return Told(tile.name, told)

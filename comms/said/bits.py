@@ -5,6 +5,7 @@ The most significant bit of a number comes first.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import accumulate
 
 from comms.said.wire import WireError
@@ -31,6 +32,16 @@ class BitWriter:
             raise WireError(f"{value} is below 0")
         bits = (value + (1 << order)).bit_length()
         self.write(value + (1 << order), 2 * bits - 1 - order)
+
+    def write_counts(self, values: Iterable[int], order: int) -> None:
+        """The same of many numbers. Raises WireError where one is below 0."""
+        value, bits, beyond = 0, 0, 1 << order
+        for one in values:
+            if one < 0:
+                raise WireError(f"{one} is below 0")
+            size = 2 * (one + beyond).bit_length() - 1 - order
+            value, bits = value << size | one + beyond, bits + size
+        self.write(value, bits)
 
     def write_signed(self, value: int, order: int) -> None:
         """A number of either sign, as the exp-Golomb code of its place in 0, 1, -1, 2, -2 and so on."""
@@ -67,10 +78,24 @@ class BitReader:
 
     def read_count(self, order: int) -> int:
         """The number of an exp-Golomb code."""
-        zeros = 0
-        while not self.read(1):
-            zeros += 1
+        rest = self._value & (1 << self.left) - 1
+        zeros = self.left - rest.bit_length()
+        self.read(min(self.left + 1, zeros + 1))
         return (1 << zeros + order) + self.read(zeros + order) - (1 << order)
+
+    def read_counts(self, order: int, count: int) -> tuple[int, ...]:
+        """The numbers of so many exp-Golomb codes."""
+        left, beyond, found = self.left, 1 << order, []
+        rest = self._value & (1 << left) - 1
+        for _ in range(count):
+            size = 2 * (left - rest.bit_length()) + 1 + order
+            if size > left:
+                raise WireError(f"a number of {size} bits is to be read, {left} are left")
+            left -= size
+            found.append((rest >> left) - beyond)
+            rest &= (1 << left) - 1
+        self.left = left
+        return tuple(found)
 
     def read_signed(self, order: int) -> int:
         """The number of either sign that `write_signed` has written."""

@@ -111,6 +111,23 @@ class _Many(NamedTuple):
         return tuple(self.made(self.entry.get(reader, around, earlier)) for _ in range(count))
 
 
+class _Counts(NamedTuple):
+    """A tuple of numbers from 0: how many there may be, and each."""
+
+    note: Counted
+    most: int
+
+    def put(self, writer: BitWriter, value: tuple[int, ...], around: Around, said: Mapping[str, Any]) -> None:
+        writer.write_count(len(value), 3)
+        writer.write_counts(value, self.note.order(around))
+
+    def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> tuple[int, ...]:
+        count = reader.read_count(3)
+        if count > self.most:
+            raise WireError(f"{count} entries are more than {self.most}")
+        return reader.read_counts(self.note.order(around), count)
+
+
 _BY_KIND = {get_args(Probability)[1]: Share(), get_args(Count)[1]: Counted(), Flag(): OneOf((False, True))}
 
 
@@ -129,6 +146,8 @@ def _packed_by(hint: Any, notes: tuple[Any, ...], where: str) -> Any:
     for note in notes:
         if isinstance(note, AtMost):
             entry = get_args(get_args(hint)[0])[0]
+            if entry == Annotated[Count, Counted(0)]:
+                return _Counts(Counted(0), note.count)
             if isinstance(entry, type) and is_dataclass(entry):
                 return _Many(_packing_of(entry), note.count, _taken, partial(_made, entry))
             return _Many(_Packing({"": entry}, where), note.count, lambda one: {"": one}, lambda said: said[""])

@@ -176,7 +176,7 @@ def modem_configs(scenario: Scenario) -> dict[str, ModemConfig]:
             answer_ms=answer_within_ms_of(scenario),
             polls=times.polls,
             by_age=link.order == "age",
-            tells_tiles=link.maps == "tiles",
+            maps=link.maps,
         )
         for platform in times.platforms
     }

@@ -187,9 +187,11 @@ class Link(Mapping):
     """When modems fail."""
     order: Literal["worth", "age"] = "worth"
     """What is said first: what is worth most a bit, or, for comparison, what has waited longest."""
-    maps: Literal["stretches", "tiles"] = "stretches"
-    """How coverage crosses: as stretches of track, with what was seen there beside what P(y) lets expect, or, for
-    comparison, as tiles, cell by cell, the newest of each; not in frames of fewer than 128 bits."""
+    maps: Literal["stretches", "corrected", "tiles"] = "stretches"
+    """How coverage crosses: as stretches of track, with what was seen there beside what P(y) lets expect; as these and,
+    where there is room, corrections of what they tell, by blocks and then cell by cell, until the coordinator's map is
+    the vehicles' own; or, for comparison, as tiles, cell by cell, the newest of each. As stretches alone in frames of
+    fewer than 128 bits."""
     on_deck_s: Annotated[float, Field(ge=0, le=600)] = 1.0
     """For so long from the start all are still on deck, and what is said goes from hand to hand: the first plans
     and tasks are known when the vehicles are in the water. 0: modems carry all from the beginning."""

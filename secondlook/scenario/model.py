@@ -407,7 +407,7 @@ def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> N
         raise refused(
             f"a frame must have {least} bits or more with {len(platforms)} platforms", ("profile", "frame_bits")
         )
-    if link.maps == "tiles" and profile.frame_bits < SMALL_BITS:
+    if link.maps != "stretches" and profile.frame_bits < SMALL_BITS:
         raise refused(f"must be stretches with frames of fewer than {SMALL_BITS} bits", ("maps",))
     frame_s = profile.preamble_s + profile.frame_bits / profile.rate_bps
     if mission is not None and frame_s * len(platforms) > mission.time_limit_s:

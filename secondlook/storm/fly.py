@@ -65,7 +65,8 @@ def fly_storm(plan: TroublePlan, *, bus: Bus = "local", folder: Path | None = No
         with tempfile.TemporaryDirectory(prefix="secondlook-storm-") as passing:
             return fly_storm(plan, bus=bus, folder=Path(passing), record=record)
     began_s = time.perf_counter()
-    witness = Witness()
+    link = plan.scenario.link
+    witness = Witness(may_rise=link is not None and link.maps == "corrected")
     flight: Flight | None = None
     record = record or any(one.what == "disk_full" for one in plan.trouble)
     fleet = _StormyFleet.of_plan(plan, folder=folder, bus=bus, record=record, made=witness.made)

@@ -190,6 +190,8 @@ REASONS: Mapping[str, str] = MappingProxyType(
         "a helper's word that it has no strip is lost": " has no work, its word on it was lost",
         "a helper is done with a strip": " of it seen by ",
         "a helper says done, and the map says no": " says done, but saw ",
+        "a helper says done before its looks have come": " says so, its looks are to come",
+        "a helper has left a strip before its looks have come": "; its looks are to come",
         "a strip is no longer worth it": "no longer worth a second look, or part of another strip",
         "a strip is left when the mission is over": f"{LEFT}: ",
         "a strip is left that nobody has served": "nobody has served it",

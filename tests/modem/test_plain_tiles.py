@@ -54,7 +54,7 @@ def test_what_is_no_tile_of_the_grid_is_refused(tile: PlainTile, why: str) -> No
 
 
 def test_a_vehicles_newest_tile_reaches_the_coordinator() -> None:
-    waters, levels = Waters(tells_tiles=True), np.full((20, 20), 50, dtype=np.uint8)
+    waters, levels = Waters(maps="tiles"), np.full((20, 20), 50, dtype=np.uint8)
     for version, part in ((1, levels // 2), (2, levels)):
         tile = CoverageTile(version, 20, 40, part, part, np.zeros((20, 20), dtype=np.bool_))
         waters.say("alpha", "agent/alpha/coverage/1-2", tile)
@@ -67,4 +67,4 @@ def test_a_vehicles_newest_tile_reaches_the_coordinator() -> None:
 
 def test_small_frames_have_no_room_for_tiles() -> None:
     with pytest.raises(ValueError, match=r"link\.maps: tiles do not cross in frames of 34 bits"):
-        config_of("alpha", frame_bits=34, tells_tiles=True)
+        config_of("alpha", frame_bits=34, maps="tiles")

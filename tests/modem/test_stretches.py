@@ -7,44 +7,12 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from modems import RUN_INFO
+from along_a_track import CURVE, GRID, HELPER, LOOKS, P_DETECT, PRIMARY, gathered, layer, look
 
 from comms.said.messages import Curve, Look
-from modem.stretches import CHUNK_M, Gathering, LayerOf, Stretch, Told
+from modem.stretches import CHUNK_M, Gathering, LayerOf
 from planner.risk import NATS_PER_LEVEL
 from vehicle_agent.coverage import CoverageLayer
-
-GRID = RUN_INFO.grid.spec
-PRIMARY, HELPER = RUN_INFO.vehicles
-P_DETECT = np.where(np.arange(146) >= 40, 0.6 - np.arange(146) / 400, 0.0)
-CURVE = Curve(1, 1.0, P_DETECT, 100)
-
-
-def look(number: int, first_along_m: float, share: float = 1.0, maneuver: int = 1, valid: bool = True) -> Look:
-    """20 m of a track north along x 200."""
-    p_detect = np.broadcast_to(P_DETECT * share, (2, 20, 146)).copy()
-    p_detect[0] *= 0.5  # less to port
-    return Look(number, maneuver, 200.0, 0.0, 0.0, first_along_m, 1.0, 1.0, p_detect, 5.0, 0.0, valid, ())
-
-
-def gathered(looks: list[Look], curve: Curve | None = CURVE) -> list[Stretch]:
-    gathering = Gathering(PRIMARY)
-    if curve is not None:
-        assert gathering.hear_curve(curve) is None
-    found = [gathering.add(one) for one in looks] + [gathering.flush()]
-    return [one for one in found if one is not None]
-
-
-def layer(told: list[Told]) -> np.ndarray:
-    """Sums in levels, of the newest version of each tile."""
-    sums = np.zeros(GRID.shape)
-    for _, tile in sorted(told, key=lambda one: one.tile.version):
-        rows, columns = tile.sum_levels.shape
-        sums[tile.first_row : tile.first_row + rows, tile.first_column : tile.first_column + columns] = tile.sum_levels
-    return sums
-
-
-LOOKS = [look(number, 20.0 * number) for number in range(20)]
 
 
 def test_looks_along_a_track_are_one_stretch_of_four_chunks_at_most() -> None:
@@ -119,3 +87,15 @@ def test_of_a_sonar_that_was_announced_what_it_sees_is_flat_between_its_ranges()
     cells = told[: round(CHUNK_M / 5), 35:46]  # centres 25 m to port to 25 m to starboard
     assert set(np.unique(cells)) == {round(-math.log(0.3) / NATS_PER_LEVEL)}
     assert told.sum() == cells.sum()
+
+
+def test_each_start_of_a_modem_numbers_its_stretches_by_itself() -> None:
+    before, anew = Gathering(PRIMARY), Gathering(PRIMARY, start=2)
+    numbers = set[int]()
+    for gathering in (before, anew):
+        for one in LOOKS[:3]:
+            gathering.add(one)
+            ended = gathering.flush()
+            assert ended is not None
+            numbers.add(ended.number)
+    assert len(numbers) == 6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 from fleets import ROSTER, with_modems
 
@@ -46,7 +46,7 @@ def config_of(
     deck_ms: int = 0,
     answer_ms: int = 10**9,
     by_age: bool = False,
-    tells_tiles: bool = False,
+    maps: Literal["stretches", "corrected", "tiles"] = "stretches",
 ) -> ModemConfig:
     """A modem's configuration in a fleet of alpha and beta with a ship."""
     return ModemConfig(
@@ -63,7 +63,7 @@ def config_of(
         deck_ms,
         answer_ms,
         by_age,
-        tells_tiles,
+        maps,
     )
 
 

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from flights import BRIEF
 
@@ -14,6 +15,7 @@ from comms.lockstep.drive import Lockstep
 from comms.lockstep.faults import CutOff, Faults
 from secondlook.launch.mission import Bus, RunOptions, run_mission
 from secondlook.scenario import load_scenario
+from secondlook.testing import Fleet
 
 
 def fly(
@@ -52,13 +54,18 @@ def test_second_looks_are_had_by_any_modem(tmp_path: Path, profile: str, platfor
 
 
 @pytest.mark.parametrize(
-    ("profile", "access", "processes"),
-    [("micromodem-6", "slots", None), ("janus", "slots", 2), ("micromodem-6", "polled", 2)],
+    ("profile", "access", "maps", "processes"),
+    [
+        ("micromodem-6", "slots", "stretches", None),
+        ("micromodem-6", "slots", "corrected", 2),
+        ("janus", "slots", "stretches", 2),
+        ("micromodem-6", "polled", "stretches", 2),
+    ],
 )
 def test_it_is_one_mission_on_either_bus_in_any_number_of_processes(
-    tmp_path: Path, profile: str, access: str, processes: int | None
+    tmp_path: Path, profile: str, access: str, maps: str, processes: int | None
 ) -> None:
-    settings = (f"link.profile={profile}", f"link.access={access}", "link.loss=0.2")
+    settings = (f"link.profile={profile}", f"link.access={access}", f"link.maps={maps}", "link.loss=0.2")
     local = fly(tmp_path / "local", *settings)
     zenoh = fly(tmp_path / "zenoh", *settings, bus="zenoh", processes=processes)
     assert zenoh["digest"] == local["digest"]
@@ -89,3 +96,16 @@ def test_an_outage_makes_what_is_known_old_and_ends(tmp_path: Path) -> None:
     )
     assert out["link"]["age"]["helper"]["largest_s"] >= 60 > calm["link"]["age"]["helper"]["largest_s"]
     assert out["hotspots"]["revisited"] > 0
+
+
+def test_corrected_the_coordinators_map_is_nearer_to_the_vehicles_own(tmp_path: Path) -> None:
+    off = []
+    for maps in ("stretches", "corrected"):
+        overrides = {"link.profile": "radio", "link.maps": maps, "mission.deadline_factor": 3}
+        flight = Fleet(BRIEF, folder=tmp_path / maps, overrides=overrides).run()
+        assert flight.inside is not None
+        known, seen = flight.inside.fleet_map("coordinator"), flight.risk_map
+        assert known is not None
+        assert seen is not None
+        off.append(float(np.abs(known.risk - seen.risk).mean()))
+    assert off[1] < 0.7 * off[0]

@@ -167,6 +167,10 @@ ROWS = {
     "it accepts and does not get there": ("a helper does not serve a strip in time", "a task: give_back"),
     "it fails at, gives back unasked": ("a helper is given up: it does not serve what it accepts",),
     "it says done, but has not covered": ("a helper says done, and the map says no",),
+    "over a link: it says done, and its looks": (
+        "a helper says done before its looks have come",
+        "a helper has left a strip before its looks have come",
+    ),
     "it vanishes": ("a helper that has a strip is lost",),
     "it comes back": ("a helper is at a strip after all", "two starts of a vehicle tell of one tile"),
     "its battery does not last": ("a helper refuses: its battery is too low",),
