@@ -246,7 +246,8 @@ class LayerOf:
         sums, largest = self.sums(tile), self._layer.largest_nats[tile.window]
         seen = self.corrections.corrected(tile, sums)
         # Of one look all that was seen is the largest; of several the largest has its share.
-        largest = np.where(sums > 0.0, largest / np.where(sums > 0.0, sums, 1.0) * seen, seen)
+        corrected = np.where(sums > 0.0, largest / np.where(sums > 0.0, sums, 1.0) * seen, seen)
+        largest = np.where(seen == sums, largest, corrected)
         settled = np.zeros(sums.shape, dtype=np.bool_)
         levels = to_levels(seen), to_levels(largest)
         told = CoverageTile(self._version, tile.first_row, tile.first_column, *levels, settled)
