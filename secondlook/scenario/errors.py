@@ -7,12 +7,37 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from pydantic_core import ErrorDetails
+
 from secondlook.errors import UserError
 
 KeyPath = tuple[str | int, ...]
 """Where a value lies in a scenario: keys, and places in lists counted from 0."""
 
 _LONGEST_VALUE = 60
+_ALLOWED = {
+    "bool_type": "must be true or false",
+    "dict_type": "must be a mapping",
+    "finite_number": "must be a finite number",
+    "float_type": "must be a number",
+    "greater_than": "must be greater than {gt:g}",
+    "greater_than_equal": "must be at least {ge:.12g}",
+    "int_type": "must be a whole number",
+    "less_than": "must be less than {lt:g}",
+    "less_than_equal": "must be at most {le:.12g}",
+    "literal_error": "must be {expected}",
+    "model_attributes_type": "must be a mapping",
+    "model_type": "must be a mapping",
+    "refused": "{allowed}",
+    "string_pattern_mismatch": "must consist of a-z, 0-9, _ and -",
+    "string_too_long": "must have at most {max_length} characters",
+    "string_type": "must be a text",
+    "string_unicode": "must be a text of whole characters",
+    "too_long": "must have at most {max_length} entries",
+    "too_short": "must have at least {min_length} entries",
+    "tuple_type": "must be a list",
+    "union_tag_invalid": "must be {expected_tags}",
+}
 
 
 @dataclass(frozen=True)
@@ -55,6 +80,19 @@ def shown(value: object) -> str:
     """A value as the user would write it in a scenario, cut where it is long."""
     text = "nothing" if value is None else json.dumps(value, ensure_ascii=False)
     return text if len(text) <= _LONGEST_VALUE else text[: _LONGEST_VALUE - 3] + "..."
+
+
+def allowed(error: ErrorDetails) -> str:
+    """What is allowed in place of what pydantic found wrong, in words that begin with `must`."""
+    sentence = _ALLOWED.get(error["type"])
+    if sentence is None:
+        return error["msg"][0].lower() + error["msg"][1:]
+    words = {key: _listed(value) if isinstance(value, str) else value for key, value in error.get("ctx", {}).items()}
+    return sentence.format(**words)
+
+
+def _listed(choices: str) -> str:
+    return choices.replace("', '", " or ").replace("'", "") if choices.startswith("'") else choices
 
 
 def _on_one_line(text: str) -> str:

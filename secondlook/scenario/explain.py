@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from secondlook.scenario.degrees import IN_DEGREES
-from secondlook.scenario.errors import KeyPath, Place, Problem, dotted, shown
+from secondlook.scenario.errors import KeyPath, Place, Problem, allowed, dotted, shown
 from secondlook.scenario.model import PatchySeabed, UniformSeabed
 from secondlook.scenario.sensor import SENSORS
 from secondlook.scenario.text import Value
@@ -31,30 +31,6 @@ _FOLLOWS = "default_factory_not_called"
 _FULLER: dict[type[BaseModel] | None, tuple[type[BaseModel] | None, str]] = {
     RevisitVehicle: (SurveyVehicle, "a survey vehicle"),
     UniformSeabed: (PatchySeabed, "a patchy seabed"),
-}
-
-_ALLOWED = {
-    "bool_type": "must be true or false",
-    "dict_type": "must be a mapping",
-    "finite_number": "must be a finite number",
-    "float_type": "must be a number",
-    "greater_than": "must be greater than {gt:g}",
-    "greater_than_equal": "must be at least {ge:.12g}",
-    "int_type": "must be a whole number",
-    "less_than": "must be less than {lt:g}",
-    "less_than_equal": "must be at most {le:.12g}",
-    "literal_error": "must be {expected}",
-    "model_attributes_type": "must be a mapping",
-    "model_type": "must be a mapping",
-    "refused": "{allowed}",
-    "string_pattern_mismatch": "must consist of a-z, 0-9, _ and -",
-    "string_too_long": "must have at most {max_length} characters",
-    "string_type": "must be a text",
-    "string_unicode": "must be a text of whole characters",
-    "too_long": "must have at most {max_length} entries",
-    "too_short": "must have at least {min_length} entries",
-    "tuple_type": "must be a list",
-    "union_tag_invalid": "must be {expected_tags}",
 }
 
 
@@ -126,9 +102,9 @@ def _problem(
         # Pydantic counts the good entries alone; the bad ones are told of by themselves.
         return None
     elif _KEY_MARK in error["loc"]:
-        value, what = path[-1], _allowed(error)
+        value, what = path[-1], allowed(error)
     else:
-        what = _allowed(error)
+        what = allowed(error)
     if made_from is not None:
         path, value = made_from
     if not path:  # of the whole file
@@ -154,18 +130,6 @@ def _locate(location: Iterable[str | int], data: dict[str, Value], tags: frozens
 
 def _has(value: Any, step: str | int) -> bool:
     return step in value if isinstance(value, dict) else isinstance(value, list) and step in range(len(value))
-
-
-def _allowed(error: ErrorDetails) -> str:
-    sentence = _ALLOWED.get(error["type"])
-    if sentence is None:
-        return error["msg"][0].lower() + error["msg"][1:]
-    words = {key: _listed(value) if isinstance(value, str) else value for key, value in error.get("ctx", {}).items()}
-    return sentence.format(**words)
-
-
-def _listed(choices: str) -> str:
-    return choices.replace("', '", " or ").replace("'", "") if choices.startswith("'") else choices
 
 
 def _unknown_key(key: str, taken_for: type[BaseModel] | None) -> str:

@@ -10,7 +10,7 @@ from comms.errors import NO_FAILURES, in_words
 from comms.said.messages import MOST_FRAMES
 from comms.said.wire import LONGEST_FRAME
 from secondlook.scenario import bundled
-from secondlook.scenario.errors import dotted
+from secondlook.scenario.errors import allowed, dotted, shown
 from secondlook.scenario.plug_ins import PROFILE, PlugInError
 from secondlook.scenario.values import Coordinate, Mapping, Share, check_as_many, check_ascending, refused
 
@@ -148,7 +148,8 @@ def _made(text: str) -> object:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         where = dotted(tuple(first["loc"])) or "it"
-        raise refused(f"must make a profile's keys; {where}: {first['msg']}") from error
+        told = f"{where}: {shown(first['input'])} is not allowed; {allowed(first)}"
+        raise refused(f"must make a profile's keys; {told}") from error
     except NO_FAILURES:
         raise
     except BaseException as error:
