@@ -299,6 +299,7 @@ class StripLife:
                 self._sectors.cut_by(now_ms, [other.window])
             elif self._may_be_done(other, vehicle):
                 self._await_looks(other, now_ms, f"left by {name}, which is at strip {number}; its looks are to come")
+                self._sectors.cut_by(now_ms, [other.window])
             else:
                 self._move(other, StripState.OPEN, now_ms, f"{name} is at strip {number}")
                 self._sectors.assign_by(now_ms, other.window)
@@ -346,7 +347,6 @@ class StripLife:
     def _await_looks(self, record: StripRecord, now_ms: int, reason: str) -> None:
         self._looks_due_ms[record.strip.number] = now_ms + self._looks_within_ms
         self._move(record, StripState.DONE, now_ms, reason, record.vehicle)
-        self._sectors.cut_by(now_ms, [record.window])
 
     def _await_no_more(self, record: StripRecord, now_ms: int) -> None:
         """What a vehicle was taken to have seen of a strip it has not: that is cut anew."""

@@ -11,6 +11,8 @@ MOST_PLATFORMS = 64
 SMALL_BITS, TINY_BITS = 128, 64
 """Frames with fewer hold acknowledgements or a single piece of a message, whose words are short; in those with fewer
 than the second the tag is, too, and nothing tells of turns."""
+SECOND_BITS = 12
+"""By which a message tells its second, where words are not to be short."""
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
 LARGEST_LEAST_BITS = 256
@@ -80,9 +82,9 @@ class ModemConfig:
     north-east corner of the box in which all places lie that are told. `polls`: where the coordinator's platform polls
     the others, instead of slots. `deck_ms`: before this all are on deck, and what is said goes from hand to hand at
     once, not through the water. `answer_ms`: for so long the coordinator waits for the answer to an offer, which is not
-    said any more then. `by_age`: what has waited longest is said first, whatever it is worth. `maps`: how
-    coverage crosses, as stretches, with corrections of what these tell where there is room, or as tiles; as the first
-    alone in small frames.
+    said any more then. `by_age`: what has waited longest is said first, whatever it is worth. `maps`: how coverage
+    crosses, as stretches, with corrections of what these tell where there is room, or as tiles; as the first alone in
+    small frames.
 
     Raises ValueError where these do not go together.
     """

@@ -2,7 +2,7 @@
 
 Stretches tell of 100 m at a time. Where a packet has room left the vehicle's modem tells, of the tile that is farthest
 off, by how much each block of 4 x 4 cells is, and where all blocks are right the same of single cells, a quarter of a
-tile at a time: coarse before fine, what is most wrong first (`modem.finer`). A correction tells how far the sum of
+tile at a time: coarse before fine, what is most wrong first (`modem.correcting`). A correction tells how far the sum of
 looks is off from that of all stretches until then. It is added to that sum, and the newest counts: what has come makes
 the same map in whatever order and however often it came, any part of it is a map, and all of it is the vehicle's own.
 """
@@ -67,16 +67,24 @@ class Corrections:
         all_tiles = tiles(self.grid)
         if correction.tile >= len(all_tiles) or correction.part > QUARTERS:
             raise WireError(f"the grid has no tile {correction.tile}, or that no part {correction.part}")
-        tile, news = all_tiles[correction.tile], False
+        tile, is_news = all_tiles[correction.tile], False
         steps = np.array([unfolded(one) for one in correction.off])
-        off = np.clip(steps, -MOST_STEPS, MOST_STEPS) * STEP_NATS
-        for quarter, rows in enumerate(quarters(tile), 1):
-            if correction.part in (0, quarter):
-                shape = shape_of(tile) if correction.part == 0 else (rows.stop - rows.start, shape_of(tile)[1])
-                off_nats = over_cells(off, shape)[rows] if correction.part == 0 else _as(off, shape)
-                if (tile, quarter) not in self._known or correction.order > self.order(tile, quarter):
-                    self._known[tile, quarter], news = (correction.order, off_nats), True
-        return tile if news else None
+        off, shape = np.clip(steps, -MOST_STEPS, MOST_STEPS) * STEP_NATS, shape_of(tile)
+        rows_of = dict(enumerate(quarters(tile), 1))
+        if correction.part == 0:
+            cells = over_cells(off, shape)
+            told = {quarter: cells[rows] for quarter, rows in rows_of.items()}
+        else:
+            rows = rows_of[correction.part]
+            told = {correction.part: _as(off, (rows.stop - rows.start, shape[1]))}
+        for quarter, off_nats in told.items():
+            if correction.order > self.order(tile, quarter):
+                self._known[tile, quarter], is_news = (correction.order, off_nats), True
+        return tile if is_news else None
+
+    def knows(self, tile: Tile) -> bool:
+        """Whether anything of a tile is corrected."""
+        return any((tile, quarter) in self._known for quarter in range(1, QUARTERS + 1))
 
     def order(self, tile: Tile, quarter: int) -> Order:
         """Of what is known of a quarter, 1 to 4, of a tile; below all others where that is nothing."""

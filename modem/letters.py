@@ -34,7 +34,7 @@ from comms.said.topics import (
     number_of,
 )
 from comms.said.wire import WireError
-from modem.config import ModemConfig
+from modem.config import SECOND_BITS, ModemConfig
 from modem.corrections import Correction
 from modem.plain_tiles import PlainTile
 from modem.stretches import Stretch
@@ -45,7 +45,6 @@ KIND_BITS = (len(CROSSING) - 1).bit_length()
 BY_COORDINATOR = (TASK, MISSION_OVER)
 BY_VEHICLES: tuple[Topic | None, ...] = (TASK_STATUS, STATE, None, CURVE, PLAN, HOTSPOT)
 """In short words, with what is said often first."""
-SECOND_BITS = 12
 MOST_A_SECOND = 64
 """Messages of a sender that are told apart within a second."""
 COORDINATOR = "coordinator"

@@ -36,8 +36,8 @@ from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, Crossing, 
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
+from modem.correcting import Correcting
 from modem.corrections import Correction
-from modem.finer import Finer
 from modem.frames import FrameForm, start_number
 from modem.layers import Layers
 from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
@@ -88,7 +88,7 @@ class Modem:
         self._form: FrameForm | None = None  # this and what follows: since the run's announcement
         self._run: RunInfo | None = None
         self._gathering: Gathering | None = None
-        self._finer: Finer | None = None
+        self._correcting: Correcting | None = None
         self._looked_ms = 0
         self._heard: list[Publication] = []
         self._on_deck: list[bytes] = []
@@ -142,10 +142,7 @@ class Modem:
         if self._form is not None and self._turns.is_now(now_ms) and self._has_nobody(now_ms):
             self._turns.has_spoken(now_ms, 0)
         elif self._form is not None and self._turns.is_now(now_ms):
-            if (
-                self._gathering is not None
-                and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room
-            ):
+            if self._gathering is not None and self._has_room():
                 self._say_stretch(self._gathering.flush(), now_ms)
                 self._say_corrections(now_ms)
             silent_ms = self.config.cycle_ms * SILENT_CYCLES
@@ -182,7 +179,7 @@ class Modem:
         if entry is not None and not self.config.is_hub and not self.config.tells_tiles:
             self._gathering = Gathering(entry, self._start)
             # Who was started anew does not know what of its map is told.
-            self._finer = None if self._start or not self.config.corrects else Finer(entry, run.grid.spec)
+            self._correcting = None if self._start or not self.config.corrects else Correcting(entry, run.grid.spec)
 
     def _receive_anew(self, other: str) -> None:
         """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is
@@ -196,13 +193,12 @@ class Modem:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
         topic, message = received.topic, received.message
         is_hub = self.config.is_hub
+        if received.header.incarnation != self._incarnation:
+            self._correcting = None  # its vehicle's map begins anew
         if isinstance(message, CoverageTile) and self.config.tells_tiles and not is_hub:
             self._enqueue_of_map(plain(message, self._grid), received.header, now_ms, received.key)
-        elif isinstance(message, CoverageTile) and self._finer is not None:
-            if received.header.incarnation == self._incarnation:
-                self._finer.hear_tile(message, now_ms)
-            else:
-                self._finer = None  # its map begins anew
+        elif isinstance(message, CoverageTile) and self._correcting is not None:
+            self._correcting.hear_tile(message, now_ms)
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
         if topic.crossing.is_fine and self.config.is_small:
@@ -211,8 +207,6 @@ class Modem:
             self._say_stretch(self._gathering.hear_curve(message), now_ms)
             self._note_said(message, now_ms)
         if not is_hub:
-            if received.header.incarnation != self._incarnation:
-                self._finer = None
             self._incarnation = received.header.incarnation
             self._state_ms = now_ms if isinstance(message, AgentState) else self._state_ms
         if not is_hub and not self._is_news(received, now_ms):
@@ -281,21 +275,20 @@ class Modem:
 
     def _note_said(self, piece: Curve | Stretch, now_ms: int) -> None:
         """What is told of its map, as rounded as it crosses."""
-        if self._finer is not None:
+        if self._correcting is not None:
             try:
                 crossing = self._letters.as_it_crosses(piece, now_ms)
             except WireError:
                 return  # nor will it be said
             if isinstance(crossing, Stretch):
-                self._finer.hear_stretch(crossing, self._looked_ms)
+                self._correcting.hear_stretch(crossing, self._looked_ms)
             else:
-                self._finer.hear_curve(crossing)
+                self._correcting.hear_curve(crossing)
 
     def _say_corrections(self, now_ms: int) -> None:
         """What of its map is wrong at the coordinator's, as far as there is room."""
-        assert self._form is not None
-        while self._finer is not None and self._bits_to_say() + STRETCH_BITS <= self.config.frames * self._form.room:
-            correction = self._finer.next(now_ms)
+        while self._correcting is not None and self._has_room():
+            correction = self._correcting.next(now_ms)
             if correction is None:
                 break
             self._enqueue_of_map(correction, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
@@ -466,6 +459,10 @@ class Modem:
         is_owed = any(one.owes for one in self._receiving.values())
         is_quiet = not len(self._queue) and all(one.is_quiet for one in self._sending.values())
         return self._is_alive or is_owed or not is_quiet
+
+    def _has_room(self) -> bool:
+        """Whether a packet has room for a stretch beside all that waits."""
+        return self._bits_to_say() + STRETCH_BITS <= self.config.frames * self.config.room
 
     def _bits_to_say(self) -> int:
         """Bits of what waits, but for what is about it."""

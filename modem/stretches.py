@@ -243,12 +243,15 @@ class LayerOf:
 
     def _told(self, tile: Tile) -> Told:
         self._version += 1
-        sums, largest = self.sums(tile), self._layer.largest_nats[tile.window]
-        seen = self.corrections.corrected(tile, sums)
-        # Of one look all that was seen is the largest; of several the largest has its share.
-        corrected = np.where(sums > 0.0, largest / np.where(sums > 0.0, sums, 1.0) * seen, seen)
-        largest = np.where(seen == sums, largest, corrected)
-        settled = np.zeros(sums.shape, dtype=np.bool_)
-        levels = to_levels(seen), to_levels(largest)
+        sum_levels, largest_levels = self._layer.sum_levels[tile.window], self._layer.largest_levels[tile.window]
+        if self.corrections.knows(tile):
+            sums, largest = self.sums(tile), self._layer.largest_nats[tile.window]
+            seen = self.corrections.corrected(tile, sums)
+            # Of one look all that was seen is the largest; of several the largest has its share.
+            share = np.where(sums > 0.0, largest / np.where(sums > 0.0, sums, 1.0), 1.0)
+            sum_levels = to_levels(seen)
+            largest_levels = to_levels(np.where(seen == sums, largest, share * seen))
+        settled = np.zeros(sum_levels.shape, dtype=np.bool_)
+        levels = sum_levels.copy(), largest_levels.copy()
         told = CoverageTile(self._version, tile.first_row, tile.first_column, *levels, settled)
         return Told(tile.name, told)

@@ -28,10 +28,7 @@ class BitWriter:
     def write_count(self, value: int, order: int) -> None:
         """A number from 0 without a bound, as an exp-Golomb code: `order` + 1 bits below 2^order, two more for the
         2^(order + 1) numbers after these, and so on. Raises WireError where it is below 0."""
-        if value < 0:
-            raise WireError(f"{value} is below 0")
-        bits = (value + (1 << order)).bit_length()
-        self.write(value + (1 << order), 2 * bits - 1 - order)
+        self.write_counts((value,), order)
 
     def write_counts(self, values: Iterable[int], order: int) -> None:
         """The same of many numbers. Raises WireError where one is below 0."""
@@ -78,10 +75,7 @@ class BitReader:
 
     def read_count(self, order: int) -> int:
         """The number of an exp-Golomb code."""
-        rest = self._value & (1 << self.left) - 1
-        zeros = self.left - rest.bit_length()
-        self.read(min(self.left + 1, zeros + 1))
-        return (1 << zeros + order) + self.read(zeros + order) - (1 << order)
+        return self.read_counts(order, 1)[0]
 
     def read_counts(self, order: int, count: int) -> tuple[int, ...]:
         """The numbers of so many exp-Golomb codes."""
@@ -90,7 +84,7 @@ class BitReader:
         for _ in range(count):
             size = 2 * (left - rest.bit_length()) + 1 + order
             if size > left:
-                raise WireError(f"a number of {size} bits is to be read, {left} are left")
+                raise WireError(f"{size} bits are to be read, {left} are left")
             left -= size
             found.append((rest >> left) - beyond)
             rest &= (1 << left) - 1

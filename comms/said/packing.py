@@ -104,9 +104,7 @@ class _Many(NamedTuple):
             self.entry.put(writer, self.taken(one), around, earlier)
 
     def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> tuple[Any, ...]:
-        count = reader.read_count(3)
-        if count > self.most:
-            raise WireError(f"{count} entries are more than {self.most}")
+        count = _how_many(reader, self.most)
         earlier: list[dict[str, int]] = []
         return tuple(self.made(self.entry.get(reader, around, earlier)) for _ in range(count))
 
@@ -122,12 +120,17 @@ class _Counts(NamedTuple):
         writer.write_counts(value, self.note.order(around))
 
     def get(self, reader: BitReader, around: Around, said: Mapping[str, Any]) -> tuple[int, ...]:
-        count = reader.read_count(3)
-        if count > self.most:
-            raise WireError(f"{count} entries are more than {self.most}")
-        return reader.read_counts(self.note.order(around), count)
+        return reader.read_counts(self.note.order(around), _how_many(reader, self.most))
 
 
+def _how_many(reader: BitReader, most: int) -> int:
+    count = reader.read_count(3)
+    if count > most:
+        raise WireError(f"{count} entries are more than {most}")
+    return count
+
+
+_SMALL_COUNT = Counted(0)
 _BY_KIND = {get_args(Probability)[1]: Share(), get_args(Count)[1]: Counted(), Flag(): OneOf((False, True))}
 
 
@@ -146,8 +149,8 @@ def _packed_by(hint: Any, notes: tuple[Any, ...], where: str) -> Any:
     for note in notes:
         if isinstance(note, AtMost):
             entry = get_args(get_args(hint)[0])[0]
-            if entry == Annotated[Count, Counted(0)]:
-                return _Counts(Counted(0), note.count)
+            if entry == Annotated[Count, _SMALL_COUNT]:
+                return _Counts(_SMALL_COUNT, note.count)
             if isinstance(entry, type) and is_dataclass(entry):
                 return _Many(_packing_of(entry), note.count, _taken, partial(_made, entry))
             return _Many(_Packing({"": entry}, where), note.count, lambda one: {"": one}, lambda said: said[""])

@@ -13,8 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from comms.said.routing import driver_of, modem_of
-from modem.config import MOST_PLATFORMS, SMALL_BITS, least_frame_bits
-from modem.letters import SECOND_BITS
+from modem.config import MOST_PLATFORMS, SECOND_BITS, SMALL_BITS, least_frame_bits
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin

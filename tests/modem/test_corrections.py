@@ -18,8 +18,8 @@ from comms.said.messages import CoverageTile, Look, Mode
 from comms.said.over_water import Around
 from comms.said.packing import get_message, put_message
 from comms.said.wire import WireError
+from modem.correcting import Correcting
 from modem.corrections import STEP_NATS, Correction, Corrections, correction_of
-from modem.finer import Finer
 from modem.stretches import LayerOf, Stretch, Told
 from planner.risk import MOST_LEVELS, NATS_PER_LEVEL, to_levels
 from planner.tiles import tiles
@@ -55,14 +55,14 @@ def patchy(share: float = 0.5) -> np.ndarray:
 
 def all_corrections(seen: np.ndarray) -> list[Correction]:
     """All that a modem tells where there is always room."""
-    finer = Finer(PRIMARY, GRID)
-    finer.hear_curve(CURVE)
+    correcting = Correcting(PRIMARY, GRID)
+    correcting.hear_curve(CURVE)
     for stretch in STRETCHES:
-        finer.hear_stretch(stretch, 1000)
+        correcting.hear_stretch(stretch, 1000)
     for tile in own_tiles(seen):
-        finer.hear_tile(tile, 2000)
+        correcting.hear_tile(tile, 2000)
     found = []
-    while (one := finer.next(700_000)) is not None:
+    while (one := correcting.next(700_000)) is not None:
         found.append(one)
         assert len(found) < 200
     return found
@@ -108,16 +108,16 @@ class TestWhatIsToldFirst:
         assert (told_by([*STRETCHES, *all_corrections(seen)])[2, 50]) >= (MOST_LEVELS - 3) * NATS_PER_LEVEL
 
     def test_what_was_looked_at_since_its_agent_has_told_of_it_waits(self) -> None:
-        finer = Finer(PRIMARY, GRID)
-        finer.hear_curve(CURVE)
+        correcting = Correcting(PRIMARY, GRID)
+        correcting.hear_curve(CURVE)
         for tile in own_tiles(patchy()):
-            finer.hear_tile(tile, 2000)
+            correcting.hear_tile(tile, 2000)
         for stretch in STRETCHES:
-            finer.hear_stretch(stretch, 2500)
-        assert finer.next(700_000) is None
+            correcting.hear_stretch(stretch, 2500)
+        assert correcting.next(700_000) is None
         for tile in own_tiles(patchy()):
-            finer.hear_tile(tile, 3000)
-        assert finer.next(700_000) is not None
+            correcting.hear_tile(tile, 3000)
+        assert correcting.next(700_000) is not None
 
 
 class TestInWhateverOrder:

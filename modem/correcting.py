@@ -16,7 +16,7 @@ FINE_AFTER_MS = 120_000
 """Cell by cell a tile is told when it was not looked at for so long: the next look there would make it another."""
 
 
-class Finer:
+class Correcting:
     """Compares a vehicle's map with what the coordinator's modem makes of all that was said of it. `entry`: the vehicle
     as it was announced."""
 
