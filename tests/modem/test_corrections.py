@@ -4,6 +4,7 @@ and all of it makes the vehicle's own."""
 from __future__ import annotations
 
 import random
+from functools import partial
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from comms.said.messages import CoverageTile, Look, Mode
 from comms.said.over_water import Around
 from comms.said.packing import get_message, put_message
 from comms.said.wire import WireError
-from modem.correcting import Correcting
+from modem.correcting import FINE_AFTER_MS, Correcting
 from modem.corrections import STEP_NATS, Correction, Corrections, correction_of
 from modem.stretches import LayerOf, Stretch, Told
 from planner.risk import MOST_LEVELS, NATS_PER_LEVEL, to_levels
@@ -106,6 +107,18 @@ class TestWhatIsToldFirst:
         seen = by_stretches()
         seen[2, 50] = MOST_LEVELS * NATS_PER_LEVEL
         assert (told_by([*STRETCHES, *all_corrections(seen)])[2, 50]) >= (MOST_LEVELS - 3) * NATS_PER_LEVEL
+
+    def test_cell_by_cell_it_is_told_when_nobody_has_looked_there_for_a_while(self) -> None:
+        correcting = Correcting(PRIMARY, GRID)
+        correcting.hear_curve(CURVE)
+        for stretch in STRETCHES:
+            correcting.hear_stretch(stretch, 1000)
+        for tile in own_tiles(patchy()):
+            correcting.hear_tile(tile, 2000)
+        soon = list(iter(partial(correcting.next, 1000 + FINE_AFTER_MS - 1), None))
+        later = list(iter(partial(correcting.next, 1000 + FINE_AFTER_MS), None))
+        assert {one.part for one in soon} == {0}
+        assert {one.part for one in later} >= {1, 2, 3, 4}
 
     def test_what_was_looked_at_since_its_agent_has_told_of_it_waits(self) -> None:
         correcting = Correcting(PRIMARY, GRID)
