@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
-from zones import assert_keeps_radius, assert_stays_out, kept_out, places
+from zones import MARGIN_M, assert_keeps_radius, assert_stays_out, kept_out, places
 
 from planner.dubins import Pose, shortest_path
 from planner.keep_out import NOWHERE, KeepOut
@@ -112,6 +112,7 @@ class TestNoWay:
 @settings(max_examples=150)
 @given(kept_out, places, places, st.sampled_from((6.0, 15.0, 30.0)))
 @example(SQUARE, Pose(-51, 0, NORTH), Pose(51, 0, NORTH), 6.0)
+@example(KeepOut((((15.0, 11.0), (-7.5, 23.99), (-7.5, -1.99)),), MARGIN_M), Pose(0, 0, 5e-324), Pose(0, 0, 0), 6.0)
 def test_every_way_stays_out_keeps_the_radius_and_arrives(
     keep_out: KeepOut, start: Pose, end: Pose, radius_m: float
 ) -> None:
