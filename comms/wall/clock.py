@@ -76,6 +76,7 @@ class MissionTime:
 WRAP_UP_S = 0.5  # wall time in which the fleet's last words are said after the mission is over
 LAST_WORD_WITHIN_S = 8.0
 HERE_S = 3.0  # a host that was heard so lately is there
+COMES_BACK_S = 8.0  # so long a process that has died may take to be there again, or one to find a clock started anew
 
 
 class Phase(enum.Enum):
@@ -96,6 +97,7 @@ FINISHED_ACTING = (Phase.ENDING, *FINISHED_LISTENING)
 class _Host:
     instance: str = ""
     heard_s: float = -HERE_S
+    awaited_until_s: float = -math.inf
     ready: bool = False
     remembers_ms: int = 0
     last_word: LastWord | None = None
@@ -164,12 +166,13 @@ class WallClock:
         else:
             self._greet(host, known, hello, now_s)
 
-    def gone(self, host: str, instance: str) -> None:
+    def gone(self, host: str, instance: str, now_s: float) -> None:
         """The connection of a process is gone; one that takes no part is not missed. At the end it is waited for a
         while as if it were there: it may be started again."""
         known = self._hosts.get(host)
         if known is not None and known.instance == instance and known.last_word is None:
             known.instance, known.ready = "", False
+            known.awaited_until_s = now_s + COMES_BACK_S
             self.notices.append(f"{host} is gone")
 
     @property
@@ -244,6 +247,8 @@ class WallClock:
             self.taken_up = True
             self.time.hear(hello.now_ms, self.factor, now_s)
             self._run(f"the mission is under way, at {hello.now_ms / 1000:.0f} s")
+            for one in self._hosts.values():  # the others find this clock sooner or later, even if the mission is over
+                one.awaited_until_s = now_s + COMES_BACK_S
         if known.last_word is None and self.phase in (FINISHED_LISTENING if self._listens[host] else FINISHED_ACTING):
             self.words.append((host, pack_finish(self._result)))
 
@@ -264,7 +269,7 @@ class WallClock:
         return [
             host
             for host, known in self._hosts.items()
-            if self._listens[host] is listens and now_s - known.heard_s < HERE_S
+            if self._listens[host] is listens and (now_s - known.heard_s < HERE_S or now_s < known.awaited_until_s)
         ]
 
     def _all_done(self, now_s: float, *, listens: bool) -> bool:

@@ -194,7 +194,8 @@ class WallHub:
             raise FleetError(f"nothing heard for {self._patience_s:g} s at {at_s:.3f} s of the mission from {names}")
 
     def _pass_on(self) -> None:
-        if self._now.is_held:  # what the others have said until they were told waits until the time goes on
+        # What the others have said waits: while time is held, and until a clock that was started anew knows the time.
+        if self._now.is_held or not self._clock.time.known:
             return
         for received in self._post.in_time(self._now_ms(self._now()), self._clock.factor):
             if received.topic is MISSION_OVER:
@@ -221,7 +222,7 @@ class WallHub:
     def _lose(self, host: str, instance: str) -> None:
         if self._ends_when_lost and not self._clock.is_done(host):
             raise HostLostError(host, self._now_ms(self._now()))
-        self._clock.gone(host, instance)
+        self._clock.gone(host, instance, self._now())
 
     def _now_ms(self, now_s: float) -> int:
         return self._clock.time.now_ms(now_s) if self._clock.time.known else 0

@@ -10,7 +10,7 @@ import pytest
 from comms.errors import WordsError
 from comms.result import Ending, LastWord
 from comms.said.codec import SCHEMA_VERSION
-from comms.wall.clock import HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, MissionTime, Phase, WallClock
+from comms.wall.clock import COMES_BACK_S, HERE_S, LAST_WORD_WITHIN_S, WRAP_UP_S, MissionTime, Phase, WallClock
 from comms.wall.words import Hello, unpack_finish
 from comms.words import unpack
 
@@ -108,9 +108,9 @@ def test_who_takes_part_is_not_sent_away_by_a_hello_that_cannot_be_its_own(anoth
 def test_a_host_that_is_gone_or_silent_may_be_replaced() -> None:
     told = clock()
     told.hello("beta", hello("1"), 1.0)
-    told.gone("beta", "2")
+    told.gone("beta", "2", 1.5)
     assert told.notices == ["beta is here"]
-    told.gone("beta", "1")
+    told.gone("beta", "1", 1.5)
     told.hello("beta", hello("2"), 1.5)
     assert [name for _, name in words(told)] == []
     told.hello("beta", hello("3"), 1.5 + HERE_S)
@@ -224,18 +224,46 @@ def test_who_knows_the_time_knows_it_better_than_who_remembers() -> None:
     assert told.time.now_ms(3.0) == 70_000
 
 
-def test_who_is_gone_at_the_end_is_waited_for_a_while_as_it_may_be_started_again() -> None:
+def test_who_dies_at_the_end_is_waited_for_a_while_as_it_may_be_started_again() -> None:
     told = under_way()
-    told.hello("alpha", hello(), 1.0)
-    told.hello("beta", hello(), 1.0)
     told.over(5_000)
     told.pass_time(1.5)
-    told.gone("alpha", "1")
+    told.gone("alpha", "1", 1.5)
     told.pass_time(1.5 + WRAP_UP_S)
     told.done("beta", LastWord())
-    told.pass_time(1.0 + HERE_S - 0.1)
+    told.pass_time(1.5 + COMES_BACK_S - 0.1)
     assert phase(told) == Phase.ENDING
-    told.pass_time(1.0 + HERE_S)
+    told.pass_time(1.5 + COMES_BACK_S)
+    assert phase(told) == Phase.CLOSING
+
+
+def test_who_died_well_before_the_end_is_not_waited_for() -> None:
+    told = under_way()
+    told.gone("alpha", "1", 2.0)
+    told.hello("beta", hello(), 2.0 + COMES_BACK_S)
+    told.over(5_000)
+    told.pass_time(2.0 + COMES_BACK_S)
+    told.pass_time(2.0 + COMES_BACK_S + WRAP_UP_S)
+    told.done("beta", LastWord())
+    told.pass_time(2.0 + COMES_BACK_S + WRAP_UP_S)
+    assert phase(told) == Phase.CLOSING
+
+
+def test_a_clock_started_anew_when_the_mission_is_over_waits_for_all_to_find_it() -> None:
+    told = clock()
+    told.hello("beta", hello(now_ms=60_000), 2.0)
+    told.over(55_000)
+    told.pass_time(2.0)
+    told.pass_time(2.0 + WRAP_UP_S)
+    assert (phase(told), words(told)) == (Phase.ENDING, [(host, "finish") for host in ("alpha", "beta")])
+    told.done("beta", LastWord())
+    told.pass_time(5.0)
+    assert phase(told) == Phase.ENDING
+    words(told)
+    told.hello("alpha", hello(now_ms=90_000), 5.5)
+    assert words(told) == [("alpha", "finish")]
+    told.done("alpha", LastWord())
+    told.pass_time(6.0)
     assert phase(told) == Phase.CLOSING
 
 
