@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from modem.streams import STREAM_BITS, STREAMS, TURN_BITS, Window
@@ -123,27 +124,27 @@ class ModemConfig:
                 f"fewer than {SMALL_BITS}"
             )
 
-    @property
+    @cached_property
     def tells_tiles(self) -> bool:
         """Whether coverage crosses as tiles, and not as stretches."""
         return self.maps == "tiles"
 
-    @property
+    @cached_property
     def corrects(self) -> bool:
         """Whether what stretches tell is corrected."""
         return self.maps == "corrected"
 
-    @property
+    @cached_property
     def hub(self) -> str:
         """The platform of the coordinator."""
         return self.platforms[0]
 
-    @property
+    @cached_property
     def is_hub(self) -> bool:
         """Whether it is on that."""
         return self.platform == self.hub
 
-    @property
+    @cached_property
     def others(self) -> tuple[str, ...]:
         """The platforms that it talks with."""
         return self.who_talks_with(self.platform)
@@ -152,7 +153,7 @@ class ModemConfig:
         """The platforms that one talks with."""
         return self.platforms[1:] if platform == self.hub else (self.hub,)
 
-    @property
+    @cached_property
     def cycle_ms(self) -> int:
         """After so long everybody has had a slot."""
         return self.slot_ms * len(self.platforms)
@@ -162,32 +163,32 @@ class ModemConfig:
         first_ms = self.platforms.index(platform) * self.slot_ms
         return (now_ms - first_ms) // self.cycle_ms * self.cycle_ms + first_ms
 
-    @property
+    @cached_property
     def is_small(self) -> bool:
         """Whether a frame holds acknowledgements or a single piece, and words are to be short."""
         return self.frame_bits < SMALL_BITS
 
-    @property
+    @cached_property
     def tag_bits(self) -> int:
         """Of the tag by which damage and strangers are noticed."""
         return _tag_bits(self.frame_bits)
 
-    @property
+    @cached_property
     def start_bits(self) -> int:
         """Of the number by which a modem that was started anew is told from its past."""
         return _start_bits(self.frame_bits)
 
-    @property
+    @cached_property
     def platform_bits(self) -> int:
         """Of the number of a platform."""
         return (len(self.platforms) - 1).bit_length()
 
-    @property
+    @cached_property
     def room(self) -> int:
         """How many bits a frame has for what is said."""
         return _room(self.frame_bits, len(self.platforms), polled=self.polls is not None)
 
-    @property
+    @cached_property
     def window(self) -> Window:
         """Of the streams of pieces."""
         return _window(self.frame_bits)

@@ -164,11 +164,14 @@ def with_fewer_corners(outline: tuple[Vertex, ...]) -> tuple[Vertex, ...]:
 
     Raises WireError for one that meets itself so that it falls apart.
     """
+    if len(outline) <= MOST_CORNERS:
+        return outline
     corners, tolerance_m = outline, FIRST_TOLERANCE_M
+    polygon = shapely.polygons([(one.x_m, one.y_m) for one in outline])
     while len(corners) > MOST_CORNERS:
-        simple = shapely.Polygon([(one.x_m, one.y_m) for one in outline]).simplify(tolerance_m)
+        simple = polygon.simplify(tolerance_m)
         if not isinstance(simple, shapely.Polygon):
             raise WireError("a hotspot's outline is none")
-        corners = tuple(Vertex(x_m, y_m) for x_m, y_m in simple.exterior.coords[:-1])
+        corners = tuple(Vertex(x_m, y_m) for x_m, y_m in shapely.get_coordinates(simple)[:-1].tolist())
         tolerance_m *= 1.5
     return corners

@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import math
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -153,7 +154,7 @@ class Modem:
             self._turns.has_spoken(now_ms, len(frames))
             if frames:
                 self._last_frames_ms, self._is_alive = now_ms, False
-                publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), Packet(frames)))
+                publish.append(Publication(MODEM_TX.key(vehicle=self.config.platform), self._packet(frames)))
         step = self._step(now_ms)
         return Step((*publish, *step.publish), step.wake_ms, step.dropped)
 
@@ -450,15 +451,22 @@ class Modem:
         on_deck, self._on_deck = self._on_deck, []
         key = MODEM_TX.key(vehicle=self.config.platform)
         for first in range(0, len(on_deck), MOST_FRAMES):
-            publish.append(Publication(key, Packet(tuple(on_deck[first : first + MOST_FRAMES]))))
+            publish.append(Publication(key, self._packet(on_deck[first : first + MOST_FRAMES])))
         dropped, self._dropped = tuple(self._dropped), []
         next_ms = None if self._form is None else self._turns.next_ms(now_ms, wants=self._has_anything_to_say())
         return Step(tuple(publish), None if next_ms is None else max(next_ms, self.config.deck_ms), dropped)
 
+    def _packet(self, frames: Sequence[bytes]) -> Packet:
+        """For the coordinator's modem, whose own are for all."""
+        return Packet(tuple(frames), "" if self.config.is_hub else self.config.hub)
+
     def _has_anything_to_say(self) -> bool:
-        is_owed = any(one.owes for one in self._receiving.values())
-        is_quiet = not len(self._queue) and all(one.is_quiet for one in self._sending.values())
-        return self._is_alive or is_owed or not is_quiet
+        return (
+            self._is_alive
+            or bool(len(self._queue))
+            or any(one.owes for one in self._receiving.values())
+            or not all(one.is_quiet for one in self._sending.values())
+        )
 
     def _has_room(self) -> bool:
         """Whether a packet has room for a stretch beside all that waits."""

@@ -2,7 +2,8 @@
 
 All platforms share one channel. Who sends during any part of a reception hears nothing of it; packets that overlap
 where they are received are lost there, both; of what is left frames are lost by range and by chance, each by itself.
-What becomes of a reception is decided when it ends, as all that overlaps it is known by then.
+What becomes of a reception is decided when it ends, as all that overlaps it is known by then. Who a packet is not for
+is told nothing of it.
 """
 
 from __future__ import annotations
@@ -75,12 +76,17 @@ class Channel:
         """When the next reception ends, None where nothing is on its way."""
         return min((one.ends_ms for one in self._open), default=None)
 
-    def send(self, sender: str, frames: tuple[bytes, ...], sent_ms: int, places: Mapping[str, Point]) -> None:
-        """Puts a packet on its way, with all platforms where they are then. One of no platform's is nobody's."""
+    def send(
+        self, sender: str, frames: tuple[bytes, ...], sent_ms: int, places: Mapping[str, Point], to: str = ""
+    ) -> None:
+        """Puts a packet on its way, to one platform or to all, with all where they are then. One of no platform's is
+        nobody's."""
         if sender not in self._counts:
             return
         if sent_ms < self._config.deck_ms:
-            self._on_deck += [Arrival(one, frames) for one in self._config.platforms if one != sender]
+            self._on_deck += [
+                Arrival(one, frames) for one in self._config.platforms if one != sender and to in ("", one)
+            ]
             return
         signal = self._config.signal
         fitting = tuple(frame for frame in frames if len(frame) <= signal.frame_bytes)[: signal.frames]
@@ -100,8 +106,10 @@ class Channel:
                 reception = _Reception(
                     begins_ms + lasts_ms, begins_ms, sent_ms, sender, receiver, count, fitting, range_m
                 )
-                self._open.append(reception)
                 self._heard[receiver].append(reception)
+                if to in ("", receiver):
+                    self._open.append(reception)
+        self._forget(sent_ms)
 
     def arrivals(self, now_ms: int) -> list[Arrival]:
         """What was said on deck, and what has come through of the receptions that have ended by now, in the order of
@@ -111,9 +119,7 @@ class Channel:
         if not ended:
             return on_deck
         self._open = [one for one in self._open if one.ends_ms > now_ms]
-        arrivals = [Arrival(one.receiver, frames) for one in ended if (frames := self._came_through(one))]
-        self._forget(now_ms)
-        return on_deck + arrivals
+        return on_deck + [Arrival(one.receiver, frames) for one in ended if (frames := self._came_through(one))]
 
     def _came_through(self, reception: _Reception) -> tuple[bytes, ...]:
         begins_ms, ends_ms, receiver = reception.begins_ms, reception.ends_ms, reception.receiver

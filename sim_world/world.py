@@ -157,7 +157,7 @@ class World:
         """Puts a packet on its way, from and to where all are at that time."""
         if self._channel is not None:
             moving = {vehicle: body.true_place(sent_ms) for vehicle, body in self._bodies.items()}
-            self._channel.send(platform, packet.frames, sent_ms, {**moving, **self._still})
+            self._channel.send(platform, packet.frames, sent_ms, {**moving, **self._still}, packet.to)
 
     def _due(self, now_ms: int) -> tuple[list[Publication], int | None]:
         """What there is to say by now, and when there is more."""

@@ -28,7 +28,10 @@ class BitWriter:
     def write_count(self, value: int, order: int) -> None:
         """A number from 0 without a bound, as an exp-Golomb code: `order` + 1 bits below 2^order, two more for the
         2^(order + 1) numbers after these, and so on. Raises WireError where it is below 0."""
-        self.write_counts((value,), order)
+        if value < 0:
+            raise WireError(f"{value} is below 0")
+        beyond = value + (1 << order)
+        self.write(beyond, 2 * beyond.bit_length() - 1 - order)
 
     def write_counts(self, values: Iterable[int], order: int) -> None:
         """The same of many numbers. Raises WireError where one is below 0."""
@@ -75,7 +78,8 @@ class BitReader:
 
     def read_count(self, order: int) -> int:
         """The number of an exp-Golomb code."""
-        return self.read_counts(order, 1)[0]
+        rest = self._value & (1 << self.left) - 1
+        return self.read(2 * (self.left - rest.bit_length()) + 1 + order) - (1 << order)
 
     def read_counts(self, order: int, count: int) -> tuple[int, ...]:
         """The numbers of so many exp-Golomb codes."""

@@ -448,14 +448,20 @@ MOST_FRAMES = 64
 @dataclass(frozen=True, slots=True)
 class Packet:
     """What a modem sends in one go, or what has come of it at another: frames, each of which arrives whole or not at
-    all."""
+    all. `to`: the platform that it is for, "" for all. Others need not be given it: they do not read what they
+    overhear."""
 
     frames: Annotated[tuple[FrameBytes, ...], AtMost(MOST_FRAMES)]
+    to: OptionalIdentifier = ""
 
     @property
     def size_bytes(self) -> int:
         """Of its frames."""
         return sum(map(len, self.frames))
+
+    def meant_for(self, platforms: int) -> int:
+        """For how many others it is, in a fleet of so many platforms."""
+        return 1 if self.to else platforms - 1
 
 
 @dataclass(frozen=True, slots=True)

@@ -58,14 +58,19 @@ class Around:
     heading_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        sides_m = (self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m)
-        if not all(0 <= side_m < math.inf for side_m in sides_m) or self.sent_ms < 0:
+        width_m, height_m = self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m
+        if not (0 <= width_m < math.inf and 0 <= height_m < math.inf and self.sent_ms >= 0):
             raise ValueError(f"{self} is no box or no time")
 
     @property
     def longest_m(self) -> float:
         """From corner to corner."""
         return math.hypot(self.high_x_m - self.low_x_m, self.high_y_m - self.low_y_m)
+
+    @property
+    def place_m(self) -> float:
+        """To which a place is known."""
+        return COARSE_M if self.coarse else PLACE_M
 
 
 class Number:
@@ -80,19 +85,12 @@ class Number:
         raise NotImplementedError
 
     def value(self, steps: int, around: Around) -> Any:
-        """The value of steps within what is allowed."""
+        """The value of steps from 0 to `most`. Raises WireError where none has them."""
         raise NotImplementedError
 
     def most(self, around: Around) -> int | None:
         """The largest number of steps; None where there is none."""
         return None
-
-    def checked(self, steps: int, around: Around) -> int:
-        """The steps; raises WireError where they are not allowed."""
-        most = self.most(around)
-        if steps < 0 or (most is not None and steps > most):
-            raise WireError(f"{steps} steps are outside 0 to {most}")
-        return steps
 
 
 @dataclass(frozen=True)
@@ -102,22 +100,16 @@ class Place(Number):
     axis: str
 
     def steps(self, value: float, around: Around) -> int:
-        return round((value - self._ends_m(around)[0]) / _place_m(around))
+        low_m = around.low_x_m if self.axis == "x" else around.low_y_m
+        return round((value - low_m) / around.place_m)
 
     def value(self, steps: int, around: Around) -> float:
-        return self._ends_m(around)[0] + steps * _place_m(around)
+        low_m = around.low_x_m if self.axis == "x" else around.low_y_m
+        return low_m + steps * around.place_m
 
     def most(self, around: Around) -> int:
-        low_m, high_m = self._ends_m(around)
-        return math.ceil((high_m - low_m) / _place_m(around))
-
-    def _ends_m(self, around: Around) -> tuple[float, float]:
-        x_m, y_m = (around.low_x_m, around.high_x_m), (around.low_y_m, around.high_y_m)
-        return x_m if self.axis == "x" else y_m
-
-
-def _place_m(around: Around) -> float:
-    return COARSE_M if around.coarse else PLACE_M
+        width_m = around.high_x_m - around.low_x_m if self.axis == "x" else around.high_y_m - around.low_y_m
+        return math.ceil(width_m / around.place_m)
 
 
 @dataclass(frozen=True)
@@ -166,6 +158,8 @@ class Heading(Number):
     def value(self, steps: int, around: Around) -> float:
         if not around.coarse:
             return steps * math.tau / (1 << self.bits)
+        if steps > (4 << self._coarse_bits - 2) + 3:
+            raise WireError(f"{steps} steps are no heading")
         from_tracks = (steps % 4 << self._coarse_bits - 2) + unfolded(steps // 4)
         return (around.heading_rad + from_tracks * math.tau / (1 << self._coarse_bits)) % math.tau
 
@@ -174,11 +168,6 @@ class Heading(Number):
 
     def order(self, around: Around) -> int:
         return 2
-
-    def checked(self, steps: int, around: Around) -> int:
-        if around.coarse and steps > (4 << self._coarse_bits - 2) + 3:
-            raise WireError(f"{steps} steps are no heading")
-        return super().checked(steps, around)
 
     @property
     def _coarse_bits(self) -> int:

@@ -47,11 +47,12 @@ class _Packing:
                 if not isinstance(note, Number):
                     note.put(writer, said[name], around, said)
                     continue
-                steps = all_steps[name] = note.checked(note.steps(said[name], around), around)
+                most = note.most(around)
+                steps = all_steps[name] = _within(note.steps(said[name], around), most)
                 if follows is not None and earlier:
                     off[name] = steps - follows.expected(name, earlier, off, around)
                     writer.write_signed(off[name], follows.order_in(around))
-                elif (most := note.most(around)) is None:
+                elif most is None:
                     writer.write_count(steps, note.order(around))
                 else:
                     writer.write(steps, most.bit_length())
@@ -74,19 +75,26 @@ class _Packing:
                 if not isinstance(note, Number):
                     said[name] = note.get(reader, around, said)
                     continue
+                most = note.most(around)
                 if follows is not None and earlier:
                     off[name] = reader.read_signed(follows.order_in(around))
                     steps = follows.expected(name, earlier, off, around) + off[name]
-                elif (most := note.most(around)) is None:
+                elif most is None:
                     steps = reader.read_count(note.order(around))
                 else:
                     steps = reader.read(most.bit_length())
-                all_steps[name] = note.checked(steps, around)
+                all_steps[name] = _within(steps, most)
                 said[name] = note.value(steps, around)
             except MISFITS as error:
                 raise WireError(f"{where}: {error}") from None
         earlier.append(all_steps)
         return said
+
+
+def _within(steps: int, most: int | None) -> int:
+    if steps < 0 or (most is not None and steps > most):
+        raise WireError(f"{steps} steps are outside 0 to {most}")
+    return steps
 
 
 class _Many(NamedTuple):
@@ -173,7 +181,7 @@ def _packing_of(cls: Any) -> _Packing:
 
 
 def _taken(record: Any) -> Mapping[str, Any]:
-    return {one.name: getattr(record, one.name) for one in fields(record)}
+    return {one.name: getattr(record, one.name) for one in _packing_of(type(record)).fields}
 
 
 def _made(cls: type[Any], said: dict[str, Any]) -> Any:

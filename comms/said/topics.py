@@ -189,7 +189,7 @@ COVERAGE = Topic(
     2.0, Keep.LATEST, crosses_water=True, burst=20_000,  # at the mission's end each tile is said up to 8 times
 )  # fmt: skip
 CONTACT = Topic(
-    "contact", "agent/{vehicle}/contact/{number}", Contact, _AGENTS_OWN, _COORDINATOR | _MODEMS | _WATCHERS, 200, 0.2,
+    "contact", "agent/{vehicle}/contact/{number}", Contact, _AGENTS_OWN, _COORDINATOR | _WATCHERS, 200, 0.2,
     Keep.EVENTS, crosses_water=True,
 )  # fmt: skip
 HOTSPOT = Topic(

@@ -43,21 +43,22 @@ class Water:
         for other in self._others:
             self._socket.sendto(b"", other)
 
-    def send(self, frames: tuple[bytes, ...]) -> None:
-        """Sends the frames of a packet to all others."""
+    def send(self, packet: Packet) -> None:
+        """Sends a packet to all others, with for whom it is."""
         for other in list(self._others):
-            self._socket.sendto(msgpack.packb(frames), other)
+            self._socket.sendto(msgpack.packb((packet.to, packet.frames)), other)
 
-    def listen(self, hears: Callable[[Packet], None]) -> None:
-        """Tells what has come through of each packet, once it is over; never returns."""
+    def listen(self, platform: str, hears: Callable[[Packet], None]) -> None:
+        """Tells what has come through of each packet that is for this platform, once it is over; never returns."""
         while True:
             datagram, other = self._socket.recvfrom(LARGEST_DATAGRAM)
             if not datagram:
                 self._others.add(other)
                 continue
             try:
-                frames = [frame for frame in msgpack.unpackb(datagram) if random.random() >= self._lost]
-                if frames:
+                to, frames = msgpack.unpackb(datagram)
+                frames = [frame for frame in frames if random.random() >= self._lost]
+                if frames and to in ("", platform):
                     hears(Packet(tuple(map(bytes, frames))))
             except (ValueError, TypeError):
                 print("what is no packet has come, and is dropped", flush=True)
@@ -75,7 +76,7 @@ def serve(session: zenoh.Session, run: str, platform: str, water: Water, delay_m
         inbox.put((str(sample.key_expr), sample.payload.to_bytes()))
 
     subscribers = [session.declare_subscriber(key, enqueue) for key in (tx_key, time_key)]
-    threading.Thread(target=water.listen, args=(come.put,), daemon=True).start()
+    threading.Thread(target=water.listen, args=(platform, come.put), daemon=True).start()
     mission_time, under_way, sent = MissionTime(), list[tuple[int, int, Packet]](), count()
     incarnation, sequence = 0, 0
     while subscribers:
@@ -107,7 +108,7 @@ def serve(session: zenoh.Session, run: str, platform: str, water: Water, delay_m
             session.put(rx_key, encode(header, come.get()))
             sequence += 1
         while under_way and under_way[0][0] <= now_ms:
-            water.send(heapq.heappop(under_way)[2].frames)
+            water.send(heapq.heappop(under_way)[2])
 
 
 def main() -> None:

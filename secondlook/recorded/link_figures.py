@@ -11,7 +11,7 @@ from comms.node import Received
 from comms.said.codec import header_of
 from comms.said.messages import AgentState, Heard, Packet
 from comms.said.topics import MODEM_TX, topic_of
-from modem.modem import DROPPED, NO_FRAME
+from modem.modem import DROPPED
 
 
 @dataclass
@@ -70,8 +70,10 @@ class LinkFigures:
     modem_bytes: int = 0
     said_bytes: int = 0
     frames_sent: int = 0
+    frames_to_all: int = 0
     frames_heard: int = 0
     packets: dict[str, int] = field(default_factory=dict)
+    _to: dict[bytes, str] = field(default_factory=dict)  # for whom each frame was
     _said: dict[str, Age] = field(default_factory=dict)  # by vehicle, as it was said
     _heard: dict[str, Age] = field(default_factory=dict)  # as a modem told it
 
@@ -84,9 +86,11 @@ class LinkFigures:
             if received.topic is MODEM_TX:
                 self.packets[received.vehicle] = self.packets.get(received.vehicle, 0) + 1
                 self.frames_sent += len(message.frames)
+                self.frames_to_all += 0 if message.to else len(message.frames)
                 self.modem_bytes += message.size_bytes
-            else:
-                self.frames_heard += len(message.frames)
+                self._to |= dict.fromkeys(message.frames, message.to)
+            else:  # a stranger's frame, or a damaged one, is none; nor is one that is overheard
+                self.frames_heard += sum(self._to.get(one) in ("", received.vehicle) for one in message.frames)
         elif isinstance(message, Heard):
             state = state_heard(message)
             if state is not None:
@@ -112,13 +116,15 @@ class LinkFigures:
         all that might have crossed counts as if it had; `hub`: the coordinator's platform; `dropped`: in the whole run,
         of which those of modems are told."""
         ages = self.ages(by_modem=bool(platforms), hub=hub)
+        expected = self.frames_sent - self.frames_to_all + self.frames_to_all * max(0, platforms - 1)
         crossed = self.modem_bytes if platforms else self.said_bytes
         return {
             "profile": profile,
             "bytes_per_s": round(crossed / now_ms * 1000, 1) if now_ms else None,
             "packets": dict(sorted(self.packets.items())),
             "frames_sent": self.frames_sent,
-            "frames_lost": self.frames_sent * max(0, platforms - 1) - self.frames_heard + dropped.get(NO_FRAME, 0),
+            "frames_expected": expected,
+            "frames_lost": expected - self.frames_heard,
             "dropped": {reason: dropped[reason] for reason in DROPPED if reason in dropped},
             "age": {name: age.told(now_ms) for name, age in sorted(ages.items())},
         }

@@ -19,21 +19,23 @@ from secondlook.recorded.link_figures import state_heard
 
 @dataclass
 class SentPacket:
-    """A packet as it was sent. `size_bytes`: of its frames. `receptions`: how many frames of it came through, each
-    counted at each other platform."""
+    """A packet as it was sent. `size_bytes`: of its frames. `to`: for whom it was, "" for all. `receptions`: how many
+    frames of it came through, each counted at each other platform that it was for, of which there are `meant_for`."""
 
     sent_ms: int
     platform: str
     frames: int
     size_bytes: int
     contents: Contents
+    to: str
+    meant_for: int
     receptions: int = 0
 
 
 @dataclass(frozen=True)
 class Span:
     """What was sent from when until when. `size_bytes`: of all frames; `used_bits`: of their bits those that are not
-    filled up; `frames_lost`: each counted at each other platform, out of `frames_expected`."""
+    filled up; `frames_lost`: each counted at each other platform that it was for, out of `frames_expected`."""
 
     from_ms: int
     until_ms: int
@@ -101,8 +103,9 @@ class LinkTrace:
     def _hear_packet(self, received: Received, packet: Packet) -> None:
         if received.topic is not MODEM_TX:
             for frame in packet.frames:
-                if frame in self._latest:
-                    self._latest[frame].receptions += 1
+                sent = self._latest.get(frame)
+                if sent is not None and sent.to in ("", received.vehicle):
+                    sent.receptions += 1
         elif self._eavesdropper is not None:
             sent_ms = received.header.sent_ms
             sent = SentPacket(
@@ -111,6 +114,8 @@ class LinkTrace:
                 len(packet.frames),
                 packet.size_bytes,
                 self._eavesdropper.open(packet, sent_ms),
+                packet.to,
+                packet.meant_for(len(self.config.platforms)),
             )
             self.packets.append(sent)
             self._latest |= dict.fromkeys(packet.frames, sent)
@@ -141,7 +146,7 @@ class LinkTrace:
 
     def span(self, from_ms: int, until_ms: int, packets: Sequence[SentPacket]) -> Span:
         """What these packets, which are all of that time, come to."""
-        expected = sum(one.frames for one in packets) * (len(self.config.platforms) - 1)
+        expected = sum(one.frames * one.meant_for for one in packets)
         return Span(
             from_ms,
             until_ms,

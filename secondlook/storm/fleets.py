@@ -18,6 +18,7 @@ LINK_SHARE = 0.2  # of fleets
 FAST_LINKS = ("radio", "unet-data", "micromodem-6")
 SLOW_LINKS = ("micromodem-0", "micromodem-1", "unet-control")
 MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey
+SMALL_FRAMES = ("janus", "unet-control")  # in which maps cross as stretches alone
 JANUS, JANUS_SHARE = "janus", 0.25  # of fleets that a slow link may have
 SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
 
@@ -147,6 +148,10 @@ def _link(number: int, drawn: dict[str, Any]) -> dict[str, Any]:
         link["loss"] = _m(rng.uniform(0, 0.3))
     if rng.random() < 0.2:
         link["slot_frames"] = 1
+    if Random(f"polled {number}").random() < 0.2:
+        link["access"] = "polled"
+    if Random(f"corrected {number}").random() < 0.2 and link["profile"] not in SMALL_FRAMES:
+        link["maps"] = "corrected"
     aboard = {"platform": rng.choice(vehicles)} if rng.random() < 0.4 and len(vehicles) > 1 else {}
     return {"link": link, "coordinator": drawn["coordinator"] | aboard}
 

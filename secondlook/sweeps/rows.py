@@ -55,7 +55,13 @@ FIGURES: Mapping[str, Any] = {
         **dict.fromkeys(("first_published_s", "first_assigned_s"), REAL),
     },
     "separation": {"least_m": REAL, "pairs_closer": WHOLE},
-    "link": {"profile": TEXT, "bytes_per_s": REAL, "frames_sent": WHOLE, "frames_lost": WHOLE},
+    "link": {
+        "profile": TEXT,
+        "bytes_per_s": REAL,
+        "frames_sent": WHOLE,
+        "frames_expected": WHOLE,
+        "frames_lost": WHOLE,
+    },
     "rounds": WHOLE,
     "messages": {topic.name: WHOLE for topic in TOPICS},
 }

@@ -108,16 +108,18 @@ def _left_too_early(flight: Flight, strips: dict[int, Received[StripStatus]]) ->
 
 def _surveyed_ms(flight: Flight, over_ms: int) -> int | None:
     """When the last primary had surveyed all, as far as the coordinator was told before the mission was over: one of
-    whom it hears nothing it gives up. None where it was told of none."""
+    whom it hears nothing it gives up. One that had, is started anew and has at its first word has since before. None
+    where it was told of none."""
     ends_ms: dict[str, tuple[int, int]] = {}
     its_lives = lives(flight, "coordinator")
     for at_ms, one in reached(flight, "coordinator", its_lives[-1]) if its_lives else []:
         if one.sender not in flight.scenario.survey_vehicles or at_ms > over_ms:
             continue
-        if isinstance(one.message, AgentState) and one.header.incarnation > ends_ms.get(one.sender, (-1, 0))[0]:
+        incarnation, ended_ms = ends_ms.get(one.sender, (-1, at_ms))
+        if isinstance(one.message, AgentState) and one.header.incarnation > incarnation:
             ends_ms.pop(one.sender, None)
             if one.message.mode.has_ended:
-                ends_ms[one.sender] = one.header.incarnation, at_ms
+                ends_ms[one.sender] = one.header.incarnation, ended_ms
     return max((at_ms for _, at_ms in ends_ms.values()), default=None)
 
 

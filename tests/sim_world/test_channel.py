@@ -46,6 +46,12 @@ class TestWay:
         near.send("a", ONE, 0, PLACES)
         assert heard(near) == [(1500, Arrival("b", ONE))]
 
+    def test_what_is_for_one_alone_comes_to_no_other_and_spoils_what_others_hear_at_the_time(self) -> None:
+        channel = Channel(CONFIG, seed=1)
+        channel.send("a", ONE, 10_000, PLACES, to="c")  # at b from 11,000 to 11,500
+        channel.send("c", TWO, 9_000, PLACES)  # there from 11,236, at a from 11,000
+        assert heard(channel) == [(11_900, Arrival("a", TWO)), (12_500, Arrival("c", ONE))]
+
     def test_who_has_no_modem_says_nothing(self) -> None:
         channel = Channel(CONFIG, seed=1)
         channel.send("d", ONE, 0, PLACES)

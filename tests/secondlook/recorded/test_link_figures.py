@@ -55,6 +55,15 @@ def test_frames_are_counted_at_each_other_platform() -> None:
     assert (told["frames_sent"], told["frames_lost"], told["bytes_per_s"]) == (2, 3, 4.0)
 
 
+def test_a_frame_for_one_platform_is_counted_there_alone() -> None:
+    figures = LinkFigures()
+    figures.hear(said("modem-beta", "modem/beta/tx", Packet((b"12345678", b"abcdefgh"), "ship"), 0))
+    figures.hear(said("world", "modem/alpha/rx", Packet((b"12345678", b"abcdefgh")), 2000))  # overheard
+    figures.hear(said("world", "modem/ship/rx", Packet((b"12345678",)), 3000))
+    told = figures.summary("toy", 3, "ship", 4000)
+    assert (told["frames_sent"], told["frames_expected"], told["frames_lost"]) == (2, 2, 1)
+
+
 def test_frames_that_modems_have_dropped_are_told_and_have_not_come() -> None:
     figures = LinkFigures()
     figures.hear(said("modem-beta", "modem/beta/tx", Packet((b"12345678", b"abcdefgh")), 0))
