@@ -119,7 +119,7 @@ class Coordinator:
             ledger, fleet, inside, sectors, outbox, config.answer_within_ms, config.looks_within_ms
         )
         self._contacts = contacts = KnownContacts(fleet, inside)
-        goal = GoalWatch(config.goal, fleet, contacts, inside, agenda, now_ms)
+        goal = GoalWatch(config.goal, fleet, contacts, region, inside, agenda, now_ms)
         self._end = MissionEnd(config, fleet, strips, sectors, goal, agenda, outbox)
         if narrowest is not None:
             self._briefing = briefing = Briefing(config, ledger, fleet, p_detect)

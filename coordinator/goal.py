@@ -8,20 +8,22 @@ from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
 from planner.clearance import mines_left_by, scatter_of_all
 from planner.goal import Goal
+from planner.region import Region
 from planner.types import BoolArray
 
 LOOK_EVERY_MS = 30_000  # the map changes slowly, and to find the contacts' objects takes its time
 
 
 class GoalWatch:
-    """Looks every LOOK_EVERY_MS. `goal`: None where the mission has none. `inside`: the area's cells, shape of the
-    grid."""
+    """Looks every LOOK_EVERY_MS. `goal`: None where the mission has none. `inside`: the cells of the `area`, shape of
+    the grid."""
 
     def __init__(
         self,
         goal: Goal | None,
         fleet: KnownFleet,
         contacts: KnownContacts,
+        area: Region,
         inside: BoolArray,
         agenda: Agenda,
         now_ms: int,
@@ -29,7 +31,7 @@ class GoalWatch:
         self._goal = goal
         self._fleet = fleet
         self._inside = inside
-        self._place = None if goal is None else goal.place(fleet.map.grid)
+        self._place = None if goal is None else goal.place(area, fleet.map.grid)
         self._agenda = agenda
         self._contacts = contacts
         if goal is not None:

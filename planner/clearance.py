@@ -102,18 +102,19 @@ def mines_left(
 
 
 def mines_left_by(
-    map_: FleetMap, inside: BoolArray, found: float, scatter: float, place: BoolArray | None = None
+    map_: FleetMap, inside: BoolArray, found: float, scatter: float, place: FloatArray | None = None
 ) -> MinesLeft | None:
-    """The same by a fleet's map, of the area's cells, `inside`, or of those in a `place`; from the number of cells that
-    have each level, as there are few levels and many cells."""
+    """The same by a fleet's map, of the area's cells, `inside`, or of a `place`, so much of each cell, 0 or more; from
+    the number of cells that have each level, as there are few levels and many cells."""
     levels, risk = map_.levels_within(EVERYWHERE, map_.layers)
-    places = [inside] if place is None else [inside & place, inside & ~place]
-    counts = [np.bincount(levels[one], minlength=risk.size) for one in places]
-    in_place = np.repeat([True, False][: len(places)], risk.size)
-    searched = np.ones_like(in_place)
-    weights = np.concatenate(counts).astype(np.float64)
-    risks = np.tile(risk, len(places))
-    return mines_left(risks, searched, in_place, map_.grid.cell_area_m2, found, scatter, weights)
+    weights = np.bincount(levels[inside], minlength=risk.size).astype(np.float64)
+    searched = in_place = np.ones(risk.size, dtype=np.bool_)
+    if place is not None:
+        some = place > 0.0
+        weights = np.concatenate([weights, np.bincount(levels[some], place[some], minlength=risk.size)])
+        risk, searched = np.tile(risk, 2), np.repeat([True, False], risk.size)
+        in_place = ~searched
+    return mines_left(risk, searched, in_place, map_.grid.cell_area_m2, found, scatter, weights)
 
 
 def scatter_of_all(vehicles: Iterable[Sequence[DetectionCurve]]) -> float:

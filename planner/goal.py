@@ -5,12 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
 import shapely
 
 from planner.clearance import MinesLeft
 from planner.region import Region
-from planner.types import BoolArray, GridSpec, Point
+from planner.types import FloatArray, GridSpec, Point
 
 
 @dataclass(frozen=True)
@@ -24,14 +23,6 @@ class Lane:
     def outline(self) -> shapely.Polygon | shapely.MultiPolygon:
         """What lies within half the width of the way; its ends are straight."""
         return shapely.LineString(self.way).buffer(self.width_m / 2.0, cap_style="flat", join_style="mitre")
-
-    def cells(self, grid: GridSpec) -> BoolArray:
-        """The cells that have their centre in it, shape of the grid."""
-        found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
-        for part in shapely.get_parts(self.outline):
-            holes = tuple(tuple(ring.coords[:-1]) for ring in part.interiors)
-            found |= Region(tuple(part.exterior.coords[:-1]), holes).inside(grid)
-        return found
 
 
 @dataclass(frozen=True)
@@ -50,9 +41,9 @@ class Goal:
         if self.lane is not None and self.clearance < 1.0:
             raise ValueError("of a lane a goal can only be that no mine is left: clearance must be 1")
 
-    def place(self, grid: GridSpec) -> BoolArray | None:
-        """The cells in which mines that are left count, shape of the grid; None for all of the area."""
-        return None if self.lane is None else self.lane.cells(grid)
+    def place(self, area: Region, grid: GridSpec) -> FloatArray | None:
+        """How much of each cell counts of what is left, see `Region.shares`; None for all of the area."""
+        return None if self.lane is None else area.shares(self.lane.outline, grid)
 
     def chance_now(self, left: MinesLeft | None) -> float:
         """With which chance what is wanted is so; 0 where nothing was seen."""

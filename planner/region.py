@@ -8,8 +8,11 @@ from functools import cached_property
 
 import numpy as np
 import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from planner.area import SurveyArea
+from planner.rounding import rounded
 from planner.types import BoolArray, FloatArray, GridSpec, Point, Strip
 
 
@@ -43,6 +46,8 @@ def points_inside(x: FloatArray, y: FloatArray, columns: FloatArray, rows: Float
 
 ON_BOUNDARY_M = 1e-6
 """A cell whose centre is as near to the boundary as this is inside."""
+NEAR_CELLS = 1.5
+"""Nothing of a cell is farther from its centre, also of one in the last column, which holds what is beyond it."""
 
 
 def share_within(strip: Strip, other: Strip) -> float:
@@ -137,10 +142,45 @@ class Region:
 
     def inside(self, grid: GridSpec) -> BoolArray:
         """Which cells have their centre in the region or on its boundary, shape `grid.shape`."""
-        with_boundary = self.polygon.buffer(ON_BOUNDARY_M, join_style="mitre")
-        found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
-        # What a hole's ring holds is in the outline's, too.
-        for ring in shapely.get_rings(shapely.get_parts(with_boundary)):
-            across_m, along_m = grid.frame.to_sweep(*ring.coords.xy)
-            found ^= points_inside(across_m[:-1], along_m[:-1], grid.across_m, grid.along_m)
-        return found
+        return _centres_in(self.polygon.buffer(ON_BOUNDARY_M, join_style="mitre"), grid)
+
+    def shares(self, within: BaseGeometry, grid: GridSpec) -> FloatArray:
+        """How much of each cell lies in a valid geometry, mission frame; shape `grid.shape`.
+
+        Of a cell that is inside, the share of what it holds of the region, by area, so that the shares in parts of the
+        region add up to 1. Another one may hold some of the region at its edge: that, over a cell's area. What of the
+        region lies beyond the last column is held by that.
+        """
+        parts = shapely.get_parts(shapely.intersection(self.polygon, within))
+        ground = shapely.union_all([part for part in parts if isinstance(part, shapely.Polygon)])
+        near_m = NEAR_CELLS * grid.cell_m
+        wholly = _centres_in(ground.buffer(-near_m), grid)
+        shares = wholly.astype(np.float64)
+        rows, columns = (_centres_in(ground.buffer(near_m), grid) & ~wholly).nonzero()
+        cells = _cells_drawn(grid, rows, columns)
+        held_m2 = shapely.area(shapely.intersection(self.polygon, cells))
+        held_m2 = np.where(self.inside(grid)[rows, columns], held_m2, grid.cell_area_m2)
+        there_m2 = shapely.area(shapely.intersection(ground, cells))
+        shares[rows, columns] = np.divide(there_m2, held_m2, out=np.zeros(rows.size), where=held_m2 > 0.0)
+        return rounded(shares)
+
+
+def _centres_in(ground: BaseGeometry, grid: GridSpec) -> BoolArray:
+    """Which cells have their centre in polygons, shape `grid.shape`."""
+    found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
+    # What a hole's ring holds is in the outline's, too.
+    for ring in () if ground.is_empty else shapely.get_rings(shapely.get_parts(ground)):
+        across_m, along_m = grid.frame.to_sweep(*ring.coords.xy)
+        found ^= points_inside(across_m[:-1], along_m[:-1], grid.across_m, grid.along_m)
+    return found
+
+
+def _cells_drawn(grid: GridSpec, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.object_]:
+    """Some cells as polygons of shapely, mission frame; those of the last column reach half a cell farther."""
+    cell_m = grid.cell_m
+    left_m, near_m = (columns - 0.5) * cell_m, rows * cell_m
+    right_m = np.where(columns == grid.columns - 1, columns + 1.0, columns + 0.5) * cell_m
+    across_m = np.stack([left_m, right_m, right_m, left_m], axis=-1)
+    along_m = np.stack([near_m, near_m, near_m + cell_m, near_m + cell_m], axis=-1)
+    corners = np.stack(grid.frame.to_mission(across_m, along_m), axis=-1)
+    return np.asarray(shapely.polygons(corners), dtype=np.object_)

@@ -9,7 +9,9 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from comms.node import Received
 from comms.said.announcement import Role, RunInfo
@@ -98,6 +100,7 @@ class Metrics:
     now_ms: int = 0
     run: RunInfo | None = None
     map: FleetMap | None = None
+    area: Region | None = None
     inside: BoolArray = field(default_factory=lambda: np.zeros((0, 0), dtype=np.bool_))
     vehicles: dict[str, VehicleFigures] = field(default_factory=dict)
     strips: dict[int, StripFigures] = field(default_factory=dict)
@@ -208,14 +211,16 @@ class Metrics:
         missed = ~np.isin(np.arange(len(self.targets.targets)), sorted(self.detected))
         return self.map.risk[self._target_cells(self.map.grid)], missed
 
-    def truly_found(self, place: BoolArray | None = None) -> float | None:
-        """The share of the targets in some cells, or in all, that somebody has detected, 1 where none lies there; None
-        in a world without targets."""
+    def truly_found(self, within: BaseGeometry | None = None) -> float | None:
+        """The share of the targets that somebody has detected, of all or of those that lie in a geometry (mission
+        frame) or on its border, 1 where none does; None in a world without targets."""
         _, missed = self.targets_met()
-        if self.map is None or not missed.size:
+        if self.targets is None or not missed.size:
             return None
-        there = missed if place is None else missed[place[self._target_cells(self.map.grid)]]
-        return 1.0 - float(there.mean()) if there.size else 1.0
+        if within is not None:
+            x_m, y_m = np.array([(one.x_m, one.y_m) for one in self.targets.targets]).T
+            missed = missed[shapely.intersects_xy(within, x_m, y_m)]
+        return 1.0 - float(missed.mean()) if missed.size else 1.0
 
     def _target_cells(self, grid: GridSpec) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """The row and column of each target's cell."""
@@ -225,9 +230,9 @@ class Metrics:
         rows, columns = grid.cells_of(x_m, y_m)
         return np.clip(rows, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)
 
-    def mines_left(self, place: BoolArray | None = None) -> MinesLeft | None:
-        """How many mines may be left in the area, or in some of its cells, by the map and by what was found anywhere;
-        None where nothing was seen."""
+    def mines_left(self, place: FloatArray | None = None) -> MinesLeft | None:
+        """How many mines may be left in the area, or in so much of each cell, by the map and by what was found
+        anywhere; None where nothing was seen."""
         if self.map is None:
             return None
         scatter = scatter_of_all(list(one.values()) for one in self.curves.values())
@@ -271,7 +276,8 @@ class Metrics:
         self.run = run
         spec = run.grid.spec
         self.map = self.objects.map = FleetMap(spec, run.rho)
-        self.inside = Region(run.outline, run.hole_outlines, run.keep_out_outlines).inside(spec)
+        self.area = Region(run.outline, run.hole_outlines, run.keep_out_outlines)
+        self.inside = self.area.inside(spec)
         self.vehicles = {entry.vehicle: VehicleFigures(entry.role, footprint_of(entry.sonar)) for entry in run.vehicles}
         self.approaches = ClosestApproaches(
             {entry.vehicle: entry.speed_mps + entry.drift_mps for entry in run.vehicles}

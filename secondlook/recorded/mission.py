@@ -13,7 +13,6 @@ from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 
-import numpy as np
 import shapely
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -132,7 +131,11 @@ class Mission(ABC):
     @cached_property
     def area(self) -> shapely.Polygon | shapely.MultiPolygon:
         """The survey area."""
-        return Region(self.run.outline, self.run.hole_outlines, self.run.keep_out_outlines).polygon
+        return self._region.polygon
+
+    @cached_property
+    def _region(self) -> Region:
+        return Region(self.run.outline, self.run.hole_outlines, self.run.keep_out_outlines)
 
     @cached_property
     def keep_out(self) -> list[shapely.Polygon]:
@@ -165,16 +168,16 @@ class Mission(ABC):
         """How many mines may be left in the area at the end, or in what of it lies within a geometry (mission frame),
         as a lane: `shapely.LineString(way).buffer(width_m / 2)`. None where nothing was seen.
 
-        All that was found, wherever, tells how dense mines lie. Raises UserError where no cell of the area has its
-        centre there.
+        Each cell of the map counts by the share of it that lies there. All that was found, wherever, tells how dense
+        mines lie. Raises UserError where nothing of the area lies there, and where the geometry is not valid.
         """
         if within is None:
             return self._figures.mines_left()
-        there = self.risk()
-        place = np.zeros(there.inside.shape, dtype=np.bool_)
-        place[there.cells_within(within)] = True
+        if not within.is_valid:
+            raise UserError(f"within: must be a valid geometry, but: {shapely.is_valid_reason(within)}")
+        place = self._region.shares(within, self.run.grid.spec)
         if not place.any():
-            raise UserError("within: no cell of the area lies there; must be a geometry in the mission frame")
+            raise UserError("within: nothing of the area lies there; must be a polygon in the mission frame")
         return self._figures.mines_left(place)
 
     @property

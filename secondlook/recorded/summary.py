@@ -88,8 +88,10 @@ def _goal(scenario: Scenario, metrics: Metrics) -> dict[str, dict[str, Any]]:
     if scenario.mission.goal is None:
         return {}
     goal = scenario.mission.goal.goal
-    place = None if metrics.map is None else goal.place(metrics.map.grid)
-    left, truly_found = metrics.mines_left(place), metrics.truly_found(place)
+    area, fleet = metrics.area, metrics.map
+    place = None if area is None or fleet is None else goal.place(area, fleet.grid)
+    left = metrics.mines_left(place)
+    truly_found = metrics.truly_found(None if goal.lane is None else goal.lane.outline)
     told = {
         "wanted": goal.words,
         "now": goal.words_now(left),

@@ -80,8 +80,9 @@ class TestTheGoal:
     def test_of_a_lane_only_what_lies_in_it_counts(self) -> None:
         risk = np.full(GRID.shape, 0.8)
         risk[:, 18:23] = 0.0005  # columns are 5 m apart: 90 m to 110 m east
-        for at_m, is_over in ((100.0, True), (200.0, False)):
-            told = coordinator(goal=goal_of_lane(Lane(((at_m, 0.0), (at_m, 400.0)), 20.0), 0.1))
+        lanes = ((100.0, 20.0, True), (200.0, 20.0, False), (102.5, 4.0, True), (202.5, 4.0, False))
+        for at_m, width_m, is_over in lanes:  # the last two lie between columns' centres
+            told = coordinator(goal=goal_of_lane(Lane(((at_m, 0.0), (at_m, 400.0)), width_m), 0.1))
             told.layer(PRIMARY, risk)
             hear_contacts(told, 10)
             told.keep_alive((PRIMARY, HELPER), 40)

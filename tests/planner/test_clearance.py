@@ -21,6 +21,7 @@ from planner.clearance import (
     scatter_of_all,
 )
 from planner.fleet_map import FleetMap
+from planner.risk import to_levels
 from planner.types import BoolArray, DetectionCurve, GridSpec, SweepFrame
 
 CELL_M2 = 25.0
@@ -114,13 +115,37 @@ def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None
     inside = ALL.copy()
     inside[:3, :4] = False
     west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
-    told = mines_left_by(fleet, inside, 20.0, 0.1, west if of_a_part else None)
+    told = mines_left_by(fleet, inside, 20.0, 0.1, (inside & west).astype(np.float64) if of_a_part else None)
     expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, 20.0, 0.1)
     assert told is not None
     assert expected is not None
     assert told.mean == pytest.approx(expected.mean, rel=1e-3 if rho else 1e-9)
     assert told.clearance == pytest.approx(expected.clearance, rel=1e-3 if rho else 1e-9)
     assert (told.low, told.high) == (expected.low, expected.high)
+
+
+def test_of_a_place_so_much_of_each_cell_counts_as_lies_there() -> None:
+    fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=10, rows=8))
+    levels = to_levels(-np.log(np.where(np.arange(10) < 5, 0.25, 0.5) * np.ones(ALL.shape)))
+    fleet.join("one", 0, Tile(levels, levels))
+    place = np.zeros(ALL.shape)
+    place[0, 0], place[0, 9], place[1, 9] = 0.1, 0.5, 1.0
+    told = mines_left_by(fleet, ALL, 7.5, 0.0, place)
+    assert told is not None
+    # Seen is the worth of 40 cells times 0.75 and 40 times 0.5; left are 0.1 x 0.25 + 1.5 x 0.5 cells.
+    assert told.mean == pytest.approx(8.0 * 0.775 / 50.0, rel=1e-2)
+    assert told.clearance == pytest.approx((1.6 - 0.775) / 1.6, rel=1e-2)
+    # A place may hold what is not in the area's cells, and nobody looked.
+    levels = np.zeros_like(levels)
+    levels[:, 1:] = 100
+    other = FleetMap(fleet.grid)
+    other.join("one", 0, Tile(levels, levels))
+    beside = np.zeros(ALL.shape)
+    beside[:, 0] = 0.2
+    told = mines_left_by(other, np.broadcast_to(np.arange(10) > 0, ALL.shape), 7.5, 0.0, beside)
+    assert told is not None
+    assert told.clearance == 0.0
+    assert told.mean == pytest.approx(8.0 * 1.6 / (72.0 * (1.0 - other.risk[0, 1])))
 
 
 def test_of_several_vehicles_the_one_whose_tracks_differ_most_counts() -> None:

@@ -1,4 +1,4 @@
-"""When a goal is reached: by hand, from how many mines are left with which chance; and which cells a lane has."""
+"""When a goal is reached: by hand, from how many mines are left with which chance; and which ground a lane has."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from scipy.stats import nbinom
 
 from planner.clearance import PRIOR_MINES, MinesLeft, mines_left
 from planner.goal import Goal, Lane, goal_of_lane
+from planner.region import Region
 from planner.types import GridSpec, SweepFrame
 
 ALL = np.ones((8, 10), dtype=np.bool_)
+SQUARE = Region(((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0)))
+GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)  # columns at 0, 5, ... 100 m, rows at 2.5 ...
 
 
 def left_of(risk: float, found: float) -> MinesLeft:
@@ -52,15 +55,14 @@ def test_where_nothing_was_seen_nothing_is_reached() -> None:
     assert goal.words_now(None) == "nothing was seen"
 
 
-def test_a_lane_has_the_cells_whose_centres_lie_within_half_its_width() -> None:
-    grid = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)  # columns at 0, 5, ... 100 m, rows at 2.5 ...
+def test_a_lane_has_so_much_of_each_cell_as_lies_within_half_its_width() -> None:
     lane = Lane(((50.0, 20.0), (50.0, 80.0)), 30.0)
-    expected = np.zeros(grid.shape, dtype=np.bool_)
-    expected[4:16, 7:14] = True
-    np.testing.assert_array_equal(lane.cells(grid), expected)
+    expected = np.zeros(GRID.shape)
+    expected[4:16, 7:14] = 1.0
+    expected[4:16, [7, 13]] = 0.5  # their centres lie on its edges, 35 and 65 m east
     goal = goal_of_lane(lane, 0.05)
-    np.testing.assert_array_equal(goal.place(grid), expected)
-    assert Goal(0.5, 0.5).place(grid) is None
+    np.testing.assert_array_equal(goal.place(SQUARE, GRID), expected)
+    assert Goal(0.5, 0.5).place(SQUARE, GRID) is None
     left = left_of(0.001, 10.0)
     assert goal.is_reached(left)
     assert not goal_of_lane(lane, 0.005).is_reached(left)
@@ -69,12 +71,18 @@ def test_a_lane_has_the_cells_whose_centres_lie_within_half_its_width() -> None:
 
 
 def test_what_a_lane_goes_round_is_not_in_it() -> None:
-    grid = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=21, rows=20)
     round_about = Lane(((10.0, 10.0), (90.0, 10.0), (90.0, 90.0), (10.0, 90.0), (10.0, 5.0)), 10.0)
-    cells = round_about.cells(grid)
-    assert cells[2, 10]
-    assert cells[10, 2]
-    assert not cells[10, 10]
+    place = goal_of_lane(round_about, 0.05).place(SQUARE, GRID)
+    assert place is not None
+    assert (place[2, 10], place[10, 2], place[10, 10]) == (1.0, 1.0, 0.0)
+
+
+@pytest.mark.parametrize("width_m", [1.0, 4.0, 5.0])
+def test_a_lane_between_the_centres_of_cells_is_as_large_as_it_is(width_m: float) -> None:
+    place = goal_of_lane(Lane(((52.5, 20.0), (52.5, 80.0)), width_m), 0.05).place(SQUARE, GRID)
+    assert place is not None
+    assert place.sum() * GRID.cell_area_m2 == pytest.approx(60.0 * width_m)
+    np.testing.assert_array_equal(place[:, 10], place[:, 11])  # centred 2.5 m to either side of its middle
 
 
 @pytest.mark.parametrize(("clearance", "chance"), [(0.0, 0.5), (1.1, 0.5), (0.5, 0.0), (0.5, 1.0)])

@@ -44,6 +44,48 @@ def test_cells_inside_are_those_of_the_polygon(region: Region, heading_rad: floa
     assert not shapely.covers(region.polygon.buffer(-1e-5), points[~inside]).any()
 
 
+def test_of_each_cell_the_share_counts_that_lies_there() -> None:
+    region = Region(SQUARE)
+    grid = region.about(0).grid(10)  # columns from -5 to 5 m, 5 to 15 m and so on, rows from 0 to 10 m and so on
+    shares = region.shares(shapely.box(12, 4, 38, 20), grid)
+    across, along = [0, 0.3, 1, 1, 0.3, 0, 0, 0, 0, 0, 0], [0.6, 1, 0, 0, 0, 0, 0, 0, 0, 0]
+    np.testing.assert_allclose(shares, np.outer(along, across), atol=1e-7)
+    # Of the first column only 0 to 5 m are of the region, and of these 4 lie there.
+    assert region.shares(shapely.box(-50, 0, 4, 100), grid)[:, 0] == pytest.approx(0.8, abs=1e-7)
+    np.testing.assert_array_equal(region.shares(region.polygon, grid), 1.0)
+    with_hole = Region(SQUARE, (MIDDLE,)).shares(shapely.box(-9, -9, 109, 109), grid)
+    # From 40 to 60 m is the hole: of the column from 35 to 45 m what is not the hole's lies there.
+    assert (with_hole[4, 4], with_hole[4, 5], with_hole[3, 5]) == (1, 0, 1)
+
+
+def test_what_lies_nowhere_in_it_has_no_share() -> None:
+    region = Region(SQUARE)
+    grid = region.about(0).grid(10)
+    for nowhere in (shapely.box(-90, 0, -10, 100), shapely.Polygon(), shapely.LineString([(0, 0), (100, 100)])):
+        assert not region.shares(nowhere, grid).any()
+
+
+def test_ground_at_an_edge_counts_though_no_cell_has_its_centre_there() -> None:
+    region = Region(((0, 0), (108, 0), (108, 102), (0, 102)))
+    grid = region.about(0).grid(10)
+    assert grid.shape == (11, 11)  # the last row from 100 to 110 m, the last column from 95 to 105 m
+    assert not region.inside(grid)[10].any()
+    top = region.shares(shapely.box(20, 100, 80, 102), grid)
+    assert top.sum() == pytest.approx(60 * 2 / 100)
+    # Beyond the last column's 105 m are 3 m of the 13 that it holds.
+    assert region.shares(shapely.box(105, 0, 108, 100), grid)[:10, 10] == pytest.approx(3 / 13, abs=1e-7)
+
+
+@given(regions(), st.floats(0, math.pi), st.floats(-300, 300))
+def test_shares_of_two_parts_are_those_of_the_whole(region: Region, heading_rad: float, at_m: float) -> None:
+    grid = region.about(heading_rad).grid(25)
+    west, east = shapely.box(-2000, -2000, at_m, 2000), shapely.box(at_m, -2000, 2000, 2000)
+    both = region.shares(west, grid) + region.shares(east, grid)
+    np.testing.assert_allclose(both, region.shares(region.polygon, grid), atol=1e-6)
+    inside = region.inside(grid)
+    np.testing.assert_allclose(both[inside], 1.0, atol=1e-6)
+
+
 def test_what_it_is_to_keep_out_of_is_no_part_of_it_also_where_that_divides_it() -> None:
     lane = ((40.0, -10.0), (60.0, -10.0), (60.0, 110.0), (40.0, 110.0))
     divided = Region(SQUARE, (), (lane,))

@@ -32,6 +32,7 @@ from planner.types import GridSpec, SweepFrame
 from secondlook.errors import UserError
 from secondlook.recorded import Activity, RecordedMission, RiskMap, StripRecord
 from secondlook.recorded.message_records import HEAD, record
+from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.second_looks import strips
 from secondlook.recorded.vehicles import activities, tracks
 
@@ -122,13 +123,36 @@ def test_mines_left_in_parts_are_those_of_the_whole(mission: RecordedMission, su
     told = summary["mines"]
     assert (whole.mean, whole.low, whole.high) == (told["left"], told["left_low"], told["left_high"])
     west, south, east, north = mission.area.buffer(1.0).bounds
-    middle = (west + east) / 2 + 0.1  # no cell has its centre there
+    middle = (west + east) / 2 + 0.1  # through cells
     boxes = (west, south, middle, north), (middle, south, east, north)
     halves = [mission.mines_left(shapely.box(*box)) for box in boxes]
     assert sum(half.mean for half in halves if half is not None) == pytest.approx(whole.mean)
     assert all(half is not None and half.none > whole.none for half in halves)
-    with pytest.raises(UserError, match="within: no cell of the area lies there"):
-        mission.mines_left(shapely.box(-90, -90, -80, -80))
+    # Strips of 4 and of 8 m, the first one between the centres of cells of 5 m.
+    narrow, wide = (mission.mines_left(shapely.box(145.5, 0, east_m, 100)) for east_m in (149.5, 153.5))
+    rest = mission.mines_left(shapely.box(149.5, 0, 153.5, 100))
+    assert narrow is not None
+    assert wide is not None
+    assert rest is not None
+    assert 0.0 < narrow.mean < wide.mean == pytest.approx(narrow.mean + rest.mean, rel=1e-6)
+    for nowhere in (shapely.box(-90, -90, -80, -80), shapely.LineString([(100, 0), (100, 100)])):
+        with pytest.raises(UserError, match="within: nothing of the area lies there; must be a polygon"):
+            mission.mines_left(nowhere)
+    with pytest.raises(UserError, match="within: must be a valid geometry, but: Self-intersection"):
+        mission.mines_left(shapely.Polygon([(0, 0), (100, 100), (100, 0), (0, 100)]))
+
+
+def test_what_is_truly_found_somewhere_is_told_by_the_targets_places(mission: RecordedMission) -> None:
+    metrics = Metrics()
+    for one in mission.messages():
+        metrics.hear(one)
+    for target in mission.targets:
+        found = 0.0 if target.found_by is None else 1.0
+        assert metrics.truly_found(target.point.buffer(0.01)) == found
+        ring = target.point.buffer(1.0).difference(target.point.buffer(0.5))
+        if not any(ring.intersects(other.point) for other in mission.targets):
+            assert metrics.truly_found(ring) == 1.0  # nothing lies there
+    assert metrics.truly_found(mission.area.buffer(1.0)) == metrics.truly_found()
 
 
 def test_cells_know_their_places() -> None:
