@@ -15,6 +15,7 @@ from bench.figures import TABLES, compared_kept, kept, linked_kept, reliability_
 from bench.flown import ROOT, Mission, Table
 from bench.rows import by
 from secondlook.compare.paired import interval_of_mean
+from secondlook.launch.run_display import mines_left_words
 from secondlook.sweeps.rows import flat
 from secondlook.testing import Fleet
 
@@ -51,6 +52,12 @@ def test_what_pages_say_beside_tables_is_what_is_kept() -> None:
     errors = by(kept("position-errors")["rows"], ("position_error_m",), "true.mean")["20",]
     too_little = fmean(row["true.mean"] - row["risk.mean"] for row in errors)
     assert f"at 20 m it tells {too_little:.3f} too little" in words_of("docs/faults.md")
+
+
+def test_what_a_mission_is_shown_to_say_of_the_mines_left_is_what_it_says(tmp_path: Path) -> None:
+    summary = Fleet("tellaro", folder=tmp_path, record=False).run().summary
+    page = (ROOT / "docs/clearance.md").read_text()
+    assert f"`secondlook run tellaro --bus local`:\n\n    mines left     {mines_left_words(summary['mines'])}\n" in page
 
 
 def words_of(page: str) -> str:
