@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from docs.pages import PAGES, ROOMS, ROOT, first_sentence, map_page
+from secondlook import testing
 from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise
 from secondlook.recorded.whereabouts import Place
@@ -122,6 +123,12 @@ def test_every_key_of_the_summary_is_told(tmp_path: Path) -> None:
     told = set(re.findall(r"\w+", " ".join(re.findall(r"`([^`\n]+)`", page.split("## summary.json")[1]))))
     names = {one for key in ("vehicles", "messages", "dropped") for one in flight.summary[key]}
     assert set(keys_of(json.loads(json.dumps([flight.summary, summary])))) - names - told == set()
+
+
+@pytest.mark.parametrize("page", ["docs/testing.md", "docs/reference/testing.md"])
+def test_all_that_may_be_asserted_or_checked_is_told(page: str) -> None:
+    told = set(re.findall(r"\b(?:assert|check)_\w+", (ROOT / page).read_text(encoding="utf-8")))
+    assert {one for one in testing.__all__ if one.startswith(("assert_", "check_"))} - told == set()
 
 
 def keys_of(value: Any) -> Iterator[str]:
