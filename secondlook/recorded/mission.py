@@ -145,9 +145,17 @@ class Mission(ABC):
     def risk(self, at_s: float | None = None, vehicles: Collection[str] | None = None) -> RiskMap:
         """The residual-risk map at a time, joined from all layers as published until then; at the end if left out.
 
-        `vehicles`: of these alone, such as `primaries`.
+        `at_s`: finite and 0 or more. `vehicles`: of these alone, such as `primaries`. Raises UserError for another
+        time, and for a vehicle that the fleet does not have.
         """
-        self.run  # noqa: B018 - raises where there is none
+        fleet = [one.vehicle for one in self.run.vehicles]
+        if at_s is not None and not 0.0 <= at_s * 1000 < math.inf:
+            raise UserError(f"at_s: {at_s} is not allowed; must be a finite number of seconds, 0 or more")
+        if isinstance(vehicles, str):  # would be taken for a list of its letters
+            raise UserError(f"vehicles: {vehicles!r} is not allowed; must be a list of {', '.join(fleet)}")
+        for name in vehicles or ():
+            if name not in fleet:
+                raise UserError(f"vehicles: {name!r} is none of the fleet; must be of {', '.join(fleet)}")
         until_ms = math.inf if at_s is None else round(at_s * 1000)
         metrics = Metrics()
         for one in self.received(RunInfo, CoverageTile):

@@ -117,6 +117,19 @@ def test_the_risk_without_the_helpers_is_that_of_the_primaries(
     assert (mission.primaries, mission.helpers) == (["primary"], ["helper"])
 
 
+@pytest.mark.parametrize("vehicles", [["hleper"], ["primary", "hleper"], "helper"])
+def test_the_risk_of_a_vehicle_that_is_not_there_is_refused(mission: RecordedMission, vehicles: Any) -> None:
+    with pytest.raises(UserError, match=r"^vehicles: 'h.*er' is .*; must be .*of primary, helper$"):
+        mission.risk(vehicles=vehicles)
+    assert not mission.risk(vehicles=[]).seen.any()
+
+
+@pytest.mark.parametrize("at_s", [math.nan, math.inf, -1.0])
+def test_the_risk_at_no_time_is_refused(mission: RecordedMission, at_s: float) -> None:
+    with pytest.raises(UserError, match=r"^at_s: .* is not allowed; must be a finite number of seconds, 0 or more$"):
+        mission.risk(at_s)
+
+
 def test_mines_left_in_parts_are_those_of_the_whole(mission: RecordedMission, summary: dict[str, Any]) -> None:
     whole = mission.mines_left()
     assert whole is not None
