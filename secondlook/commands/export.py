@@ -19,6 +19,7 @@ from secondlook.files import CannotWriteError, whole_file, write_whole
 from secondlook.progress import no_remark, shown_progress
 from secondlook.recorded import GeographicOrigin, RecordedMission, load_run, to_geojson
 from secondlook.recorded.geojson import collection, features_of
+from secondlook.scenario import Scenario
 
 Run = Annotated[Path, typer.Argument(help="The folder of a run.")]
 Origin = Annotated[
@@ -39,7 +40,8 @@ def geojson(
     else in local metres."""
     place = _place(origin)
     with reading("geojson", GEOJSON) as on_read:
-        text = json.dumps(to_geojson(load_run(run, on_read), place))
+        mission = load_run(run, on_read)
+        text = json.dumps(to_geojson(mission, place or _told_origin(mission)))
     if out is None:
         typer.echo(text)
         return
@@ -75,7 +77,7 @@ def _export(
     told: Callable[[float], None],
 ) -> list[str]:
     """Writes all files; their paths."""
-    place = place or mission.origin
+    place = place or _told_origin(mission)
     if place is None:
         raise UserError(f"{run}: the scenario has no origin; must be given: --origin LAT LON")
     folder = out or run / "export"
@@ -106,6 +108,16 @@ def _files(
     yield "risk-levels.qml", qgis_style()
     if find_spec("rasterio") is not None:
         yield "risk.tif", import_module("secondlook.export.geotiff").to_geotiff(risk, origin)
+
+
+def _told_origin(mission: RecordedMission) -> GeographicOrigin | None:
+    """The scenario's; None where it does not say. Raises UserError where the run's folder holds no scenario, which
+    might have said."""
+    if not mission.scenario.keys() & Scenario.model_fields.keys():
+        file = mission.folder / "scenario.yaml"
+        why = "holds no scenario" if file.exists() else "no such file"
+        raise UserError(f"{file}: {why}, so that nothing tells the origin; must be given: --origin LAT LON")
+    return mission.origin
 
 
 def _place(origin: tuple[float, float] | None) -> GeographicOrigin | None:

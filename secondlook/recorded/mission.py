@@ -309,7 +309,7 @@ class RecordedMission(Mission):
 
     @cached_property
     def origin(self) -> GeographicOrigin | None:
-        """Where the mission frame is on Earth; None where the scenario does not say."""
+        """Where the mission frame is on Earth; None where the scenario does not say, or is missing."""
         try:
             return GeographicOrigin(**self.scenario["origin"]) if "origin" in self.scenario else None
         except (TypeError, ValueError):
