@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,6 +19,7 @@ from comms.runner import Intake
 from comms.said.messages import Heard as ByModem
 from comms.said.routing import Routing
 from comms.said.topics import MISSION_OVER
+from secondlook.errors import UserError
 from secondlook.launch.mission import Bus
 from secondlook.recorded.mission import Mission, chosen_keys
 from secondlook.scenario import Scenario
@@ -210,6 +212,18 @@ def _given(
                 (event.until_ms if event.at_ms <= due_ms < event.until_ms else due_ms, one) for due_ms, one in found
             ]
     return sorted((one for one in found if one[0] < until_ms), key=lambda one: (one[0], one[1].header.order))
+
+
+def check_limit(name: str, limit: Any, must: str, *, above_0: bool = False, most: float = math.inf) -> None:
+    """Raises UserError for a limit that is no number, or that no flight could keep to or go against: what is not
+    finite, below 0, 0 itself with `above_0`, above `most`. `name`: the argument; `must`: in words, what it must be."""
+    __tracebackhide__ = True
+    try:
+        is_number = not isinstance(limit, bool) and math.isfinite(limit)
+    except TypeError:
+        is_number = False
+    if not is_number or limit < 0 or limit > most or (above_0 and limit == 0):
+        raise UserError(f"{name}: {limit} is not allowed; must be {must}")
 
 
 _MOST_TOLD = 10

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 
 from comms.node import Received
@@ -11,7 +10,7 @@ from comms.said.topics import MODEM_TX
 from secondlook.errors import UserError
 from secondlook.fleet.link import coordinator_platform, deck_ms_of
 from secondlook.recorded.link_figures import Age, LinkFigures
-from secondlook.testing.flight import Flight, fail_if
+from secondlook.testing.flight import Flight, check_limit, fail_if
 
 
 def assert_bytes_across_water(flight: Flight, *, at_most_per_s: float) -> None:
@@ -22,8 +21,7 @@ def assert_bytes_across_water(flight: Flight, *, at_most_per_s: float) -> None:
     most, and when most was said.
     """
     __tracebackhide__ = True
-    if not (math.isfinite(at_most_per_s) and at_most_per_s >= 0):
-        raise UserError(f"at_most_per_s: {at_most_per_s} is not allowed; must be bytes a second, 0 or more")
+    check_limit("at_most_per_s", at_most_per_s, "bytes a second, 0 or more")
     by_modem, deck_ms = flight.scenario.link is not None, deck_ms_of(flight.scenario.link)
     said, minutes = Counter[str](), Counter[int]()
     for one in flight.heard:
@@ -56,8 +54,7 @@ def assert_age_at_most(flight: Flight, age_s: float, *, vehicle: str | None = No
     since the start. It fails with who it was, how old, and when.
     """
     __tracebackhide__ = True
-    if not (math.isfinite(age_s) and age_s > 0):
-        raise UserError(f"age_s: {age_s} is not allowed; must be seconds, more than 0")
+    check_limit("age_s", age_s, "seconds, more than 0", above_0=True)
     names = list(flight.scenario.vehicles)
     if vehicle not in (None, *names):
         raise UserError(f"vehicle: {vehicle} is not allowed; must be one of {', '.join(names)}")

@@ -11,7 +11,7 @@ from comms.said.messages import AgentState, CoverageTile, Look, MissionOver
 from planner.fleet_map import CLOSED, FleetMap, VehicleLayer
 from planner.risk import RiskLayer
 from secondlook.errors import UserError
-from secondlook.testing.flight import Flight, Life, fail_if, lives, reached
+from secondlook.testing.flight import Flight, Life, check_limit, fail_if, lives, reached
 from secondlook.testing.inside import OwnLayer
 from vehicle_agent.coverage import CoverageLayer
 
@@ -59,15 +59,20 @@ def assert_risk_at_most(
     uncovered_share: float | None = None,
 ) -> None:
     """The fleet's residual risk in the end, its mean over the worst 30 % of the area, and the share of the area that
-    nobody has seen, are no more than this."""
+    nobody has seen, are no more than this; each a share from 0 to 1, at least one of them."""
     __tracebackhide__ = True
     risk = flight.summary["risk"]
-    limits = {"mean": mean, "worst30_mean": worst30_mean, "uncovered_share": uncovered_share}
+    named = {"mean": mean, "worst30_mean": worst30_mean, "uncovered_share": uncovered_share}
+    limits = {name: limit for name, limit in named.items() if limit is not None}
+    if not limits:
+        raise UserError(f"assert_risk_at_most needs a limit: {', '.join(named)}, or several of them")
+    for name, limit in limits.items():
+        check_limit(name, limit, "a share from 0 to 1", most=1)
     fail_if(
         [
             f"{name} is {risk[name]:.4f} at {flight.end_s:g} s, and not at most {limit:g}"
             for name, limit in limits.items()
-            if limit is not None and not risk[name] <= limit
+            if not risk[name] <= limit
         ],
         "the residual risk is too large",
     )

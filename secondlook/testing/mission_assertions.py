@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from comms.lockstep.group import LOST
@@ -10,7 +9,7 @@ from comms.said.messages import AgentState, MissionOver, Mode
 from secondlook.errors import UserError
 from secondlook.launch.mission import Bus
 from secondlook.testing.fleet import Fleet, first_difference
-from secondlook.testing.flight import Flight, fail_if, lives
+from secondlook.testing.flight import Flight, check_limit, fail_if, lives
 
 
 def assert_all_finished(flight: Flight) -> None:
@@ -63,14 +62,16 @@ def assert_no_message_dropped(flight: Flight) -> None:
 
 
 def assert_kept_apart(flight: Flight, separation_m: float | None = None) -> None:
-    """No two vehicles came nearer to each other than this; `mission.separation_m` of the scenario if left out.
+    """No two vehicles came nearer to each other than this; `mission.separation_m` of the scenario if left out,
+    which must not be 0 then.
 
     True positions count where they are told; a vehicle counts from when it is first under way.
     """
     __tracebackhide__ = True
     least_m = flight.scenario.mission.separation_m if separation_m is None else separation_m
-    if not (math.isfinite(least_m) and least_m >= 0):
-        raise UserError(f"separation_m: {least_m} is not allowed; must be a length in metres, 0 or more")
+    if separation_m is None and not least_m:
+        raise UserError("assert_kept_apart needs separation_m where mission.separation_m of the scenario is 0")
+    check_limit("separation_m", least_m, "a length in metres, more than 0", above_0=True)
     problems = [
         f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other at {one.t_s:.3f} s"
         for one in flight.closest

@@ -21,7 +21,7 @@ from comms.said.messages import (
 from coordinator.ledger import NUMBERS_A_SECOND, WITH_A_VEHICLE
 from coordinator.mission_end import GOAL_REACHED
 from secondlook.fleet.link import answer_within_ms_of, lost_after_ms_of, silent_after_ms_of
-from secondlook.testing.flight import Flight, fail_if, lives, reached
+from secondlook.testing.flight import Flight, check_limit, fail_if, lives, reached
 
 _AT_WORK = (TaskState.ACCEPTED, TaskState.UNDER_WAY)
 
@@ -249,6 +249,7 @@ def assert_strips_offered_within(flight: Flight, within_s: float) -> None:
     """No strip stays open for longer than `within_s` while a helper is free that has neither refused it nor failed at
     it; a helper is free as long as it says that it is idle."""
     __tracebackhide__ = True
+    check_limit("within_s", within_s, "seconds, 0 or more")
     problems = []
     open_since: dict[int, int] = {}
     idle_since: dict[str, int] = {}

@@ -82,11 +82,13 @@ class TestMissions:
             "five-helpers", folder=tmp_path, overrides=("mission.separation_m=0", COARSE, *until(1500)), seed=1
         )
         flight = fleet.run()
-        assert_kept_apart(flight)
+        with pytest.raises(UserError, match=r"needs separation_m where mission\.separation_m of the scenario is 0"):
+            assert_kept_apart(flight)
         with pytest.raises(AssertionError, match=r"came within \d+\.\d m of each other at \d+\.\d{3} s"):
             assert_kept_apart(flight, 12)
-        with pytest.raises(UserError, match="separation_m: nan is not allowed"):
-            assert_kept_apart(flight, math.nan)
+        for wrong in (math.nan, math.inf, -1, 0):
+            with pytest.raises(UserError, match=rf"separation_m: {wrong} is not allowed; must be a length in metres"):
+                assert_kept_apart(flight, wrong)
         told = dict(flight.summary)
         closing_table(told, tmp_path)
         assert "too close" not in capsys.readouterr().out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -319,6 +320,11 @@ class TestStripsOfferedWithin:
         assert_strips_offered_within(idle, 1000)
         assert_strips_offered_within(replace(idle, events=(Kill("helper", opened.header.sent_ms),)), 20)
 
+    @pytest.mark.parametrize("wrong", [math.nan, math.inf, -1])
+    def test_a_wait_that_is_no_time_is_refused(self, two: Flight, wrong: float) -> None:
+        with pytest.raises(UserError, match=f"^within_s: {wrong} is not allowed; must be seconds, 0 or more$"):
+            assert_strips_offered_within(two, wrong)
+
     def test_not_for_a_helper_that_has_refused_it(self, tmp_path: Path) -> None:
         overrides = {"vehicles.helper.endurance_s": 51, "coordinator.allocator": "greedy"}
         assert_strips_offered_within(fly(tmp_path, BRIEF, overrides=overrides), 100)
@@ -416,6 +422,17 @@ class TestMissions:
             assert_risk_at_most(flight, **limit)
         limit = {name: 0.5}
         assert_risk_at_most(flight, **limit)
+
+    def test_without_a_limit_nothing_is_asked_of_the_risk(self, two: Flight) -> None:
+        with pytest.raises(UserError, match="needs a limit: mean, worst30_mean, uncovered_share, or several"):
+            assert_risk_at_most(two)
+
+    @pytest.mark.parametrize("wrong", [math.nan, math.inf, -0.1, 1.1, "0.5", True])
+    @pytest.mark.parametrize("name", ["mean", "worst30_mean", "uncovered_share"])
+    def test_a_limit_that_no_risk_can_have_is_refused(self, two: Flight, name: str, wrong: Any) -> None:
+        limit: dict[str, Any] = {"mean": 0.5, name: wrong}
+        with pytest.raises(UserError, match=f"^{name}: {wrong} is not allowed; must be a share from 0 to 1$"):
+            assert_risk_at_most(two, **limit)
 
     def test_of_many_problems_the_first_are_told(self, two: Flight) -> None:
         with pytest.raises(AssertionError, match=r"\n  and \d+ more$") as caught:

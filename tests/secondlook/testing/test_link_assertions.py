@@ -128,7 +128,10 @@ def packet(message: Any) -> Packet:
     [
         (lambda flight: assert_bytes_across_water(flight, at_most_per_s=-1), "at_most_per_s: -1 is not allowed; must"),
         (lambda flight: assert_bytes_across_water(flight, at_most_per_s=float("nan")), "at_most_per_s: nan is not all"),
+        (lambda flight: assert_bytes_across_water(flight, at_most_per_s=float("inf")), "at_most_per_s: inf is not all"),
         (lambda flight: assert_age_at_most(flight, 0), "age_s: 0 is not allowed; must be seconds, more than 0"),
+        (lambda flight: assert_age_at_most(flight, float("nan")), "age_s: nan is not allowed; must be seconds, more"),
+        (lambda flight: assert_age_at_most(flight, True), "age_s: True is not allowed; must be seconds, more than 0"),
         (
             lambda flight: assert_age_at_most(flight, 5, vehicle="boat"),
             "vehicle: boat is not allowed; must be one of primary, helper",
