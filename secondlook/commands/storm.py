@@ -59,9 +59,12 @@ def storm(
         bool, typer.Option("--shrink", help="Leave out of this storm what it fails without, and fly what is left.")
     ] = False,
     flights: Annotated[
-        int, typer.Option(min=1, max=MOST_STORMS, help="With --shrink, how often it is flown at most.")
-    ] = MOST_FLIGHTS,
-    bus: Annotated[Bus, typer.Option(help="Of a single storm.")] = "local",
+        int | None,
+        typer.Option(
+            min=1, max=MOST_STORMS, help=f"With --shrink, how often it is flown at most; {MOST_FLIGHTS} if left out."
+        ),
+    ] = None,
+    bus: Annotated[Bus | None, typer.Option(help="Of a single storm; local if left out.")] = None,
     again: Annotated[
         int,
         typer.Option(min=0, metavar="N", help="Of many each Nth is flown twice, each 10 Nth over Zenoh, too; 0: none."),
@@ -87,14 +90,19 @@ def storm(
         raise UserError("--canaries: not allowed beside --plan or --seed; must be flown with a range, --seeds A..B")
     if seeds is not None and (plan is not None or seed is not None):
         raise UserError("--seeds: not allowed beside --plan or --seed; a range is flown without")
+    if flights is not None and not shrink:
+        raise UserError("--flights: not allowed without --shrink; says how often a storm is flown to shrink it")
+    most_flights = (flights or MOST_FLIGHTS) if shrink else 0
     if plan is not None:
         if scenario is not None or seed is not None:
             raise UserError("--plan: not allowed beside a scenario or --seed; the plan holds both")
-        _fly_one(load_plan(plan), out or Path("runs") / plan.stem, bus, flights if shrink else 0)
+        _fly_one(load_plan(plan), out or Path("runs") / plan.stem, bus or "local", most_flights)
     elif seed is not None:
-        _fly_one(storm_of(mission, seed), out or Path("runs") / f"storm-{seed}", bus, flights if shrink else 0)
+        _fly_one(storm_of(mission, seed), out or Path("runs") / f"storm-{seed}", bus or "local", most_flights)
     elif shrink:
         raise UserError("--shrink: not allowed without --seed or --plan; it shrinks a single storm")
+    elif bus is not None:
+        raise UserError("--bus: not allowed without --seed or --plan; of many storms --again says which fly over Zenoh")
     elif canaries:
         _look_for_canaries(mission, _range_of(seeds or "1..500"), jobs or os.cpu_count() or 1, out)
     else:
