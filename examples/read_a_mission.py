@@ -10,10 +10,18 @@ from pathlib import Path
 
 import secondlook
 from comms.said.messages import Plan, StripState
+from secondlook.errors import UserError
 from secondlook.recorded import to_geojson
 
-mission = secondlook.load(sys.argv[1])
-print(f"{mission.run.scenario}, seed {mission.run.seed}: {mission.area.area / 1e6:.2f} km² in {mission.end_s:.0f} s")
+try:
+    if len(sys.argv) != 2:
+        raise UserError(f"{len(sys.argv) - 1} arguments are not allowed; must be one, the folder of a run")
+    mission = secondlook.load(sys.argv[1])
+    flown = f"{mission.run.scenario}, seed {mission.run.seed}"
+except UserError as error:
+    sys.stderr.write(f"{error}\n")
+    sys.exit(2)
+print(f"{flown}: {mission.area.area / 1e6:.2f} km² in {mission.end_s:.0f} s")
 for vehicle, path in mission.paths.items():
     print(f"{vehicle} has flown {path.length_m:.0f} m")
 

@@ -395,15 +395,36 @@ def test_a_message_that_cannot_be_read_is_named(brief_copy: Path) -> None:
         assert mission.tracks
 
 
-def test_the_example_runs(brief_copy: Path) -> None:
+def read_a_mission(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """The example called with these."""
     example = Path(__file__).parents[3] / "examples" / "read_a_mission.py"
-    done = subprocess.run(
-        [sys.executable, example, brief_copy], capture_output=True, text=True, check=False, timeout=60
+    return subprocess.run(
+        [sys.executable, example, *arguments], capture_output=True, text=True, check=False, timeout=60
     )
+
+
+def test_the_example_runs(brief_copy: Path) -> None:
+    done = read_a_mission(brief_copy)
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith("brief, seed 3: 0.03 km² in ")
     assert "\nstrip 1, " in done.stdout
     assert json.loads((brief_copy / "mission.geojson").read_text())["type"] == "FeatureCollection"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        ((), "0 arguments are not allowed; must be one, the folder of a run"),
+        (("runs", "more"), "2 arguments are not allowed; must be one, the folder of a run"),
+        (("none",), "none: there is no such folder; must be the folder of a run"),
+        ((Path(__file__).parent,), "holds no messages.mpk; must be the folder of a run without --no-record"),
+    ],
+)
+def test_the_example_refuses_what_is_no_run(arguments: tuple[str | Path, ...], sentence: str) -> None:
+    done = read_a_mission(*arguments)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert sentence in done.stderr
+    assert done.stderr.count("\n") == 1
 
 
 def test_a_track_was_laid_for_the_latest_range_before_it_was_flown() -> None:
