@@ -7,8 +7,15 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+from flights import BRIEF
+
+from comms.said.codec import header_of
+from secondlook.launch.mission import RunOptions, run_mission
+from secondlook.recorded.mission_files import read_messages
+from secondlook.scenario import load_scenario
+
 ROOT = Path(__file__).parents[2]
-BRIEF = ROOT / "tests" / "support" / "brief.yaml"
 
 
 def python_blocks(document: str) -> list[str]:
@@ -31,3 +38,18 @@ def test_the_allocator_shown_is_the_examples() -> None:
     (shown,) = python_blocks("plug-ins.md")
     example = (ROOT / "examples" / "own_allocator" / "longest_first.py").read_text(encoding="utf-8")
     assert shown == example
+
+
+def test_what_reads_a_mission_back_runs_as_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    run_mission(load_scenario(BRIEF), RunOptions(tmp_path, bus="local"))
+    blocks = python_blocks("reading-back.md")
+    printed = []
+    for block in blocks:
+        shown = re.sub(r"runs/tellaro-\d+-\d+|\bRUN\b", str(tmp_path), block)
+        assert shown != block
+        exec(compile(shown, "reading-back.md", "exec"), {})
+        printed.append(capsys.readouterr().out.splitlines())
+    with_secondlook, with_msgpack = printed
+    messages = read_messages(tmp_path / "messages.mpk")
+    assert len(with_secondlook) == sum(key.startswith("coord/") for key, _ in messages) > 0
+    assert with_msgpack == [f"{n} {key} {header_of(payload).sent_ms}" for n, (key, payload) in enumerate(messages, 1)]
