@@ -18,6 +18,7 @@ from comms.said.wire import WireError
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.progress import no_remark, shown_progress
+from secondlook.recorded.mission import read_summary
 from secondlook.recorded.mission_files import read_recording
 from secondlook.recorded.replay import replay_node
 from secondlook.scenario import load_scenario
@@ -34,6 +35,13 @@ def _by_wall_clock(run: Path, recording: Sequence[tuple[str, bytes]]) -> bool:
         announced = decode(payload, RunInfo)[1]
         return isinstance(announced, RunInfo) and announced.mode is ClockMode.WALL
     return False
+
+
+def _said_in_all(run: Path) -> int | None:
+    """How many messages there were, by the summary; None of a mission that was not flown to its end, as of one that was
+    killed: all that was recorded of it may be left."""
+    summary = read_summary(run)
+    return sum((summary.get("messages") or {}).values()) if summary.get("digest") else None
 
 
 def replay(
@@ -58,9 +66,15 @@ def replay(
             f"{node}: cannot be replayed exactly, as messages are missing that it may have heard or said", err=True
         )
         raise typer.Exit(DIFFERS)
+    in_all = _said_in_all(run)
+    lost = max(0, (in_all or 0) - len(recording))
     fleet = build_fleet(load_scenario(str(scenario_file)), record=False)
     if node not in fleet.specs:
         raise UserError(f"--node {node}: not a node of this mission; must be one of {', '.join(fleet.specs)}")
+    if lost:
+        typer.echo(
+            f"{node}: not all that it may have heard or said is left: {lost} of {in_all} messages are lost", err=True
+        )
     try:
         with shown_progress("replay", begins="reading") as tell:
             result = replay_node(
@@ -68,7 +82,7 @@ def replay(
                 fleet.specs[node].make(),
                 Routing(fleet.roster),
                 recording,
-                whole=(run / "summary.json").exists(),
+                whole=in_all is not None and not lost,
                 tolerance=tolerance,
                 told=lambda share: tell(share, no_remark),
             )
@@ -77,7 +91,9 @@ def replay(
         raise typer.Exit(DIFFERS) from error
     if result.difference is None:
         how = f"numbers within {tolerance:g}" if tolerance else "byte for byte"
-        typer.echo(f"{node}: all {result.agreed} messages are said again, {how}")
+        typer.echo(f"{node}: all {result.agreed} messages{' that are left' if lost else ''} are said again, {how}")
+        if lost:
+            raise typer.Exit(DIFFERS)
         return
     difference = result.difference
     typer.echo(

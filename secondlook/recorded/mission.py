@@ -394,6 +394,20 @@ class _Summary(BaseModel):
     begun_utc: str | None = None
     factor: float | None = None
     time: _Times | None = None
+    digest: str | None = None
+    messages: dict[str, int] | None = None
+
+
+def read_summary(folder: Path) -> Mapping[str, Any]:
+    """What summary.json of a run holds; empty where it is missing, empty or cut short, of which the log tells. Raises
+    UserError, in one sentence, for what no run has written."""
+    summary = _mapping(folder / "summary.json", json.loads)
+    try:
+        _Summary.model_validate(summary)
+    except ValidationError as error:
+        key = ".".join(map(str, error.errors()[0]["loc"]))
+        raise UserError(f"{folder / 'summary.json'}: {key} must be as the run wrote it") from None
+    return summary
 
 
 def load_run(run: str | os.PathLike[str], on_read: OnRead | None = None, *, quiet: bool = False) -> RecordedMission:
@@ -410,12 +424,7 @@ def load_run(run: str | os.PathLike[str], on_read: OnRead | None = None, *, quie
     messages = folder / "messages.mpk"
     if not messages.exists():
         raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
-    summary = _mapping(folder / "summary.json", json.loads)
-    try:
-        _Summary.model_validate(summary)
-    except ValidationError as error:
-        key = ".".join(map(str, error.errors()[0]["loc"]))
-        raise UserError(f"{folder / 'summary.json'}: {key} must be as the run wrote it") from None
+    summary = read_summary(folder)
     recording = read_recording(messages)
     if recording.damage is not None and not quiet:
         log.warning("%s: %s", messages, recording.damage)

@@ -120,6 +120,39 @@ def test_a_recording_that_was_cut_off_is_replayed_as_far_as_it_goes(run: Path, t
     assert output.startswith("primary: all ")
 
 
+@pytest.mark.parametrize("bytes_left", ["of half a message", "of whole messages"])
+@pytest.mark.parametrize("node", ["primary", "coordinator"])
+def test_of_a_mission_that_was_flown_to_its_end_the_end_is_missed(
+    run: Path, tmp_path: Path, node: str, bytes_left: str
+) -> None:
+    said = read_messages(run / "messages.mpk")
+    place = len(said) * 2 // 3
+    copy = rewrite(run, tmp_path, lambda entries: entries[: place + 1])
+    file = copy / "messages.mpk"
+    last = record(place + 1, *said[place])
+    keeps = 10 if bytes_left == "of half a message" else 0
+    file.write_bytes(file.read_bytes()[: keeps - len(last)])
+    again = sum(decode_sender(payload) == node for _, payload in said[:place])
+    code, output = replay(copy, node)
+    assert again >= 10
+    assert code == 1
+    lost = f"{len(said) - place} of {len(said)} messages are lost"
+    assert output.endswith(
+        f"{node}: not all that it may have heard or said is left: {lost}\n"
+        f"{node}: all {again} messages that are left are said again, byte for byte\n"
+    )
+    assert output.count("was cut off or is damaged at its end") == (keeps > 0)
+
+
+def test_what_lies_behind_the_end_is_nothing_that_is_missed(run: Path, tmp_path: Path) -> None:
+    copy = rewrite(run, tmp_path, list)
+    with (copy / "messages.mpk").open("ab") as file:
+        file.write(bytes(50))
+    code, output = replay(copy, "primary")
+    assert code == 0
+    assert output.startswith(f"{copy / 'messages.mpk'}: was cut off or is damaged at its end: its last 50 bytes")
+
+
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
