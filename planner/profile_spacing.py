@@ -17,6 +17,7 @@ from planner.spacing_planners import (
     SinglesPlanner,
     SpacingDecision,
     SpacingPlanner,
+    checked_decision,
     counted_range_m,
 )
 from planner.types import DetectionCurve
@@ -151,14 +152,19 @@ def known_before(prior: DetectionCurve, threshold: float) -> Known:
 def first_decision(
     spacing: SpacingPlanner, width_m: float, known: Known | None, terms: SpacingTerms
 ) -> SpacingDecision:
-    """The tracks for a whole part, by all that the spacing planner can make use of."""
+    """The tracks for a whole part, by all that the spacing planner can make use of. Raises ValueError for an answer of
+    a user's own that is no decision (`checked_decision`)."""
     measured_m = known.r_eff_m if known is not None and known.measured else None
-    decision = None
+    decision, method = None, "decide"
     if known is not None and isinstance(spacing, ProfilePlanner):
+        method = "lay"
         decision = spacing.lay(PartSoFar(width_m, measured_m, (), (), known.curve, known.r_eff_m), terms)
     elif measured_m is not None and isinstance(spacing, SinglesPlanner):
+        method = "cover"
         decision = spacing.cover(width_m, (), measured_m)
-    return spacing.decide(width_m, 0.0, measured_m) if decision is None else decision
+    if decision is None:
+        method, decision = "decide", spacing.decide(width_m, 0.0, measured_m)
+    return checked_decision(spacing, method, decision)
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, runtime_checkable
 
 from planner.cover import fewest_tracks, spans_left
 from planner.spacing import adapt_range, track_offsets
@@ -57,6 +58,30 @@ class SinglesPlanner(SpacingPlanner, Protocol):
 
     def cover(self, width_m: float, flown: Sequence[FlownTrack], r_eff_m: int) -> SpacingDecision | None:
         """Tracks for what these have left of [0, width_m], none if that is nothing; None to go on with `decide`."""
+
+
+def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> SpacingDecision:
+    """What a spacing planner, which may be a user's own, has answered to a method of its, if it can be planned with:
+    a range in whole metres from 1 on, finite offsets, and to be asked again after 1 track or more. Raises ValueError,
+    which names the planner, for anything else."""
+    kind = type(spacing)
+    told = f"the spacing planner {kind.__module__}:{kind.__qualname__}"
+    if not all(hasattr(answer, one.name) for one in fields(SpacingDecision)):
+        must = f"must answer {method} with a planner.spacing_planners.SpacingDecision"
+        raise ValueError(f"{told} {must}, not {reprlib.repr(answer)}")
+    for name, must in (("range_m", "whole metres"), ("asks_after", "a whole number of tracks")):
+        value = getattr(answer, name)
+        if not hasattr(value, "__index__") or value < 1:
+            given = f"answers {method} with {name} {reprlib.repr(value)}"
+            raise ValueError(f"{told} {given}; must be {must}, 1 or more")
+    try:
+        wrong = [one for one in answer.offsets_m if not math.isfinite(one)]
+    except TypeError:
+        given = f"answers {method} with offsets_m {reprlib.repr(answer.offsets_m)}"
+        raise ValueError(f"{told} {given}; must be a tuple of metres across the tracks") from None
+    if wrong:
+        raise ValueError(f"{told} lays a track at {wrong[0]} m by {method}; must be a finite number of metres")
+    return answer  # type: ignore[no-any-return]
 
 
 @dataclass(frozen=True)

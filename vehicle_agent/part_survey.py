@@ -13,6 +13,7 @@ from planner.spacing_planners import (
     FlownTrack,
     SinglesPlanner,
     SpacingDecision,
+    checked_decision,
     counted_range_m,
     lowest_range_m,
 )
@@ -84,16 +85,18 @@ class PartSurvey:
         return self._decision.replans
 
     def next(self, r_eff_m: int, curve: DetectionCurve) -> SpacingDecision | None:
-        """The tracks for what is left; None where that is nothing."""
+        """The tracks for what is left; None where that is nothing. Raises ValueError for an answer that is no decision
+        (`planner.spacing_planners.checked_decision`)."""
         spacing, width_m = self._config.spacing, self.area.width_m
         if isinstance(spacing, ProfilePlanner):
-            decision = spacing.lay(self._so_far(r_eff_m, curve), self._terms)
+            method, decision = "lay", spacing.lay(self._so_far(r_eff_m, curve), self._terms)
         else:
             self._covered_m = max(self._covered_m, self._edge_m(self._since, r_eff_m))
-            decision = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
-            if decision is None and self._covered_m < width_m - NARROWEST_M:
-                decision = spacing.decide(width_m, self._covered_m, r_eff_m)
-        if decision is None or not decision.offsets_m:
+            singles = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
+            method, decision = "cover", singles
+            if singles is None and self._covered_m < width_m - NARROWEST_M:
+                decision = self._decided(self._covered_m, r_eff_m)
+        if decision is None or not checked_decision(spacing, method, decision).offsets_m:
             return None
         self._decision, self._since = decision, []
         return decision
@@ -118,8 +121,12 @@ class PartSurvey:
         # Whatever r_eff will be, a next pair begins no nearer to this one than at twice the least range. Where the far
         # side is near its tracks are pulled in; then they lie as they would with what is known now.
         nearest_m = max(track.across_m for track in pair) + 2 * lowest_range_m(self._config.nadir_gap_m)
-        pulled_in_m = min(self._config.spacing.decide(self.area.width_m, edge_m, known_m).offsets_m)
+        pulled_in_m = min(self._decided(edge_m, known_m).offsets_m)
         return min(nearest_m, pulled_in_m) - reach.far_m - cell_m
+
+    def _decided(self, covered_m: float, r_eff_m: int) -> SpacingDecision:
+        spacing = self._config.spacing
+        return checked_decision(spacing, "decide", spacing.decide(self.area.width_m, covered_m, r_eff_m))
 
     def _so_far(self, r_eff_m: int, curve: DetectionCurve) -> PartSoFar:
         planned_m = self._decision.offsets_m[self._done([]) :]

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
+from dataclasses import replace
+from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +19,7 @@ from planner.spacing_planners import (
     FlownTrack,
     SinglesPlanner,
     SpacingDecision,
+    checked_decision,
     counted_range_m,
     lowest_range_m,
 )
@@ -224,3 +229,27 @@ class TestFixedSpacing:
 )
 def test_the_lowest_range_is_three_nadir_gaps_in_whole_metres(nadir_gap_m: float, lowest_m: int) -> None:
     assert lowest_range_m(nadir_gap_m) == lowest_m
+
+
+@pytest.mark.parametrize(
+    ("changed", "sentence"),
+    [
+        ({"asks_after": 0}, "answers lay with asks_after 0; must be a whole number of tracks, 1 or more"),
+        ({"range_m": 0}, "answers lay with range_m 0; must be whole metres, 1 or more"),
+        ({"range_m": None}, "answers lay with range_m None; must be whole metres, 1 or more"),
+        ({"offsets_m": (40.0, math.inf)}, "lays a track at inf m by lay; must be a finite number of metres"),
+        ({"offsets_m": ("40",)}, "answers lay with offsets_m ('40',); must be a tuple of metres across the tracks"),
+    ],
+)
+def test_a_decision_that_cannot_be_planned_with_is_told_with_who_made_it(
+    changed: dict[str, Any], sentence: str
+) -> None:
+    planner = FixedSpacing(20.0, 80.0)
+    decision = SpacingDecision(80, (20.0, 60.0), replans=False)
+    assert checked_decision(planner, "lay", decision) is decision
+    by_numpy: dict[str, Any] = {"range_m": np.int64(80), "offsets_m": tuple(np.array([20.0, 60.0]))}
+    whole = replace(decision, **by_numpy)
+    assert checked_decision(planner, "lay", whole) is whole
+    told = re.escape(f"the spacing planner planner.spacing_planners:FixedSpacing {sentence}")
+    with pytest.raises(ValueError, match=f"^{told}$"):
+        checked_decision(planner, "lay", replace(decision, **changed))

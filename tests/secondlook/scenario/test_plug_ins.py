@@ -55,6 +55,32 @@ class Nowhere(Every60):
     def decide(self, width_m, covered_m, r_eff_m):
         return SpacingDecision(60, (float("nan"),), replans=False)
 
+class Hushed(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return None
+
+class Paired(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return 60, (30.0, 90.0)
+
+class Halved(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(60.5, (30.0, 90.0), replans=False)
+
+class OneTrack(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(60, 30.0, replans=False)
+
+class HushedLater(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(30, (30.0, 60.0), replans=True) if r_eff_m is None else None
+
+class PairedSingles(Every60):
+    def decide(self, width_m, covered_m, r_eff_m):
+        return SpacingDecision(30, (30.0, 60.0), replans=True)
+    def cover(self, width_m, flown, r_eff_m):
+        return 60, (90.0,)
+
 class Deaf(CurveSonar):
     def p_detect(self, range_m, look_bearing_rad, altitude_m, position_m, time_s):
         return 0.1 * super().p_detect(range_m, look_bearing_rad, altitude_m, position_m, time_s)
@@ -288,3 +314,32 @@ def test_an_answer_that_is_none_is_told_for_what_it_is(run: Run, allocator: str,
     code, _, error = run(f"coordinator.allocator=own:{allocator}")
     assert code == 1
     assert re.search(rf"^coordinator has failed at \d+\.\d+ s: {re.escape(sentence)}", error, re.MULTILINE), error
+
+
+DECISION = "with a planner.spacing_planners.SpacingDecision, not "
+
+
+@pytest.mark.parametrize(
+    ("spacing", "at", "sentence"),
+    [
+        ("Hushed", "0.001 s", f"must answer decide {DECISION}None"),
+        ("Paired", "0.001 s", f"must answer decide {DECISION}(60, (30.0, 90.0))"),
+        ("Nowhere", "0.001 s", "lays a track at nan m by decide; must be a finite number of metres"),
+        ("Halved", "0.001 s", "answers decide with range_m 60.5; must be whole metres, 1 or more"),
+        ("OneTrack", "0.001 s", "answers decide with offsets_m 30.0; must be a tuple of metres across the tracks"),
+        ("HushedLater", "", f"must answer decide {DECISION}None"),
+        ("PairedSingles", "", f"must answer cover {DECISION}(60, (90.0,))"),
+    ],
+)
+def test_a_spacing_planner_that_answers_wrongly_is_named(run: Run, spacing: str, at: str, sentence: str) -> None:
+    code, _, error = run(f"vehicles.primary.spacing=own:{spacing}")
+    assert code == 1
+    told = re.escape(f"ValueError: the spacing planner own:{spacing} {sentence}; what was recorded is in ")
+    assert re.search(rf"^primary has failed at {re.escape(at) or '[0-9.]+ s'}: {told}", error, re.MULTILINE), error
+
+
+def test_what_it_answers_wrongly_is_told_before_anything_flies_too(folder: Path, called: Call) -> None:
+    code, _, error = called("plan", "bay.yaml", "--set", "vehicles.primary.spacing=own:Hushed")
+    assert code == 2
+    said = f"ValueError: the spacing planner own:Hushed must answer decide {DECISION}None"
+    assert error == f"own:Hushed has failed to lay tracks: {said}\n"
