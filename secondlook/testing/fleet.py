@@ -21,7 +21,7 @@ from secondlook.launch.mission import Bus, Made, RunOptions, run_mission
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.recorded.observer import RunStopped
 from secondlook.scenario import Scenario, load_scenario, make_scenario
-from secondlook.testing.flight import Flight, Heard
+from secondlook.testing.flight import Flight, Heard, delivered_until_ms, fail_if
 from secondlook.testing.full_disk import filling
 from secondlook.testing.inside import Inside
 from secondlook.testing.plan import TroublePlan, load_plan
@@ -165,10 +165,16 @@ class Fleet(Trouble):
     def run(self, *, bus: Bus | None = None) -> Flight:
         """Flies the mission to its end, on another bus than the fleet's if one is given.
 
-        Raises RunFailedError, in one sentence, if it fails.
+        Raises RunFailedError, in one sentence, if it fails, and AssertionError if it was over before trouble that was
+        to strike in it: a test of that would test nothing. Of what goes on for a while the beginning counts; trouble of
+        a plan may lie after the end.
         """
+        __tracebackhide__ = True
         flight, _ = self._fly(_Watch(self._new_heard(), self._until_now), self.bus if bus is None else _checked(bus))
         self._until_now, self._from_ms = [], 0
+        until_ms = delivered_until_ms(flight)
+        never = [f"{what} {from_ms / 1000:g} s" for what, from_ms in self.held if from_ms > until_ms]
+        fail_if(never, f"the mission was over at {flight.end_s:.3f} s, before trouble that never came")
         return flight
 
     def run_until(self, condition: Condition, *, timeout_s: float) -> Flight:

@@ -140,7 +140,7 @@ class Life:
 
 def lives(flight: Flight, node_id: str) -> list[Life]:
     """The starts of a node in their order; none for one that is absent to the end."""
-    beyond_ms = _end_ms(flight) + 1
+    beyond_ms = delivered_until_ms(flight) + 1
     events = sorted((one for one in flight.events if one.node_id == node_id), key=lambda one: one.at_ms)
     found = [] if node_id in absent_at_start(events) else [Life(0, 0, beyond_ms, killed=False)]
     for event in events:
@@ -156,7 +156,7 @@ def lives(flight: Flight, node_id: str) -> list[Life]:
     return found
 
 
-def _end_ms(flight: Flight) -> int:
+def delivered_until_ms(flight: Flight) -> int:
     """Until when messages are delivered: after the mission's end that of the last words, too."""
     overs_ms = [one.header.sent_ms for one in flight.heard if one.topic is MISSION_OVER]
     now_ms = flight.heard.now_ms

@@ -188,12 +188,15 @@ class TroublePlan(Mapping):
         return dump(self.model_dump(mode="json", exclude_none=True))
 
     def schedule(self, trouble: Trouble) -> None:
-        """Schedules all that goes wrong. Raises UserError, which names the entry."""
+        """Schedules all that goes wrong; a mission may be over before it comes to that. Raises UserError, which names
+        the entry."""
+        held = tuple(trouble.held)
         for place, one in enumerate(self.trouble):
             try:
                 one.schedule(trouble)
             except UserError as error:
                 raise UserError(f"trouble[{place}]: {error}") from error
+        trouble.held[:] = held
 
 
 def load_plan(path: str | os.PathLike[str]) -> TroublePlan:

@@ -22,6 +22,9 @@ class Trouble:
 
     Where no time is given, trouble begins now: at the moment at which `Fleet.run_until` has ended, or at the mission's
     start. Before that moment nothing can be changed any more. UserError tells, in one sentence, what is not allowed.
+
+    `held`: in words what is to strike, and from when on in milliseconds, of all trouble that a mission must not be over
+    before: that which plans have scheduled is left out, as what a storm draws may lie after the end.
     """
 
     def __init__(self, routing: Routing, seed: int) -> None:
@@ -29,6 +32,7 @@ class Trouble:
         self.events: tuple[NodeEvent, ...] = ()
         self.disk_full_ms: int | None = None
         self.outages: tuple[Outage, ...] = ()
+        self.held: list[tuple[str, int]] = []
         self._seed = seed
         self._message_faults: list[MessageFault] = []
         self._cut_offs: list[CutOff] = []
@@ -60,6 +64,7 @@ class Trouble:
         """From then on no file can be written, the test's own included, until the mission has failed: with
         RunFailedError, which names a file, at the latest when it ends. On the local bus alone."""
         self.disk_full_ms = self._event_ms(at_s)
+        self.held.append(("disk_full at", self.disk_full_ms))
 
     def cut_off(self, vehicle: str, *, for_s: float, from_s: float | None = None) -> None:
         """For a while nothing crosses the water from the vehicle's agent or to it. Agent and vehicle go on talking."""
@@ -68,6 +73,7 @@ class Trouble:
             raise UserError(f"cut_off: {vehicle!r} is not allowed; must be one of {', '.join(vehicles)}")
         from_ms = self._time_ms("from_s", from_s)
         self._cut_offs.append(CutOff(vehicle, from_ms, from_ms + _span_ms("for_s", for_s)))
+        self.held.append((f"cut_off of {vehicle} from", from_ms))
 
     def blackout(self, platform: str | None = None, *, for_s: float, from_s: float | None = None) -> None:
         """The modem of a platform, a vehicle or the ship, neither sends nor hears for a while; left out, no modem does.
@@ -160,6 +166,7 @@ class Trouble:
         from_ms = self._time_ms("from_s", from_s)
         until_ms = from_ms + _span_ms("for_s", for_s)
         self.outages = (*self.outages, Outage(from_ms, until_ms, platform, beyond_m=beyond_m, loss=loss))
+        self.held.append((f"{what} from" if platform is None else f"{what} of {platform} from", from_ms))
 
     def _strike(
         self,
@@ -180,6 +187,7 @@ class Trouble:
         from_ms = self._time_ms("from_s", from_s)
         until_ms = None if for_s == math.inf else from_ms + _span_ms("for_s", for_s)
         self._message_faults.append(MessageFault(kind, keys, probability, to, from_ms, until_ms, delay_ms))
+        self.held.append((f"{kind.value} of {keys} from", from_ms))
 
     def _plan(self, event: NodeEvent) -> None:
         events = (*self.events, event)
@@ -188,6 +196,7 @@ class Trouble:
         except ValueError as error:
             raise UserError(str(error)) from error
         self.events = events
+        self.held.append((f"{type(event).__name__.lower()} of {event.node_id} at", event.at_ms))
 
     def _event_ms(self, at_s: float | None) -> int:
         return max(1, self._time_ms("at_s", at_s))

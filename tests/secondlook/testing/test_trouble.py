@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -224,6 +225,71 @@ class TestInMidMission:
         assert (fleet.events, bool(fleet.faults)) == ((), False)
         fleet.run()
         fleet.kill("helper", at_s=1)  # the next flight begins anew
+
+
+class TestAfterTheEnd:
+    """Trouble that lies after the mission's end."""
+
+    def test_what_never_came_fails_the_flight(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.kill("helper", at_s=5000)
+        fleet.join("helper", at_s=5001, memory=True)
+        fleet.freeze("primary", at_s=4000, for_s=5)
+        fleet.drop("agent/**", probability=0.9, from_s=6000.5, for_s=10)
+        fleet.delay("**", by_s=3, from_s=7000)
+        fleet.cut_off("helper", from_s=8000, for_s=1)
+        fleet.disk_full(at_s=9000)
+        fleet.drop("coord/task/*/0", probability=0)  # from the start
+        with pytest.raises(AssertionError) as failed:
+            fleet.run()
+        assert fleet.heard.messages("run")
+        over, *told = str(failed.value).splitlines()
+        assert re.fullmatch(r"the mission was over at \d+\.\d{3} s, before trouble that never came:", over)
+        assert told == [
+            "  kill of helper at 5000 s",
+            "  join of helper at 5001 s",
+            "  freeze of primary at 4000 s",
+            "  drop of agent/** from 6000.5 s",
+            "  delay of ** from 7000 s",
+            "  cut_off of helper from 8000 s",
+            "  disk_full at 9000 s",
+        ]
+
+    def test_so_does_what_never_came_on_the_water(self, tmp_path: Path) -> None:
+        fleet = Fleet(BRIEF, folder=tmp_path, overrides={"link.profile": "micromodem-6", "link.on_deck_s": 0})
+        fleet.blackout("helper", from_s=5000, for_s=5)
+        fleet.blackout(from_s=5001, for_s=5)
+        fleet.range_cut(100, from_s=5002, for_s=5)
+        fleet.jammed(loss=0.5, from_s=5003, for_s=5)
+        told = ["blackout of helper from 5000", "blackout from 5001", "range_cut from 5002", "jammed from 5003"]
+        with pytest.raises(AssertionError, match=":" + "".join(rf"\n  {one} s" for one in told) + "$"):
+            fleet.run()
+
+    def test_of_what_goes_on_for_a_while_the_beginning_counts(self, brief: MakeFleet) -> None:
+        end_s = brief().run().end_s
+        fleet = brief()
+        fleet.drop("agent/helper/**", from_s=end_s - 1, for_s=5000)
+        fleet.cut_off("helper", from_s=end_s - 1, for_s=5000)
+        fleet.freeze("helper", at_s=end_s - 1, for_s=1)
+        assert fleet.run().digest
+
+    def test_up_to_a_condition_it_may_be_still_to_come(self, brief: MakeFleet) -> None:
+        fleet = brief()
+        fleet.kill("helper", at_s=5000)
+        fleet.run_until(first_task, timeout_s=100)
+        with pytest.raises(AssertionError, match=r"  kill of helper at 5000 s$"):
+            fleet.run()
+
+    def test_that_of_a_plan_may_lie_there(self, brief: MakeFleet, tmp_path: Path) -> None:
+        fleet = brief()
+        late = {"what": "kill", "node": "helper", "at_s": 5000}
+        (tmp_path / "plan.yaml").write_text(make_plan({"scenario": fleet.scenario, "trouble": [late]}).to_yaml())
+        calm = brief().run().digest
+        assert Fleet.of_plan(tmp_path / "plan.yaml", folder=tmp_path / "planned").run().digest == calm
+        fleet.drop("**", from_s=6000)
+        fleet.plan(tmp_path / "plan.yaml")
+        with pytest.raises(AssertionError, match=r"never came:\n  drop of \*\* from 6000 s$"):
+            fleet.run()
 
 
 class TestLinks:
