@@ -101,8 +101,9 @@ def contenders(scenario: Scenario, names: Sequence[str] = ()) -> list[Contender]
     """Those with the given names, each an allocator's as in `coordinator.allocator`, or a baseline's.
 
     Without names: the scenario's own allocator, then our others, then the baselines. Raises UserError for a name that
-    is none, or comes twice.
+    is none, or comes twice, and for a scenario in which contenders would not be what they are called.
     """
+    _check(scenario)
     own = scenario.coordinator.allocator
     chosen = list(names) or [own, *(name for name in ALLOCATOR.ours if name != own), *BASELINES]
     twice = next((name for index, name in enumerate(chosen) if name in chosen[:index]), None)
@@ -110,6 +111,23 @@ def contenders(scenario: Scenario, names: Sequence[str] = ()) -> list[Contender]
         raise UserError(f"--allocators: {twice} is not allowed twice")
     blind = {name for name, baseline in BASELINES.items() if baseline.told_nothing}
     return [Contender(name, _scenario_of(scenario, name), name in blind) for name in chosen]
+
+
+def _check(scenario: Scenario) -> None:
+    coordinator = scenario.coordinator
+    told = []
+    if coordinator.strips != "reacting":
+        told.append(
+            f"coordinator.strips: {coordinator.strips} is not allowed in a comparison, in which no allocator would "
+            "decide anything; must be reacting, and lawnmower, across or beforehand among --allocators"
+        )
+    if coordinator.node is not None:
+        told.append(
+            f"coordinator.node: {coordinator.node} is not allowed in a comparison, in which it would decide for all "
+            "contenders; must be left out, or compared with secondlook sweep --vary coordinator.node=..."
+        )
+    if told:
+        raise UserError("\n".join(told))
 
 
 def equal_vehicle_seconds(scenario: Scenario) -> float:

@@ -103,6 +103,18 @@ class TestWhoIsCompared:
         with pytest.raises(UserError, match=r"^--allocators: greedy is not allowed twice$"):
             contenders(load_scenario("tellaro"), ["greedy", "none", "greedy"])
 
+    @pytest.mark.parametrize("strips", ["lanes", "lanes_across", "beforehand"])
+    def test_a_scenario_in_which_allocators_decide_nothing_is_refused(self, strips: str) -> None:
+        scenario = load_scenario("tellaro", [f"coordinator.strips={strips}"])
+        for names in ([], ["none"], ["lawnmower"], ["plan", "self"]):
+            with pytest.raises(UserError, match=rf"^coordinator\.strips: {strips} is not allowed in a comparison, .*"):
+                contenders(scenario, names)
+
+    def test_a_coordinator_that_would_decide_for_all_contenders_is_refused(self) -> None:
+        node = "coordinator.coordinator:Coordinator"
+        with pytest.raises(UserError, match=rf"^coordinator\.node: {node} is not allowed in a comparison, .*"):
+            contenders(load_scenario("tellaro", [f"coordinator.node={node}"]), ["plan", "none"])
+
 
 FLOWN: Flown = {
     "first": {1: result(1, 0.40), 2: result(2, 0.50), 3: result(3, 0.30)},
