@@ -126,6 +126,11 @@ def _check(scenario: Scenario) -> None:
             f"coordinator.node: {coordinator.node} is not allowed in a comparison, in which it would decide for all "
             "contenders; must be left out, or compared with secondlook sweep --vary coordinator.node=..."
         )
+    if scenario.mission.goal is not None:
+        told.append(
+            "mission.goal: is not allowed in a comparison, as a mission may reach it before the survey is done, and "
+            "each contender at another time; must be left out, as with --set mission.goal=null"
+        )
     if told:
         raise UserError("\n".join(told))
 

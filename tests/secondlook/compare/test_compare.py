@@ -115,6 +115,12 @@ class TestWhoIsCompared:
         with pytest.raises(UserError, match=rf"^coordinator\.node: {node} is not allowed in a comparison, .*"):
             contenders(load_scenario("tellaro", [f"coordinator.node={node}"]), ["plan", "none"])
 
+    @pytest.mark.parametrize("goal", ["{kind: cleared, clearance: 0.5}", "{kind: none_left}"])
+    def test_a_mission_that_ends_when_its_goal_is_reached_is_refused(self, goal: str) -> None:
+        with pytest.raises(UserError, match=r"^mission\.goal: is not allowed in a comparison, .*goal=null$"):
+            contenders(load_scenario("tellaro", [f"mission.goal={goal}"]))
+        contenders(load_scenario("tellaro", [f"mission.goal={goal}", "mission.goal=null"]))
+
 
 FLOWN: Flown = {
     "first": {1: result(1, 0.40), 2: result(2, 0.50), 3: result(3, 0.30)},
