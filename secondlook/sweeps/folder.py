@@ -20,10 +20,12 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from pydantic import BaseModel, ConfigDict, ValidationError
 
 from secondlook.engine.code_here import code_here, differing
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, whole_file, write_whole
+from secondlook.scenario.errors import dotted
 from secondlook.sweeps.plan import SweepPlan
 from secondlook.sweeps.rows import TEXT, WHOLE, Row, as_cell, schema_of
 
@@ -31,6 +33,28 @@ MADE_WITH, PLAN, ROWS, MISSIONS = "made_with.json", "sweep.yaml", "rows", "missi
 BROKEN_OFF = ".*.part"  # what was left by a process that was killed while it wrote
 FIRST_FILE_S, FILE_EVERY_S = 0.5, 10.0  # of the wall clock; twice as long after each file until then
 MOST_IN_FILE = 5000
+
+
+class MadeWith(BaseModel):
+    """What must be the same for rows to be of one sweep, and which seeds and values there are: the first seed and the
+    last, and by key the values that were asked for."""
+
+    model_config = ConfigDict(strict=True)
+
+    version: str
+    code: dict[str, str]
+    scenario: dict[str, Any]
+    vary: dict[str, list[Any]]
+    seeds: tuple[int, int]
+
+
+def read_made_with(folder: Path) -> MadeWith:
+    """What the sweep in a folder was made with. Raises OSError, and ValueError, in words, for what no sweep wrote."""
+    try:
+        return MadeWith.model_validate_json((folder / MADE_WITH).read_bytes())
+    except ValidationError as error:
+        key = dotted(error.errors()[0]["loc"])
+        raise ValueError(f"{key or 'all of it'} must be as the sweep wrote it") from error
 
 
 @contextmanager
@@ -65,7 +89,7 @@ def sweep_folder(folder: Path, plan: SweepPlan) -> Iterator[SweepFolder]:
 
 
 def _made_with(plan: SweepPlan) -> dict[str, Any]:
-    """What must be the same for rows to be of one sweep, and which seeds and values there are."""
+    """As the file holds it."""
     scenario = plan.combinations[0].scenario.model_dump(mode="json", exclude_none=True)
     return {
         "version": version("secondlook"),
@@ -78,28 +102,28 @@ def _made_with(plan: SweepPlan) -> dict[str, Any]:
 
 def _check_same(folder: Path, plan: SweepPlan) -> None:
     try:
-        before = json.loads((folder / MADE_WITH).read_text())
+        before = read_made_with(folder)
     except FileNotFoundError:
         raise UserError(
             f"--out {folder}: holds other files; must be a new or empty folder, or that of a sweep"
         ) from None
     except (OSError, ValueError) as error:
         raise UserError(f"--out {folder}: {MADE_WITH} cannot be read: {error}") from error
-    now = json.loads(json.dumps(_made_with(plan)))
-    if code := differing(before["code"], now["code"]):
+    now = MadeWith.model_validate_json(json.dumps(_made_with(plan)))
+    if code := differing(before.code, now.code):
         told = f"other code: {', '.join(code)} {'has' if len(code) == 1 else 'have'} changed"
-    elif before["vary"].keys() != now["vary"].keys():
-        told = f"{', '.join(before['vary']) or 'nothing'} varied"
+    elif before.vary.keys() != now.vary.keys():
+        told = f"{', '.join(before.vary) or 'nothing'} varied"
     elif gone := [
         f"{key}={json.dumps(value)}"
-        for key, values in before["vary"].items()
+        for key, values in before.vary.items()
         for value in values
-        if value not in now["vary"][key]
+        if value not in now.vary[key]
     ]:
         told = f"{gone[0]}, too"
-    elif not (now["seeds"][0] <= before["seeds"][0] and before["seeds"][1] <= now["seeds"][1]):
-        told = f"seeds {before['seeds'][0]} to {before['seeds'][1]}"
-    elif other := _other(before["scenario"], now["scenario"], {tuple(key.split(".")) for key in plan.vary}):
+    elif not (now.seeds[0] <= before.seeds[0] and before.seeds[1] <= now.seeds[1]):
+        told = f"seeds {before.seeds[0]} to {before.seeds[1]}"
+    elif other := _other(before.scenario, now.scenario, {tuple(key.split(".")) for key in plan.vary}):
         told = f"another scenario: {other}"
     else:
         return
@@ -196,7 +220,7 @@ def read_rows(folder: Path, schema: pa.Schema | None = None) -> pa.Table:
 def _places(folder: Path, table: pa.Table) -> pa.Table:
     """Of each row its seed, and the place of each of its values among those that the plan has."""
     places = {"seed": table["seed"]}
-    for key, values in json.loads((folder / MADE_WITH).read_text())["vary"].items():
+    for key, values in read_made_with(folder).vary.items():
         if key in table.column_names:  # of a table without rows nothing is known
             kind = table.schema.field(key).type
             cells = [as_cell(value) if kind == TEXT and value is not None else value for value in values]

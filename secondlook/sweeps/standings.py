@@ -3,7 +3,7 @@ seed."""
 
 from __future__ import annotations
 
-import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from secondlook.compare.paired import FEWEST_SEEDS, interval_of_mean
 from secondlook.errors import UserError
 from secondlook.scenario.explain import nearest
 from secondlook.scenario.text import Value
-from secondlook.sweeps.folder import MADE_WITH, read_rows
+from secondlook.sweeps.folder import MADE_WITH, read_made_with, read_rows
 from secondlook.sweeps.plan import as_text
 
 SHOWN = ("risk.mean", "risk.worst30_mean")
@@ -41,13 +41,13 @@ class Sweep:
 def load_sweep(folder: str | os.PathLike[str]) -> Sweep:
     """The sweep in a folder as far as it was flown, also while it is. Raises UserError for what is none."""
     try:
-        told = json.loads((Path(folder) / MADE_WITH).read_text())
-        vary, (first, last) = told["vary"], told["seeds"]
-        scenario = told["scenario"]["name"]
+        told = read_made_with(Path(folder))
+        scenario = told.scenario["name"]
     except (OSError, ValueError, KeyError) as error:
         raise UserError(f"{folder}: is not the folder of a sweep, {MADE_WITH} cannot be read") from error
-    missions = (last - first + 1) * int(np.prod([len(values) for values in vary.values()], dtype=np.int64))
-    return Sweep(scenario, read_rows(Path(folder)), vary, missions)
+    first, last = told.seeds
+    missions = (last - first + 1) * math.prod(len(values) for values in told.vary.values())
+    return Sweep(scenario, read_rows(Path(folder)), told.vary, missions)
 
 
 @dataclass(frozen=True)

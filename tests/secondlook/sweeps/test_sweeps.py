@@ -199,6 +199,39 @@ class TestRefusedFolder:
         with pytest.raises(UserError, match="was flown with other code: planner has changed"):
             fly(plan(), tmp_path)
 
+    @pytest.mark.parametrize(
+        ("changes", "told"),
+        [
+            (dict.fromkeys(("version", "code", "scenario", "vary", "seeds")), "version"),
+            ({"code": None}, "code"),
+            ({"code": 5}, "code"),
+            ({"vary": {"coordinator.allocator": "plan"}}, "vary.coordinator.allocator"),
+            ({"seeds": [1]}, "seeds[1]"),
+            ({"seeds": ["1", 8]}, "seeds[0]"),
+        ],
+    )
+    def test_one_that_does_not_say_what_it_was_made_with(
+        self, tmp_path: Path, changes: dict[str, Any], told: str
+    ) -> None:
+        fly(plan(), tmp_path)
+        file = tmp_path / "made_with.json"
+        changed = {**json.loads(file.read_text()), **changes}
+        file.write_text(json.dumps({key: value for key, value in changed.items() if value is not None}))
+        with pytest.raises(UserError) as refused:
+            fly(plan(), tmp_path)
+        cannot = "made_with.json cannot be read"
+        assert str(refused.value) == f"--out {tmp_path}: {cannot}: {told} must be as the sweep wrote it"
+        with pytest.raises(UserError, match=f"is not the folder of a sweep, {cannot}"):
+            load_sweep(tmp_path)
+
+    @pytest.mark.parametrize("content", ["", "[]", "{", "[" * 30_000])
+    def test_one_whose_making_is_told_in_no_mapping(self, tmp_path: Path, content: str) -> None:
+        (tmp_path / "made_with.json").write_text(content)
+        with pytest.raises(UserError, match=r"made_with\.json cannot be read: all of it must be as the sweep wrote it"):
+            fly(plan(), tmp_path)
+        with pytest.raises(UserError, match="is not the folder of a sweep"):
+            load_sweep(tmp_path)
+
     def test_one_that_holds_anything_else(self, tmp_path: Path) -> None:
         (tmp_path / "notes.txt").write_text("mine")
         with pytest.raises(UserError, match="holds other files; must be a new or empty folder, or that of a sweep"):
