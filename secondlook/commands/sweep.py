@@ -95,6 +95,9 @@ def _plan(
 def _show(folder: Path, names: list[str], *, page: bool = True) -> None:
     flown = load_sweep(folder)
     stood = standings(flown, names)
+    if not stood:
+        typer.echo(f"{flown.scenario}, 0 of {flown.missions} missions: none is done yet, so there is nothing to show")
+        return
     told = table_of(flown, stood, names)
     console = Console(soft_wrap=True, highlight=False)
     console.width = max(console.width, Console(width=WIDEST).measure(told).maximum)  # nothing is cut off

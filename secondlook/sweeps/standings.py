@@ -79,7 +79,9 @@ class Standing:
 
 def standings(sweep: Sweep, figures: Sequence[str] = SHOWN) -> list[Standing]:
     """Those that have flown, in the order of the values asked for. Raises UserError for a figure that is no number of
-    the table."""
+    the table, which of one without rows nobody can tell."""
+    if not len(sweep.table):
+        return []
     check_figures(sweep.table.schema, figures)
     names = short_names(list(sweep.vary))
     found, first = list[Standing](), dict[str, dict[int, float]]()

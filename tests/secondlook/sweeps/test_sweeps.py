@@ -325,6 +325,16 @@ class TestCommand:
         other = pq.read_table(tmp_path / "other" / "missions.parquet")
         assert other.drop_columns(["time.wall_s", "time.real_time_factor"]).equals(told_before)
 
+    def test_before_the_first_mission_is_done_it_says_so(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        with sweep_folder(tmp_path, plan()):
+            assert standings(load_sweep(tmp_path)) == []
+            _command(["sweep", str(tmp_path), "--show"])
+        told = "brief, 0 of 16 missions: none is done yet, so there is nothing to show\n"
+        assert capsys.readouterr() == (told, "")
+        assert not (tmp_path / "sweep.html").exists()
+
 
 class TestFromPython:
     def test_anybodys_executor_flies_a_sweep(self, tmp_path: Path) -> None:
