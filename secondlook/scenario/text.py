@@ -18,7 +18,7 @@ from secondlook.scenario.errors import KeyPath, Place, Problem, ScenarioError, d
 Value = None | bool | int | float | str | list["Value"] | dict[str, "Value"]
 
 _DEEPEST = 20
-_LONGEST_INT = 18
+_LONGEST_INT = 300  # digits, which as a float are finite, too
 
 _NULL = re.compile(r"^(?:~|null|Null|NULL|)$")
 _BOOL = re.compile(r"^(?:true|True|TRUE|false|False|FALSE)$")
@@ -69,7 +69,7 @@ Dumper.add_representer(str, _represent_text)
 
 
 def _integer(text: str) -> int | float:
-    # Converting thousands of digits is slow, and none of a scenario's numbers is that large.
+    # Converting thousands of digits is slow. What is far too large is whole as well, and told as it was written.
     return int(text) if len(text) <= _LONGEST_INT else float(text)
 
 
