@@ -25,6 +25,7 @@ _ALLOWED = {
     "int_type": "must be a whole number",
     "less_than": "must be less than {lt:g}",
     "less_than_equal": "must be at most {le:.12g}",
+    "list_type": "must be a list",
     "literal_error": "must be {expected}",
     "model_attributes_type": "must be a mapping",
     "model_type": "must be a mapping",

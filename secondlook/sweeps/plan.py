@@ -11,9 +11,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field, PlainValidator
 
 from comms.said.announcement import LARGEST_SEED
 from secondlook.errors import UserError
@@ -21,6 +21,8 @@ from secondlook.fleet.build import build_fleet
 from secondlook.scenario import Scenario, ScenarioError, load_scenario, scenario_hash
 from secondlook.scenario.load import load_model
 from secondlook.scenario.text import Value, dump, read_value
+from secondlook.scenario.values import Mapping as FileMapping
+from secondlook.scenario.values import refused
 
 MOST_COMBINATIONS = 10_000
 MOST_MISSIONS = 10_000_000
@@ -142,12 +144,16 @@ def seed_range(text: str) -> range:
     return range(first, last + 1) if last <= LARGEST_SEED else range(0)
 
 
-def seeds_of(text: str, option: str = "--seeds") -> range:
+def seeds_of(text: str) -> range:
     """The seeds of A..B, both of which belong to it, or of a single number. Raises UserError."""
-    seeds = seed_range(text if ".." in text else f"{text}..{text}")
+    seeds = _range_or_one(text)
     if not seeds:
-        raise UserError(f"{option}: {text} is not allowed; must be A..B, whole numbers up to {LARGEST_SEED}")
+        raise UserError(f"--seeds: {text} is not allowed; must be A..B, whole numbers up to {LARGEST_SEED}")
     return seeds
+
+
+def _range_or_one(text: str) -> range:
+    return seed_range(text if ".." in text else f"{text}..{text}")
 
 
 def varied(options: Sequence[str]) -> dict[str, Sequence[Value]]:
@@ -156,7 +162,7 @@ def varied(options: Sequence[str]) -> dict[str, Sequence[Value]]:
     for option in options:
         key, _, text = option.partition("=")
         if not key or not text:
-            raise UserError(f"--vary {option}: is not allowed; must be KEY=VALUE,VALUE,..., as coordinator.rho=0,0.5")
+            raise UserError(f"--vary {option}: is not allowed; must be KEY=VALUE,VALUE,..., as mission.rho=0,0.5")
         if key in vary:
             raise UserError(f"--vary {option}: {key} is varied already; must be given once with all its values")
         try:
@@ -186,13 +192,19 @@ def _check(key: str, values: Sequence[Value], place: str) -> None:
         raise UserError(f"{place}: {as_text(twice)} is not allowed twice")
 
 
-class _PlanFile(BaseModel):
-    model_config = ConfigDict(extra="forbid", strict=True)
+def _seeds_in_file(value: object) -> range:
+    is_known = isinstance(value, str | int) and not isinstance(value, bool)
+    seeds = _range_or_one(str(value)) if is_known else range(0)
+    if not seeds:
+        raise refused(f"must be A..B or one seed, whole numbers up to {LARGEST_SEED}")
+    return seeds
 
+
+class _PlanFile(FileMapping):
     scenario: str
-    seeds: str | int
-    set: list[str] = []
-    vary: dict[str, list[Any]] = {}
+    seeds: Annotated[range, PlainValidator(_seeds_in_file)]
+    set: list[str] = Field(default_factory=list)
+    vary: dict[str, list[Any]] = Field(default_factory=dict)
 
 
 def load_sweep_plan(path: str | os.PathLike[str]) -> SweepPlan:
@@ -201,7 +213,6 @@ def load_sweep_plan(path: str | os.PathLike[str]) -> SweepPlan:
     told, places = load_model(path, _PlanFile)
     for key, values in told.vary.items():
         _check(key, values, f"{places[('vary', key)]}: vary.{key}")
-    seeds = seeds_of(str(told.seeds), f"{places[('seeds',)]}: seeds")
     beside = Path(path).parent / told.scenario
     scenario = str(beside) if beside.suffix and beside.exists() else told.scenario
-    return SweepPlan(scenario, seeds, tuple(told.set), told.vary)
+    return SweepPlan(scenario, told.seeds, tuple(told.set), told.vary)

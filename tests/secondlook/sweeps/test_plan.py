@@ -11,6 +11,7 @@ from secondlook.errors import UserError
 from secondlook.sweeps.plan import SweepPlan, as_text, load_sweep_plan, seeds_of, varied
 
 TWO = {"coordinator.allocator": ["plan", "greedy"], "vehicles.helper.speed_mps": [2, 3.5]}
+NO_SEEDS = "is not allowed; must be A..B or one seed, whole numbers up to 4294967295"
 
 
 def plan(**changes: object) -> SweepPlan:
@@ -70,7 +71,7 @@ class TestRefused:
     @pytest.mark.parametrize(
         ("option", "told"),
         [
-            ("mission.rho", "must be KEY=VALUE,VALUE"),
+            ("mission.rho", "must be KEY=VALUE,VALUE,..., as mission.rho=0,0.5"),
             ("mission.rho=", "must be KEY=VALUE,VALUE"),
             ("mission.rho=[1", "--vary mission.rho=[1: "),
             ("mission.rho=0.5,0.5", "0.5 is not allowed twice"),
@@ -111,8 +112,31 @@ class TestPlanFile:
         ("text", "told"),
         [
             ("scenario: tellaro\n", "seeds: missing; must be given"),
-            ("scenario: tellaro\nseeds: 1..x\n", "sweep.yaml:2: seeds: 1..x is not allowed"),
-            ("scenario: tellaro\nseeds: 1\nvarry: {}\n", "sweep.yaml:3: varry"),
+            ("scenario: tellaro\nseeds: 1..x\n", f'sweep.yaml:2: seeds: "1..x" {NO_SEEDS}'),
+            ("scenario: tellaro\nseeds: [1, 2]\n", f"sweep.yaml:2: seeds: [1, 2] {NO_SEEDS}"),
+            ("scenario: tellaro\nseeds: true\n", f"sweep.yaml:2: seeds: true {NO_SEEDS}"),
+            ("scenario: tellaro\nseeds: -1\n", f"sweep.yaml:2: seeds: -1 {NO_SEEDS}"),
+            ("scenario: tellaro\nseeds: 1.5\n", f"sweep.yaml:2: seeds: 1.5 {NO_SEEDS}"),
+            ("scenario: tellaro\nseeds:\n", f"sweep.yaml:2: seeds: nothing {NO_SEEDS}"),
+            (
+                "scenario: tellaro\nseeds: 1\nvarry: {}\n",
+                "sweep.yaml:3: varry: {} is not allowed; no such key, did you mean vary?",
+            ),
+            (
+                "scenario: tellaro\nseeds: 1\nsets: []\n",
+                "sweep.yaml:3: sets: [] is not allowed; no such key, did you mean set?",
+            ),
+            (
+                "name: bay\nscenario: tellaro\nseeds: 1\n",
+                'sweep.yaml:1: name: "bay" is not allowed; no such key here, there are scenario, seeds, set, vary',
+            ),
+            ("scenario: 5\nseeds: 1\n", "sweep.yaml:1: scenario: 5 is not allowed; must be a text"),
+            ("scenario: tellaro\nseeds: 1\nset: a=1\n", 'sweep.yaml:3: set: "a=1" is not allowed; must be a list'),
+            ("scenario: tellaro\nseeds: 1\nset: [1]\n", "sweep.yaml:3: set[0]: 1 is not allowed; must be a text"),
+            (
+                "scenario: tellaro\nseeds: 1\nvary: {mission.rho: 0.5}\n",
+                "sweep.yaml:3: vary.mission.rho: 0.5 is not allowed; must be a list",
+            ),
             ("scenario: tellaro\nseeds: 1\nvary:\n  mission.rho: []\n", "sweep.yaml:4: vary.mission.rho: has no value"),
             ("scenario: tellaro\nseeds: 1\nvary: [1]\n", "sweep.yaml:3: vary: [1] is not allowed; must be a mapping"),
             ("- 1\n", "must be a mapping of keys to values"),
@@ -123,7 +147,8 @@ class TestPlanFile:
         file.write_text(text)
         with pytest.raises(UserError) as refused:
             load_sweep_plan(file)
-        assert told in str(refused.value)
+        (line,) = str(refused.value).splitlines()
+        assert told in line
 
     def test_a_file_that_is_not_there(self, tmp_path: Path) -> None:
         with pytest.raises(UserError, match="cannot be read: No such file"):
