@@ -23,6 +23,7 @@ from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.run_folder import make_new_folder
 from secondlook.scenario import load_scenario
+from secondlook.sweeps.plan import refuse_seed
 
 MOST_SEEDS = 10_000
 WIDEST = 500  # characters
@@ -31,12 +32,12 @@ WIDEST = 500  # characters
 def compare(
     scenario: Annotated[str, typer.Argument(help="A bundled scenario's name or a YAML file.")] = "tellaro",
     allocators: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="A,B,...",
             help="Allocators; self and self-longer: no helper, primaries revisit themselves. All, if left out.",
         ),
-    ] = "",
+    ] = None,
     seeds: Annotated[int, typer.Option(min=1, max=MOST_SEEDS, help="How many seeds each flies with.")] = 10,
     first_seed: Annotated[
         int, typer.Option(min=0, max=LARGEST_SEED - MOST_SEEDS, help="The first of them; the others follow.")
@@ -52,9 +53,10 @@ def compare(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON alone.")] = False,
 ) -> None:
     """Fly the same seeds with several allocators, and compare what they leave."""
+    refuse_seed(set_ or (), "--first-seed and --seeds")
     mission = load_scenario(scenario, set_ or ())
     objective = objective_of(mission)
-    chosen = contenders(mission, [name.strip() for name in allocators.split(",")] if allocators else ())
+    chosen = contenders(mission, () if allocators is None else [name.strip() for name in allocators.split(",")])
     for contender in chosen:
         build_fleet(contender.scenario, record=False)
     if out is not None:

@@ -153,8 +153,7 @@ def run(
 ) -> None:
     """Tell what a mission is expected to come to, fly it, and write what happened."""
     _check(bus, processes, real_time, keep_going=keep_going, live=live, web=web, no_record=no_record)
-    overrides = [*(set_ or ()), *([] if cell is None else [f"area.cell_m={cell:g}"])]
-    mission = load_scenario(scenario, overrides, seed)
+    mission = load_scenario(scenario, set_ or (), seed, cell_m=cell)
     check_bodies(mission)
     expected = None
     with contextlib.suppress(SpacingFailedError):  # when it is flown that is told with the whole traceback

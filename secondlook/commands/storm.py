@@ -35,7 +35,7 @@ from secondlook.storm.fly import Outcome, fly_storm, latest_flight
 from secondlook.storm.shrink import MOST_FLIGHTS, is_alike, violations_of, what_is_left
 from secondlook.storm.shrink import shrink as make_smaller
 from secondlook.storm.witness import Violation
-from secondlook.sweeps.plan import seed_range
+from secondlook.sweeps.plan import refuse_seed, seed_range
 from secondlook.testing.fleet import Fleet
 from secondlook.testing.plan import TroublePlan, load_plan
 
@@ -83,6 +83,7 @@ def storm(
     """Fly fleets through swarms of faults, drawn from a number each, and tell what did not hold."""
     if set_ and scenario is None:
         raise UserError("--set: not allowed without a scenario, as fleets are drawn then")
+    refuse_seed(set_ or (), "--seed or --seeds")
     mission = None if scenario is None else load_scenario(scenario, set_ or ())
     if mission is not None:
         build_fleet(mission, record=False)  # refuses what makes none, before there is a folder

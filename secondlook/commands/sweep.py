@@ -49,6 +49,12 @@ def sweep(
     """Fly a scenario with many seeds and settings into a table; the same command goes on where it was broken off."""
     names = [name.strip() for name in figures.split(",")]
     if show:
+        flies = {"--seeds": seeds, "--vary": vary, "--set": set_, "--plan": plan, "--jobs": jobs, "--dask": dask}
+        for name, value in flies.items():
+            if value is not None:
+                raise UserError(f"{name}: not allowed beside --show, which flies nothing")
+        if out is not None and scenario is not None:
+            raise UserError(f"--out {out}: not allowed beside the folder {scenario}; one is shown")
         _show(out or Path(scenario or ""), names)
         return
     if out is None:

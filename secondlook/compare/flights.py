@@ -155,7 +155,8 @@ def _scenario_of(scenario: Scenario, name: str) -> Scenario:
         try:
             ALLOCATOR.maker(name)
         except Exception as error:
-            raise UserError(f"--allocators: {name} is not allowed; {error}, or {' or '.join(BASELINES)}") from error
+            others = " or ".join(BASELINES)
+            raise UserError(f"--allocators: {name or repr(name)} is not allowed; {error}, or {others}") from error
         data["coordinator"]["allocator"] = name
     try:
         return make_scenario(data)

@@ -24,15 +24,22 @@ M = TypeVar("M", bound=BaseModel)
 
 
 def override(
-    document: Document, settings: Sequence[str], seed: int | None = None, *, option: str = "--set"
+    document: Document,
+    settings: Sequence[str],
+    seed: int | None = None,
+    cell_m: float | None = None,
+    *,
+    option: str = "--set",
 ) -> Document:
-    """A copy of the document with each `KEY=VALUE` set, in their order, then the seed. `option`: by which they came.
+    """A copy of the document with each `KEY=VALUE` set, in their order, then the seed and the map's cell, which no
+    setting may say otherwise. `option`: by which settings came.
 
     A key is a dotted path; mappings on the way that the file leaves out are made. A value is written as in the file.
     A setting that cannot be made is listed in the copy's problems. Whether key and value are allowed is for the
     validation to say, which finds the setting as their place.
     """
     changed = copy.deepcopy(document)
+    said = dict[KeyPath, tuple[str, Value]]()
     for setting in settings:
         place = Place(f"{option} {setting}")
         key, equals, text = setting.partition("=")
@@ -45,13 +52,24 @@ def override(
         except ScenarioError as error:
             changed.problems.extend(Problem(place, problem.text) for problem in error.problems)
             continue
-        if obstacle := _obstacle(changed.data, path):
-            changed.problems.append(Problem(place, obstacle))
-        else:
-            _set(changed, path, value, place)
-    if seed is not None:
-        _set(changed, ("seed",), seed, Place(f"--seed {seed}"))
+        said[path] = setting, value
+        _set_if_possible(changed, path, value, place)
+    for name, path, number in (("--seed", ("seed",), seed), ("--cell", ("area", "cell_m"), cell_m)):
+        if number is None:
+            continue
+        place = Place(f"{name} {number:.12g}")
+        setting, value = said.get(path, ("", number))
+        if setting and value != number:
+            changed.problems.append(Problem(place, f"not allowed beside {option} {setting}, which says otherwise"))
+        _set_if_possible(changed, path, number, place)
     return changed
+
+
+def _set_if_possible(document: Document, path: tuple[str, ...], value: Value, place: Place) -> None:
+    if obstacle := _obstacle(document.data, path):
+        document.problems.append(Problem(place, obstacle))
+    else:
+        _set(document, path, value, place)
 
 
 def _obstacle(data: dict[str, Value], path: tuple[str, ...]) -> str | None:
@@ -89,6 +107,7 @@ def load_scenario(
     overrides: Sequence[str] = (),
     seed: int | None = None,
     varied: Sequence[str] = (),
+    cell_m: float | None = None,
 ) -> Scenario:
     """The scenario of a bundled name, or else of a YAML file.
 
@@ -97,12 +116,13 @@ def load_scenario(
         overrides: `KEY=VALUE` each, KEY a dotted path, VALUE as in the file.
         seed: in place of the scenario's own.
         varied: further overrides, of which errors tell as of `--vary`.
+        cell_m: cell of the map in place of the scenario's own.
 
     Raises:
         ScenarioError: there is no such scenario, or it cannot be used; all that is wrong, one sentence a line.
     """
     source = os.fspath(name_or_path)
-    document = override(read(_text(source), source), overrides, seed)
+    document = override(read(_text(source), source), overrides, seed, cell_m)
     return _validated(override(document, varied, option="--vary") if varied else document, Path(source).parent)
 
 

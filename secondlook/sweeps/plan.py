@@ -93,6 +93,11 @@ class SweepPlan:
                 f"{self.count} missions are not allowed; must be at most {MOST_COMBINATIONS} combinations "
                 f"and {MOST_MISSIONS} missions"
             )
+        refuse_seed(self.settings, "--seeds, or seeds in a plan")
+        for setting in self.settings:
+            key = setting.partition("=")[0]
+            if (over := next((one for one in self.vary if f"{key}.".startswith(f"{one}.")), None)) is not None:
+                raise UserError(f"--set {setting}: is not allowed beside --vary {over}, which says otherwise")
         found = dict[str, Combination]()
         for values in itertools.product(*self.vary.values()):
             varied = dict(zip(self.vary, values, strict=True))
@@ -128,6 +133,13 @@ class SweepPlan:
             "vary": {key: list(values) for key, values in self.vary.items()},
         }
         return dump(data)
+
+
+def refuse_seed(settings: Sequence[str], instead: str) -> None:
+    """Raises UserError where one of KEY=VALUE sets the seed of what flies many seeds. `instead`: what asks for them."""
+    for setting in settings:
+        if setting.partition("=")[0] == "seed":
+            raise UserError(f"--set {setting}: seed is not allowed; must be asked for with {instead}")
 
 
 def as_text(value: Value) -> str:

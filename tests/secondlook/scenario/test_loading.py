@@ -217,6 +217,18 @@ def test_the_last_of_two_overrides_of_a_key_counts() -> None:
     assert scenario.targets.count == 5
 
 
+def test_a_seed_or_cell_may_be_said_twice_if_it_is_the_same() -> None:
+    settings = ["seed=4", "seed=3", "area.cell_m=2"]
+    scenario = load_scenario("tellaro", settings, seed=3, cell_m=2.0)
+    assert (scenario.seed, scenario.area.cell_m) == (3, 2.0)
+    with pytest.raises(ScenarioError) as refused:
+        load_scenario("tellaro", settings, seed=4, cell_m=5.0)
+    assert str(refused.value) == (
+        "--seed 4: not allowed beside --set seed=3, which says otherwise\n"
+        "--cell 5: not allowed beside --set area.cell_m=2, which says otherwise"
+    )
+
+
 def test_overriding_leaves_the_document_as_it_was() -> None:
     document = read("mission: {rho: 1}", "some.yaml")
     changed = override(document, ["mission.rho=2", "mission"], seed=3)

@@ -83,6 +83,22 @@ class TestRefused:
             varied([option])
         assert told in str(refused.value)
 
+    @pytest.mark.parametrize(
+        ("setting", "told"),
+        [
+            ("seed=3", "--set seed=3: seed is not allowed; must be asked for with --seeds, or seeds in a plan"),
+            ("mission.rho=1", "--set mission.rho=1: is not allowed beside --vary mission.rho, which says otherwise"),
+        ],
+    )
+    def test_a_setting_that_would_do_nothing(self, setting: str, told: str) -> None:
+        with pytest.raises(UserError) as refused:
+            plan(settings=(setting,), vary={"mission.rho": [0, 1]}).combinations  # noqa: B018 - it is the question
+        assert str(refused.value) == told
+
+    def test_a_part_of_what_is_set_may_be_varied(self) -> None:
+        one, other = plan(settings=("mission={rho: 0.5}",), vary={"mission.rho": [0, 1]}).combinations
+        assert (one.scenario.mission.rho, other.scenario.mission.rho) == (0, 1)
+
     def test_a_key_given_twice(self) -> None:
         with pytest.raises(UserError, match=r"mission\.rho is varied already"):
             varied(["mission.rho=0", "mission.rho=1"])
