@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from secondlook.commands.left_out import REAL_TIME, is_number, with_value
-from secondlook.commands.many_missions import DASK, HERE, is_address
+from secondlook.commands.many_missions import DASK, HERE, is_like_address
 from secondlook.errors import UserError
 from secondlook.installed_command import WRONG_USE
 
@@ -69,7 +69,7 @@ def app_for(arguments: Sequence[str]) -> typer.Typer:
 
 def command_line(arguments: Sequence[str]) -> Callable[[], None]:
     """What they ask for, loaded and not yet begun. It exits: 0 done, 1 failed, 2 wrong use or bad input, 130 Ctrl-C."""
-    completed = with_value(with_value(arguments, REAL_TIME, "1", is_number), DASK, HERE, is_address)
+    completed = with_value(with_value(arguments, REAL_TIME, "1", is_number), DASK, HERE, is_like_address)
     app = app_for(completed)
 
     def run() -> None:

@@ -54,8 +54,13 @@ def engine(jobs: int | None, dask: str | None) -> AbstractContextManager[Engine]
 
 
 def is_address(text: str) -> bool:
-    """Whether this may be the value of --dask, which can be left out."""
+    """Whether a scheduler may be at it."""
     return re.fullmatch(r"[a-z]+://\S+", text) is not None
+
+
+def is_like_address(text: str) -> bool:
+    """Whether it is to be the value of --dask, which can be left out: an address, or what was meant as one."""
+    return re.fullmatch(r"[a-z]+:?//\S*|[^-\s]\S*:[0-9]+|[0-9.]+", text) is not None
 
 
 def fly_watched(command: str, missions: str, total: int, fly: Callable[[Tell], None], *, shown: bool) -> str:
