@@ -1,4 +1,5 @@
-"""How files are written: small ones whole or not at all, streams so that they are readable as far as they go."""
+"""How files are written: small ones whole or not at all, streams so that they are readable as far as they go. And what
+a run's folder is."""
 
 from __future__ import annotations
 
@@ -52,6 +53,14 @@ def write_whole(path: Path, content: str) -> None:
     """Writes a text as a file, whole or not at all; see `whole_file`. Raises CannotWriteError."""
     with whole_file(path) as file:
         file.write(content.encode())
+
+
+def check_run_folder(path: Path) -> None:
+    """Raises UserError for what is no folder, and so not that of a run."""
+    if path.is_file():
+        raise UserError(f"{path}: is a file; must be the folder of a run, as secondlook run writes it")
+    if not path.is_dir():
+        raise UserError(f"{path}: there is no such folder; must be the folder of a run")
 
 
 @contextmanager

@@ -31,7 +31,7 @@ def picture(
     # Only who draws needs matplotlib.
     from secondlook.pictures import write_picture  # noqa: PLC0415
 
-    path = run / "picture.png" if out is None else out
+    path = run / "picture.png" if out is None else _ends_in(".png", out)
     with reading("picture", PICTURE) as on_read:
         write_picture(load_run(run, on_read), time, path, width)
     typer.echo(str(path))
@@ -49,10 +49,17 @@ def video(
     # Only who draws needs matplotlib.
     from secondlook.pictures import write_video  # noqa: PLC0415
 
-    path = run / "video.webp" if out is None else out
+    path = run / "video.webp" if out is None else _ends_in(".webp", out)
     with shown_progress("video", "drawn", begins="reading") as tell:
         write_video(load_run(run), path, width, seconds, frames, lambda share: tell(share, no_remark))
     typer.echo(str(path))
+
+
+def _ends_in(ending: str, out: Path) -> Path:
+    """The file, which may have no ending but this. Raises UserError."""
+    if out.suffix.lower() not in ("", ending):
+        raise UserError(f"--out {out}: {out.suffix} is not allowed; must end in {ending}, which is what is written")
+    return out
 
 
 def _check_matplotlib(command: str) -> None:

@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from secondlook.errors import UserError
+from secondlook.files import check_run_folder
 from secondlook.progress import shown_progress
 from viz.recording_viewer import RecordingViewer, is_empty, is_recording, is_whole, repair
 from viz.viewer_program import ViewerError, check_display
@@ -56,8 +57,7 @@ def _opened(recording: Path, *, web: bool, at_s: float | None) -> RecordingViewe
 
 def _recording(run: Path) -> Path:
     recording = run / "mission.rrd"
-    if not run.is_dir():
-        raise UserError(f"{run}: there is no such folder; must be the folder of a run")
+    check_run_folder(run)
     try:
         if is_empty(recording):
             why = "its recorder was killed before it had written anything, or is about to write"

@@ -41,6 +41,7 @@ from planner.fleet_map import FleetMap
 from planner.region import Region
 from planner.types import PriorityGround
 from secondlook.errors import UserError
+from secondlook.files import check_run_folder
 from secondlook.geography import GeographicOrigin
 from secondlook.recorded.closest_approach import Closest
 from secondlook.recorded.ground import (
@@ -419,8 +420,7 @@ def load_run(run: str | os.PathLike[str], on_read: OnRead | None = None, *, quie
     UserError, in one sentence, for what is not the folder of a recorded run.
     """
     folder = Path(run)
-    if not folder.is_dir():
-        raise UserError(f"{folder}: there is no such folder; must be the folder of a run")
+    check_run_folder(folder)
     messages = folder / "messages.mpk"
     if not messages.exists():
         raise UserError(f"{folder}: holds no messages.mpk; must be the folder of a run without --no-record")
