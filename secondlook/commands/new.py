@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from secondlook.commands.planned_survey import planned_surveys
+from secondlook.commands.run import expected_of
 from secondlook.errors import UserError
 from secondlook.files import CannotWriteError, write_whole
 from secondlook.scenario import Scenario, make_scenario
@@ -42,10 +43,12 @@ def new(
     if out is not None and out.exists():
         raise UserError(f"--out {out}: is there already; must be a new file")
     text, scenario = scenario_of(drawn, chart)
+    refusals = expected_of(scenario).refusals
     for sentence in drawn.left_out:
         sys.stderr.write(f"{chart}: {sentence}; left out\n")
     if out is None:
         typer.echo(text, nl=False)
+        _tell(chart, refusals)
         return
     try:
         write_whole(out, text)
@@ -57,6 +60,12 @@ def new(
     typer.echo(
         f"{out}: {across_m:.0f} m by {along_m:.0f} m from {place}; secondlook check {out} tells how it is surveyed"
     )
+    _tell(out, refusals)
+
+
+def _tell(source: Path, refusals: Iterable[str]) -> None:
+    """Tells why the mission cannot be flown as it is, which secondlook check would say later."""
+    sys.stderr.writelines(f"{source}: {sentence}\n" for sentence in refusals)
 
 
 def scenario_of(chart: Chart, source: Path) -> tuple[str, Scenario]:

@@ -182,7 +182,10 @@ def test_without_starts_there_are_two_vehicles_by_the_corner(
 ) -> None:
     draw(polygon([(9.8, 44.0), (9.9, 44.0), (9.9, 44.1), (9.8, 44.1)]), "Großer Ort!.json")
     assert command(monkeypatch, "new", "Großer Ort!.json") == 0
-    Path("made.yaml").write_text(capsys.readouterr().out)
+    made, told = capsys.readouterr()
+    begins = "Großer Ort!.json: vehicles.primary.endurance_s: 36000 s (10:00:00) ends its survey after about "
+    assert told.startswith(begins)
+    Path("made.yaml").write_text(made)
     scenario = load_scenario("made.yaml")
     assert {key: vehicle.start for key, vehicle in scenario.vehicles.items()} == {
         "primary": Start(x_m=-20, y_m=-20),
@@ -191,6 +194,25 @@ def test_without_starts_there_are_two_vehicles_by_the_corner(
     # 8 km by 11.1 km: a map of at most a million cells, and a limit that the mission can keep.
     assert (scenario.name, scenario.area.cell_m) == ("gro-er-ort", 10)
     assert scenario.mission.time_limit_s > 20_000
+
+
+def test_what_keeps_the_mission_from_its_end_is_told_with_the_key_to_change(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    square = polygon([(10.5, 59.88), (10.51, 59.88), (10.51, 59.885), (10.5, 59.885)])
+    far = feature({"type": "Point", "coordinates": [10.5, 59.3]}, role="start", vehicle="primary")
+    for name, features in {"near": [feature(square)], "far": [feature(square), far]}.items():
+        draw({"type": "FeatureCollection", "features": features})
+        assert command(monkeypatch, "new", "bay.geojson", "--out", f"{name}.yaml") == 0
+        told = capsys.readouterr().err
+        code = command(monkeypatch, "check", f"{name}.yaml")
+        checked = capsys.readouterr().err
+        if name == "near":
+            assert (code, told) == (0, "")
+        else:
+            assert code == 2
+            assert told.startswith("far.yaml: vehicles.primary.endurance_s: ")
+            assert [line.removeprefix("far.yaml: ") for line in told.splitlines()] == checked.splitlines()[-1:]
 
 
 Write = Callable[[str], str]
