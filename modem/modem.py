@@ -57,6 +57,9 @@ STRETCH_BITS = 130
 """That a stretch takes, with all about it: where a packet has room for them, what was seen so far is told at once."""
 FROM_DECK_MS = 10_000
 """For so long after it has left the deck it may still hear what was said there."""
+LATE_FRAMES_MS = 60_000
+"""When the first frame of a modem that was started anew has come, those of its past that come late are not heard for so
+long."""
 SILENT_CYCLES = 3
 """For so long a vehicle is silent at most while its agent says states, if these tell nothing new."""
 SILENT_REPORTS = 3
@@ -84,6 +87,7 @@ class Modem:
         self._sending: dict[Stream, Sending] = {}
         self._receiving: dict[Stream, Receiving] = {}
         self._starts: dict[str, int] = {}  # of the others, as their frames tell
+        self._past: dict[tuple[str, int], int] = {}  # the starts before these, and how long frames of them may yet come
         self._start = 0
         self._turns = turns_of(config)
         self._form: FrameForm | None = None  # this and what follows: since the run's announcement
@@ -343,10 +347,15 @@ class Modem:
                     self._drop(NO_FRAME, f"{len(frame)} bytes")
                 continue
             platform, start, reader, polled = opened
+            if now_ms < self._past.get((platform, start), now_ms):
+                continue  # of a modem that is gone: what it says is said again by who is in its place, or is forgotten
             if on_deck is None:
                 self._turns.has_heard(platform, polled, now_ms)
             # Who is there from the beginning knows that the others were, too; who was started anew does not.
-            if start != self._starts.get(platform, start if self._start else 0):  # it has forgotten all
+            before = self._starts.get(platform, start if self._start else 0)
+            if start != before:  # it has forgotten all
+                self._past[platform, before] = now_ms + LATE_FRAMES_MS
+                self._past.pop((platform, start), None)
                 self._receive_anew(platform)
                 for number in range(STREAMS):
                     self._sending[platform, number].begin_again()

@@ -229,6 +229,22 @@ def test_large_pieces_are_said_though_something_is_to_be_acknowledged_each_time(
     assert [key for key, _ in heard(waters, "beta")] == [f"coord/task/beta/{number}" for number in range(1, 6)]
 
 
+def test_what_comes_late_of_a_modem_that_is_gone_is_not_heard() -> None:
+    waters = Waters()
+    waters.say("coordinator", "coord/task/beta/1", TAKE)
+    waters.run(24_000)
+    late = next(one for _, platform, one in waters.packets if platform == "ship")
+    waters.start("ship")
+    for number in (2, 3):
+        waters.say("coordinator", f"coord/task/beta/{number}", replace(TAKE, strip=number))
+        waters.run(waters.now_ms + 24_000)
+    waters.say("world", "modem/beta/rx", late)
+    for number in (4, 5):
+        waters.say("coordinator", f"coord/task/beta/{number}", replace(TAKE, strip=number))
+        waters.run(waters.now_ms + 24_000)
+    assert [key for key, _ in heard(waters, "beta")] == [f"coord/task/beta/{number}" for number in range(1, 6)]
+
+
 @pytest.mark.parametrize("frame_bits", [48, 64, 128, 256])
 @pytest.mark.parametrize("seed", range(3))
 def test_a_modem_that_is_started_anew_understands(frame_bits: int, seed: int) -> None:
