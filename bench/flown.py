@@ -58,10 +58,12 @@ class Table:
     draw: Callable[[Document], None] | None = None
 
 
-def call_secondlook(*arguments: str) -> None:
-    """Gives a command of the program, in a process of its own. Raises CalledProcessError where it fails."""
+def call_secondlook(*arguments: str, quiet: bool = False) -> None:
+    """Gives a command of the program, in a process of its own. `quiet`: what that prints is not shown. Raises
+    CalledProcessError where it fails."""
     program = "from secondlook.installed_command import main; main()"
-    subprocess.run([sys.executable, "-c", program, *arguments], check=True, cwd=ROOT)
+    shown = subprocess.DEVNULL if quiet else None
+    subprocess.run([sys.executable, "-c", program, *arguments], check=True, cwd=ROOT, stdout=shown, stderr=shown)
 
 
 def fly_overridden(folder: Path, flown: Iterable[Case], seeds: str, figures: Iterable[str]) -> Document:

@@ -18,6 +18,7 @@ from planner.spacing_planners import (
     SpacingDecision,
     SpacingPlanner,
     checked_decision,
+    checked_if_any,
     counted_range_m,
 )
 from planner.types import DetectionCurve
@@ -155,16 +156,15 @@ def first_decision(
     """The tracks for a whole part, by all that the spacing planner can make use of. Raises ValueError for an answer of
     a user's own that is no decision (`checked_decision`)."""
     measured_m = known.r_eff_m if known is not None and known.measured else None
-    decision, method = None, "decide"
+    decision = None
     if known is not None and isinstance(spacing, ProfilePlanner):
-        method = "lay"
-        decision = spacing.lay(PartSoFar(width_m, measured_m, (), (), known.curve, known.r_eff_m), terms)
+        part = PartSoFar(width_m, measured_m, (), (), known.curve, known.r_eff_m)
+        decision = checked_if_any(spacing, "lay", spacing.lay(part, terms))
     elif measured_m is not None and isinstance(spacing, SinglesPlanner):
-        method = "cover"
-        decision = spacing.cover(width_m, (), measured_m)
+        decision = checked_if_any(spacing, "cover", spacing.cover(width_m, (), measured_m))
     if decision is None:
-        method, decision = "decide", spacing.decide(width_m, 0.0, measured_m)
-    return checked_decision(spacing, method, decision)
+        decision = checked_decision(spacing, "decide", spacing.decide(width_m, 0.0, measured_m))
+    return decision
 
 
 @dataclass(frozen=True)

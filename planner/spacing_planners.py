@@ -84,6 +84,11 @@ def checked_decision(spacing: SpacingPlanner, method: str, answer: Any) -> Spaci
     return answer  # type: ignore[no-any-return]
 
 
+def checked_if_any(spacing: SpacingPlanner, method: str, answer: Any) -> SpacingDecision | None:
+    """The same of a method that may answer None, which says that it decides nothing. Raises ValueError."""
+    return None if answer is None else checked_decision(spacing, method, answer)
+
+
 @dataclass(frozen=True)
 class AdaptiveSpacing:
     """Algorithm 1 of the paper, run again after every pair on the width beyond the covered edge.

@@ -14,6 +14,7 @@ from planner.spacing_planners import (
     SinglesPlanner,
     SpacingDecision,
     checked_decision,
+    checked_if_any,
     counted_range_m,
     lowest_range_m,
 )
@@ -89,14 +90,15 @@ class PartSurvey:
         (`planner.spacing_planners.checked_decision`)."""
         spacing, width_m = self._config.spacing, self.area.width_m
         if isinstance(spacing, ProfilePlanner):
-            method, decision = "lay", spacing.lay(self._so_far(r_eff_m, curve), self._terms)
+            decision = checked_if_any(spacing, "lay", spacing.lay(self._so_far(r_eff_m, curve), self._terms))
         else:
             self._covered_m = max(self._covered_m, self._edge_m(self._since, r_eff_m))
-            singles = spacing.cover(width_m, self._looked, r_eff_m) if isinstance(spacing, SinglesPlanner) else None
-            method, decision = "cover", singles
-            if singles is None and self._covered_m < width_m - NARROWEST_M:
+            decision = None
+            if isinstance(spacing, SinglesPlanner):
+                decision = checked_if_any(spacing, "cover", spacing.cover(width_m, self._looked, r_eff_m))
+            if decision is None and self._covered_m < width_m - NARROWEST_M:
                 decision = self._decided(self._covered_m, r_eff_m)
-        if decision is None or not checked_decision(spacing, method, decision).offsets_m:
+        if decision is None or not decision.offsets_m:
             return None
         self._decision, self._since = decision, []
         return decision

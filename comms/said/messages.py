@@ -459,10 +459,6 @@ class Packet:
         """Of its frames."""
         return sum(map(len, self.frames))
 
-    def meant_for(self, platforms: int) -> int:
-        """For how many others it is, in a fleet of so many platforms."""
-        return 1 if self.to else platforms - 1
-
 
 @dataclass(frozen=True, slots=True)
 class Heard:

@@ -20,7 +20,7 @@ from secondlook.recorded.link_figures import state_heard
 @dataclass
 class SentPacket:
     """A packet as it was sent. `size_bytes`: of its frames. `to`: for whom it was, "" for all. `receptions`: how many
-    frames of it came through, each counted at each other platform that it was for, of which there are `meant_for`."""
+    frames of it came through, each counted at each other platform that it was for."""
 
     sent_ms: int
     platform: str
@@ -28,7 +28,6 @@ class SentPacket:
     size_bytes: int
     contents: Contents
     to: str
-    meant_for: int
     receptions: int = 0
 
 
@@ -115,7 +114,6 @@ class LinkTrace:
                 packet.size_bytes,
                 self._eavesdropper.open(packet, sent_ms),
                 packet.to,
-                packet.meant_for(len(self.config.platforms)),
             )
             self.packets.append(sent)
             self._latest |= dict.fromkeys(packet.frames, sent)
@@ -146,7 +144,8 @@ class LinkTrace:
 
     def span(self, from_ms: int, until_ms: int, packets: Sequence[SentPacket]) -> Span:
         """What these packets, which are all of that time, come to."""
-        expected = sum(one.frames * one.meant_for for one in packets)
+        others = len(self.config.platforms) - 1
+        expected = sum(one.frames * (1 if one.to else others) for one in packets)
         return Span(
             from_ms,
             until_ms,

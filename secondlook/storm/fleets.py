@@ -18,8 +18,8 @@ LINK_SHARE = 0.2  # of fleets
 FAST_LINKS = ("radio", "unet-data", "micromodem-6")
 SLOW_LINKS = ("micromodem-0", "micromodem-1", "unet-control")
 MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey
-SMALL_FRAMES = ("janus", "unet-control")  # in which maps cross as stretches alone
 JANUS, JANUS_SHARE = "janus", 0.25  # of fleets that a slow link may have
+UNCORRECTED = (JANUS, "unet-control")  # a correction does not cross in their frames, or takes several
 SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
 
 
@@ -150,7 +150,7 @@ def _link(number: int, drawn: dict[str, Any]) -> dict[str, Any]:
         link["slot_frames"] = 1
     if Random(f"polled {number}").random() < 0.2:
         link["access"] = "polled"
-    if Random(f"corrected {number}").random() < 0.2 and link["profile"] not in SMALL_FRAMES:
+    if Random(f"corrected {number}").random() < 0.2 and link["profile"] not in UNCORRECTED:
         link["maps"] = "corrected"
     aboard = {"platform": rng.choice(vehicles)} if rng.random() < 0.4 and len(vehicles) > 1 else {}
     return {"link": link, "coordinator": drawn["coordinator"] | aboard}
