@@ -36,6 +36,7 @@ from viz.viewer_program import ViewerError
 
 RUN = "tellaro-run"
 PATIENCE_S = 30.0
+PIECE_ENDS = b"RRF2FOOT\x01\0\0\0"  # the last bytes of a recording
 
 
 def wait_until(holds: Callable[[], Any]) -> None:
@@ -213,18 +214,23 @@ def recorded_live(
 ) -> Iterator[Callable[[str], int]]:
     """Within it a recorder has had a stream and goes on; tells how many rows of an entity a live view has by now."""
     monkeypatch.setattr(canvas, "LIVE_EVERY_S", 0.0)
-    pipe, shown = tmp_path / "pipe", tmp_path / "shown.rrd"
+    pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
     recorder = Recorder(RecorderConfig(tmp_path / "mission.rrd", Story, live_pipe=pipe))
     for received in stream:
         recorder.on_message(received)
+    shown = bytearray()
 
     def rows_shown(entity: str) -> int:
-        with shown.open("ab") as file, contextlib.suppress(BlockingIOError):
-            while piece := os.read(reader, 1 << 16):
-                file.write(piece)
-        return rows_so_far(shown, entity)
+        with contextlib.suppress(BlockingIOError):
+            while read := os.read(reader, 1 << 16):
+                shown.extend(read)
+        # Each piece is a recording by itself; the reader looks at a file's end alone, and takes two in one for harmed.
+        *pieces, _ = bytes(shown).split(PIECE_ENDS)
+        for number, piece in enumerate(pieces):
+            (tmp_path / f"shown-{number}.rrd").write_bytes(piece + PIECE_ENDS)
+        return sum(rows_so_far(tmp_path / f"shown-{number}.rrd", entity) for number in range(len(pieces)))
 
     try:
         yield rows_shown
