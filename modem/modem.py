@@ -26,6 +26,7 @@ from comms.said.messages import (
     Heard,
     Look,
     Message,
+    MissionOver,
     Mode,
     Packet,
     Task,
@@ -106,11 +107,12 @@ class Modem:
         self._held_of = 0  # and its number
         self._state_headers: dict[str, Header] = {}  # of the last states told here
         self._state_told: dict[str, int] = {}  # and when that was
-        self._words: dict[str, tuple[int, int]] = {}  # of the newest words on tasks told here
+        self._newest: dict[str, tuple[int, int]] = {}  # of states and words on tasks told here
         self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
         self._last_frames_ms = 0
         self._is_alive = False  # whether its agent has told its state since it spoke
         self._state_ms: int | None = None  # when it last did
+        self._over: Said | None = None  # what was told here of the mission's end
         self._incarnation = 0
 
     def start(self, now_ms: int) -> Step:
@@ -213,7 +215,10 @@ class Modem:
             self._note_said(message, now_ms)
         if not is_hub:
             self._incarnation = received.header.incarnation
-            self._state_ms = now_ms if isinstance(message, AgentState) else self._state_ms
+            if isinstance(message, AgentState):
+                self._state_ms = now_ms
+                if self._over is not None and not (message.mode.has_ended or message.mode.is_out_of_work):
+                    self._say_here(*self._over)  # it was started anew since, or has not heard it
         if not is_hub and not self._is_news(received, now_ms):
             return
         if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
@@ -226,6 +231,9 @@ class Modem:
             if _are_same(self._last_said.get(received.key), said):
                 return  # it will arrive
             self._last_said[received.key] = said
+        crossing = topic.crossing
+        if isinstance(message, AgentState) and message.mode.has_ended:
+            crossing = replace(crossing, acknowledged=True)  # it says little after that, and others wait for it
         to = self.config.others
         if topic is TASK:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
@@ -234,7 +242,7 @@ class Modem:
             self._note_strip(received.vehicle, message)  # type: ignore[arg-type]
         for platform in to:
             said_here = Said(received.key, received.header, message)
-            self._enqueue(topic, topic.crossing, said_here, platform, now_ms, about)
+            self._enqueue(topic, crossing, said_here, platform, now_ms, about)
 
     def _is_news(self, received: Received, now_ms: int) -> bool:
         """Whether what an agent says of itself and its work is not known at the coordinator's, or will not be."""
@@ -405,16 +413,18 @@ class Modem:
             return
         if topic is TASK and said.key.split("/")[2] != self.config.platform:
             return
-        if isinstance(message, Task):
+        if isinstance(message, MissionOver):
+            self._over = said
+        elif isinstance(message, Task):
             self._last_status = None  # whoever says it again has not heard the answer
             self._note_strip(self.config.platform, message)
         if isinstance(message, AgentState):
-            if not self.config.is_small and _order(header) < self._words.get(platform, _order(header)):
-                return  # its word on a task has overtaken it, and tells what it does since
+            if not self.config.is_small and not self._is_newest(platform, header):
+                return  # another has overtaken it, or its word on a task, which tells what it does since
             header = self._in_order(platform, header, now_ms)
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
-            self._words[platform] = max(_order(header), self._words.get(platform, _order(header)))
+            self._is_newest(platform, header)
             self._presences[platform].hear_status(message, now_ms)
             strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
             # The map is told before the word.
@@ -425,6 +435,12 @@ class Modem:
             self._tell_tiles(platform, header, [told(message, self._grid, header.sequence)])
         elif isinstance(message, Curve | Stretch | Correction) and platform != self.config.hub:
             self._tell_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
+
+    def _is_newest(self, platform: str, header: Header) -> bool:
+        """Whether a vehicle has told nothing newer of itself or its work; from now on that counts."""
+        newest = max(_order(header), self._newest.get(platform, _order(header)))
+        self._newest[platform] = newest
+        return newest == _order(header)
 
     def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:
         header = header._replace(incarnation=layer_start(header.incarnation, self._start))

@@ -155,14 +155,14 @@ class Packets:
         only_ends = form.is_small and left < form.room - 1
         choices: list[_Choice] = []
         for stream, sending in self._sending.items():
-            for number, under in sending.unheard.items():
+            for number, its_worth in self._worths(sending).items():
+                under = sending.unheard[number]
                 piece = under.piece
                 if (stream, number) in self._said or self._about_bits(is_whole=piece.whole) + piece.bits > left:
                     continue
                 if only_ends and not piece.last:
                     continue
                 is_due = not form.is_small or self._now_ms - under.said_ms > LEFT_OUT * self._config.cycle_ms
-                its_worth = worth(under.worth_now, PIECES_TTL_S, under.queued_ms, self._now_ms)
                 choices.append(_Choice(is_due, its_worth, stream, number))
             if sending.rest.bits and self._can_cut(sending, sending.rest, left, only_ends=only_ends):
                 bit_value, queued_ms = sending.about_rest
@@ -180,6 +180,18 @@ class Packets:
             elif not sending.rest.bits and self._can_cut(sending, one.said, left, only_ends=only_ends):
                 return _Choice(True, its_worth, stream, message=one)
         return best
+
+    def _worths(self, sending: Sending) -> dict[int, float]:
+        """What a bit of each piece that is not known to have arrived is worth. Where messages are told in their order
+        those behind the first wait for it: as much as the best of them, where the receiver has answered without it."""
+        worths = {
+            number: worth(under.worth_now, PIECES_TTL_S, under.queued_ms, self._now_ms)
+            for number, under in sending.unheard.items()
+        }
+        first = min(worths, default=None)
+        if first is not None and not sending.unheard[first].times and (self._config.is_hub or self._form.is_small):
+            worths[first] = max(worths.values())
+        return worths
 
     def _goes_alone(self, one: Waiting) -> bool:
         """Whether a message is said once, and not in pieces."""

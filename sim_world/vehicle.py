@@ -137,7 +137,9 @@ class SimulatedVehicle:
                 self._to_come = deque()
             case ManeuverKind.GOTO:
                 heading_rad = None if start == end else bearing_rad(start, end)
-                ends_ms = self._motion.go_to(end, heading_rad, now_ms, loiters=not goes_home)
+                ends_ms = now_ms
+                if not (goes_home and self._is_at_home(self._motion.place_at(now_ms))):  # else it is there
+                    ends_ms = self._motion.go_to(end, heading_rad, now_ms, loiters=not goes_home)
                 done = ManeuverStatus(maneuver.number, ManeuverState.DONE, ends_ms, "")
                 self._to_come = deque([(ends_ms, done)])
             case ManeuverKind.FOLLOW:

@@ -59,7 +59,10 @@ class SecondLooks:
         agent = self._agent
         strip = task.as_strip
         known, answer = self._answers.get(task.strip, (None, None))
-        if task.action is TaskAction.GIVE_BACK:
+        wanted_back = task.action is TaskAction.GIVE_BACK  # which need not tell where the strip lies
+        is_it = known is not None and (wanted_back or _is_done_with(known, strip))
+        is_done = is_it and answer is TaskState.DONE
+        if wanted_back and (self._has(task.strip) or not is_done):
             self._give_back(task.strip, now_ms)
         elif task.action is TaskAction.STAND_ASIDE:
             may = self.strip is None and not busy and not agent.mode.is_out_of_work
@@ -68,8 +71,8 @@ class SecondLooks:
         elif self.strip is not None and self.strip.number == task.strip:
             under_way = agent.mode is Mode.REVISIT
             self._tell(task.strip, TaskState.UNDER_WAY if under_way else TaskState.ACCEPTED, agent.expected_end_ms)
-        elif known is not None and answer is TaskState.DONE and _is_done_with(known, strip):
-            agent.report_again(known)  # whoever offers it again does not know what was seen there
+        elif known is not None and is_done:
+            agent.report_again(known)  # whoever offers it again, or wants it back, does not know what was seen there
             self._tell(task.strip, TaskState.DONE, now_ms)
         elif busy or agent.mode.is_out_of_work:
             self._tell(task.strip, TaskState.REFUSED, 0, busy or ON_ITS_WAY_HOME)
@@ -210,9 +213,12 @@ class SecondLooks:
         free_ms = leg_ends_ms + endurance.run_out_ms(leg, config.run_in_m) + round(left_s * 1000)
         return endurance.lasts_from(self._passes[-1].end, free_ms)
 
+    def _has(self, number: int) -> bool:
+        return any(one is not None and one.number == number for one in (self.strip, self._next))
+
     def _give_back(self, number: int, now_ms: int) -> None:
         is_at_it = self.strip is not None and self.strip.number == number
-        if is_at_it or (self._next is not None and self._next.number == number):
+        if self._has(number):
             self._next = None  # what was to come after it rests on what is no more
         if is_at_it:
             self._leave(TaskState.GIVEN_BACK, now_ms)

@@ -66,6 +66,7 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
                 is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING)
                 if is_at_work and _where(one.message) != _where(before.message):
                     failed_s = max(failed_s, one.t_s)
+            surveyed_s = max(surveyed_s, witness.ended_s(name))  # or its word that it has ended comes late
     surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * silent_after_ms_of(plan.scenario) / 1000)
     ends_s = mission.ends_s(surveyed_s + _heard_within_s(plan)) + END_WITHIN_S
     if overs[-1].t_s > ends_s + END_WITHIN_S:

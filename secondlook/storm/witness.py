@@ -110,6 +110,10 @@ class Witness:
             self.agents.setdefault(node_id, []).append(beside)
             _stand_beside(node, beside)
 
+    def ended_s(self, vehicle: str) -> float:
+        """When a coordinator last heard as news that a vehicle has ended its work; 0 if never."""
+        return max((one.ended_s.get(vehicle, 0.0) for one in self.coordinators), default=0.0)
+
     def tell(self, found: Violation) -> None:
         """Something does not hold; said once of each node."""
         if (found.invariant, found.who) not in self._told:
@@ -149,7 +153,8 @@ _NONE_YET = (-1, -1)
 class CoordinatorWitness:
     """Beside one start of the coordinator. `tiles`: of each vehicle, place and incarnation the newest that came.
 
-    `over`: whether it has said that the mission is over. `may_rise`: see `Witness`.
+    `over`: whether it has said that the mission is over. `may_rise`: see `Witness`. `ended_s`: of each vehicle when its
+    word came that it has ended its work, the last time that this was news.
     """
 
     node_id: str
@@ -160,6 +165,7 @@ class CoordinatorWitness:
     tiles: dict[tuple[str, Place], dict[int, CoverageTile]] = field(default_factory=dict)
     started_ms: int = 0
     over: bool = False
+    ended_s: dict[str, float] = field(default_factory=dict)
     _states: dict[str, tuple[Header, AgentState]] = field(default_factory=dict)  # the newest of each vehicle
     _hotspots: dict[tuple[str, int], dict[int, int]] = field(default_factory=dict)
     _answers: dict[tuple[str, int], tuple[int, int]] = field(default_factory=dict)
@@ -228,6 +234,8 @@ class CoordinatorWitness:
         before, vehicle = self._states.get(received.vehicle), received.vehicle
         if before is None or order_of(received.header) > order_of(before[0]):
             self._states[vehicle] = received.header, state
+            if state.mode.has_ended and (before is None or not before[1].mode.has_ended):
+                self.ended_s[vehicle] = now_ms / 1000
         else:
             self.noted.add(LATE_STATE)
         known, (header, newest) = self.node.fleet.vehicles.get(vehicle), self._states[vehicle]
@@ -364,7 +372,8 @@ class AgentWitness:
         if task.action is TaskAction.GIVE_BACK:
             said = [(one.message.strip, one.message.state) for one in step.publish if type(one.message) is TaskStatus]
             works_on = self.node.works_on if isinstance(self.node, RevisitAgent) else 0  # else it may be a track
-            if works_on == task.strip or (task.strip, TaskState.GIVEN_BACK) not in said:
+            answers = {(task.strip, state) for state in (TaskState.GIVEN_BACK, TaskState.DONE)}
+            if works_on == task.strip or answers.isdisjoint(said):
                 what = f"it was told to give strip {task.strip} back, and has not"
                 self.tell(Violation("who is told to give back does", now_ms / 1000, self.node_id, what))
 

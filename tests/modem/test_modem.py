@@ -133,6 +133,15 @@ def test_the_end_of_the_mission_is_heard_by_all() -> None:
     assert heard(waters, "alpha") == heard(waters, "beta") == [("coord/mission_over", "MissionOver")]
 
 
+@pytest.mark.parametrize(("mode", "times"), [(Mode.TRANSIT, 2), (Mode.FINISHED, 1), (Mode.RETURNING, 1)])
+def test_an_agent_that_goes_on_is_told_again_that_the_mission_is_over(mode: Mode, times: int) -> None:
+    waters = Waters()
+    waters.say("coordinator", "coord/mission_over", MissionOver("every primary has finished"))
+    waters.run(30_000)
+    waters.say("beta", "agent/beta/state", state(mode))
+    assert heard(waters, "beta") == [("coord/mission_over", "MissionOver")] * times
+
+
 @pytest.mark.parametrize("frame_bits", [30, 34, 48, 128, 256, 512])
 @pytest.mark.parametrize("frames", [1, 3])
 @pytest.mark.parametrize("seed", range(3))
@@ -186,6 +195,16 @@ def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refuse
     ]  # fmt: skip
     with pytest.raises(ValueError, match=f"frames of {least - 1} bits are too small for 3 platforms"):
         config_of("ship", frame_bits=least - 1, polls=polls)
+
+
+def test_what_is_missing_is_said_again_though_what_waits_for_it_is_worth_more() -> None:
+    waters = Waters(arrives=lambda platform, to, count: platform != "ship" or count != 3, frame_bits=34)
+    waters.say("coordinator", "coord/task/beta/1", TAKE)  # the last of its four pieces is lost
+    waters.run(40_000)
+    for number in range(2, 5):  # of whose pieces a bit is worth more
+        waters.say("coordinator", f"coord/task/beta/{number}", Task(TaskAction.GIVE_BACK, number, 0, 0, 0, 0, 0))
+    waters.run(400_000)
+    assert [one.message.strip for _, _, one in waters.heard if isinstance(one.message, Task)] == [7, 2, 3, 4]
 
 
 def test_who_is_out_of_reach_does_not_keep_the_water_from_others() -> None:
@@ -287,6 +306,34 @@ def test_a_state_that_a_word_on_a_task_has_overtaken_is_not_told(frame_bits: int
     accepted = next(place for place, one in enumerate(told) if isinstance(one, TaskStatus) and one.strip == 8)
     after = [one.mode for one in told[accepted:] if isinstance(one, AgentState)]
     assert set(after) <= {Mode.TRANSIT}
+
+
+def modes_of_alpha(waters: Waters) -> list[tuple[int, Mode]]:
+    """When alpha's state was told aboard the ship, and what it does then, each as it changes."""
+    told = [(at_ms, one.message) for at_ms, to, one in waters.heard if to == "ship"]
+    modes = [(at_ms, one.mode) for at_ms, one in told if isinstance(one, AgentState)]
+    return [one for place, one in enumerate(modes) if place == 0 or modes[place - 1][1] is not one[1]]
+
+
+@pytest.mark.parametrize(("mode", "told_ms"), [(Mode.FINISHED, 55_500), (Mode.HOME, 55_500), (Mode.IDLE, 175_500)])
+def test_a_state_in_which_all_work_has_ended_is_said_until_it_has_arrived(mode: Mode, told_ms: int) -> None:
+    waters = Waters(lambda platform, _, count: platform == "ship" or count not in (1, 2, 3), reports=True)
+    waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
+    waters.run(12_000)
+    waters.say("alpha", "agent/alpha/state", state(mode))  # said in the slots at 16, 28, 40 s, and so on
+    waters.run(200_000)
+    assert modes_of_alpha(waters) == [(7_500, Mode.TRANSIT), (told_ms, mode)]
+
+
+def test_a_state_that_is_said_again_after_a_newer_one_is_not_told() -> None:
+    waters = Waters(lambda platform, _, count: platform == "ship" or count not in (1, 2), reports=True)
+    waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
+    waters.run(12_000)
+    waters.say("alpha", "agent/alpha/state", state(Mode.FINISHED))
+    waters.run(33_000)
+    waters.say("alpha", "agent/alpha/state", state(Mode.RETURNING))
+    waters.run(100_000)
+    assert [mode for _, mode in modes_of_alpha(waters)] == [Mode.TRANSIT, Mode.RETURNING]
 
 
 @pytest.mark.parametrize(("answer_ms", "said"), [(3_000, [2]), (10**9, [1, 2])])

@@ -50,6 +50,13 @@ def test_who_was_sent_home_lies_there_and_needs_no_battery() -> None:
     assert navs(told)[-1].y_m == 0.0
 
 
+def test_who_is_sent_home_when_it_has_just_left_is_there_and_does_not_turn_a_circle() -> None:
+    told = sea(replace(SHORT, home=(0.0, -100.0))).order("a", follow(1, (0, 0), (0, 400))).until(20)  # 4 cm north of it
+    told.order("a", go_to(2, (0, -200), (0, -100))).until(10_000)
+    assert told.statuses()[1:] == [(20, ManeuverState.ACCEPTED, 20), (20, ManeuverState.DONE, 20)]
+    assert {(nav.y_m, nav.speed_mps) for nav in navs(told, 20)} == {(-99.96, 0.0)}
+
+
 def test_elsewhere_it_circles_until_it_is_empty() -> None:
     told = sea(replace(SHORT, home=(500.0, 0.0))).order("a", go_to(1, (0, -100), (0, 0))).until(90_000)
     assert told.statuses()[-1][:2] == (60_500, ManeuverState.EMPTY)

@@ -354,6 +354,22 @@ class TestGivingBack:
         assert agent.last(AgentState).works_on == STRIP.strip
         assert to_follow(agent) is not None
 
+    @pytest.mark.parametrize("tells_where", [True, False])
+    def test_what_it_has_done_it_says_is_done_with_what_was_seen_there(self, tells_where: bool) -> None:
+        agent = revisit()
+        tell(agent, STRIP)
+        fly(agent, HELPER, agent.last(Maneuver), SEES_25_M)
+        back = give_back() if tells_where else Task(TaskAction.GIVE_BACK, STRIP.strip, 0, 0, 0, 0, 0)
+        said = tell(agent, back)
+        assert [(one.strip, one.state, one.progress) for one in agent.all(TaskStatus, said)] == [
+            (STRIP.strip, TaskState.DONE, 1.0)
+        ]
+        assert agent.all(CoverageTile, said) != []
+        elsewhere = replace(STRIP, start_x_m=STRIP.start_x_m + 100)
+        assert answer(agent, elsewhere).state is TaskState.ACCEPTED  # the number stands for another strip now
+        assert answer(agent, back).state is TaskState.GIVEN_BACK
+        assert answer(agent, back).state is TaskState.GIVEN_BACK
+
     def test_what_was_given_back_can_be_taken_again(self) -> None:
         agent = revisit()
         tell(agent, STRIP)

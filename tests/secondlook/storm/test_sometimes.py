@@ -163,6 +163,7 @@ ROWS = {
         "a helper is at another strip than it was offered",
     ),
     "over a link: it does not answer": ("a strip that is next is open", "a helper does a strip next after all"),
+    "its word that it is done with a strip is lost": ("a helper says again that it is done",),
     "it goes on to its next strip": ("a helper at its next strip has seen the one before",),
     "it accepts and does not get there": ("a helper does not serve a strip in time", "a task: give_back"),
     "it fails at, gives back unasked": ("a helper is given up: it does not serve what it accepts",),
