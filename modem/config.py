@@ -16,6 +16,8 @@ SECOND_BITS = 12
 """By which a message tells its second, where words are not to be short."""
 LEAST_PIECE_BITS = 8
 """A piece of a message with fewer bits is not worth the bits about it."""
+OTHERS_A_TURN = 2
+"""Of the other platforms so many speak until it is the coordinator's turn again."""
 LARGEST_LEAST_BITS = 256
 """In frames of so many bits all platforms can talk that there may be."""
 
@@ -59,6 +61,14 @@ def _window(frame_bits: int) -> Window:
     return Window(5)
 
 
+def slots_of(platforms: tuple[str, ...]) -> tuple[str, ...]:
+    """Who has the water, slot by slot of a cycle: the first of the platforms, the coordinator's, before every two of the
+    others, as it talks with them all."""
+    first, others = platforms[0], platforms[1:]
+    pairs = [others[place : place + OTHERS_A_TURN] for place in range(0, len(others), OTHERS_A_TURN)]
+    return tuple(name for pair in pairs for name in (first, *pair))
+
+
 @dataclass(frozen=True)
 class PollTimes:
     """What polling is reckoned with. `packet_ms`: how long a packet of 1, 2 ... frames is on the water; `way_ms`: how
@@ -75,7 +85,7 @@ class PollTimes:
 
 @dataclass(frozen=True)
 class ModemConfig:
-    """`platform`: which one it is on. `platforms`: all, in the order in which they speak; the first is the
+    """`platform`: which one it is on. `platforms`: all, in the order in which they speak (`slots`); the first is the
     coordinator's, with which all others talk, and no two others talk with each other. `vehicles`: those of the fleet in
     the order of the roster, each a platform. `frame_bits`: of one frame, `frames`: the most that one packet has.
     `slot_ms`: so long one platform has the water, packet and way of sound included. `late_ms`: so much later than its
@@ -154,14 +164,27 @@ class ModemConfig:
         return self.platforms[1:] if platform == self.hub else (self.hub,)
 
     @cached_property
+    def slots(self) -> tuple[str, ...]:
+        """Who has the water, slot by slot of a cycle."""
+        return slots_of(self.platforms)
+
+    @cached_property
     def cycle_ms(self) -> int:
         """After so long everybody has had a slot."""
-        return self.slot_ms * len(self.platforms)
+        return self.slot_ms * len(self.slots)
 
     def slot_of(self, platform: str, now_ms: int) -> int:
         """When the last slot of a platform began, at `now_ms` or before; negative if none has yet."""
-        first_ms = self.platforms.index(platform) * self.slot_ms
-        return (now_ms - first_ms) // self.cycle_ms * self.cycle_ms + first_ms
+        ago = [(now_ms - place * self.slot_ms) % self.cycle_ms for place in self._places_of(platform)]
+        return now_ms - min(ago)
+
+    def next_slot_of(self, platform: str, now_ms: int) -> int:
+        """When its next slot begins, after `now_ms`."""
+        ahead = [(place * self.slot_ms - now_ms - 1) % self.cycle_ms for place in self._places_of(platform)]
+        return now_ms + 1 + min(ahead)
+
+    def _places_of(self, platform: str) -> list[int]:
+        return [place for place, name in enumerate(self.slots) if name == platform]
 
     @cached_property
     def is_small(self) -> bool:

@@ -34,7 +34,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, Crossing, Topic
+from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, TASK_STATUS, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
@@ -109,6 +109,7 @@ class Modem:
         self._state_told: dict[str, int] = {}  # and when that was
         self._newest: dict[str, tuple[int, int]] = {}  # of states and words on tasks told here
         self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
+        self._has_told_since = False  # its agent, of its tasks since it has told a state that was news
         self._last_frames_ms = 0
         self._is_alive = False  # whether its agent has told its state since it spoke
         self._state_ms: int | None = None  # when it last did
@@ -233,7 +234,8 @@ class Modem:
             self._last_said[received.key] = said
         crossing = topic.crossing
         if isinstance(message, AgentState) and message.mode.has_ended:
-            crossing = replace(crossing, acknowledged=True)  # it says little after that, and others wait for it
+            # The mission's end counts from it: it arrives for sure, and before maps, as a word on a task does.
+            crossing = replace(crossing, value=TASK_STATUS.crossing.value, acknowledged=True)
         to = self.config.others
         if topic is TASK:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
@@ -252,14 +254,16 @@ class Modem:
             said = incarnation, message.strip, message.state
             if said == self._last_status and not self._queue.holds(_about(received)):
                 return False
-            self._last_status = said
+            self._last_status, self._has_told_since = said, True
             if presence is not None:
                 presence.hear_status(message, now_ms)
         elif isinstance(message, AgentState) and presence is not None:
             if not presence.is_news(message, incarnation, now_ms, seldom_ms(self.config)):
                 self._is_alive = True
-                self._queue.forget(_about(received))  # what waits was news before its words on tasks told as much
+                if self._has_told_since:  # what waits was news before its words on tasks told as much
+                    self._queue.forget(_about(received))
                 return False
+            self._has_told_since = False
             presence.hear_state(message, incarnation, now_ms)
         return True
 

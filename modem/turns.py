@@ -49,7 +49,7 @@ def turns_of(config: ModemConfig) -> Turns:
 
 
 class Slots:
-    """Each platform has a slot in a cycle."""
+    """Each platform has a slot in a cycle, the coordinator's several (`modem.config.slots_of`)."""
 
     must_speak = False
 
@@ -66,11 +66,13 @@ class Slots:
         return now_ms - slot_ms <= self._config.late_ms and slot_ms > self._spoke_ms
 
     def next_ms(self, now_ms: int, *, wants: bool) -> int | None:
-        """Its next slot."""
+        """Its next slot, which may be this one."""
         slot_ms = self._slot_ms(now_ms)
         if not wants:
             return None
-        return slot_ms if slot_ms == now_ms and slot_ms > self._spoke_ms else slot_ms + self._config.cycle_ms
+        if slot_ms == now_ms and slot_ms > self._spoke_ms:
+            return slot_ms
+        return self._config.next_slot_of(self._config.platform, now_ms)
 
     def names(self) -> None:
         """Nobody."""

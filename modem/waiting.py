@@ -78,10 +78,12 @@ class Queue:
         number = next(number for number, other in self._waiting.items() if other is one)
         del self._waiting[number]
 
-    def drop_old(self, now_ms: int) -> None:
-        """What need not arrive, and has waited for too long, is not said any more; nor what nobody waits for."""
+    def drop_old(self, now_ms: int, cycle_ms: int = 0) -> None:
+        """What need not arrive, and has waited for too long, and at least a cycle, is not said any more; nor what nobody
+        waits for."""
         for number, one in list(self._waiting.items()):
-            is_old = not one.crossing.acknowledged and now_ms - one.queued_ms > one.crossing.ttl_s * 1000
+            too_long_ms = max(one.crossing.ttl_s * 1000, cycle_ms)
+            is_old = not one.crossing.acknowledged and now_ms - one.queued_ms > too_long_ms
             if is_old or now_ms >= one.until_ms:
                 del self._waiting[number]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from coordinator.config import ANSWER_WITHIN_MS
-from modem.config import ModemConfig, PollTimes
+from modem.config import ModemConfig, PollTimes, slots_of
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
@@ -63,7 +63,7 @@ class LinkTimes:
         """How long it takes until each platform has had a slot, or was polled, at most."""
         if self.polls is not None:
             return self.polls.round_ms(self.frames) * (len(self.platforms) - 1)
-        return self.slot_ms * len(self.platforms)
+        return self.slot_ms * len(slots_of(self.platforms))
 
     @property
     def packets_a_word(self) -> int:

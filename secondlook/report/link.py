@@ -121,7 +121,7 @@ def _bar_ends_ms(config: ModemConfig, end_ms: int) -> list[int]:
 
 def _platform(trace: LinkTrace, name: str, end_ms: int) -> PlatformFigures:
     packets = [one for one in trace.packets if one.platform == name]
-    span = trace.span(0, end_ms, packets)
+    span, slots = trace.span(0, end_ms, packets), trace.config.slots
     mean_s = largest_s = None
     if name in trace.words:
         age = Age()
@@ -134,7 +134,7 @@ def _platform(trace: LinkTrace, name: str, end_ms: int) -> PlatformFigures:
         frames=sum(one.frames for one in packets),
         bytes_per_s=span.size_bytes / span.seconds,
         lost_share=span.lost_share,
-        slots_full=span.used_bits * len(trace.config.platforms) / trace.capacity_bits(span),
+        slots_full=span.used_bits * len(slots) / slots.count(name) / trace.capacity_bits(span),
         age_mean_s=mean_s,
         age_largest_s=largest_s,
     )

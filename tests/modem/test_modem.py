@@ -34,6 +34,7 @@ from modem.letters import with_fewer_corners
 TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
 OUTLINE = tuple(Vertex(100.0 + 10 * place, 50.0 + 5 * (place % 3)) for place in range(12))
 CURVE = Curve(1, 1.0, np.linspace(0.0, 0.9, 40), 30)
+HALF = np.full((2, 20, 26), 0.5)
 FOUND = Hotspot(1, HotspotState.ACTIVE, OUTLINE, 0.6, 40, True, 0)
 
 
@@ -113,9 +114,8 @@ def test_what_is_lost_is_said_again_until_it_is_known_to_have_arrived() -> None:
 
 def test_a_word_on_a_task_goes_before_maps_and_is_said_again_before_them() -> None:
     waters = Waters(arrives=lambda platform, _, count: platform == "ship" or count > 5)  # those of beta
-    p_detect = np.full((2, 20, 26), 0.5)
     for number in range(300):  # on a track each
-        look = Look(number, number, 50.0 + number, 50.0, 0.0, 0.0, 1.0, 1.0, p_detect, 5.0, 0.0, True, ())
+        look = Look(number, number, 50.0 + number, 50.0, 0.0, 0.0, 1.0, 1.0, HALF, 5.0, 0.0, True, ())
         waters.say("world", "veh/beta/look", look)
     waters.run(40_000)
     waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.DONE, 1.0, 40_000, ""))
@@ -315,7 +315,7 @@ def modes_of_alpha(waters: Waters) -> list[tuple[int, Mode]]:
     return [one for place, one in enumerate(modes) if place == 0 or modes[place - 1][1] is not one[1]]
 
 
-@pytest.mark.parametrize(("mode", "told_ms"), [(Mode.FINISHED, 55_500), (Mode.HOME, 55_500), (Mode.IDLE, 175_500)])
+@pytest.mark.parametrize(("mode", "told_ms"), [(Mode.FINISHED, 55_500), (Mode.HOME, 55_500), (Mode.IDLE, 127_500)])
 def test_a_state_in_which_all_work_has_ended_is_said_until_it_has_arrived(mode: Mode, told_ms: int) -> None:
     waters = Waters(lambda platform, _, count: platform == "ship" or count not in (1, 2, 3), reports=True)
     waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
@@ -325,14 +325,35 @@ def test_a_state_in_which_all_work_has_ended_is_said_until_it_has_arrived(mode: 
     assert modes_of_alpha(waters) == [(7_500, Mode.TRANSIT), (told_ms, mode)]
 
 
-def test_a_state_that_is_said_again_after_a_newer_one_is_not_told() -> None:
-    waters = Waters(lambda platform, _, count: platform == "ship" or count not in (1, 2), reports=True)
+@pytest.mark.parametrize("mode", [Mode.FINISHED, Mode.IDLE])
+def test_a_state_that_is_news_waits_for_its_slot_though_the_next_report_tells_the_same(mode: Mode) -> None:
+    waters = Waters(slot_ms=12_000, reports=True)
+    waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
+    waters.run(15_000)
+    waters.say("alpha", "agent/alpha/state", state(mode))  # and again at 25, 35 and 45 s
+    waters.run(100_000)
+    assert modes_of_alpha(waters) == [(15_500, Mode.TRANSIT), (51_500, mode)]
+
+
+def test_before_maps_it_is_said_that_all_work_has_ended() -> None:
+    waters = Waters(frame_bits=128, reports=True)
+    waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
+    for number in range(60):  # on a track each
+        look = Look(number, number, 50.0 + number, 50.0, 0.0, 0.0, 1.0, 1.0, HALF, 5.0, 0.0, True, ())
+        waters.say("world", "veh/alpha/look", look)
+    waters.run(39_000)
+    waters.say("alpha", "agent/alpha/state", state(Mode.FINISHED))
+    waters.run(200_000)
+    assert modes_of_alpha(waters)[-1] == (43_500, Mode.FINISHED)
+
+
+def test_a_state_that_comes_after_a_newer_one_is_not_told() -> None:
+    waters = Waters(reports=True)
     waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
     waters.run(12_000)
-    waters.say("alpha", "agent/alpha/state", state(Mode.FINISHED))
-    waters.run(33_000)
     waters.say("alpha", "agent/alpha/state", state(Mode.RETURNING))
-    waters.run(100_000)
+    waters.run(30_000)
+    waters.say("world", "modem/ship/rx", waters.packets[0][2])
     assert [mode for _, mode in modes_of_alpha(waters)] == [Mode.TRANSIT, Mode.RETURNING]
 
 

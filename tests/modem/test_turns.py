@@ -1,4 +1,4 @@
-"""Polled, one speaks after the other, by the times worked out by hand; who is silent holds up nobody for long."""
+"""Slots, and polled, one after the other, by times worked out by hand; who is silent holds up nobody for long."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import random
 from dataclasses import replace
 from itertools import pairwise
 
+import pytest
 from fleets import state
-from modems import Waters
+from modems import Waters, config_of
 
 from comms.said.messages import Task, TaskAction, TaskState, TaskStatus
 from modem.config import PollTimes
@@ -19,6 +20,26 @@ TAKE = Task(TaskAction.TAKE, 7, 100.0, 50.0, 1.25, 180.0, 40.0)
 
 def spoke(waters: Waters, *platforms: str) -> list[tuple[int, str]]:
     return [(at_ms, platform) for at_ms, platform, _ in waters.packets if platform in platforms]
+
+
+@pytest.mark.parametrize(
+    ("vehicles", "slots"),
+    [("a", "sa"), ("ab", "sab"), ("abc", "sabsc"), ("abcd", "sabscd"), ("abcdef", "sabscdsef")],
+)
+def test_the_coordinators_platform_has_a_slot_before_every_two_of_the_others(vehicles: str, slots: str) -> None:
+    config = replace(config_of("ship"), platform="s", platforms=("s", *vehicles), vehicles=tuple(vehicles))
+    assert ("".join(config.slots), config.cycle_ms) == (slots, 4000 * len(slots))
+    for number in range(2 * len(slots)):  # the slot that begins then, and until the next begins
+        for now_ms in (4000 * number, 4000 * number + 3999):
+            assert config.slot_of(config.slots[number % len(slots)], now_ms) == 4000 * number
+            follows = (number + 1) % len(slots)
+            assert config.next_slot_of(config.slots[follows], now_ms) == 4000 * (number + 1)
+    for platform in config.platforms:
+        begins = [4000 * number for number in range(2 * len(slots)) if slots[number % len(slots)] == platform]
+        assert config.slot_of(platform, begins[0] - 1) < 0
+        for begin, later in pairwise(begins):
+            assert config.slot_of(platform, later - 1) == begin
+            assert config.next_slot_of(platform, begin) == config.next_slot_of(platform, later - 1) == later
 
 
 def test_who_is_polled_answers_at_once_and_then_the_next_is_polled() -> None:
