@@ -5,6 +5,9 @@ coordinator.platform=ship,primary] --out DIR` flies them; `python -m bench.link_
 prints a line for each link: the share kept, mean and least over the seeds of any scenario, bytes a second across the
 water, and how old what the coordinator knew was on average. Other keys of the link, as link.access, are varied in a
 folder of their own beside one with the ideal link.
+
+Missions are compared at 1.05 times the time at which the primary had surveyed all, or at their end if that comes
+before: else one whose coordinator hears late of that would have more time.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ import secondlook
 
 Row = dict[str, Any]
 LINK, IDEAL = "link.profile", "ideal"
+AT_105 = "risk_at.1.mean"
 NAMED = {"coordinator.platform": "coordinator on", "link.also": "and"}
 
 
@@ -45,7 +49,8 @@ def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tup
 
 
 def _removed(row: Row) -> float:
-    return float(row["risk_primary_alone.mean"] - row["risk.mean"])
+    left = row["risk.mean"] if row[AT_105] is None else row[AT_105]
+    return float(row["risk_primary_alone.mean"] - left)
 
 
 def _age_s(row: Row) -> float:

@@ -62,8 +62,8 @@ def _window(frame_bits: int) -> Window:
 
 
 def slots_of(platforms: tuple[str, ...]) -> tuple[str, ...]:
-    """Who has the water, slot by slot of a cycle: the first of the platforms, the coordinator's, before every two of the
-    others, as it talks with them all."""
+    """Who has the water, slot by slot of a cycle: the coordinator's platform, the first, before every two others, as it
+    talks with them all."""
     first, others = platforms[0], platforms[1:]
     pairs = [others[place : place + OTHERS_A_TURN] for place in range(0, len(others), OTHERS_A_TURN)]
     return tuple(name for pair in pairs for name in (first, *pair))

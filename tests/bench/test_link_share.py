@@ -12,7 +12,7 @@ from bench.link_share import shares
 def row(profile: str, seed: int, mean: float, *, alone: float = 0.6, platform: str = "ship") -> dict[str, Any]:
     return {
         "scenario": "toy", "seed": seed, "link.profile": profile, "platform": platform, "failure": None,
-        "risk.mean": mean, "risk_primary_alone.mean": alone,
+        "risk.mean": mean, "risk_primary_alone.mean": alone, "risk_at.1.mean": None,
     }  # fmt: skip
 
 
@@ -21,6 +21,11 @@ def test_each_mission_is_held_against_that_of_its_own_seed() -> None:
     found = shares(rows, ["link.profile"])
     assert [share for _, share in found[("ideal",)]] == pytest.approx([1.0, 1.0])
     assert [share for _, share in found[("janus",)]] == pytest.approx([0.5, 1.0])
+
+
+def test_the_risk_at_105_of_the_primarys_time_counts_where_the_mission_lasts_longer() -> None:
+    rows = [row("ideal", 1, 0.4) | {"risk_at.1.mean": 0.4}, row("janus", 1, 0.3) | {"risk_at.1.mean": 0.45}]
+    assert [share for _, share in shares(rows, ["link.profile"])[("janus",)]] == pytest.approx([0.75])
 
 
 def test_and_of_its_own_platform() -> None:
