@@ -79,7 +79,7 @@ class Queue:
         del self._waiting[number]
 
     def drop_old(self, now_ms: int, cycle_ms: int = 0) -> None:
-        """What need not arrive is not said any more when it has waited for too long, a cycle at least; nor is what nobody
+        """What need not arrive is not said any more when it has waited for too long, a cycle at least; nor what nobody
         waits for."""
         for number, one in list(self._waiting.items()):
             too_long_ms = max(one.crossing.ttl_s * 1000, cycle_ms)
