@@ -154,18 +154,11 @@ def _of_link(scenario: str, profile: str, also: str) -> tuple[str, ...]:
 
 def linked_kept(scenario: str, rows: Sequence[Document]) -> list[Document]:
     """What is kept of a sweep's rows: what shares and ages are reckoned from."""
-    names = (
-        "seed",
-        "failure",
-        "link.profile",
-        "link.also",
-        "coordinator.platform",
-        "link.bytes_per_s",
-        link_share.AT_105,
-    )
+    names = ("seed", "failure", "link.profile", "link.also", "coordinator.platform", "link.bytes_per_s")
     kept = []
     for row in rows:
-        figures = (name for name in row if name.startswith(("risk.", "risk_primary")) or name.endswith(".mean_s"))
+        begins = ("risk.", "risk_at.1.", "risk_primary")
+        figures = (name for name in row if name.startswith(begins) or name.endswith(".mean_s"))
         kept.append({"scenario": scenario, **some(row, dict.fromkeys((*names, *figures)))})
     return kept
 

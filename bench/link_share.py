@@ -2,9 +2,9 @@
 
 `secondlook sweep SCENARIO --seeds 1001..1020 --vary link.profile=ideal,micromodem-1,... [--vary
 coordinator.platform=ship,primary] --out DIR` flies them; `python -m bench.link_share DIR ...` pools the folders, and
-prints a line for each link: the share kept, mean and least over the seeds of any scenario, bytes a second across the
-water, and how old what the coordinator knew was on average. Other keys of the link, as link.access, are varied in a
-folder of their own beside one with the ideal link.
+prints a line for each link: the share kept of the mean, on average and least over the seeds of any scenario, that of
+the worst 30 %, bytes a second across the water, and how old what the coordinator knew was on average. Other keys of the
+link, as link.access, are varied in a folder of their own beside one with the ideal link.
 
 Missions are compared at 1.05 times the time at which the primary had surveyed all, or at their end if that comes
 before: else one whose coordinator hears late of that would have more time.
@@ -21,20 +21,19 @@ import secondlook
 
 Row = dict[str, Any]
 LINK, IDEAL = "link.profile", "ideal"
-AT_105 = "risk_at.1.mean"
 NAMED = {"coordinator.platform": "coordinator on", "link.also": "and"}
 
 
-def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tuple[Row, float]]]:
+def shares(rows: list[Row], varied: list[str], of: str = "mean") -> dict[tuple[str, ...], list[tuple[Row, float]]]:
     """Of each combination of what was varied, by its values as text, the missions with the share that each keeps of
     what the ideal link's removes, whatever else of the link was varied; those that failed, and those of which nothing
-    was removed by that, are left out.
+    was removed by that, are left out. `of`: of the mean, or of the `worst30_mean`.
 
     Raises ValueError where the ideal link was not flown.
     """
     others = [key for key in varied if not key.startswith("link.")]
     removed = {
-        (row["scenario"], row["seed"], *(row.get(key) for key in others)): _removed(row)
+        (row["scenario"], row["seed"], *(row.get(key) for key in others)): _removed(row, of)
         for row in rows
         if row[LINK] == IDEAL and row["failure"] is None
     }
@@ -44,13 +43,13 @@ def shares(rows: list[Row], varied: list[str]) -> dict[tuple[str, ...], list[tup
     for row in rows:
         ideal = removed.get((row["scenario"], row["seed"], *(row.get(key) for key in others)), 0.0)
         if row["failure"] is None and ideal > 0.0:
-            found[tuple(str(row.get(key, "-")) for key in varied)].append((row, _removed(row) / ideal))
+            found[tuple(str(row.get(key, "-")) for key in varied)].append((row, _removed(row, of) / ideal))
     return found
 
 
-def _removed(row: Row) -> float:
-    left = row["risk.mean"] if row[AT_105] is None else row[AT_105]
-    return float(row["risk_primary_alone.mean"] - left)
+def _removed(row: Row, of: str) -> float:
+    at_105 = row[f"risk_at.1.{of}"]
+    return float(row[f"risk_primary_alone.{of}"] - (row[f"risk.{of}"] if at_105 is None else at_105))
 
 
 def _age_s(row: Row) -> float:
@@ -70,15 +69,15 @@ def main(folders: list[str]) -> None:
 def table(rows: list[Row], varied: list[str]) -> list[str]:
     """The lines of the table, as Markdown. Raises ValueError as `shares` does."""
     names = [NAMED.get(key, f"`{key}`") for key in varied]
-    heads = [*names, "missions", "share kept", "least", "bytes a second", "age in s"]
+    heads = [*names, "missions", "share kept", "least", "of the worst 30 %", "bytes a second", "age in s"]
     lines = [f"| {' | '.join(heads)} |", f"|{'---|' * len(heads)}"]
+    of_worst = shares(rows, varied, "worst30_mean")
     for values, missions in shares(rows, varied).items():
-        kept = [share for _, share in missions]
+        kept, worst = [share for _, share in missions], fmean(share for _, share in of_worst[values])
         bytes_per_s, age_s = (fmean(of(row) for row, _ in missions) for of in (_bytes_per_s, _age_s))
         told = " | ".join(one if " " in one or one == "-" else f"`{one}`" for one in values)
-        lines.append(
-            f"| {told} | {len(kept)} | {fmean(kept):.3f} | {min(kept):.3f} | {bytes_per_s:.1f} | {age_s:.0f} |"
-        )
+        cells = f"{fmean(kept):.3f} | {min(kept):.3f} | {worst:.3f} | {bytes_per_s:.1f} | {age_s:.0f}"
+        lines.append(f"| {told} | {len(kept)} | {cells} |")
     return lines
 
 

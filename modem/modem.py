@@ -34,7 +34,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, TASK_STATUS, Crossing, Topic
+from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, URGENT, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
@@ -234,8 +234,7 @@ class Modem:
             self._last_said[received.key] = said
         crossing = topic.crossing
         if isinstance(message, AgentState) and message.mode.has_ended:
-            # The mission's end counts from it: it arrives for sure, and before maps, as a word on a task does.
-            crossing = replace(crossing, value=TASK_STATUS.crossing.value, acknowledged=True)
+            crossing = URGENT  # the mission's end counts from it
         to = self.config.others
         if topic is TASK:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]

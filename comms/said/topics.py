@@ -75,6 +75,10 @@ class Crossing:
     is_fine: bool = False
 
 
+URGENT = Crossing(8000, 60, newest_only=True)
+"""How words on tasks go, and that the mission is over, or a vehicle's work: before maps, and until they have come."""
+
+
 @dataclass(frozen=True, eq=False)
 class Topic:
     """One row of the table; another topic with the same entries is another one.
@@ -203,17 +207,17 @@ STRIP = Topic(
 TASK = Topic(
     # In the first 49 days of a mission, while its time in milliseconds takes 4 bytes, no task has more than 64 bytes.
     "task", "coord/task/{vehicle}/{number}", Task, _COORDINATOR, _AGENTS_OWN | _MODEMS | _WATCHERS, 68, 0.1,
-    Keep.EVENTS, crosses_water=True, crossing=Crossing(8000, 60, newest_only=True),
+    Keep.EVENTS, crosses_water=True, crossing=URGENT,
 )  # fmt: skip
 TASK_STATUS = Topic(
     "task_status", "agent/{vehicle}/task_status/{number}", TaskStatus, _HELPERS_OWN,
     _COORDINATOR | _MODEMS | _WATCHERS, 400, 0.2, Keep.EVENTS, crosses_water=True,
-    crossing=Crossing(8000, 60, newest_only=True),
+    crossing=URGENT,
 )  # fmt: skip
 MISSION_OVER = Topic(
     "mission_over", "coord/mission_over", MissionOver, _COORDINATOR,
     dict.fromkeys(_AGENTS_OWN, Reach.ALL) | {Role.WORLD: Reach.ALL} | _MODEMS | _WATCHERS, 400, 0.1, Keep.LATEST,
-    crosses_water=True, crossing=Crossing(8000, 60, newest_only=True),
+    crosses_water=True, crossing=URGENT,
 )  # fmt: skip
 MODEM_TX = Topic(
     "modem_tx", "modem/{platform}/tx", Packet, _MODEM_OWN, _CARRIERS | _WATCHERS, 300_000,

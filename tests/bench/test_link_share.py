@@ -13,6 +13,7 @@ def row(profile: str, seed: int, mean: float, *, alone: float = 0.6, platform: s
     return {
         "scenario": "toy", "seed": seed, "link.profile": profile, "platform": platform, "failure": None,
         "risk.mean": mean, "risk_primary_alone.mean": alone, "risk_at.1.mean": None,
+        "risk.worst30_mean": mean, "risk_primary_alone.worst30_mean": 1.0, "risk_at.1.worst30_mean": None,
     }  # fmt: skip
 
 
@@ -21,6 +22,8 @@ def test_each_mission_is_held_against_that_of_its_own_seed() -> None:
     found = shares(rows, ["link.profile"])
     assert [share for _, share in found[("ideal",)]] == pytest.approx([1.0, 1.0])
     assert [share for _, share in found[("janus",)]] == pytest.approx([0.5, 1.0])
+    of_worst = shares(rows, ["link.profile"], "worst30_mean")
+    assert [share for _, share in of_worst[("janus",)]] == pytest.approx([5 / 6, 7 / 8])
 
 
 def test_the_risk_at_105_of_the_primarys_time_counts_where_the_mission_lasts_longer() -> None:
