@@ -26,7 +26,8 @@ def mission_blueprint(extent: Extent, run: RunInfo, *, has_link: bool = False) -
     beside: rrb.Container | rrb.View = curves
     if has_link:
         below = rrb.Tabs(_ranges_view(), curves)
-        beside = rrb.Vertical(_ages_view(), rrb.Tabs(_bytes_view(), _shares_view()), row_shares=[4, 3])
+        ages, sent = rrb.Tabs(*_ages_views()), rrb.Tabs(_bytes_view(), _subjects_view(), _shares_view())
+        beside = rrb.Vertical(ages, sent, row_shares=[4, 3])
     log = _log_view()
     over_time = rrb.Tabs(_metrics_view(), _mines_view())
     if wide:
@@ -131,12 +132,17 @@ def _ranges_view() -> rrb.TimeSeriesView:
     return _series_view(paths.RANGES, "Range in metres: r_eff, and what is planned for", rrb.Corner2D.RightTop)
 
 
-def _ages_view() -> rrb.TimeSeriesView:
-    return _series_view(paths.LINK_AGES, "Age in s of what is known", rrb.Corner2D.LeftTop)
+def _ages_views() -> list[rrb.TimeSeriesView]:
+    names = {paths.LINK_AGES: "Age in s of what is known", paths.LINK_AGES_OF_HUB: "Of the coordinator’s words"}
+    return [_series_view(path, name, rrb.Corner2D.LeftTop) for path, name in names.items()]
 
 
 def _bytes_view() -> rrb.TimeSeriesView:
     return _series_view(paths.LINK, "Bytes a second", None, contents=[paths.LINK_BYTES])
+
+
+def _subjects_view() -> rrb.TimeSeriesView:
+    return _series_view(paths.LINK_BYTES_FOR, "For what", rrb.Corner2D.RightTop)
 
 
 def _shares_view() -> rrb.TimeSeriesView:

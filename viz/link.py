@@ -1,5 +1,5 @@
-"""The link over time, of fleets that talk by modems: how old what the coordinator knows of each vehicle is, what is
-sent and lost, and how full slots are."""
+"""The link over time, of fleets that talk by modems: how old what the coordinator knows of each vehicle is, and what
+each has heard of it, what is sent, for what, and lost, and how full slots are."""
 
 from __future__ import annotations
 
@@ -21,8 +21,11 @@ class Link:
         self._canvas, self._teller = canvas, teller
         colours = palette.vehicle_colours(run.vehicles)
         for one in run.vehicles:
-            self._present(paths.age(one.vehicle), one.vehicle, colours[one.vehicle])
+            for path in (paths.age(one.vehicle), paths.age_of_hub(one.vehicle)):
+                self._present(path, one.vehicle, colours[one.vehicle])
         self._present(paths.LINK_BYTES, "bytes a second", palette.COVERED)
+        for place, (subject, words) in enumerate(teller.subjects.items()):
+            self._present(f"{paths.LINK_BYTES_FOR}/{subject}", words, palette.SUBJECTS[place % len(palette.SUBJECTS)])
         self._present(paths.LINK_LOST, "share of frames lost", palette.WORST_RISK)
         self._present(paths.LINK_FULL, "how full slots are", palette.COVERED)
 

@@ -36,7 +36,9 @@ TASKS = "/tasks"
 LOG = "/log"
 LINK = "/link"
 LINK_AGES = f"{LINK}/age"
+LINK_AGES_OF_HUB = f"{LINK}/age_of_coordinator"
 LINK_BYTES = f"{LINK}/bytes_per_s"
+LINK_BYTES_FOR = f"{LINK}/bytes_per_s_for"
 LINK_LOST = f"{LINK}/frames_lost"
 LINK_FULL = f"{LINK}/slots_full"
 
@@ -69,6 +71,11 @@ def planned_range(vehicle: str) -> str:
 def age(vehicle: str) -> str:
     """How old what the coordinator knows of a vehicle is."""
     return f"{LINK_AGES}/{vehicle}"
+
+
+def age_of_hub(vehicle: str) -> str:
+    """How old what a vehicle has heard of the coordinator's platform is."""
+    return f"{LINK_AGES_OF_HUB}/{vehicle}"
 
 
 def mode(vehicle: str) -> str:

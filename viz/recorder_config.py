@@ -29,12 +29,17 @@ class Storyteller(Protocol):
 
 
 LinkPoint = tuple[int, str, float]
-"""When, in simulated milliseconds, of which series, and what: `age/VEHICLE` in seconds, `bytes_per_s`, `frames_lost`
+"""When, in simulated milliseconds, of which series, and what: `age/VEHICLE`, what the coordinator knows of it, and
+`age_of_coordinator/VEHICLE`, what that has heard, in seconds; `bytes_per_s`, `bytes_per_s_for/SUBJECT`; `frames_lost`
 and `slots_full` as shares."""
 
 
 class LinkTeller(Protocol):
-    """Tells how the link goes, as series over time."""
+    """Tells how the link goes, as series over time. `subjects`: what bytes are for, each with words for people."""
+
+    @property
+    def subjects(self) -> Mapping[str, str]:
+        """See above."""
 
     @property
     def telling(self) -> tuple[type, ...]:

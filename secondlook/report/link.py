@@ -7,34 +7,22 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from modem.config import ModemConfig
-from modem.overheard import STRETCH
 from secondlook.errors import UserError
 from secondlook.fleet.link import modem_configs
 from secondlook.recorded import RecordedMission
 from secondlook.recorded.link_figures import Age
-from secondlook.recorded.link_trace import LinkTrace, Span
+from secondlook.recorded.link_trace import ABOUT, ACKNOWLEDGEMENTS, IN_WORDS, LinkTrace, Span, Word
 from secondlook.report.drawing import Element, drawing, element, points, ticks
 from secondlook.scenario import make_scenario
 
 MOST_BARS, SHORTEST_BAR_MS = 60, 20_000
-IN_WORDS = {
-    "state": "states of vehicles",
-    "plan": "plans of tracks",
-    "curve": "P(y) of tracks",
-    "hotspot": "hotspots",
-    "task": "tasks",
-    "task_status": "answers to tasks",
-    "mission_over": "that the mission is over",
-    STRETCH: "coverage, as stretches",
-    "": "pieces said before their first",
-}
 
 
 @dataclass(frozen=True)
 class PlatformFigures:
     """A platform's line: what it has sent, which share of its frames was lost, counted at each other platform, which
-    share of what its slots could carry was used, and how old what the coordinator knew of it was, in seconds; None
-    where it is no vehicle."""
+    share of what its slots could carry was used, and in seconds how old what the coordinator knew of it was, None where
+    it is no vehicle, and how long ago what it had heard of the coordinator's platform was said, None for that."""
 
     platform: str
     packets: int
@@ -44,6 +32,8 @@ class PlatformFigures:
     slots_full: float
     age_mean_s: float | None
     age_largest_s: float | None
+    age_of_hub_mean_s: float | None
+    age_of_hub_largest_s: float | None
 
 
 @dataclass(frozen=True)
@@ -122,12 +112,7 @@ def _bar_ends_ms(config: ModemConfig, end_ms: int) -> list[int]:
 def _platform(trace: LinkTrace, name: str, end_ms: int) -> PlatformFigures:
     packets = [one for one in trace.packets if one.platform == name]
     span, slots = trace.span(0, end_ms, packets), trace.config.slots
-    mean_s = largest_s = None
-    if name in trace.words:
-        age = Age()
-        for word in trace.words[name]:
-            age.hear(word.said_ms, word.came_ms)
-        mean_s, largest_s = age.mean_s(end_ms), age.largest_ms / 1000
+    known_s, knows_s = (_age_s(words.get(name), end_ms) for words in (trace.words, trace.words_of_hub))
     return PlatformFigures(
         name,
         packets=len(packets),
@@ -135,9 +120,21 @@ def _platform(trace: LinkTrace, name: str, end_ms: int) -> PlatformFigures:
         bytes_per_s=span.size_bytes / span.seconds,
         lost_share=span.lost_share,
         slots_full=span.used_bits * len(slots) / slots.count(name) / trace.capacity_bits(span),
-        age_mean_s=mean_s,
-        age_largest_s=largest_s,
+        age_mean_s=known_s[0],
+        age_largest_s=known_s[1],
+        age_of_hub_mean_s=knows_s[0],
+        age_of_hub_largest_s=knows_s[1],
     )
+
+
+def _age_s(words: Sequence[Word] | None, end_ms: int) -> tuple[float | None, float | None]:
+    """How old what was known was, on average and at most."""
+    if words is None:
+        return None, None
+    age = Age()
+    for word in words:
+        age.hear(word.said_ms, word.came_ms)
+    return age.mean_s(end_ms), age.largest_ms / 1000
 
 
 def _subjects(trace: LinkTrace) -> list[SubjectFigures]:
@@ -146,8 +143,8 @@ def _subjects(trace: LinkTrace) -> list[SubjectFigures]:
     contents = [one.contents for one in trace.packets]
     rows = [(IN_WORDS.get(name, name), bits, again[name]) for name, bits in said.most_common()]
     rows += [
-        ("acknowledgements", sum(one.acknowledgements for one in contents), 0),
-        ("tags, senders and numbers", sum(one.about for one in contents), 0),
+        (IN_WORDS[ACKNOWLEDGEMENTS], sum(one.acknowledgements for one in contents), 0),
+        (IN_WORDS[ABOUT], sum(one.about for one in contents), 0),
         ("nothing: filled up with zeros", sum(one.unused for one in contents), 0),
     ]
     total = sum(bits for _, bits, _ in rows) or 1

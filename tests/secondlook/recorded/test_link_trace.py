@@ -17,7 +17,7 @@ from comms.runner import Stamp
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import Heard, Packet
 from comms.said.routing import Routing
-from secondlook.recorded.link_trace import LinkSeries, LinkTrace, Word
+from secondlook.recorded.link_trace import IN_WORDS, LinkSeries, LinkTrace, Word
 from secondlook.report import report_page
 from secondlook.report.link import link_report
 from secondlook.testing import Fleet, Flight
@@ -48,6 +48,7 @@ MESSAGES = [
     said("modem-ship", "modem/ship/tx", Packet((b"hgfedcba",)), 30_000),
     said("world", "modem/beta/rx", Packet((b"87654321",)), 31_000),  # overheard
     said("world", "modem/ship/rx", Packet((b"87654321",)), 31_500),
+    said("world", "modem/beta/rx", Packet((b"hgfedcba",)), 33_000),
     state_heard(30_000, 49_000),
 ]
 
@@ -59,12 +60,13 @@ def test_what_was_sent_lost_and_known_by_hand() -> None:
     assert [(one.platform, one.frames, one.receptions) for one in trace.packets] == [
         ("beta", 2, 3),
         ("alpha", 1, 1),
-        ("ship", 1, 0),
+        ("ship", 1, 1),
     ]
     assert trace.words == {"alpha": [], "beta": [Word(10_000, 1000), Word(49_000, 30_000)]}
+    assert trace.words_of_hub == {"alpha": [], "beta": [Word(33_000, 30_000)]}
     first, second = trace.spans([30_000, 60_000])
     assert (first.size_bytes, first.frames_expected, first.frames_lost) == (24, 5, 1)
-    assert (second.size_bytes, second.frames_expected, second.frames_lost) == (8, 2, 2)
+    assert (second.size_bytes, second.frames_expected, second.frames_lost) == (8, 2, 1)
     assert first.used_bits == 24 * 8  # none of these frames is one, so that nothing is known to be filled up
     assert trace.capacity_bits(first) == 6 * 128
 
@@ -76,17 +78,26 @@ def test_series_are_told_as_they_become_known() -> None:
     assert ages == [(9_999, "age/beta", 10.0), (10_000, "age/beta", 9.0), (48_999, "age/beta", 48.0),
                     (49_000, "age/beta", 19.0)]  # fmt: skip
     assert not any(name == "bytes_per_s" for points in told for _, name, _ in points)  # something may yet be heard
+    of_hub = [point for points in told for point in points if point[1] == "age_of_coordinator/beta"]
+    assert of_hub == [(32_999, "age_of_coordinator/beta", 33.0), (33_000, "age_of_coordinator/beta", 3.0)]
     rest = {(at_ms, name): value for at_ms, name, value in series.rest(45_000)}
+    for_what = {key: rest.pop(key) for key in list(rest) if key[1].startswith("bytes_per_s_for/")}
+    # None of these frames is one: all of it is about nothing that is known.
+    assert {key: value for key, value in for_what.items() if value} == pytest.approx(
+        {(30_000, "bytes_per_s_for/about"): 24 / 30, (45_000, "bytes_per_s_for/about"): 8 / 15}
+    )
     assert rest == pytest.approx(
         {
             (30_000, "bytes_per_s"): 24 / 30,
             (30_000, "frames_lost"): 1 / 5,
             (30_000, "slots_full"): 24 * 8 / 768,
             (45_000, "bytes_per_s"): 8 / 15,
-            (45_000, "frames_lost"): 1.0,
+            (45_000, "frames_lost"): 0.5,
             (45_000, "slots_full"): 8 * 8 / 384,
             (45_000, "age/alpha"): 45.0,
             (45_000, "age/beta"): 15.0,
+            (45_000, "age_of_coordinator/alpha"): 45.0,
+            (45_000, "age_of_coordinator/beta"): 15.0,
         }
     )
     later = LinkSeries(CONFIG)
@@ -141,6 +152,19 @@ def test_the_recording_holds_it_and_only_with_a_link(flight: Flight, brief_run: 
     )
     frames = [frame for one in flight.messages("modem/*/tx") for frame in packet_of(one).frames]
     assert total == pytest.approx(sum(map(len, frames)))
+    report = link_report(secondlook.load(flight.folder))
+    assert report is not None
+    for subject in ("state", "stretch", "acknowledgements"):
+        series = rows(recording, f"/link/bytes_per_s_for/{subject}", "Scalars:scalars")
+        assert [at_ms for at_ms, _ in series] == ends_ms[1:]
+        sent = sum(
+            (until - begun) / 1000 * value[0] for begun, (until, value) in zip(ends_ms[:-1], series, strict=True)
+        )
+        assert sent == pytest.approx(next(one.size_bytes for one in report.subjects if one.words == IN_WORDS[subject]))
+    heard = rows(recording, "/link/age_of_coordinator/helper", "Scalars:scalars")
+    of_helper = next(one for one in report.platforms if one.platform == "helper")
+    assert max(value[0] for _, value in heard) == pytest.approx(of_helper.age_of_hub_largest_s, abs=0.1)
+    assert next(one for one in report.platforms if one.platform == "ship").age_of_hub_mean_s is None
     assert not any(path.startswith("/link") for path in entities(brief_run / "mission.rrd"))
     assert "Across the water" not in Page(report_page(secondlook.load(brief_run))).told
 
