@@ -4,8 +4,9 @@ python -m bench.every_link [--scenarios a,b] [--profiles x,y] [--until S] [--als
 
 Each mission is flown on the local bus, and `secondlook.testing` judges its strips: none lost, none served twice, no
 vehicle at two, none offered to who is silent. A line for each tells the wall time, the bytes a second across the water,
-and what did not hold, or why it is refused; the exit code is 1 if anything did not hold. `--until`: missions are over
-by then at the latest, in simulated seconds; `--also`: overrides a key of all scenarios.
+for which share of the time helpers had nothing to do, from when each first set out to the end of its last strip, and
+what did not hold, or why it is refused; the exit code is 1 if anything did not hold. `--until`: missions are over by
+then at the latest, in simulated seconds; `--also`: overrides a key of all scenarios.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 
+from comms.said.messages import AgentState, Mode
 from secondlook.errors import UserError
 from secondlook.scenario import bundled
 from secondlook.testing import (
@@ -37,8 +40,21 @@ HELD: tuple[Callable[[Flight], None], ...] = (
 )
 
 
-def flown(scenario: str, profile: str, also: Sequence[str], folder: Path) -> tuple[float | None, list[str]]:
-    """Flies one mission. Returns the bytes a second across the water, None where it failed, and what did not hold.
+def idle_share(flight: Flight) -> float:
+    """For which share of the time helpers had nothing to do, each from when it first set out to a strip until it ended
+    its last one; 0 where none ever did."""
+    idle_s = all_s = 0.0
+    for helper in flight.scenario.revisit_vehicles:
+        said = flight.said(AgentState, f"agent/{helper}/state")
+        at_work = [place for place, one in enumerate(said) if one.message.mode in (Mode.TRANSIT, Mode.REVISIT)]
+        for before, one in pairwise(said[at_work[0] : at_work[-1] + 1] if at_work else []):
+            all_s += one.t_s - before.t_s
+            idle_s += one.t_s - before.t_s if before.message.mode in (Mode.IDLE, Mode.FINISHED) else 0.0
+    return idle_s / all_s if all_s else 0.0
+
+
+def flown(scenario: str, profile: str, also: Sequence[str], folder: Path) -> tuple[Flight | None, list[str]]:
+    """Flies one mission. Returns it, None where it failed, and what did not hold.
 
     Raises UserError for what cannot be flown at all.
     """
@@ -53,7 +69,7 @@ def flown(scenario: str, profile: str, also: Sequence[str], folder: Path) -> tup
             holds(flight)
         except AssertionError as error:
             problems.append(f"{holds.__name__}: {str(error).splitlines()[0]}")
-    return flight.summary["link"]["bytes_per_s"], problems
+    return flight, problems
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -67,18 +83,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     also = list(told.also)
     if told.until is not None:
         also += [f"mission.deadline_s={told.until}", "mission.deadline_factor=null"]
-    print("| scenario | `link.profile` | wall s | bytes a second | held |\n|---|---|---|---|---|", flush=True)
+    print(
+        "| scenario | `link.profile` | wall s | bytes a second | idle | held |\n|---|---|---|---|---|---|", flush=True
+    )
     failed = False
     for scenario in told.scenarios.split(","):
         for profile in told.profiles.split(","):
             begun_s = time.perf_counter()
             with tempfile.TemporaryDirectory() as folder:
                 try:
-                    bytes_per_s, problems = flown(scenario, profile, also, Path(folder))
+                    flight, problems = flown(scenario, profile, also, Path(folder))
                 except UserError as error:  # more platforms than its frames can tell apart
-                    print(f"| `{scenario}` | `{profile}` | - | - | refused: {error} |", flush=True)
+                    print(f"| `{scenario}` | `{profile}` | - | - | - | refused: {error} |", flush=True)
                     continue
-            said = "-" if bytes_per_s is None else f"{bytes_per_s:.1f}"
+            said = "- | -"
+            if flight is not None:
+                said = f"{flight.summary['link']['bytes_per_s']:.1f} | {idle_share(flight):.3f}"
             took_s = time.perf_counter() - begun_s
             row = f"| `{scenario}` | `{profile}` | {took_s:.1f} | {said} | {'; '.join(problems) or 'all'} |"
             print(row, flush=True)
