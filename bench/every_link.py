@@ -47,7 +47,7 @@ def idle_share(flight: Flight) -> float:
     for helper in flight.scenario.revisit_vehicles:
         said = flight.said(AgentState, f"agent/{helper}/state")
         at_work = [place for place, one in enumerate(said) if one.message.mode in (Mode.TRANSIT, Mode.REVISIT)]
-        for before, one in pairwise(said[at_work[0] : at_work[-1] + 1] if at_work else []):
+        for before, one in pairwise(said[at_work[0] : at_work[-1] + 2] if at_work else []):
             all_s += one.t_s - before.t_s
             idle_s += one.t_s - before.t_s if before.message.mode in (Mode.IDLE, Mode.FINISHED) else 0.0
     return idle_s / all_s if all_s else 0.0

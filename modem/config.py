@@ -83,6 +83,12 @@ class PollTimes:
         return self.packet_ms[frames - 1] + self.packet_ms[-1] + 2 * self.way_ms + self.guard_ms
 
 
+def cycle_ms_of(platforms: tuple[str, ...], slot_ms: int, polls: PollTimes | None, frames: int) -> int:
+    """How long it takes until each platform has had a slot, or was polled, at most. `frames`: the most that a packet
+    has."""
+    return slot_ms * len(slots_of(platforms)) if polls is None else polls.round_ms(frames) * (len(platforms) - 1)
+
+
 @dataclass(frozen=True)
 class ModemConfig:
     """`platform`: which one it is on. `platforms`: all, in the order in which they speak (`slots`); the first is the
@@ -170,18 +176,18 @@ class ModemConfig:
 
     @cached_property
     def cycle_ms(self) -> int:
-        """After so long everybody has had a slot."""
-        return self.slot_ms * len(self.slots)
+        """After so long everybody has had a slot, or was polled."""
+        return cycle_ms_of(self.platforms, self.slot_ms, self.polls, self.frames)
 
     def slot_of(self, platform: str, now_ms: int) -> int:
         """When the last slot of a platform began, at `now_ms` or before; negative if none has yet."""
-        ago = [(now_ms - place * self.slot_ms) % self.cycle_ms for place in self._places_of(platform)]
-        return now_ms - min(ago)
+        all_ms = self.slot_ms * len(self.slots)
+        return now_ms - min((now_ms - place * self.slot_ms) % all_ms for place in self._places_of(platform))
 
     def next_slot_of(self, platform: str, now_ms: int) -> int:
         """When its next slot begins, after `now_ms`."""
-        ahead = [(place * self.slot_ms - now_ms - 1) % self.cycle_ms for place in self._places_of(platform)]
-        return now_ms + 1 + min(ahead)
+        all_ms = self.slot_ms * len(self.slots)
+        return now_ms + 1 + min((place * self.slot_ms - now_ms - 1) % all_ms for place in self._places_of(platform))
 
     def _places_of(self, platform: str) -> list[int]:
         return [place for place, name in enumerate(self.slots) if name == platform]

@@ -34,7 +34,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.said.topics import COVERAGE, HEARD, MODEM_TX, STATE, TASK, URGENT, Crossing, Topic
+from comms.said.topics import COVERAGE, HEARD, MISSION_OVER, MODEM_TX, STATE, TASK, URGENT, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
@@ -113,7 +113,8 @@ class Modem:
         self._last_frames_ms = 0
         self._is_alive = False  # whether its agent has told its state since it spoke
         self._state_ms: int | None = None  # when it last did
-        self._over: Said | None = None  # what was told here of the mission's end
+        self._ended: tuple[int, Mode] | None = None  # in which incarnation its agent has last said so, and how
+        self._over: Said | None = None  # what was told or said here of the mission's end
         self._incarnation = 0
 
     def start(self, now_ms: int) -> Step:
@@ -234,7 +235,12 @@ class Modem:
             self._last_said[received.key] = said
         crossing = topic.crossing
         if isinstance(message, AgentState) and message.mode.has_ended:
-            crossing = URGENT  # the mission's end counts from it
+            ended = received.header.incarnation, message.mode
+            if ended != self._ended or self._queue.holds(about, for_sure=True):
+                crossing = URGENT  # the mission's end counts from it
+            self._ended = ended
+        elif isinstance(message, MissionOver):
+            self._over = Said(received.key, received.header, message)
         to = self.config.others
         if topic is TASK:
             if message.action is TaskAction.TELL_AGAIN or received.vehicle == self.config.hub:  # type: ignore[union-attr]
@@ -253,21 +259,21 @@ class Modem:
             said = incarnation, message.strip, message.state
             if said == self._last_status and not self._queue.holds(_about(received)):
                 return False
-            self._last_status, self._has_told_since = said, True
-            if presence is not None:
-                presence.hear_status(message, now_ms)
+            self._last_status = said
+            if presence is not None and presence.hear_status(message, now_ms):
+                self._has_told_since = True
         elif isinstance(message, AgentState) and presence is not None:
-            if not presence.is_news(message, incarnation, now_ms, seldom_ms(self.config)):
+            waits = self._queue.holds(received.key) and not self._has_told_since
+            if not waits and not presence.is_news(message, incarnation, now_ms, seldom_ms(self.config)):
                 self._is_alive = True
-                if self._has_told_since:  # what waits was news before its words on tasks told as much
-                    self._queue.forget(_about(received))
+                self._queue.forget(received.key)  # what waits was news before its words on tasks told as much
                 return False
             self._has_told_since = False
             presence.hear_state(message, incarnation, now_ms)
         return True
 
     def _note_strip(self, vehicle: str, task: Task) -> None:
-        if task.length_m > 0 and vehicle in self._presences:
+        if task.action.is_offer and vehicle in self._presences:
             self._presences[vehicle].strips[task.strip] = task.as_strip
 
     def _note_held(self, status: TaskStatus, now_ms: int) -> None:
@@ -332,8 +338,6 @@ class Modem:
             is_offer = isinstance(said.message, Task) and said.message.action.is_offer
             until_ms = now_ms + self.config.answer_ms if is_offer else math.inf
             if self.config.by_age:
-                if not crossing.acknowledged:
-                    until_ms = now_ms + crossing.ttl_s * 1000
                 crossing = by_age(crossing, bits.bits)
             self._queue.add(Waiting(about, platform, crossing, bits, now_ms, until_ms))
 
@@ -370,6 +374,8 @@ class Modem:
                 self._receive_anew(platform)
                 for number in range(STREAMS):
                     self._sending[platform, number].begin_again()
+                if self.config.is_hub and self._over is not None:
+                    self._enqueue(MISSION_OVER, URGENT, self._over, platform, now_ms, self._over.key)
             self._starts[platform] = start
             heard.add(platform)
             try:
@@ -427,9 +433,10 @@ class Modem:
             header = self._in_order(platform, header, now_ms)
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
-            self._is_newest(platform, header)
-            self._presences[platform].hear_status(message, now_ms)
+            tells = self._presences[platform].hear_status(message, now_ms)
             strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
+            if tells:
+                self._is_newest(platform, header)
             # The map is told before the word.
             self._tell_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
         if topic is not None:

@@ -64,7 +64,7 @@ class Packets:
         there is one at least."""
         form, frames = self._form, list[bytes]()
         self._now_ms, self._said = now_ms, set()
-        self._queue.drop_old(now_ms, self._config.cycle_ms)
+        self._queue.drop_old(now_ms)
         while len(frames) < self._config.frames:
             writer = BitWriter()
             has_acks = not frames and self._write_acks(writer)

@@ -55,11 +55,11 @@ class Presence:
         self._state, self._incarnation = state, incarnation
         self.told_ms = self._said_ms = said_ms
 
-    def hear_status(self, status: TaskStatus, now_ms: int) -> None:
-        """What it says of a task tells of its work, too."""
+    def hear_status(self, status: TaskStatus, now_ms: int) -> bool:
+        """What it says of a task tells of its work, too: returns whether it does."""
         state = self.at(now_ms)
         if state is None or state.mode.is_out_of_work or state.mode is Mode.HOME:
-            return
+            return state is None and status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY)
         if status.state is TaskState.ACCEPTED:
             self._accept(state, status.strip, now_ms)
         elif status.state is TaskState.UNDER_WAY:
@@ -72,8 +72,9 @@ class Presence:
             rest = Mode.FINISHED if self._entry.role is Role.SURVEY_REVISIT else Mode.IDLE
             self._state, self._sweep = replace(state, mode=rest, works_on=0, expected_end_ms=0), None
         else:
-            return
+            return False
         self.told_ms = now_ms
+        return True
 
     def at(self, now_ms: int) -> AgentState | None:
         """Its state as it is reckoned by now; None before it has said any. On a track it goes straight on, for as long

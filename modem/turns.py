@@ -66,12 +66,11 @@ class Slots:
         return now_ms - slot_ms <= self._config.late_ms and slot_ms > self._spoke_ms
 
     def next_ms(self, now_ms: int, *, wants: bool) -> int | None:
-        """Its next slot, which may be this one."""
-        slot_ms = self._slot_ms(now_ms)
+        """Now, if its slot has just begun and it has not spoken in it; else its next one."""
         if not wants:
             return None
-        if slot_ms == now_ms and slot_ms > self._spoke_ms:
-            return slot_ms
+        if self.is_now(now_ms):
+            return now_ms
         return self._config.next_slot_of(self._config.platform, now_ms)
 
     def names(self) -> None:

@@ -16,7 +16,8 @@ PIECES_TTL_S = 300.0
 @dataclass(frozen=True, slots=True)
 class Waiting:
     """A message that waits. `to`: the platform that it is for. `key`: what it is about; of a topic with `newest_only` a
-    newer one with the same takes its place. `until_ms`: from then on nobody waits for it any more."""
+    newer one with the same takes its place, and has waited for as long. `until_ms`: from then on nobody waits for it
+    any more."""
 
     key: str
     to: str
@@ -61,13 +62,14 @@ class Queue:
         if one.crossing.newest_only:
             for number, before in list(self._waiting.items()):
                 if (before.key, before.to) == (one.key, one.to):
+                    one = replace(one, queued_ms=before.queued_ms)
                     del self._waiting[number]
         self._waiting[self._count] = one
         self._count += 1
 
-    def holds(self, key: str) -> bool:
-        """Whether a message about something waits."""
-        return any(one.key == key for one in self._waiting.values())
+    def holds(self, key: str, *, for_sure: bool = False) -> bool:
+        """Whether a message about something waits; `for_sure`: one that is to be acknowledged."""
+        return any(one.key == key and one.crossing.acknowledged >= for_sure for one in self._waiting.values())
 
     def forget(self, key: str) -> None:
         """What waits about something is not said."""
@@ -78,14 +80,9 @@ class Queue:
         number = next(number for number, other in self._waiting.items() if other is one)
         del self._waiting[number]
 
-    def drop_old(self, now_ms: int, cycle_ms: int = 0) -> None:
-        """What need not arrive is not said any more when it has waited for too long, a cycle at least; nor what nobody
-        waits for."""
-        for number, one in list(self._waiting.items()):
-            too_long_ms = max(one.crossing.ttl_s * 1000, cycle_ms)
-            is_old = not one.crossing.acknowledged and now_ms - one.queued_ms > too_long_ms
-            if is_old or now_ms >= one.until_ms:
-                del self._waiting[number]
+    def drop_old(self, now_ms: int) -> None:
+        """What nobody waits for any more is not said."""
+        self._waiting = {number: one for number, one in self._waiting.items() if now_ms < one.until_ms}
 
     def best_first(self, now_ms: int) -> Iterable[Waiting]:
         """All, what is worth most a bit first; of equals what waits longer."""

@@ -59,8 +59,9 @@ class SecondLooks:
         agent = self._agent
         strip = task.as_strip
         known, answer = self._answers.get(task.strip, (None, None))
-        wanted_back = task.action is TaskAction.GIVE_BACK  # which need not tell where the strip lies
-        is_it = known is not None and (wanted_back or _is_done_with(known, strip))
+        wanted_back = task.action is TaskAction.GIVE_BACK
+        tells_not_where = wanted_back and task.length_m == 0  # as over a link
+        is_it = known is not None and (tells_not_where or _is_done_with(known, strip))
         is_done = is_it and answer is TaskState.DONE
         if wanted_back and (self._has(task.strip) or not is_done):
             self._give_back(task.strip, now_ms)

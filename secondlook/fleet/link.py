@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from coordinator.config import ANSWER_WITHIN_MS
-from modem.config import ModemConfig, PollTimes, slots_of
+from modem.config import ModemConfig, PollTimes, cycle_ms_of
 from planner.types import Point
 from secondlook.scenario import SHIP, Link, Profile, Scenario, Sonar
 from sim_world.acoustics import Water
@@ -61,9 +61,7 @@ class LinkTimes:
     @property
     def cycle_ms(self) -> int:
         """How long it takes until each platform has had a slot, or was polled, at most."""
-        if self.polls is not None:
-            return self.polls.round_ms(self.frames) * (len(self.platforms) - 1)
-        return self.slot_ms * len(slots_of(self.platforms))
+        return cycle_ms_of(self.platforms, self.slot_ms, self.polls, self.frames)
 
     @property
     def packets_a_word(self) -> int:

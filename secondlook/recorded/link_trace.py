@@ -261,4 +261,5 @@ def _bits_for(packets: Sequence[SentPacket]) -> Counter[str]:
     bits = Counter[str]()
     for one in packets:
         bits.update({**one.contents.said, ACKNOWLEDGEMENTS: one.contents.acknowledgements, ABOUT: one.contents.about})
+    bits[ABOUT] += bits.pop("", 0)  # pieces of which nobody can tell yet what they are about
     return bits

@@ -180,7 +180,7 @@ class Link(Mapping):
     `micromodem-1`, `micromodem-6`, `radio`, `unet-control`, `unet-data`), a YAML file with the keys below, relative to
     the scenario's, such a mapping, or `package.module:Class` of what makes one as a dict."""
     access: Literal["slots", "polled"] = "slots"
-    """Who speaks when: each platform in a slot of a cycle, or when the coordinator's platform, which polls one after
+    """Who speaks when: each platform in slots of a cycle, or when the coordinator's platform, which polls one after
     the other, names it."""
     loss: Annotated[float, Field(ge=0, lt=1)] = 0.0
     """An extra share of frames that is lost, at random, at every range."""

@@ -13,7 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, fie
 
 from comms.said.announcement import LARGEST_SEED, LONGEST_NAME, MOST_VEHICLES
 from comms.said.routing import driver_of, modem_of
-from modem.config import MOST_PLATFORMS, SECOND_BITS, SMALL_BITS, least_frame_bits
+from modem.config import MOST_PLATFORMS, SECOND_BITS, SMALL_BITS, least_frame_bits, slots_of
 from secondlook.scenario.area import Area
 from secondlook.scenario.current import AnyCurrent, GridCurrent
 from secondlook.scenario.degrees import Origin
@@ -409,8 +409,9 @@ def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> N
     if link.maps != "stretches" and profile.frame_bits < SMALL_BITS:
         raise refused(f"must be stretches with frames of fewer than {SMALL_BITS} bits", ("maps",))
     frame_s = profile.preamble_s + profile.frame_bits / profile.rate_bps
-    if mission is not None and frame_s * len(platforms) > mission.time_limit_s:
-        most_s = mission.time_limit_s / len(platforms)
+    turns = len(platforms) if polled else len(slots_of(tuple(platforms)))
+    if mission is not None and frame_s * turns > mission.time_limit_s:
+        most_s = mission.time_limit_s / turns
         raise refused(
             f"a frame must take {most_s:.6g} s or less, and not {frame_s:.6g} s, for each of {len(platforms)} "
             "platforms to have a turn within mission.time_limit_s",
@@ -421,7 +422,7 @@ def _check_modem(link: Link, platforms: list[str], mission: Mission | None) -> N
     guard_s = profile.guard_s if link.guard_s is None else link.guard_s
     packet_s = profile.preamble_s + (link.slot_frames or profile.frames) * profile.frame_bits / profile.rate_bps
     turn_s = packet_s + (link.reach_m or 0.0) / profile.speed_mps + guard_s
-    most_s = min(CYCLE_UNDER_S, math.inf if mission is None else mission.time_limit_s) / len(platforms)
+    most_s = min(CYCLE_UNDER_S, math.inf if mission is None else mission.time_limit_s) / turns
     if turn_s >= most_s:
         raise refused(
             f"a turn, the longest packet, the sound's way and the guard, must take less than {most_s:.6g} s, and not "

@@ -111,8 +111,9 @@ class Witness:
             _stand_beside(node, beside)
 
     def ended_s(self, vehicle: str) -> float:
-        """When a coordinator last heard as news that a vehicle has ended its work; 0 if never."""
-        return max((one.ended_s.get(vehicle, 0.0) for one in self.coordinators), default=0.0)
+        """When a coordinator heard that a vehicle has ended its work, of the last of its starts; 0 if never."""
+        heard = [at_s for one in self.coordinators for (name, _), at_s in one.ended_s.items() if name == vehicle]
+        return max(heard, default=0.0)
 
     def tell(self, found: Violation) -> None:
         """Something does not hold; said once of each node."""
@@ -153,8 +154,8 @@ _NONE_YET = (-1, -1)
 class CoordinatorWitness:
     """Beside one start of the coordinator. `tiles`: of each vehicle, place and incarnation the newest that came.
 
-    `over`: whether it has said that the mission is over. `may_rise`: see `Witness`. `ended_s`: of each vehicle when its
-    word came that it has ended its work, the last time that this was news.
+    `over`: whether it has said that the mission is over. `may_rise`: see `Witness`. `ended_s`: of each start of
+    a vehicle when its first word came that it has ended its work.
     """
 
     node_id: str
@@ -165,7 +166,7 @@ class CoordinatorWitness:
     tiles: dict[tuple[str, Place], dict[int, CoverageTile]] = field(default_factory=dict)
     started_ms: int = 0
     over: bool = False
-    ended_s: dict[str, float] = field(default_factory=dict)
+    ended_s: dict[tuple[str, int], float] = field(default_factory=dict)
     _states: dict[str, tuple[Header, AgentState]] = field(default_factory=dict)  # the newest of each vehicle
     _hotspots: dict[tuple[str, int], dict[int, int]] = field(default_factory=dict)
     _answers: dict[tuple[str, int], tuple[int, int]] = field(default_factory=dict)
@@ -234,8 +235,8 @@ class CoordinatorWitness:
         before, vehicle = self._states.get(received.vehicle), received.vehicle
         if before is None or order_of(received.header) > order_of(before[0]):
             self._states[vehicle] = received.header, state
-            if state.mode.has_ended and (before is None or not before[1].mode.has_ended):
-                self.ended_s[vehicle] = now_ms / 1000
+            if state.mode.has_ended:
+                self.ended_s.setdefault((vehicle, received.header.incarnation), now_ms / 1000)
         else:
             self.noted.add(LATE_STATE)
         known, (header, newest) = self.node.fleet.vehicles.get(vehicle), self._states[vehicle]

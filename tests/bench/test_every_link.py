@@ -26,9 +26,9 @@ def flight(**modes: list[tuple[float, Mode]]) -> Any:
 def test_from_when_it_first_sets_out_to_its_last_strips_end() -> None:
     east = [(0.0, Mode.IDLE), (50.0, Mode.TRANSIT), (60.0, Mode.REVISIT), (100.0, Mode.IDLE), (120.0, Mode.TRANSIT)]
     east += [(150.0, Mode.REVISIT), (250.0, Mode.FINISHED), (900.0, Mode.FINISHED)]
-    assert idle_share(flight(east=east)) == pytest.approx(20 / 100)
-    west = [(0.0, Mode.TRANSIT), (300.0, Mode.REVISIT)]
-    assert idle_share(flight(east=east, west=west)) == pytest.approx(20 / 400)
+    assert idle_share(flight(east=east)) == pytest.approx(20 / 200)
+    west = [(0.0, Mode.TRANSIT), (200.0, Mode.REVISIT), (300.0, Mode.FINISHED)]
+    assert idle_share(flight(east=east, west=west)) == pytest.approx(20 / 500)
 
 
 def test_who_never_sets_out_has_no_part_in_it() -> None:

@@ -142,6 +142,19 @@ def test_an_agent_that_goes_on_is_told_again_that_the_mission_is_over(mode: Mode
     assert heard(waters, "beta") == [("coord/mission_over", "MissionOver")] * times
 
 
+@pytest.mark.parametrize("frame_bits", [34, 256])
+def test_a_modem_that_is_started_anew_is_told_that_the_mission_is_over(frame_bits: int) -> None:
+    waters = Waters(frame_bits=frame_bits)
+    waters.say("coordinator", "coord/mission_over", MissionOver("every primary has finished"))
+    waters.run(120_000)
+    before = len(heard(waters, "beta"))
+    waters.start("beta")
+    waters.say("beta", "agent/beta/state", state(Mode.TRANSIT))
+    waters.run(240_000)
+    assert heard(waters, "beta")[before:] == [("coord/mission_over", "MissionOver")]
+    assert heard(waters, "alpha") == [("coord/mission_over", "MissionOver")]
+
+
 @pytest.mark.parametrize("frame_bits", [30, 34, 48, 128, 256, 512])
 @pytest.mark.parametrize("frames", [1, 3])
 @pytest.mark.parametrize("seed", range(3))
@@ -333,6 +346,33 @@ def test_a_state_that_is_news_waits_for_its_slot_though_the_next_report_tells_th
     waters.say("alpha", "agent/alpha/state", state(mode))  # and again at 25, 35 and 45 s
     waters.run(100_000)
     assert modes_of_alpha(waters) == [(15_500, Mode.TRANSIT), (51_500, mode)]
+
+
+@pytest.mark.parametrize("frame_bits", [34, 256])
+def test_though_it_refuses_a_strip_before(frame_bits: int) -> None:
+    waters = Waters(slot_ms=12_000, reports=True, frame_bits=frame_bits)
+    waters.say("beta", "agent/beta/state", state(Mode.TRANSIT, works_on=1))
+    waters.run(300_000)
+    waters.say("beta", "agent/beta/state", state(Mode.RETURNING))
+    waters.run(303_000)
+    waters.say("beta", "agent/beta/task_status/1", TaskStatus(7, TaskState.REFUSED, 0.0, 0, "on its way home"))
+    waters.run(550_000)
+    told = [(at_ms, one.message.mode) for at_ms, to, one in waters.heard if isinstance(one.message, AgentState)]
+    assert Mode.RETURNING in [mode for at_ms, mode in told]
+
+
+def test_while_out_of_reach_its_end_is_said_again_and_not_more_and_more_of_it() -> None:
+    away = {"ends_ms": 0}
+    waters = Waters(lambda *_: waters.now_ms >= away["ends_ms"], reports=True, frame_bits=128)
+    waters.say("alpha", "agent/alpha/state", state(Mode.TRANSIT, works_on=1))
+    waters.run(20_000)
+    away["ends_ms"] = 1_500_000
+    waters.say("alpha", "agent/alpha/state", state(Mode.FINISHED))
+    waters.run(1_500_000)
+    assert len(waters.modems["alpha"]._sending["ship", 0].unheard) == 1
+    waters.run(1_560_000)
+    assert modes_of_alpha(waters)[-1][1] is Mode.FINISHED
+    assert not waters.modems["alpha"]._sending["ship", 0].unheard
 
 
 def test_before_maps_it_is_said_that_all_work_has_ended() -> None:

@@ -12,6 +12,7 @@ from modems import Waters, config_of
 
 from comms.said.messages import Task, TaskAction, TaskState, TaskStatus
 from modem.config import PollTimes
+from modem.turns import Slots
 
 # A packet of 3 s that takes 0.5 s to everybody, as the waters of these tests have it.
 TIMES = PollTimes(packet_ms=(3000,), way_ms=500, guard_ms=400)
@@ -40,6 +41,30 @@ def test_the_coordinators_platform_has_a_slot_before_every_two_of_the_others(veh
         for begin, later in pairwise(begins):
             assert config.slot_of(platform, later - 1) == begin
             assert config.next_slot_of(platform, begin) == config.next_slot_of(platform, later - 1) == later
+
+
+def test_the_coordinators_platform_is_woken_in_each_of_its_slots_and_others_in_their_one() -> None:
+    names = ("s", "a", "b", "c")  # s a b s c, of 4 s each
+    config = replace(config_of("ship"), platform="s", platforms=names, vehicles=names[1:])
+    for platform, begins in (("s", [0, 12_000, 20_000, 32_000]), ("c", [16_000, 36_000])):
+        slots = Slots(replace(config, platform=platform))
+        slots.begin(0)
+        now_ms, found = 0, list[int]()
+        while now_ms < 40_000 and (at_ms := slots.next_ms(now_ms, wants=True)) is not None and at_ms < 40_000:
+            assert slots.is_now(at_ms)
+            slots.has_spoken(at_ms, 1)
+            found.append(at_ms)
+            now_ms = at_ms
+        assert found == begins
+
+
+def test_what_comes_just_after_the_slot_has_begun_is_said_in_it() -> None:
+    slots = Slots(config_of("beta"))  # from 8 s on; 0.1 s late at most
+    slots.begin(0)
+    assert slots.next_ms(8_100, wants=True) == 8_100
+    assert slots.next_ms(8_101, wants=True) == 20_000
+    slots.has_spoken(8_100, 1)
+    assert slots.next_ms(8_100, wants=True) == 20_000
 
 
 def test_who_is_polled_answers_at_once_and_then_the_next_is_polled() -> None:

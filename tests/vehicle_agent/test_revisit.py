@@ -366,6 +366,7 @@ class TestGivingBack:
         ]
         assert agent.all(CoverageTile, said) != []
         elsewhere = replace(STRIP, start_x_m=STRIP.start_x_m + 100)
+        assert answer(agent, replace(elsewhere, action=TaskAction.GIVE_BACK)).state is TaskState.GIVEN_BACK
         assert answer(agent, elsewhere).state is TaskState.ACCEPTED  # the number stands for another strip now
         assert answer(agent, back).state is TaskState.GIVEN_BACK
         assert answer(agent, back).state is TaskState.GIVEN_BACK

@@ -8,7 +8,7 @@ import pytest
 
 from modem.config import PollTimes
 from secondlook.fleet.build import build_fleet, world_config
-from secondlook.fleet.link import LinkTimes, channel_config, link_times, platforms_of, ship_position
+from secondlook.fleet.link import LinkTimes, channel_config, link_times, modem_configs, platforms_of, ship_position
 from secondlook.scenario import Scenario, load_scenario
 from sim_world.channel_config import ChannelConfig, Outage
 
@@ -64,6 +64,13 @@ class TestSlots:
         assert (times.way_ms, times.guard_ms, times.slot_ms) == (2000, 500, 6000)
         assert times.cycle_ms == 18_000
         assert times_of("link.reach_m=3000", "link.guard_s=0.2").slot_ms == 5700
+
+    def test_with_more_vehicles_the_coordinators_platform_has_several(self) -> None:
+        scenario = load_scenario("two-helpers", ["link.profile=micromodem-0", "link.reach_m=3000"])
+        times = link_times(scenario)
+        assert times is not None
+        assert (times.slot_ms, times.cycle_ms) == (6000, 5 * 6000)
+        assert modem_configs(scenario)["west"].cycle_ms == 5 * 6000
 
     def test_polled_a_cycle_has_a_packet_to_each_other_platform_and_one_back(self) -> None:
         times = times_of("link.reach_m=3000", "link.access=polled")
