@@ -94,7 +94,7 @@ def link_report(mission: RecordedMission) -> LinkReport | None:
         end_s=mission.end_s,
         trace=trace,
         bars=list(trace.spans(_bar_ends_ms(config, end_ms))),
-        platforms=[_platform(trace, name, end_ms) for name in config.platforms],
+        platforms=[platform_figures(trace, name, end_ms) for name in config.platforms],
         subjects=_subjects(trace),
         bytes_per_s=whole.size_bytes / mission.end_s,
         lost_share=whole.lost_share,
@@ -109,7 +109,8 @@ def _bar_ends_ms(config: ModemConfig, end_ms: int) -> list[int]:
     return [*range(bar_ms, end_ms, bar_ms), end_ms + 1]
 
 
-def _platform(trace: LinkTrace, name: str, end_ms: int) -> PlatformFigures:
+def platform_figures(trace: LinkTrace, name: str, end_ms: int) -> PlatformFigures:
+    """A platform's line, of all that was sent until a time."""
     packets = [one for one in trace.packets if one.platform == name]
     span, slots = trace.span(0, end_ms, packets), trace.config.slots
     known_s, knows_s = (_age_s(words.get(name), end_ms) for words in (trace.words, trace.words_of_hub))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,10 @@ from comms.runner import Stamp
 from comms.said.codec import Header, body_of, packed
 from comms.said.messages import Heard, Packet
 from comms.said.routing import Routing
-from secondlook.recorded.link_trace import IN_WORDS, LinkSeries, LinkTrace, Word
+from modem.overheard import Contents
+from secondlook.recorded.link_trace import IN_WORDS, LinkSeries, LinkTrace, SentPacket, Word
 from secondlook.report import report_page
-from secondlook.report.link import link_report
+from secondlook.report.link import link_report, platform_figures
 from secondlook.testing import Fleet, Flight
 from tests.viz.recordings import entities, rows
 
@@ -69,6 +71,15 @@ def test_what_was_sent_lost_and_known_by_hand() -> None:
     assert (second.size_bytes, second.frames_expected, second.frames_lost) == (8, 2, 1)
     assert first.used_bits == 24 * 8  # none of these frames is one, so that nothing is known to be filled up
     assert trace.capacity_bits(first) == 6 * 128
+
+
+def test_a_platform_is_judged_by_all_of_its_slots() -> None:
+    names = ("ship", "alpha", "beta", "gamma")  # ship, alpha, beta, ship, gamma: 25 s
+    trace = LinkTrace(replace(CONFIG, platforms=names, vehicles=names[1:]))
+    for at_ms, name in ((0, "ship"), (5000, "alpha"), (15_000, "ship")):
+        trace.packets.append(SentPacket(at_ms, name, 2, 16, Contents(about=128), ""))
+    full = {name: platform_figures(trace, name, 25_000).slots_full for name in names}
+    assert full == pytest.approx({"ship": 1.0, "alpha": 1.0, "beta": 0.0, "gamma": 0.0})
 
 
 def test_series_are_told_as_they_become_known() -> None:
