@@ -108,7 +108,7 @@ class Modem:
         self._state_headers: dict[str, Header] = {}  # of the last states told here
         self._state_told: dict[str, int] = {}  # and when that was
         self._newest: dict[str, tuple[int, int]] = {}  # of states and words on tasks told here
-        self._last_status: tuple[int, int, TaskState] | None = None  # said since a task was told here
+        self._last_statuses: dict[int, tuple[int, TaskState]] = {}  # by strip, said since a task on it was told here
         self._has_told_since = False  # its agent, of its tasks since it has told a state that was news
         self._last_frames_ms = 0
         self._is_alive = False  # whether its agent has told its state since it spoke
@@ -256,10 +256,10 @@ class Modem:
         message, incarnation = received.message, received.header.incarnation
         presence = self._presences.get(self.config.platform)
         if isinstance(message, TaskStatus):
-            said = incarnation, message.strip, message.state
-            if said == self._last_status and not self._queue.holds(_about(received)):
+            said = incarnation, message.state
+            if said == self._last_statuses.get(message.strip) and not self._queue.holds(_about(received)):
                 return False
-            self._last_status = said
+            self._last_statuses[message.strip] = said
             if presence is not None and presence.hear_status(message, now_ms):
                 self._has_told_since = True
         elif isinstance(message, AgentState) and presence is not None:
@@ -425,7 +425,7 @@ class Modem:
         if isinstance(message, MissionOver):
             self._over = said
         elif isinstance(message, Task):
-            self._last_status = None  # whoever says it again has not heard the answer
+            self._last_statuses.pop(message.strip, None)  # whoever says it again has not heard the answer
             self._note_strip(self.config.platform, message)
         if isinstance(message, AgentState):
             if not self.config.is_small and not self._is_newest(platform, header):

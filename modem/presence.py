@@ -60,6 +60,8 @@ class Presence:
         state = self.at(now_ms)
         if state is None or state.mode.is_out_of_work or state.mode is Mode.HOME:
             return state is None and status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY)
+        if (state.mode, state.works_on) == (_MODES.get(status.state), status.strip):
+            return False  # it has said so before, and has gone on since
         if status.state is TaskState.ACCEPTED:
             self._accept(state, status.strip, now_ms)
         elif status.state is TaskState.UNDER_WAY:

@@ -210,6 +210,22 @@ def test_the_smallest_frames_hold_what_is_to_be_said_and_smaller_ones_are_refuse
         config_of("ship", frame_bits=least - 1, polls=polls)
 
 
+def test_how_far_a_strip_is_swept_is_not_said_again_because_another_word_was_said_between() -> None:
+    waters = Waters()
+    under_way = TaskStatus(7, TaskState.UNDER_WAY, 0.0, 0, "")
+    for number, word in enumerate(
+        (under_way, replace(under_way, progress=0.2), TaskStatus(8, TaskState.NEXT, 0, 0, ""))
+    ):
+        waters.say("beta", f"agent/beta/task_status/{number}", word)
+        waters.run(waters.now_ms + 30_000)
+    waters.say("coordinator", "coord/task/beta/1", replace(TAKE, strip=8, action=TaskAction.TAKE_NEXT))
+    waters.run(waters.now_ms + 30_000)
+    waters.say("beta", "agent/beta/task_status/4", replace(under_way, progress=0.4))
+    waters.run(waters.now_ms + 60_000)
+    told = [one.message for _, to, one in waters.heard if to == "ship" and isinstance(one.message, TaskStatus)]
+    assert [(one.strip, one.state) for one in told] == [(7, TaskState.UNDER_WAY), (8, TaskState.NEXT)]
+
+
 def test_what_is_missing_is_said_again_though_what_waits_for_it_is_worth_more() -> None:
     waters = Waters(arrives=lambda platform, to, count: platform != "ship" or count != 3, frame_bits=34)
     waters.say("coordinator", "coord/task/beta/1", TAKE)  # the last of its four pieces is lost

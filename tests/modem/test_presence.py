@@ -45,7 +45,8 @@ def test_over_a_strip_it_goes_as_it_was_given() -> None:
     presence = Presence(BETA)
     presence.strips[7] = NORTH
     presence.hear_state(IDLE, 0, 0)
-    presence.hear_status(status(TaskState.ACCEPTED), 10_000)
+    assert presence.hear_status(status(TaskState.ACCEPTED), 10_000)
+    assert not presence.hear_status(status(TaskState.ACCEPTED), 15_000)
     going = presence.at(20_000)
     assert going is not None
     assert (going.mode, going.works_on, place(presence, 20_000)) == (Mode.TRANSIT, 7, (100.0, 0.0))
@@ -53,6 +54,9 @@ def test_over_a_strip_it_goes_as_it_was_given() -> None:
     assert going.expected_end_ms == pytest.approx(10_000 + 125_000, abs=100)
     presence.hear_status(status(TaskState.UNDER_WAY), 40_000)
     assert place(presence, 40_000) == pytest.approx((100.0, 40.0))
+    assert place(presence, 90_000) == pytest.approx((100.0, 140.0))
+    assert not presence.hear_status(status(TaskState.UNDER_WAY), 90_000)  # said again: it does not begin again
+    assert not presence.hear_status(status(TaskState.NEXT, 8), 90_000)
     assert place(presence, 90_000) == pytest.approx((100.0, 140.0))
     assert place(presence, 500_000) == pytest.approx((100.0, 240.0))
     presence.hear_status(status(TaskState.DONE), 150_000)
