@@ -58,13 +58,12 @@ class Crossing:
     """How messages of a topic cross the water by modem: what is worth most a bit, the longer it waits the more, is said
     first.
 
-    `value`: what one is worth beside those of other topics. What a word on a task takes of the water is worth more than
-    what a map takes even when it is said again. `ttl_s`: what has waited for so long is worth twice as much.
-    `newest_only`: a newer one takes the place of one that waits, of the same
-    key; of tasks and answers, of the same strip and action or state. `acknowledged`: it is said again until it is known
-    to have arrived, and of a key not once more where it is told again as it was. `is_long`: it takes many bits, and
-    what does not need not wait for it. `is_fine`: it is not said where words are to be short, as what else is said
-    tells as much.
+    `value`: what one is worth beside those of other topics: a word on a task more than a map, even when it is said
+    again. `ttl_s`: what has waited for so long is worth twice as much. `newest_only`: a newer one takes the place of
+    one that waits, of the same key; of tasks and answers, of the same strip and action or state. `acknowledged`: it is
+    said again until it is known to have arrived, and of a key not once more where it is told again as it was.
+    `is_long`: it takes many bits, and what does not need not wait for it. `is_fine`: it is not said where words are to
+    be short, as what else is said tells as much.
     """
 
     value: float
