@@ -10,20 +10,19 @@ from __future__ import annotations
 import logging
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 from comms.node import Publication, Received, Step
 from comms.said.announcement import RunInfo
 from comms.said.bits import BitReader
-from comms.said.codec import LARGEST_INCARNATION, Header, body_of, packed
+from comms.said.codec import Header, body_of
 from comms.said.messages import (
     MOST_FRAMES,
     AgentState,
     CoverageTile,
     Curve,
-    Heard,
     Look,
     Message,
     MissionOver,
@@ -34,20 +33,21 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
-from comms.said.topics import COVERAGE, HEARD, MISSION_OVER, MODEM_TX, STATE, TASK, URGENT, Crossing, Topic
+from comms.said.topics import MISSION_OVER, MODEM_TX, TASK, URGENT, Crossing, Topic
 from comms.said.wire import WireError
 from modem.config import ModemConfig
 from modem.contents import Letter, PieceFor, parts_of
-from modem.correcting import Correcting
 from modem.corrections import Correction
 from modem.frames import FrameForm, start_number
 from modem.layers import Layers
-from modem.letters import COORDINATOR, MOST_A_SECOND, Letters, Said
+from modem.letters import COORDINATOR, Letters, Said
+from modem.own_map import OwnMap
 from modem.packets import OF_MAP, Packets, Stream
-from modem.plain_tiles import PlainTile, plain, told
+from modem.plain_tiles import PlainTile, plain
 from modem.presence import REPORT_MS, Presence, seldom_ms
 from modem.streams import STREAMS, Receiving, Sending
-from modem.stretches import Gathering, Stretch, Told
+from modem.stretches import Stretch
+from modem.told_here import ToldHere
 from modem.turns import turns_of
 from modem.waiting import Queue, Waiting, by_age
 from planner.keep_out import KeepOut
@@ -72,8 +72,6 @@ DROPPED = NO_FRAME, MALFORMED, NOT_ITS, NO_FIT = (
     "does not fit the water",
 )
 """Why frames that have come, or what is in them, are dropped; and last what cannot be said by modem."""
-MOST_BESIDE, MOST_STARTS = 1024, 8
-"""So many starts of a vehicle are told apart by each of so many of the coordinator's modem."""
 
 
 class Modem:
@@ -93,21 +91,12 @@ class Modem:
         self._turns = turns_of(config)
         self._form: FrameForm | None = None  # this and what follows: since the run's announcement
         self._run: RunInfo | None = None
-        self._gathering: Gathering | None = None
-        self._correcting: Correcting | None = None
-        self._looked_ms = 0
-        self._heard: list[Publication] = []
+        self._own_map: OwnMap | None = None  # on a vehicle, if it is told by stretches
         self._on_deck: list[bytes] = []
-        self._told = 0
         self._last_said: dict[str, tuple[int, Any]] = {}
         self._said_at: Counter[int] = Counter()
         self._opened_at: Counter[int] = Counter()
         self._presences: dict[str, Presence] = {}  # by vehicle; on one, its own alone
-        self._held: list[Stretch] = []  # of the strip under way, which may be done yet
-        self._held_of = 0  # and its number
-        self._state_headers: dict[str, Header] = {}  # of the last states told here
-        self._state_told: dict[str, int] = {}  # and when that was
-        self._newest: dict[str, tuple[int, int]] = {}  # of states and words on tasks told here
         self._last_statuses: dict[int, tuple[int, TaskState]] = {}  # by strip, said since a task on it was told here
         self._has_told_since = False  # its agent, of its tasks since it has told a state that was news
         self._last_frames_ms = 0
@@ -133,9 +122,8 @@ class Modem:
         elif isinstance(message, Packet):
             return self._hear(message, now_ms)
         elif isinstance(message, Look):
-            if self._gathering is not None:
-                self._say_stretch(self._gathering.add(message), now_ms)
-                self._looked_ms = now_ms
+            if self._own_map is not None:
+                self._say_of_map(self._own_map.hear_look(message, now_ms), now_ms)
         else:
             self._take(received, now_ms)
         return self._step(now_ms)
@@ -151,9 +139,9 @@ class Modem:
         if self._form is not None and self._turns.is_now(now_ms) and self._has_nobody(now_ms):
             self._turns.has_spoken(now_ms, 0)
         elif self._form is not None and self._turns.is_now(now_ms):
-            if self._gathering is not None and self._has_room():
-                self._say_stretch(self._gathering.flush(), now_ms)
-                self._say_corrections(now_ms)
+            if self._own_map is not None and self._has_room():
+                self._say_of_map(self._own_map.flush(now_ms), now_ms)
+                self._say_corrections(self._own_map, now_ms)
             silent_ms = self.config.cycle_ms * SILENT_CYCLES
             is_alive = self._is_alive and now_ms - self._last_frames_ms >= silent_ms
             frames = self._packets.next(
@@ -178,17 +166,17 @@ class Modem:
             self._sending |= {(other, number): Sending(self._form.window) for number in range(STREAMS)}
             self._receive_anew(other)
         self._letters = Letters(self.config, run.grid.heading_rad)
-        self._layers = Layers(self.config, run)
+        layers = Layers(self.config, run)
         self._packets = Packets(self.config, self._form, self._queue, self._sending, self._receiving, self._starts)
         keep_out = KeepOut(run.keep_out_outlines, run.keep_out_margin_m)
         known = self.config.others if self.config.is_hub else (self.config.platform,)
         self._presences = {one.vehicle: Presence(one, keep_out) for one in run.vehicles if one.vehicle in known}
         entry = next((one for one in run.vehicles if one.vehicle == self.config.platform), None)
         self._grid = run.grid.spec
+        self._here = ToldHere(self.config, layers, self._grid, self._start, self._presences)
         if entry is not None and not self.config.is_hub and not self.config.tells_tiles:
-            self._gathering = Gathering(entry, self._start)
-            # Who was started anew does not know what of its map is told.
-            self._correcting = None if self._start or not self.config.corrects else Correcting(entry, run.grid.spec)
+            by_strips = entry.vehicle in layers.by_strips
+            self._own_map = OwnMap(self.config, entry, self._grid, self._letters, self._start, by_strips=by_strips)
 
     def _receive_anew(self, other: str) -> None:
         """Of tasks the last one counts, so those of one vehicle are told in the order in which they were said, as is
@@ -202,31 +190,31 @@ class Modem:
         """Something that was said on this platform: it waits for its turn, if it is for another."""
         topic, message = received.topic, received.message
         is_hub = self.config.is_hub
-        if received.header.incarnation != self._incarnation:
-            self._correcting = None  # its vehicle's map begins anew
+        own_map = self._own_map
+        if own_map is not None and received.header.incarnation != self._incarnation:
+            own_map.begin_anew()
         if isinstance(message, CoverageTile) and self.config.tells_tiles and not is_hub:
             self._enqueue_of_map(plain(message, self._grid), received.header, now_ms, received.key)
-        elif isinstance(message, CoverageTile) and self._correcting is not None:
-            self._correcting.hear_tile(message, now_ms)
+        elif isinstance(message, CoverageTile) and own_map is not None:
+            own_map.hear_tile(message, now_ms)
         if topic.crossing is None or is_hub != (received.sender == COORDINATOR):
             return
         if topic.crossing.is_fine and self.config.is_small:
             return
-        if isinstance(message, Curve) and self._gathering is not None:
-            self._say_stretch(self._gathering.hear_curve(message), now_ms)
-            self._note_said(message, now_ms)
+        if isinstance(message, Curve) and own_map is not None:
+            self._say_of_map(own_map.hear_curve(message, now_ms), now_ms)
         if not is_hub:
             self._incarnation = received.header.incarnation
             if isinstance(message, AgentState):
                 self._state_ms = now_ms
                 if self._over is not None and not (message.mode.has_ended or message.mode.is_out_of_work):
-                    self._say_here(*self._over)  # it was started anew since, or has not heard it
+                    self._here.say(*self._over)  # it was started anew since, or has not heard it
         if not is_hub and not self._is_news(received, now_ms):
             return
-        if self._gathering is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
-            self._say_stretch(self._gathering.flush(), now_ms)
-        if isinstance(message, TaskStatus):
-            self._note_held(message, now_ms)
+        if own_map is not None and _ends_a_stretch(message):  # what was seen comes before that it is done
+            self._say_of_map(own_map.flush(now_ms), now_ms)
+        if own_map is not None and isinstance(message, TaskStatus):
+            self._say_of_map(own_map.hear_status(message, now_ms), now_ms)
         about = _about(received)
         if topic.crossing.newest_only and topic.crossing.acknowledged and about == received.key:
             said = (received.header.incarnation, message)
@@ -276,44 +264,18 @@ class Modem:
         if task.action.is_offer and vehicle in self._presences:
             self._presences[vehicle].strips[task.strip] = task.as_strip
 
-    def _note_held(self, status: TaskStatus, now_ms: int) -> None:
-        """What was seen of the strip under way is said where that ends and is not done."""
-        if status.state in (TaskState.ACCEPTED, TaskState.UNDER_WAY):
-            self._held_of = status.strip
-        elif status.strip == self._held_of:
-            held, self._held = self._held, []
-            for stretch in held if status.state is not TaskState.DONE else ():
-                self._enqueue_stretch(stretch, now_ms)
+    def _say_of_map(self, pieces: Iterable[Stretch | Correction], now_ms: int) -> None:
+        """Pieces of its vehicle's map."""
+        for piece in pieces:
+            self._enqueue_of_map(piece, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
 
-    def _say_stretch(self, stretch: Stretch | None, now_ms: int) -> None:
-        if stretch is not None and self.config.platform in self._layers.by_strips:
-            self._held.append(stretch)
-        elif stretch is not None:
-            self._enqueue_stretch(stretch, now_ms)
-
-    def _enqueue_stretch(self, stretch: Stretch, now_ms: int) -> None:
-        self._note_said(stretch, now_ms)
-        self._enqueue_of_map(stretch, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
-
-    def _note_said(self, piece: Curve | Stretch, now_ms: int) -> None:
-        """What is told of its map, as rounded as it crosses."""
-        if self._correcting is not None:
-            try:
-                crossing = self._letters.as_it_crosses(piece, now_ms)
-            except WireError:
-                return  # nor will it be said
-            if isinstance(crossing, Stretch):
-                self._correcting.hear_stretch(crossing, self._looked_ms)
-            else:
-                self._correcting.hear_curve(crossing)
-
-    def _say_corrections(self, now_ms: int) -> None:
+    def _say_corrections(self, own_map: OwnMap, now_ms: int) -> None:
         """What of its map is wrong at the coordinator's, as far as there is room."""
-        while self._correcting is not None and self._has_room():
-            correction = self._correcting.next(now_ms)
+        while self._has_room():
+            correction = own_map.next_correction(now_ms)
             if correction is None:
                 break
-            self._enqueue_of_map(correction, Header(self.config.platform, self._incarnation, 0, now_ms), now_ms)
+            self._say_of_map([correction], now_ms)
 
     def _enqueue_of_map(
         self, piece: Stretch | Correction | PlainTile, header: Header, now_ms: int, about: str = ""
@@ -386,7 +348,7 @@ class Modem:
             except WireError as error:
                 self._drop(MALFORMED, f"{platform}: {error}")
         for platform in sorted(heard):
-            self._tell_by_reckoning(platform, now_ms)
+            self._here.reckon(platform, now_ms)
         return self._speak(now_ms) if self._turns.must_speak else self._step(now_ms)
 
     def _read(self, form: FrameForm, platform: str, reader: BitReader, now_ms: int) -> None:
@@ -427,62 +389,10 @@ class Modem:
         elif isinstance(message, Task):
             self._last_statuses.pop(message.strip, None)  # whoever says it again has not heard the answer
             self._note_strip(self.config.platform, message)
-        if isinstance(message, AgentState):
-            if not self.config.is_small and not self._is_newest(platform, header):
-                return  # another has overtaken it, or its word on a task, which tells what it does since
-            header = self._in_order(platform, header, now_ms)
-            self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
-        elif isinstance(message, TaskStatus):
-            tells = self._presences[platform].hear_status(message, now_ms)
-            strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
-            if tells:
-                self._is_newest(platform, header)
-            # The map is told before the word.
-            self._tell_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
-        if topic is not None:
-            self._say_here(said.key, header, message)
-        if isinstance(message, PlainTile):
-            self._tell_tiles(platform, header, [told(message, self._grid, header.sequence)])
-        elif isinstance(message, Curve | Stretch | Correction) and platform != self.config.hub:
-            self._tell_tiles(platform, header, self._layers.hear(platform, header.incarnation, message))
-
-    def _is_newest(self, platform: str, header: Header) -> bool:
-        """Whether a vehicle has told nothing newer of itself or its work; from now on that counts."""
-        newest = max(_order(header), self._newest.get(platform, _order(header)))
-        self._newest[platform] = newest
-        return newest == _order(header)
-
-    def _tell_tiles(self, platform: str, header: Header, told: list[Told]) -> None:
-        header = header._replace(incarnation=layer_start(header.incarnation, self._start))
-        for name, tile in told:
-            self._told += 1
-            self._say_here(COVERAGE.key(vehicle=platform, tile=name), header._replace(sequence=self._told), tile)
-
-    def _tell_by_reckoning(self, platform: str, now_ms: int) -> None:
-        """Who is heard is there: its state as it is by now, where it was not told for a while."""
-        before = self._state_headers.get(platform)
-        if before is None or now_ms - self._state_told[platform] < REPORT_MS:
-            return
-        state = self._presences[platform].at(now_ms)
-        header = before._replace(sequence=now_ms // 1000 * MOST_A_SECOND, sent_ms=now_ms)
-        self._say_here(STATE.key(vehicle=platform), self._in_order(platform, header, now_ms), state)
-
-    def _in_order(self, platform: str, header: Header, now_ms: int) -> Header:
-        """A state's header as it is told here: one that was reckoned before does not make it an old one."""
-        before = self._state_headers.get(platform, header)
-        if header.incarnation == before.incarnation:
-            sequence = header.sequence if before is header else max(header.sequence, before.sequence + 1)
-            header = header._replace(sequence=sequence, sent_ms=max(header.sent_ms, before.sent_ms))
-        if header.incarnation >= before.incarnation:
-            self._state_headers[platform], self._state_told[platform] = header, now_ms
-        return header
-
-    def _say_here(self, key: str, header: Header, message: Any) -> None:
-        heard = Heard(key, packed(header, body_of(message)))
-        self._heard.append(Publication(HEARD.key(vehicle=self.config.platform), heard))
+        self._here.hear(platform, topic, said, now_ms)
 
     def _step(self, now_ms: int) -> Step:
-        publish, self._heard = self._heard, []
+        publish = [] if self._form is None else self._here.take()
         on_deck, self._on_deck = self._on_deck, []
         key = MODEM_TX.key(vehicle=self.config.platform)
         for first in range(0, len(on_deck), MOST_FRAMES):
@@ -511,22 +421,6 @@ class Modem:
         """Bits of what waits, but for what is about it."""
         pieces = (one.piece.bits for sending in self._sending.values() for one in sending.unheard.values())
         return self._queue.bits + sum(pieces) + sum(sending.rest.bits for sending in self._sending.values())
-
-
-def layer_start(incarnation: int, start: int) -> int:
-    """Under which of a vehicle's starts a layer is told that is put together by a start of the coordinator's modem.
-
-    One that was started anew knows nothing of what it has told before: what it tells from then on counts beside that,
-    as that of a vehicle that was started anew does.
-    """
-    if start == 0:
-        return incarnation
-    return LARGEST_INCARNATION - (MOST_BESIDE - incarnation % MOST_BESIDE) * MOST_STARTS + start
-
-
-def _order(header: Header) -> tuple[int, int]:
-    """Of what one sender says the newer is greater."""
-    return header.incarnation, header.sequence
 
 
 def _about(received: Received) -> str:
