@@ -39,7 +39,7 @@ from secondlook.fleet.nodes import (
 from secondlook.launch.mission import not_over, recorder_config, warn_of
 from secondlook.launch.run_display import closing_table
 from secondlook.launch.signals import signals_ask
-from secondlook.launch.supervisor import AGAIN, OVER, end_with_supervisor, tell_supervisor
+from secondlook.launch.supervisor import AGAIN, OVER, end_with_supervisor, starts_before, tell_supervisor
 from secondlook.recorded.observer import Observer
 from secondlook.recorded.summary import summarise
 from secondlook.report import write_report
@@ -176,8 +176,10 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
         begun_utc=begun_utc,
         factor=outcome.factor,
     )
+    where = f"what was recorded is in {folder}"
     if failure is None and summary["risk"] is None:  # of one that was started again at the very end, say
         failure = "the mission was over before anything was heard of it"
+        where = nothing_in(folder, starts_before())
     warn_of(summary)
     try:
         write_whole(folder / "summary.json", json.dumps(summary, indent=2) + "\n")
@@ -185,10 +187,16 @@ def run_recorder(scenario: Scenario, link: Link, folder: Path) -> int:
     except UserError as error:
         failure = failure or str(error)
     if failure is not None:
-        _say(RECORDER, f"{failure}; what was recorded is in {folder}")
+        _say(RECORDER, f"{failure}; {where}")
         return FAILED
     closing_table(summary, folder)
     return 0
+
+
+def nothing_in(folder: Path, starts: int) -> str:
+    """Where to look instead of a folder in which nothing was recorded, after so many starts of its recorder."""
+    before = "; what was recorded before it was started again is in the folder before it" if starts else ""
+    return f"{folder} holds nothing of it{before}"
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from spread import PATIENT, SpreadFleet, interrupt, kill, loopback_endpoint, lost_of_what_is_kept, spread_fleet
 
+from secondlook.launch.spread_fleet import nothing_in
+
 FACTOR = 15.0
 NODES = (("world",), ("agent", "primary"), ("agent", "helper"), ("coordinator",))
 
@@ -106,3 +108,9 @@ def test_an_endpoint_where_nobody_listens_is_told_in_one_sentence(fleet: SpreadF
     world = fleet.node("world", more=["--wait", "0.3"])
     assert world.ends() == 2
     assert world.said == f"no connection to {fleet.endpoint} within 0.3 s: nobody listens there\n"
+
+
+def test_a_recorder_that_has_heard_nothing_tells_where_to_look() -> None:
+    assert nothing_in(Path("record"), 0) == "record holds nothing of it"
+    before = "what was recorded before it was started again is in the folder before it"
+    assert nothing_in(Path("record-2"), 1) == f"record-2 holds nothing of it; {before}"
