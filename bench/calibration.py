@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from operator import itemgetter
 from statistics import fmean
 
@@ -20,6 +21,7 @@ from bench.rows import MISSION, Column, Row, by, head, line, mean_table
 from secondlook.errors import UserError
 
 HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer")
+MANY = 1000
 GOAL_HEADS = ("missions", "reached it", "after, s", "true", "95 % of that")
 CONTACT_COLUMNS = (
     Column("residual risk", itemgetter("risk.mean")),
@@ -46,21 +48,41 @@ def share_interval(held: int, of: int) -> tuple[float, float]:
     return (middle - spread) / (1 + z * z / of), (middle + spread) / (1 + z * z / of)
 
 
+@dataclass(frozen=True)
+class Held:
+    """Of some missions how many mines were `left` and how many were `told`, on average, and in how many missions `more`
+    were left than the 90 % interval holds, and `fewer`."""
+
+    missions: int
+    left: float
+    told: float
+    more: int
+    fewer: int
+
+    @classmethod
+    def of(cls, missions: Sequence[Row]) -> Held:
+        """Of these, at least one."""
+        more = sum(left_of(row) > row["mines.left_high"] for row in missions)
+        fewer = sum(left_of(row) < row["mines.left_low"] for row in missions)
+        left, told = fmean(map(left_of, missions)), fmean(row["mines.left"] for row in missions)
+        return cls(len(missions), left, told, more, fewer)
+
+    def figures(self) -> list[str]:
+        """Under HEADS; shares of many missions to a tenth of a per cent."""
+        digits = 1 if self.missions >= MANY else 0
+        held = self.missions - self.more - self.fewer
+        low, high = share_interval(held, self.missions)
+        shares = f"{held / self.missions:.{digits}%}", f"{low:.{digits}%} to {high:.{digits}%}"
+        return [str(self.missions), f"{self.left:.1f}", f"{self.told:.1f}", *shares, str(self.more), str(self.fewer)]
+
+
 def table(rows: Iterable[Row], varied: Sequence[str]) -> list[str]:
     """The lines of the table, as Markdown; missions that failed, and such without targets, are left out."""
     lines = head(varied, HEADS)
     for values, flown in by(rows, varied, "mines.left").items():
         missions = [row for row in flown if row["truth.targets"]]
-        if not missions:
-            continue
-        more = sum(left_of(row) > row["mines.left_high"] for row in missions)
-        fewer = sum(left_of(row) < row["mines.left_low"] for row in missions)
-        count = len(missions)
-        held = count - more - fewer
-        low, high = share_interval(held, count)
-        left, told = fmean(map(left_of, missions)), fmean(row["mines.left"] for row in missions)
-        counts = f"{held / count:.0%}", f"{low:.0%} to {high:.0%}", str(more), str(fewer)
-        lines.append(line(values, (str(count), f"{left:.1f}", f"{told:.1f}", *counts)))
+        if missions:
+            lines.append(line(values, Held.of(missions).figures()))
     return lines
 
 

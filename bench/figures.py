@@ -15,8 +15,10 @@ import argparse
 import json
 import tempfile
 from collections.abc import Sequence
+from dataclasses import asdict
 from itertools import takewhile
 from pathlib import Path
+from statistics import fmean
 
 import secondlook
 from bench import calibration, compared, link_curve, link_share, position_errors, predicted_risk, scenario_tables
@@ -32,6 +34,7 @@ from bench.flown import (
     risk_and_truth,
     some,
 )
+from bench.rows import MISSION, head, line, values_of
 from secondlook.scenario import load_scenario
 
 KEPT = ROOT / "docs" / "figures"
@@ -48,6 +51,12 @@ LINKS = (
 )
 """Profiles, each with what else is wrong with the link."""
 
+LANES = {"along the tracks": "coordinator.strips=lanes", "across them": "coordinator.strips=lanes_across"}
+LANES_FIGURES = (
+    *MISSION,
+    *(f"{at}.{of}" for at in ("risk_at.1", "risk_primary_alone") for of in ("mean", "worst30_mean")),
+)
+
 CALIBRATED: tuple[Case, ...] = (
     ("tellaro", ()),
     ("two-helpers", ()),
@@ -61,6 +70,14 @@ CALIBRATED: tuple[Case, ...] = (
     ("patchy", ("vehicles.primary.sensor.estimate.blind_to_seabed=true",)),
 )
 """What is true, or told of, otherwise than in a scenario as it is."""
+
+SMALL = "area.polygon_m=[[0, 0], [404, 0], [404, 133], [0, 133]]"
+MANY_TIMES: tuple[tuple[Case, int], ...] = (
+    (("tellaro", (SMALL,)), 10_000),
+    (("tellaro", (SMALL, "targets.correlation=1", "mission.rho=1")), 1_000),
+    (("tellaro", (SMALL, "seabed={kind: patchy}")), 1_000),
+)
+"""What is flown so often that one may tell 90 % from 88 and 92."""
 
 HELPERS_TWICE = "mission.deadline_factor=2"
 GOALS: tuple[Case, ...] = (
@@ -84,6 +101,7 @@ RELIABLE: tuple[tuple[str, str], ...] = (
     ("tellaro", ""),
     ("tellaro", SHARED.format(0.5)),
     ("tellaro", SHARED.format(1)),
+    ("tellaro", " ".join((SHARED.format(1), *(f"vehicles.{one}.sensor.noise_cell=0" for one in _BOTH)))),
     ("two-helpers", ""),
     ("patchy", ""),
     ("tellaro", "mission.rho=1"),
@@ -170,8 +188,47 @@ def _first_linked(document: Document) -> Mission:
     return Mission(row["scenario"], overrides, row["seed"], risk_and_truth(row))
 
 
+def _fly_lanes(folder: Path) -> Document:
+    flown = [(scenario, (told,)) for told in LANES.values() for scenario in LINKED]
+    return fly_overridden(folder, flown, LINKED_SEEDS, LANES_FIGURES)
+
+
+def lanes_lines(document: Document) -> list[str]:
+    """A line for each kind of lanes: the share kept of what the ideal link's fleet removes, which is flown for another
+    table."""
+    linked = kept("across-the-water")["rows"]
+    ideal = [row for row in linked if row["link.profile"] == "ideal" and row["coordinator.platform"] == "ship"]
+    lines = ["| lanes, told beforehand | missions | share kept | least | of the worst 30 % |", f"|{'---|' * 5}"]
+    for words, told in LANES.items():
+        lanes = [row | {"link.profile": words} for row in document["rows"] if row["overrides"] == [told]]
+        of_mean, of_worst = (
+            [share for _, share in link_share.shares([*ideal, *lanes], ["link.profile"], of)[words,]]
+            for of in ("mean", "worst30_mean")
+        )
+        figures = f"{fmean(of_mean):.3f} | {min(of_mean):.3f} | {fmean(of_worst):.3f}"
+        lines.append(f"| {words} | {len(of_mean)} | {figures} |")
+    return lines
+
+
 def _fly_calibrated(folder: Path) -> Document:
     return fly_overridden(folder, CALIBRATED, "1..40", calibration.LEFT_FIGURES)
+
+
+def _fly_many_times(folder: Path) -> Document:
+    rows = []
+    for place, ((scenario, overrides), seeds) in enumerate(MANY_TIMES):
+        flown = fly_overridden(folder / str(place), [(scenario, overrides)], f"1..{seeds}", calibration.LEFT_FIGURES)
+        first, *_ = missions = [row for row in flown["rows"] if row["failure"] is None]
+        told = {name: first[name] for name in ("scenario", "overrides", *MISSION)}
+        rows.append(told | {"held": asdict(calibration.Held.of(missions))})
+    return {"rows": rows}
+
+
+def held_lines(document: Document) -> list[str]:
+    """A line for each case."""
+    varied = ("scenario", "overrides")
+    cases = ((values_of(row, varied), calibration.Held(**row["held"])) for row in document["rows"])
+    return [*head(varied, calibration.HEADS), *(line(values, held.figures()) for values, held in cases)]
 
 
 def _fly_goals(folder: Path) -> Document:
@@ -237,6 +294,11 @@ TABLES: dict[str, Table] = {
         fly=_fly_calibrated,
         lines=lambda document: calibration.table(document["rows"], ("scenario", "overrides")),
     ),
+    "intervals": Table(
+        page="docs/clearance.md",
+        fly=_fly_many_times,
+        lines=held_lines,
+    ),
     "goals": Table(
         page="docs/clearance.md",
         fly=_fly_goals,
@@ -259,6 +321,7 @@ TABLES: dict[str, Table] = {
         lines=lambda document: link_share.table(document["rows"], document["varied"]),
         first=_first_linked,
     ),
+    "lanes": Table(page="docs/across-the-water.md", fly=_fly_lanes, lines=lanes_lines),
     "link-curve": Table(
         page="docs/across-the-water.md",
         fly=lambda folder: link_curve.fly(),

@@ -15,6 +15,8 @@ import sys
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from itertools import product
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -28,7 +30,7 @@ from secondlook.testing import Fleet
 
 Document = dict[str, Any]
 SCENARIOS = ("tellaro", "two-helpers", "patchy")
-SEEDS = (1001,)
+SEEDS = (1001, 1002, 1003, 1004)
 BITS_PER_S = (5, 10, 20, 40, 80, 160)
 FRAME_BITS = 256
 SETTINGS = {
@@ -57,27 +59,28 @@ def overrides(scenario: str, bits_per_s: float, setting: str) -> tuple[str, ...]
 
 
 def fly() -> Document:
-    """Flies all missions of the curve, one after the other: a row for each."""
-    rows: list[Document] = []
-    for seed in SEEDS:
-        for scenario in SCENARIOS:
-            ideal = _flown(scenario, seed, ())
-            ends = ("mission.deadline_factor=null", f"mission.deadline_s={ideal['time']['mission_s']}")
-            alone, left = ideal["risk_primary_alone"]["mean"], ideal["risk"]["mean"]
-            for bits_per_s in BITS_PER_S:
-                for setting in SETTINGS:
-                    set_ = (*overrides(scenario, bits_per_s, setting), *ends)
-                    flown = _flown(scenario, seed, set_)
-                    share = (alone - flown["risk"]["mean"]) / (alone - left)
-                    row = {"scenario": scenario, "seed": seed, "bits_per_s": bits_per_s, "setting": setting}
-                    row |= {"share": share, "risk.mean": flown["risk"]["mean"]}
-                    row |= {"risk.worst30_mean": flown["risk"]["worst30_mean"], "overrides": set_}
-                    row["bytes_per_s"] = flown["link"]["bytes_per_s"]
-                    rows.append(
-                        {key: round(one, DIGITS) if isinstance(one, float) else one for key, one in row.items()}
-                    )
-                    print(f"{scenario} {seed}, {bits_per_s} bits a second, {setting}: {share:.3f}", flush=True)
-    return {"rows": rows}
+    """Flies all missions of the curve: a row for each."""
+    flown = [(scenario, seed) for seed in SEEDS for scenario in SCENARIOS]
+    with ProcessPoolExecutor() as pool:
+        return {"rows": [row for rows in pool.map(_fly_rates, *zip(*flown, strict=True)) for row in rows]}
+
+
+def _fly_rates(scenario: str, seed: int) -> list[Document]:
+    """All settings at all rates."""
+    ideal, rows = _flown(scenario, seed, ()), list[Document]()
+    ends = ("mission.deadline_factor=null", f"mission.deadline_s={ideal['time']['mission_s']}")
+    alone, left = ideal["risk_primary_alone"]["mean"], ideal["risk"]["mean"]
+    for bits_per_s, setting in product(BITS_PER_S, SETTINGS):
+        set_ = (*overrides(scenario, bits_per_s, setting), *ends)
+        flown = _flown(scenario, seed, set_)
+        share = (alone - flown["risk"]["mean"]) / (alone - left)
+        row = {"scenario": scenario, "seed": seed, "bits_per_s": bits_per_s, "setting": setting}
+        row |= {"share": share, "risk.mean": flown["risk"]["mean"]}
+        row |= {"risk.worst30_mean": flown["risk"]["worst30_mean"], "overrides": set_}
+        row["bytes_per_s"] = flown["link"]["bytes_per_s"]
+        rows.append({key: round(one, DIGITS) if isinstance(one, float) else one for key, one in row.items()})
+        print(f"{scenario} {seed}, {bits_per_s} bits a second, {setting}: {share:.3f}", flush=True)
+    return rows
 
 
 def _flown(scenario: str, seed: int, set_: Sequence[str]) -> Document:
@@ -113,7 +116,7 @@ def draw(rows: Sequence[Document], out: Path) -> None:
     axes.axhline(1.0, color="#444444", linewidth=0.8, linestyle=":")
     axes.set_xscale("log", base=2)
     axes.set_xticks(BITS_PER_S, labels=list(map(str, BITS_PER_S)))
-    axes.set(xlabel="bits a second across the water", ylabel="share kept", ylim=(0.0, 1.05))
+    axes.set(xlabel="bits a second across the water", ylabel="share kept", ylim=(0.0, 1.1))
     axes.grid(visible=True, color="#e4e4e4", linewidth=0.7)
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, fontsize=9)

@@ -103,4 +103,6 @@ def draw(cases: Mapping[str, Sequence[Bin]], across: int = 1) -> Figure:
         panel.errorbar(predicted, shares, errors, fmt="o", markersize=4, capsize=2)
         panel.set(xlim=(0, 1), ylim=(0, 1), xlabel="predicted residual risk", ylabel="share of targets missed")
         panel.set_title(f"{name}{sum(one.targets for one in bins)} targets, two standard errors", fontsize=9)
+    for panel in panels[len(cases) :]:
+        panel.set_visible(False)
     return figure

@@ -25,8 +25,13 @@ def by(rows: Iterable[Row], varied: Sequence[str], figure: str) -> dict[tuple[st
     found = defaultdict[tuple[str, ...], list[Row]](list)
     for row in rows:
         if row["failure"] is None and row[figure] is not None:
-            found[tuple(_cell(row, key) for key in varied)].append(row)
+            found[values_of(row, varied)].append(row)
     return found
+
+
+def values_of(row: Row, varied: Sequence[str]) -> tuple[str, ...]:
+    """What a mission was flown with, as lines tell it."""
+    return tuple(_cell(row, key) for key in varied)
 
 
 def _cell(row: Row, key: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from bench.calibration import contact_table, goal_table, main, share_interval, table
+from bench.calibration import Held, contact_table, goal_table, main, share_interval, table
 
 
 def row(left: int, low: int, high: int, **varied: Any) -> dict[str, Any]:
@@ -22,6 +22,11 @@ def test_a_line_for_each_combination_tells_how_often_the_interval_holds() -> Non
     assert head.startswith("| `rho` | missions | left | told | within 90 % |")
     assert right == "| `0.0` | 4 | 62.5 | 60.0 | 50% | 15% to 85% | 1 | 1 |"
     assert wrong == "| `1.0` | 1 | 99.0 | 60.0 | 0% | 0% to 79% | 1 | 0 |"
+
+
+def test_of_many_missions_the_share_is_told_to_a_tenth_of_a_per_cent() -> None:
+    held = Held.of([row(60, 50, 70)] * 897 + [row(71, 50, 70)] * 60 + [row(49, 50, 70)] * 43)
+    assert held.figures() == ["1000", "60.2", "60.0", "89.7%", "87.7% to 91.4%", "60", "43"]
 
 
 def test_missions_without_targets_or_without_a_look_tell_nothing() -> None:
