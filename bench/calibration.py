@@ -22,6 +22,7 @@ from secondlook.errors import UserError
 
 HEADS = ("missions", "left", "told", "within 90 %", "95 % of that", "more left", "fewer")
 MANY = 1000
+"""Missions, from which on shares are told to a tenth of a per cent."""
 GOAL_HEADS = ("missions", "reached it", "after, s", "true", "95 % of that")
 CONTACT_COLUMNS = (
     Column("residual risk", itemgetter("risk.mean")),
@@ -68,7 +69,7 @@ class Held:
         return cls(len(missions), left, told, more, fewer)
 
     def figures(self) -> list[str]:
-        """Under HEADS; shares of many missions to a tenth of a per cent."""
+        """Under HEADS."""
         digits = 1 if self.missions >= MANY else 0
         held = self.missions - self.more - self.fewer
         low, high = share_interval(held, self.missions)

@@ -52,6 +52,7 @@ LINKS = (
 """Profiles, each with what else is wrong with the link."""
 
 LANES = {"along the tracks": "coordinator.strips=lanes", "across them": "coordinator.strips=lanes_across"}
+"""Lanes that are told beforehand, as the table calls them."""
 LANES_FIGURES = (
     *MISSION,
     *(f"{at}.{of}" for at in ("risk_at.1", "risk_primary_alone") for of in ("mean", "worst30_mean")),

@@ -16,7 +16,7 @@ from planner.types import GridSpec
 
 
 class OwnMap:
-    """What it returns is to be said, and counts as said from then on.
+    """Hears what the vehicle sees. What it returns is to be said, and counts as said from then on.
 
     `entry`: the vehicle as it was announced; `start`: of its modem. `by_strips`: whether the strips that it has done
     tell by themselves what was seen of them.
