@@ -80,7 +80,7 @@ class ToldHere:
         self.say(STATE.key(vehicle=platform), self._in_order(platform, header, now_ms), state)
 
     def _say_tiles(self, platform: str, header: Header, tiles: Iterable[Told]) -> None:
-        header = header._replace(incarnation=_layer_start(header.incarnation, self._start))
+        header = header._replace(incarnation=layer_start(header.incarnation, self._start))
         for name, tile in tiles:
             self._tiles += 1
             self.say(COVERAGE.key(vehicle=platform, tile=name), header._replace(sequence=self._tiles), tile)
@@ -102,7 +102,7 @@ class ToldHere:
         return header
 
 
-def _layer_start(incarnation: int, start: int) -> int:
+def layer_start(incarnation: int, start: int) -> int:
     """Under which of a vehicle's starts a layer is told that is put together by a start of the coordinator's modem.
 
     One that was started anew knows nothing of what it has told before: what it tells from then on counts beside that,
