@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Iterable, Iterator
 from itertools import product
 
 import numpy as np
@@ -12,6 +11,9 @@ import shapely
 from planner.types import BoolArray, FloatArray
 
 Corner = tuple[int, int]
+
+FILLED = -1
+"""As the area of a notch: that of none, once its vertex is left out."""
 
 
 def outline(cells: BoolArray, most_vertices: int) -> FloatArray:
@@ -69,31 +71,32 @@ def _without_notches(corners: list[Corner], most_vertices: int) -> list[Corner]:
     triangle with its neighbours, which the polygon gains, holds no other vertex. Corners counterclockwise; no corner
     twice.
     """
-    before_each, after_each = corners[-1:] + corners[:-1], corners[1:] + corners[:1]
-    preceding = dict(zip(corners, before_each, strict=True))
-    following = dict(zip(corners, after_each, strict=True))
-    turns = map(_turn, before_each, corners, after_each)
-    queue = [(-turn, corner) for turn, corner in zip(turns, corners, strict=True) if turn <= 0]
-    areas = {corner: area for area, corner in queue}
+    count = len(corners)
+    if count <= most_vertices:
+        return corners
+    # The ring by places in the list: of each corner the one before and the one after it that are left.
+    before, after = [count - 1, *range(count - 1)], [*range(1, count), 0]
+    areas = [-turn for turn in map(_turn, corners[-1:] + corners[:-1], corners, corners[1:] + corners[:1])]
+    queue = [(areas[k], corner, k) for k, corner in enumerate(corners) if areas[k] >= 0]
     heapq.heapify(queue)
-    while queue and len(following) > most_vertices:
-        area, corner = heapq.heappop(queue)
-        if areas.get(corner) != area:
+    left = set(corners)
+    while queue and len(left) > most_vertices:
+        area, corner, k = heapq.heappop(queue)
+        if areas[k] != area:
             continue  # filled already, or changed when its neighbour was
-        before, after = preceding[corner], following[corner]
+        one, other = before[k], after[k]
         # A triangle of half a cell holds no other lattice point, and a flat one has no inside.
-        if area > 1 and _any_in_triangle(before, corner, after, following):
+        if area > 1 and _any_in_triangle(corners[one], corner, corners[other], left):
             continue  # what blocks it is part of the polygon, until a neighbour is left out, which queues it anew
-        following[before], preceding[after] = after, before
-        del following[corner], preceding[corner], areas[corner]
-        for beside in (before, after):
-            turn = _turn(preceding[beside], beside, following[beside])
-            if turn > 0:
-                areas.pop(beside, None)
-            else:
-                areas[beside] = -turn
-                heapq.heappush(queue, (-turn, beside))
-    return list(_ring(following))
+        after[one], before[other] = other, one
+        left.remove(corner)
+        areas[k] = FILLED
+        for beside in (one, other):
+            area = -_turn(corners[before[beside]], corners[beside], corners[after[beside]])
+            areas[beside] = area
+            if area >= 0:
+                heapq.heappush(queue, (area, corners[beside], beside))
+    return [corner for corner in corners if corner in left]
 
 
 def _turn(a: Corner, b: Corner, c: Corner) -> int:
@@ -101,26 +104,16 @@ def _turn(a: Corner, b: Corner, c: Corner) -> int:
     return (b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0])
 
 
-def _any_in_triangle(a: Corner, b: Corner, c: Corner, vertices: dict[Corner, Corner]) -> bool:
+def _any_in_triangle(a: Corner, b: Corner, c: Corner, vertices: set[Corner]) -> bool:
     """Whether any vertex but its own lies in or on a triangle that bends right."""
     x0, x1 = min(a[0], b[0], c[0]), max(a[0], b[0], c[0])
     y0, y1 = min(a[1], b[1], c[1]), max(a[1], b[1], c[1])
-    near: Iterable[Corner]
     if (x1 - x0 + 1) * (y1 - y0 + 1) < len(vertices):
-        near = [p for p in product(range(x0, x1 + 1), range(y0, y1 + 1)) if p in vertices]
+        near = [p for p in product(range(x0, x1 + 1), range(y0, y1 + 1)) if p in vertices and p not in (a, b, c)]
     else:
-        near = [p for p in vertices if x0 <= p[0] <= x1 and y0 <= p[1] <= y1]
-    return any(_turn(a, b, p) <= 0 and _turn(b, c, p) <= 0 and _turn(c, a, p) <= 0 for p in near if p not in (a, b, c))
-
-
-def _ring(following: dict[Corner, Corner]) -> Iterator[Corner]:
-    """The corners in their order."""
-    first = corner = next(iter(following))
-    while True:
-        yield corner
-        corner = following[corner]
-        if corner == first:
-            return
+        near = [p for p in vertices if x0 <= p[0] <= x1 and y0 <= p[1] <= y1 and p not in (a, b, c)]
+    # Most often there is none.
+    return bool(near) and any(_turn(a, b, p) <= 0 and _turn(b, c, p) <= 0 and _turn(c, a, p) <= 0 for p in near)
 
 
 def _sides_about(corners: FloatArray, sides: int) -> FloatArray:
