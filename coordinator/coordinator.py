@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from itertools import chain
 
 from comms.node import Received, Step
@@ -39,6 +39,8 @@ log = logging.getLogger("secondlook.coordinator")
 # News is cut by at once where a helper is free, or none is at a strip; where one on its way may be turned round,
 # within the first of these times the sectors, which share the coordinator's time; else within the second.
 TURN_WITHIN_MS, CUT_WITHIN_MS = 10_000, 120_000
+TELLS_OF_GROUND = (CoverageTile, Hotspot, Contact)
+"""No deadline of a vehicle or a strip hangs on these messages."""
 
 
 class Coordinator:
@@ -63,6 +65,7 @@ class Coordinator:
         self.has_begun = False
         self._cutting: list[StripCutting] = []  # by sector, where there are helpers
         self._fixed: Beforehand | Lanes | None = None  # where second looks do not react to what is seen
+        self._first_other_ms: list[int] | None = None  # see _others_ms; None where it may have changed
 
     @property
     def ledger(self) -> Ledger:
@@ -76,6 +79,8 @@ class Coordinator:
 
     def on_message(self, received: Received, now_ms: int) -> Step:
         """Hears what the agents say; what follows from it is decided at a wake-up of its own, 1 ms later."""
+        if not isinstance(received.message, TELLS_OF_GROUND):
+            self._first_other_ms = None
         if self.has_begun:
             self._hear(received, now_ms)
         elif isinstance(received.message, RunInfo):
@@ -84,6 +89,7 @@ class Coordinator:
 
     def on_wake(self, now_ms: int) -> Step:
         """Finds who is lost and what is late, does what is due, and finds whether the mission is over."""
+        self._first_other_ms = None
         if self.has_begun and self._end.over is None:
             self._strips.find_overdue(self.fleet.find_lost(now_ms), now_ms)
             if now_ms < self._end.may_end_ms():  # what is offered then would be left in the same breath
@@ -231,8 +237,14 @@ class Coordinator:
             return None
         if self._end.over is not None:
             return self._agenda.deadline_ms(Item.SAY_OVER)
-        others_ms = chain(self.fleet.deadlines_ms(), self._strips.deadlines_ms(), self._end.deadlines_ms())
-        return self._agenda.next_wake_ms(now_ms, others_ms)
+        return self._agenda.next_wake_ms(now_ms, self._others_ms())
+
+    def _others_ms(self) -> Iterator[int]:
+        """The earliest deadline that is not on the agenda, if there is one; only who asks has it worked out."""
+        if self._first_other_ms is None:
+            others_ms = chain(self.fleet.deadlines_ms(), self._strips.deadlines_ms(), self._end.deadlines_ms())
+            self._first_other_ms = sorted(others_ms)[:1]
+        yield from self._first_other_ms
 
 
 def _sectors(config: CoordinatorConfig, fleet: KnownFleet, in_reach: BoolArray, p_detect: float) -> list[Sector]:
