@@ -115,7 +115,7 @@ def _leg(mission: Removable, helper: LegHelper, looks: Sequence[Look]) -> Leg | 
     way = math.sin(turn_rad) if across else math.cos(turn_rad)
     if abs(way) < STRAIGHT:
         return None
-    side_m, along_m = map(float, grid.frame.to_sweep(*looks[0].geometry.origin))
+    side_m, along_m = grid.frame.to_sweep(*looks[0].geometry.origin)
     # In cells, from where the first column and the first row begin.
     begin, line = ((side_m / cell_m + 0.5), along_m / cell_m - 0.5) if across else (along_m / cell_m, side_m / cell_m)
     swath, (steps, lines) = helper.sensor(across=across).swath, mission.extent(across=across)

@@ -99,7 +99,7 @@ class Simulator:
     def _path_m(self, helper: int, before: Leg | None, leg: Leg) -> float:
         flown_by, frame = self.mission.helpers[helper], self.mission.grid.frame
         if before is None:
-            across_m, along_m = map(float, frame.to_sweep(flown_by.start.x_m, flown_by.start.y_m))
+            across_m, along_m = frame.to_sweep(flown_by.start.x_m, flown_by.start.y_m)
             pose = Pose(across_m, along_m, flown_by.start.heading_rad - frame.heading_rad)
         else:
             pose = self._pose(flown_by, before, before.end if before.up else before.first)

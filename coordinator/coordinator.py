@@ -252,7 +252,7 @@ def _sectors(config: CoordinatorConfig, fleet: KnownFleet, in_reach: BoolArray, 
     grid, homes = fleet.map.grid, {}
     for one in fleet.helpers:
         across_m, along_m = grid.frame.to_sweep(one.entry.home_x_m, one.entry.home_y_m)
-        homes[one.entry.vehicle] = (float(along_m) / grid.cell_m, float(across_m) / grid.cell_m)
+        homes[one.entry.vehicle] = (along_m / grid.cell_m, across_m / grid.cell_m)
     swath_m = min((footprint_of(one.entry.sonar).reach.strip_width_m for one in fleet.helpers), default=0.0)
     team = config.helpers_a_team if config.strips == "reacting" else max(1, len(homes))
     return [

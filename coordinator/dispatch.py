@@ -106,6 +106,6 @@ class Dispatch:
 
 def _lies_inside(grid: GridSpec, inside: BoolArray, place: Point) -> bool:
     """Whether a place, in the mission frame, lies in one of the area's cells."""
-    across_m, along_m = (float(one) for one in grid.frame.to_sweep(*place))
+    across_m, along_m = grid.frame.to_sweep(*place)
     column, row = round(across_m / grid.cell_m), math.floor(along_m / grid.cell_m)
     return 0 <= column < grid.columns and 0 <= row < grid.rows and bool(inside[row, column])

@@ -86,7 +86,7 @@ class Lanes:
         for one in self._fleet.helpers:
             assert one.state is not None
             place_m = grid.frame.to_sweep(one.state.x_m, one.state.y_m)[1 if self._across else 0]
-            entries[one.entry.vehicle] = float(place_m), one.entry
+            entries[one.entry.vehicle] = place_m, one.entry
         names = sorted(entries, key=lambda name: (entries[name][0], name))
         shares = np.cumsum([0.0, *(_sweeps_m2ps(entries[name][1]) for name in names)])
         inside = self._inside.T if self._across else self._inside

@@ -160,7 +160,7 @@ class Sectors:
 
     def _way_m(self, window: Window, place: Point) -> float:
         """How far a place, in the mission frame, lies from a window."""
-        across_m, along_m = (float(one) / self._grid.cell_m for one in self._grid.frame.to_sweep(*place))
+        across_m, along_m = (one / self._grid.cell_m for one in self._grid.frame.to_sweep(*place))
         beside = max(window.first_column - across_m, across_m - window.end_column, 0.0)
         beyond = max(window.first_row - along_m, along_m - window.end_row, 0.0)
         return self._grid.cell_m * math.hypot(beside, beyond)

@@ -62,5 +62,5 @@ def stretches_over(entry: RosterVehicle, strip: Strip) -> list[Stretch]:
     for leg in legs_over_strip(strip, swath_m):
         x_m, y_m = frame.to_mission(leg.across_m - strip.width_m / 2, 0.0)
         number = -(strip.number * MOST_LEGS + leg.number)
-        found.append(Stretch(number, float(x_m), float(y_m), strip.heading_rad, strip.length_m, 0, (Seen(0, 0),)))
+        found.append(Stretch(number, x_m, y_m, strip.heading_rad, strip.length_m, 0, (Seen(0, 0),)))
     return found

@@ -97,7 +97,7 @@ class Gathering:
         self._number += 1
         first = looks[0]
         frame = SweepFrame(first.origin_x_m, first.origin_y_m, first.heading_rad)
-        x_m, y_m = map(float, frame.to_mission(0.0, first.first_along_m))
+        x_m, y_m = frame.to_mission(0.0, first.first_along_m)
         curve = self._curve
         return Stretch(
             number=self._number,

@@ -45,7 +45,7 @@ class SurveyArea:
         unshifted = SweepFrame(0.0, 0.0, self.track_heading_rad)
         across_m, along_m = unshifted.to_sweep(*np.array(self.vertices).T)
         x_m, y_m = unshifted.to_mission(float(across_m.min()), float(along_m.min()))
-        return SweepFrame(float(x_m), float(y_m), self.track_heading_rad)
+        return SweepFrame(x_m, y_m, self.track_heading_rad)
 
     @property
     def width_m(self) -> float:
@@ -112,8 +112,8 @@ class SurveyArea:
         if not extent_m:
             return None
         ends_m = sorted((min(extent_m), max(extent_m)), reverse=reverse)
-        x_m, y_m = self.frame.to_mission(across_m, np.array(ends_m))
-        return Track(number, across_m, (float(x_m[0]), float(y_m[0])), (float(x_m[1]), float(y_m[1])))
+        start, end = (self.frame.to_mission(across_m, end_m) for end_m in ends_m)
+        return Track(number, across_m, start, end)
 
     @cached_property
     def _corners(self) -> tuple[Point, ...]:

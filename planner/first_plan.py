@@ -57,9 +57,8 @@ def _entered(parts: Iterable[SurveyArea], start: Point) -> tuple[float, list[Sur
 
 def _sides(part: SurveyArea) -> tuple[Point, Point]:
     """The middles of the sides from which and towards which tracks are laid."""
-    ends = (part.frame.to_mission(across_m, part.length_m / 2) for across_m in (0.0, part.width_m))
-    (near_x, near_y), (far_x, far_y) = ends
-    return (float(near_x), float(near_y)), (float(far_x), float(far_y))
+    near, far = (part.frame.to_mission(across_m, part.length_m / 2) for across_m in (0.0, part.width_m))
+    return near, far
 
 
 MOST_SIDES = 6

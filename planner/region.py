@@ -127,7 +127,7 @@ class Region:
         whole = self.about(track_heading_rad)
         u_m, v_m = (begin * whole.width_m, end * whole.width_m), (-1.0, whole.length_m + 1.0)
         corners = [(u_m[0], v_m[0]), (u_m[1], v_m[0]), (u_m[1], v_m[1]), (u_m[0], v_m[1])]
-        band = shapely.Polygon([tuple(map(float, whole.frame.to_mission(*corner))) for corner in corners])
+        band = shapely.Polygon([whole.frame.to_mission(*corner) for corner in corners])
         cut = band.intersection(self._drawn)
         if not isinstance(cut, shapely.Polygon) or cut.is_empty:
             what = "nothing of the area" if cut.is_empty else "the area, in several pieces,"
@@ -170,7 +170,7 @@ def _centres_in(ground: BaseGeometry, grid: GridSpec) -> BoolArray:
     found: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
     # What a hole's ring holds is in the outline's, too.
     for ring in () if ground.is_empty else shapely.get_rings(shapely.get_parts(ground)):
-        across_m, along_m = grid.frame.to_sweep(*ring.coords.xy)
+        across_m, along_m = grid.frame.to_sweep(*shapely.get_coordinates(ring).T)
         found ^= points_inside(across_m[:-1], along_m[:-1], grid.across_m, grid.along_m)
     return found
 

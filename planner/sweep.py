@@ -76,7 +76,7 @@ def legs_over_strip(strip: Strip, swath_m: float, beside_m: float = 0.0) -> list
     for index in range(count):
         across_m = strip.width_m * (index + 0.5) / count + beside_m
         ends = [frame.to_mission(across_m - strip.width_m / 2, along_m) for along_m in (0.0, strip.length_m)]
-        start, end = ((float(x_m), float(y_m)) for x_m, y_m in (ends if index % 2 == 0 else reversed(ends)))
+        start, end = ends if index % 2 == 0 else reversed(ends)
         legs.append(Track(index + 1, across_m, start, end))
     return legs
 

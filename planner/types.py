@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Point = tuple[float, float]
+OneOrMany = TypeVar("OneOrMany", float, FloatArray)
 
 
 @dataclass(frozen=True)
@@ -31,17 +33,19 @@ class SweepFrame:
     origin_y_m: float
     heading_rad: float
 
-    def to_sweep(self, x_m: FloatArray | float, y_m: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-        """Mission-frame points as (across_m, along_m)."""
+    def to_sweep(self, x_m: OneOrMany, y_m: OneOrMany) -> tuple[OneOrMany, OneOrMany]:
+        """Mission-frame points as (across_m, along_m); one as plain numbers, many as arrays."""
         sin, cos = math.sin(self.heading_rad), math.cos(self.heading_rad)
-        dx, dy = np.asarray(x_m) - self.origin_x_m, np.asarray(y_m) - self.origin_y_m
+        dx, dy = x_m - self.origin_x_m, y_m - self.origin_y_m
         return dx * cos - dy * sin, dx * sin + dy * cos
 
-    def to_mission(self, across_m: FloatArray | float, along_m: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-        """Sweep-frame points as (x_m, y_m)."""
+    def to_mission(self, across_m: OneOrMany, along_m: OneOrMany) -> tuple[OneOrMany, OneOrMany]:
+        """Sweep-frame points as (x_m, y_m), likewise."""
         sin, cos = math.sin(self.heading_rad), math.cos(self.heading_rad)
-        u, v = np.asarray(across_m), np.asarray(along_m)
-        return self.origin_x_m + u * cos + v * sin, self.origin_y_m - u * sin + v * cos
+        return (
+            self.origin_x_m + across_m * cos + along_m * sin,
+            self.origin_y_m - across_m * sin + along_m * cos,
+        )
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,7 @@ class GridSpec:
         if (first_row, end_row, first_column, end_column) == (0, self.rows, 0, self.columns):
             return self
         x_m, y_m = self.frame.to_mission(first_column * self.cell_m, first_row * self.cell_m)
-        frame = SweepFrame(float(x_m), float(y_m), self.frame.heading_rad)
+        frame = SweepFrame(x_m, y_m, self.frame.heading_rad)
         return GridSpec(frame, self.cell_m, end_column - first_column, end_row - first_row)
 
     @cached_property

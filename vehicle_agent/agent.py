@@ -323,5 +323,4 @@ def _next_word_due_ms(status: ManeuverStatus) -> int | None:
 
 def _in_mission_frame(look: Look, along_m: float, lateral_m: float) -> Point:
     frame = SweepFrame(look.origin_x_m, look.origin_y_m, look.heading_rad)
-    x_m, y_m = frame.to_mission(lateral_m, along_m)
-    return float(x_m), float(y_m)
+    return frame.to_mission(lateral_m, along_m)

@@ -314,13 +314,13 @@ class SurveyAgent(Agent):
 
     def _across_m(self, track: Track) -> float:
         """A track's offset in the grid's frame; its own is in that of its part."""
-        return float(self._grid.frame.to_sweep(*track.start)[0])
+        return self._grid.frame.to_sweep(*track.start)[0]
 
     def _passed_along_m(self, look: Look) -> float:
         """Where the stretch of track ends that a look stands for, along the grid."""
         end_m = look.first_along_m + self.footprint.track_length_m(look.geometry)
         end = shifted((look.origin_x_m, look.origin_y_m), look.heading_rad, end_m)
-        return float(self._grid.frame.to_sweep(*end[:2])[1])
+        return self._grid.frame.to_sweep(*end[:2])[1]
 
     def _settle(self) -> None:
         """Marks the cells that no remaining track of the plan can improve; before the first look that is not known."""
@@ -344,7 +344,7 @@ class SurveyAgent(Agent):
     def _still_ahead(self, track: Track) -> Ahead:
         """What may yet be seen along a track: from where the vehicle is, or is to begin, to as far as it sees from
         where it ends; the last bin may reach beyond that."""
-        from_m, to_m = (float(self._grid.frame.to_sweep(*end)[1]) for end in (track.start, track.end))
+        from_m, to_m = (self._grid.frame.to_sweep(*end)[1] for end in (track.start, track.end))
         way, lead_m = math.copysign(1.0, to_m - from_m), self.footprint.lead_m
         end_m = to_m + way * (self._along_bin_m + self.footprint.ahead_m - lead_m)
         from_m -= way * lead_m

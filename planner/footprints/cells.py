@@ -30,7 +30,7 @@ def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -
     reach_m = (geometry.range_bins - 0.5) * geometry.range_bin_m
     turn_rad = geometry.heading_rad - grid.frame.heading_rad
     sin, cos = math.sin(turn_rad), math.cos(turn_rad)
-    origin_across, origin_along = map(float, grid.frame.to_sweep(*geometry.origin))
+    origin_across, origin_along = grid.frame.to_sweep(*geometry.origin)
     corners = [(lateral_m, along_m) for lateral_m in (-reach_m, reach_m) for along_m in (begin_m, end_m)]
     columns = _window([origin_across + u_m * cos + v_m * sin for u_m, v_m in corners], grid.across_m)
     rows = _window([origin_along - u_m * sin + v_m * cos for u_m, v_m in corners], grid.along_m)

@@ -66,7 +66,7 @@ class RiskMap:
 
     def at(self, x_m: FloatArray | float, y_m: FloatArray | float) -> FloatArray:
         """The risk of the cells that hold these places (mission frame); NaN outside the grid."""
-        across_m, along_m = self.grid.frame.to_sweep(x_m, y_m)
+        across_m, along_m = self.grid.frame.to_sweep(np.asarray(x_m), np.asarray(y_m))
         columns = np.floor(across_m / self.grid.cell_m + 0.5).astype(int)
         rows = np.floor(along_m / self.grid.cell_m).astype(int)
         on_grid = (columns >= 0) & (columns < self.grid.columns) & (rows >= 0) & (rows < self.grid.rows)

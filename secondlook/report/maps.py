@@ -80,8 +80,7 @@ class MapFrame:
         down_m, right_m = steps[0] * grid.cell_m, steps[1] * grid.cell_m
         sin, cos = math.sin(grid.frame.heading_rad), math.cos(grid.frame.heading_rad)
         # Columns are centred at whole multiples of the cell, rows begin there.
-        x_m, y_m = grid.frame.to_mission(-grid.cell_m / 2, 0.0)
-        left, top = self.place(float(x_m), float(y_m))
+        left, top = self.place(*grid.frame.to_mission(-grid.cell_m / 2, 0.0))
         numbers = (right_m * cos, right_m * sin, down_m * sin, -down_m * cos, left, top)
         return f"matrix({' '.join(f'{number:.6g}' for number in numbers)})"
 

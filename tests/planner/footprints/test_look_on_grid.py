@@ -188,7 +188,7 @@ class TestProperties:
         in_centimetres: bool,
     ) -> None:
         grid = GridSpec(SweepFrame(3, 4, frame_rad), 5, 25, 25)
-        x_m, y_m = (float(x) for x in grid.frame.to_mission(start_mm[0] / 1000, start_mm[1] / 1000))
+        x_m, y_m = grid.frame.to_mission(start_mm[0] / 1000, start_mm[1] / 1000)
         compass_rad, bin_m = frame_rad + heading_rad, bin_cm / 100
         whole = LookGeometry((x_m, y_m), compass_rad, 0, bin_m, 5, sum(bins), 8)
         once = on_whole_grid(grid, whole, np.ones((2, sum(bins), 8)))

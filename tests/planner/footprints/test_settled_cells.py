@@ -161,7 +161,7 @@ class TestProperties:
         ahead = []
         for track in tracks[2:]:
             improved |= seen_by(grid, track, 0, REACH)
-            along_m = sorted(float(grid.frame.to_sweep(*end)[1]) for end in (track.start, track.end))
+            along_m = sorted(grid.frame.to_sweep(*end)[1] for end in (track.start, track.end))
             ahead.append(Ahead(track.across_m, *along_m))
         settled = settled_cells(grid, ahead, REACH)
         assert improved.any()
