@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -175,7 +176,7 @@ class SensorConfig:
             return None
         return replace(self, seabed_share=0.0).sonar_over(seabed, vehicle)
 
-    @property
+    @cached_property
     def bins_per_look(self) -> int:
         """Along-track bins of the stretch of track that a whole look stands for."""
         return round(self.look_m / self.along_bin_m)
@@ -186,7 +187,7 @@ class SensorConfig:
         bins_m = self.along_bin_m, self.range_bin_m
         return FOOTPRINTS[self.footprint].bins_of(self.shape, self.bins_per_look, bins_m)
 
-    @property
+    @cached_property
     def shape(self) -> SonarShape:
         """What ground it sees."""
         return SonarShape(self.footprint, self.near_m, float(self.curve.range_m[-1]), self.half_angle_rad, self.look_m)

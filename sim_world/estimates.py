@@ -31,7 +31,8 @@ class Estimates:
     """
 
     def __init__(self, sensor: SensorConfig, draw: Draw) -> None:
-        self._wrong = sensor.estimate
+        self._wrong = wrong = sensor.estimate
+        self._is_biased = any((wrong.bias, wrong.bias_at_reach, wrong.bias_after_turn))
         self._noise = PDetectEstimate(sensor.noise_cell, sensor.noise_track)
         self._draw = draw
         self._far_m = float(sensor.curve.range_m[-1])
@@ -64,6 +65,8 @@ class Estimates:
 
     def _believed(self, p_detect: FloatArray, range_m: FloatArray, straight_m: FloatArray) -> FloatArray:
         wrong = self._wrong
+        if not self._is_biased:
+            return np.minimum(p_detect, HIGHEST_P_DETECT)
         times = (1.0 + wrong.bias) * (1.0 + wrong.bias_at_reach / self._far_m * range_m)
         times = times * (1.0 + wrong.bias_after_turn * np.maximum(1.0 - straight_m / wrong.turn_m, 0.0))
         return np.minimum(p_detect * times, HIGHEST_P_DETECT)

@@ -141,6 +141,8 @@ class Looks:
         return contacts, truth
 
     def _clutter_passed(self, swath: Swath, maneuver: Maneuver, time_s: float) -> list[LookContact]:
+        if self._clutter is NO_TARGETS:
+            return []
         passed = self._clutter.passed(swath)
         if not passed.numbers.size:
             return []

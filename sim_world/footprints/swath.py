@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import lru_cache
 from typing import Self
 
 import numpy as np
@@ -103,17 +103,15 @@ class Swath(ABC):
         """Lateral range of the outermost cells' centres."""
         return (self.range_bins - 1) * self.range_bin_m
 
-    @cached_property
+    @property
     def along_m(self) -> FloatArray:
-        """How far down the track the cells' centres lie, shape (bins, 1)."""
-        bins: FloatArray = np.arange(self.bins, dtype=np.float64)[:, None]
-        return self.first_along_m + (bins + 0.5) * self.along_bin_m
+        """How far down the track the cells' centres lie, shape (bins, 1); read-only."""
+        return _along_m(self.first_along_m, self.bins, self.along_bin_m)
 
-    @cached_property
+    @property
     def lateral_m(self) -> FloatArray:
-        """How far to the side the cells' centres lie, shape (2, 1, range_bins)."""
-        lateral_m: FloatArray = SIDES * (np.arange(self.range_bins) * self.range_bin_m)
-        return lateral_m
+        """How far to the side the cells' centres lie, shape (2, 1, range_bins); read-only."""
+        return _lateral_m(self.range_bins, self.range_bin_m)
 
     def cell_centres(self) -> tuple[FloatArray, FloatArray]:
         """The x and y of the cells' centres."""
@@ -126,3 +124,17 @@ class Swath(ABC):
         sin, cos = math.sin(self.heading_rad), math.cos(self.heading_rad)
         dx, dy = x_m - self.origin_x_m, y_m - self.origin_y_m
         return dx * sin + dy * cos, dx * cos - dy * sin
+
+
+@lru_cache(maxsize=256)  # the looks along a track begin where those along another do
+def _along_m(first_along_m: float, bins: int, along_bin_m: float) -> FloatArray:
+    along_m: FloatArray = first_along_m + (np.arange(bins, dtype=np.float64)[:, None] + 0.5) * along_bin_m
+    along_m.setflags(write=False)
+    return along_m
+
+
+@lru_cache(maxsize=16)
+def _lateral_m(range_bins: int, range_bin_m: float) -> FloatArray:
+    lateral_m: FloatArray = SIDES * (np.arange(range_bins) * range_bin_m)
+    lateral_m.setflags(write=False)
+    return lateral_m
