@@ -62,9 +62,9 @@ class VehicleLayer:
         oldest = min(versions, default=incarnation)
         if tile.version <= versions.get(incarnation, -1) or (incarnation < oldest and versions[oldest] == CLOSED):
             return False
-        told = _Told(tile.sum_levels, tile.largest_levels, tile.settled)
+        told: ToldTile | _Told = tile
         if versions.keys() - {incarnation}:
-            told = self._with_other_starts(place, window, incarnation, told)
+            told = self._with_other_starts(place, window, incarnation, tile)
         versions[incarnation] = tile.version
         if len(versions) > MOST_STARTS:
             self._hold_oldest_as_one(place)
@@ -74,14 +74,14 @@ class VehicleLayer:
         self.told[window] = True
         return True
 
-    def _with_other_starts(self, place: Place, window: tuple[slice, slice], incarnation: int, told: _Told) -> _Told:
+    def _with_other_starts(self, place: Place, window: tuple[slice, slice], incarnation: int, told: ToldTile) -> _Told:
         """What a start has told, now, joined with what the others have."""
         apart = self._apart.get(place)
         if apart is None:  # so far one alone has told of it
             (other,) = self.versions[place]
             before = _Told(self.sum_levels[window], self.largest_levels[window], self.settled[window])
             apart = self._apart[place] = {other: before.copy()}
-        apart[incarnation] = told.copy()
+        apart[incarnation] = _Told(told.sum_levels, told.largest_levels, told.settled).copy()
         return reduce(_Told.joined, apart.values())
 
     def _hold_oldest_as_one(self, place: Place) -> None:

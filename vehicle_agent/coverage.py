@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import itemgetter
+
 import numpy as np
 
 from comms.node import Publication
@@ -31,7 +33,7 @@ class CoverageLayer:
         self._version = 0
         self._versions_told = 0  # the sum of the newest of all tiles
         self._tiles = tiles(grid)
-        self._said: dict[Tile, tuple[int, int]] = {}  # of each tile its version, and how often that was said
+        self._said: dict[Tile, tuple[int, int]] = {}  # of each tile how often it was said, and its version
         self._published_sum = np.zeros(grid.shape, dtype=np.uint8)
         self._published_largest = np.zeros(grid.shape, dtype=np.uint8)
         self._published_settled = self.settled
@@ -53,9 +55,9 @@ class CoverageLayer:
         published = []
         for tile in sorted(changed, key=lambda one: (one.first_row, one.first_column)):
             self._version += 1
-            before, _ = self._said.get(tile, (0, 0))
+            _, before = self._said.get(tile, (0, 0))
             self._versions_told += self._version - before
-            self._said[tile] = (self._version, 0)
+            self._said[tile] = (0, self._version)
             published.append(self._say(tile))
         return published
 
@@ -75,7 +77,7 @@ class CoverageLayer:
         """A tile of those that were said the fewest times since they changed, as it was said last: the oldest."""
         if not self._said:
             return []
-        tile, _ = min(self._said.items(), key=lambda said: said[1][::-1])
+        tile, _ = min(self._said.items(), key=itemgetter(1))
         return [self._say(tile)]
 
     def told(self) -> int:
@@ -85,7 +87,7 @@ class CoverageLayer:
     def again(self) -> list[Publication]:
         """Tiles as they were said last, as some have not arrived: up to MOST_AGAIN of those said the fewest times, the
         oldest first."""
-        return [self._say(tile) for tile in sorted(self._said, key=lambda tile: self._said[tile][::-1])[:MOST_AGAIN]]
+        return [self._say(tile) for tile in sorted(self._said, key=self._said.__getitem__)[:MOST_AGAIN]]
 
     def again_at(self, strip: Strip) -> list[Publication]:
         """The tiles about a strip, as they were said last."""
@@ -93,11 +95,11 @@ class CoverageLayer:
 
     def all_again(self) -> list[Publication]:
         """All tiles, as they were said last, but for those that were said often enough since they changed."""
-        return [self._say(tile) for tile, (_, times) in self._said.items() if times < OFTEN_ENOUGH]
+        return [self._say(tile) for tile, (times, _) in self._said.items() if times < OFTEN_ENOUGH]
 
     def _say(self, tile: Tile) -> Publication:
-        version, times = self._said[tile]
-        self._said[tile] = (version, times + 1)
+        times, version = self._said[tile]
+        self._said[tile] = (times + 1, version)
         window = tile.window
         message = CoverageTile(
             version=version,

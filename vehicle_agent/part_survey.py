@@ -35,6 +35,7 @@ class PartSurvey:
         self.area = area
         self._config = config
         self._terms = terms
+        self._by_profile = isinstance(config.spacing, ProfilePlanner)  # to ask a protocol takes long
         self._before_m: int | None = None
         self._decision: SpacingDecision
         self._covered_m = 0.0
@@ -107,11 +108,10 @@ class PartSurvey:
         """The offset beyond which the next decision may still lay tracks that see; None where it will not."""
         if not self._decision.replans or not ahead:
             return None
-        by_profile = isinstance(self._config.spacing, ProfilePlanner)
-        if by_profile and r_eff_m is None:
+        if self._by_profile and r_eff_m is None:
             # Nothing but the range that it was told has laid what comes after the first track.
             return ahead[0].across_m - reach.far_m
-        if self._decision.singles or by_profile:
+        if self._decision.singles or self._by_profile:
             # They will not lie much nearer than they do now.
             beyond = self._beyond(ahead)
             return min(track.across_m for track in beyond) - reach.far_m if beyond else None
