@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -74,8 +75,8 @@ class LinkFigures:
     frames_heard: int = 0
     packets: dict[str, int] = field(default_factory=dict)
     _to: dict[bytes, str] = field(default_factory=dict)  # for whom each frame was
-    _said: dict[str, Age] = field(default_factory=dict)  # by vehicle, as it was said
-    _heard: dict[str, Age] = field(default_factory=dict)  # as a modem told it
+    _said: defaultdict[str, Age] = field(default_factory=lambda: defaultdict(Age))  # by vehicle, as it was said
+    _heard: defaultdict[str, Age] = field(default_factory=lambda: defaultdict(Age))  # as a modem told it
 
     def hear(self, received: Received) -> None:
         """Takes one message."""
@@ -95,11 +96,11 @@ class LinkFigures:
             state = state_heard(message)
             if state is not None:
                 vehicle, said_ms = state
-                self._heard.setdefault(vehicle, Age()).hear(said_ms, sent_ms)
+                self._heard[vehicle].hear(said_ms, sent_ms)
         elif received.topic.crosses_water:
             self.said_bytes += len(received.payload)
             if isinstance(message, AgentState):
-                self._said.setdefault(received.vehicle, Age()).hear(sent_ms, sent_ms)
+                self._said[received.vehicle].hear(sent_ms, sent_ms)
 
     def ages(self, *, by_modem: bool, hub: str) -> dict[str, Age]:
         """How old what the coordinator knew was, of each vehicle that has said anything. `by_modem`: whether it hears

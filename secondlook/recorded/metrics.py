@@ -24,12 +24,10 @@ from comms.said.messages import (
     ManeuverState,
     ManeuverStatus,
     Mode,
-    Nav,
     Plan,
     StripState,
     StripStatus,
     TruthLook,
-    TruthPose,
     TruthTargets,
 )
 from comms.strip_books import StripBooks
@@ -122,7 +120,7 @@ class Metrics:
         if received.header.sent_ms > self.now_ms:
             self._pass_time(received.header.sent_ms)
         vehicle = self.vehicles.get(received.vehicle)
-        if isinstance(message, Nav | TruthPose):
+        if isinstance(message, Whereabouts.telling):
             if vehicle is not None:
                 self._hear_places(self.whereabouts.hear(received))
         elif isinstance(message, RunInfo) and self.run is None:

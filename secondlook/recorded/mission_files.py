@@ -119,15 +119,16 @@ def read_messages(path: Path) -> list[tuple[str, bytes]]:
 
 
 @cache
-def _field_names(kind: type[Any]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(kind))
+def _field_names(kind: Any) -> tuple[str, ...] | None:
+    return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
 def _plain(value: Any) -> Any:
     """What JSON has no word for: a message or a part of one, an enumeration's member, bytes, an array."""
-    kind: type[Any] = type(value)
-    if is_dataclass(kind):
-        return {name: getattr(value, name) for name in _field_names(kind)}
+    kind: Any = type(value)
+    names = _field_names(kind)
+    if names is not None:
+        return {name: getattr(value, name) for name in names}
     if isinstance(value, bytes):
         return value.hex()
     return value.value if isinstance(value, enum.Enum) else value.tolist()

@@ -28,7 +28,9 @@ class Place(NamedTuple):
 
 
 class Whereabouts:
-    """Take the messages in order."""
+    """Take the messages in order. `telling`: those that tell of places."""
+
+    telling = (Nav, TruthPose)
 
     def __init__(self) -> None:
         self._believed: dict[str, Trace] = {}
@@ -37,7 +39,7 @@ class Whereabouts:
     def hear(self, received: Received) -> list[Place]:
         """The places that a message adds, in the order of time: those up to where a course begins, that included."""
         message, name = received.message, received.vehicle
-        if not isinstance(message, Nav | TruthPose):
+        if not isinstance(message, self.telling):
             return []
         is_true = isinstance(message, TruthPose)
         traces = self._true if is_true else self._believed
