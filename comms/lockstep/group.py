@@ -34,10 +34,8 @@ class LockstepNode:
         self._mail: dict[int, list[Received]] = {}
         self._late_ms: list[int] = []
 
-    def deliver(self, received: Received, due_ms: int | None = None) -> None:
-        """Puts a message into the mailbox, to be handled when it is due: as its topic says, or at `due_ms`."""
-        if due_ms is None:
-            due_ms = received.topic.due_ms(received.header.sent_ms)
+    def deliver(self, received: Received, due_ms: int) -> None:
+        """Puts a message into the mailbox, to be handled when it is due."""
         self._mail.setdefault(due_ms, []).append(received)
 
     def deliver_late(self, received: Received, due_ms: int) -> None:
@@ -168,11 +166,13 @@ class NodeGroup:
         return [self.runners[name] for name in route.readers if name in self.runners]
 
     def _hand_out(self, received: Received, readers: list[LockstepNode]) -> None:
-        for runner in readers:
-            if self._faults:
+        if self._faults:
+            for runner in readers:
                 self._deliver_with_faults(runner, received)
-            else:
-                runner.deliver(received)
+            return
+        due_ms = received.topic.due_ms(received.header.sent_ms)
+        for runner in readers:
+            runner.deliver(received, due_ms)
 
     def give_kept(self, node_id: str, messages: Iterable[tuple[str, bytes]], due_ms: int) -> None:
         """What was kept for a node that joins; one that goes on is given what it has not handled."""

@@ -64,9 +64,10 @@ def replay_node(
         last_ms = max(last_ms, one.header.sent_ms)
         route = routing.route(one.key)
         if route is not None and node_id in route.readers:
-            runner.deliver(one)
+            due_ms = one.topic.due_ms(one.header.sent_ms)
+            runner.deliver(one, due_ms)
             if one.topic.wakes:
-                due_times.add(one.topic.due_ms(one.header.sent_ms))
+                due_times.add(due_ms)
     overs = [one.header.sent_ms for one in messages if one.topic is MISSION_OVER]
     end_ms = max(overs[0] + WRAP_UP_MS, last_ms) if overs else last_ms
     agreed = 0
