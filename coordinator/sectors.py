@@ -18,8 +18,7 @@ import numpy as np
 from comms.node import Received
 from comms.said.messages import Hotspot
 from coordinator.agenda import Agenda, Item
-from coordinator.allocate.routes import HORIZON_S
-from coordinator.allocate.situation import Helper
+from coordinator.allocate.situation import HORIZON_S, Helper
 from coordinator.cut.window import Window
 from coordinator.expect.expectation import ExpectedMap
 from coordinator.vehicles import KnownVehicle

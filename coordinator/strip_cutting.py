@@ -10,8 +10,8 @@ import numpy as np
 
 from comms.said.announcement import RosterVehicle
 from comms.said.messages import StripState
-from coordinator.allocate.routes import HORIZON_S, plan_routes
-from coordinator.allocate.situation import Situation
+from coordinator.allocate.routes import plan_each
+from coordinator.allocate.situation import HORIZON_S, Situation
 from coordinator.briefing import Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.cutter import Cutter, Flown
@@ -83,11 +83,12 @@ class StripCutting:
         helpers, grid = situation.helpers, self._grid
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
 
-        def flown(cuts: Sequence[Counted]) -> Mapping[int, float]:
+        def flown(choices: Sequence[Sequence[Counted]]) -> Sequence[Mapping[int, float]]:
             if not helpers:
-                return dict.fromkeys(range(len(cuts)), 1.0)
-            strips = [self._briefing.as_open(cut.strip(grid, place), cut) for place, cut in enumerate(cuts)]
-            return plan_routes(strips, helpers, deadline_s, COMPARED_BEAM).shares
+                return [dict.fromkeys(range(len(cuts)), 1.0) for cuts in choices]
+            as_open = self._briefing.as_open
+            strips = [[as_open(cut.strip(grid, place), cut) for place, cut in enumerate(cuts)] for cuts in choices]
+            return [routes.shares for routes in plan_each(strips, helpers, deadline_s, COMPARED_BEAM)]
 
         return flown
 

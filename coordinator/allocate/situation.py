@@ -14,6 +14,9 @@ from planner.keep_out import NOWHERE, KeepOut
 from planner.types import FloatArray, Strip
 from planner.way_home import WayHome
 
+HORIZON_S = 4 * 3600.0
+"""How far ahead is planned while nobody can tell when the mission ends."""
+
 
 @dataclass(frozen=True)
 class OpenStrip:

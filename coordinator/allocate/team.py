@@ -10,7 +10,7 @@ from statistics import median
 import numpy as np
 
 from coordinator.allocate.service import StripTable, StripWays, tables_of
-from coordinator.allocate.situation import Helper, OpenStrip
+from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip
 from planner.types import FloatArray
 
 MOST_STRIPS = 32
@@ -23,13 +23,13 @@ looks at the same ground."""
 class Team:
     """What helpers find.
 
-    A node is a strip flown one way; the last node is a helper's start. `to_begin_s`, `sweep_s`, `home_s`: shape
-    (helpers * nodes, strips): how long it is from each node of each helper until the sonar is on at a strip, flown the
-    way that is shortest, as a helper's agent does, how long the sonar is on then, and how long it is home after that;
-    `way`, shape (helpers, nodes, strips): the node that this is. `worth_m2`: (helpers, strips). `alone_s`: what a strip
-    takes by itself, and `alone_m2`: what it brings at most, shape (strips,); `by_rate`: the strips' places in order of
-    what they so bring a second, the most first, `rank`: of each its place in that order. `later_m2ps`: what a second is
-    worth for which no strip is left.
+    A node is a strip flown one way; the last node is a helper's start. `table`, shape (helpers, nodes, 4, strips): how
+    long it is from each node of each helper until the sonar is on at a strip, flown the way that is shortest, as a
+    helper's agent does, how long the sonar is on then, how long it is home after that, and what the strip is worth;
+    `way`, shape (helpers, nodes, strips): the node that this is. `alone_s`: what a strip takes by itself, and
+    `alone_m2`: what it brings at most, shape (strips,); `by_rate`: the strips' places in order of what they so bring a
+    second, the most first, `rank`: of each its place in that order. `later_m2ps`: what a second is worth for which no
+    strip is left.
     """
 
     def __init__(self, strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float) -> None:
@@ -39,38 +39,32 @@ class Team:
         count, ways = len(self.strips), max(one.sonar_on_s.shape[1] for one in tables)
         self.start, self.nodes = count * ways, count * ways + 1
         places = np.arange(count)
-        # At nodes that a helper does not have:
-        shape = (len(helpers), self.nodes, count)
-        to_begin_s, sweep_s, home_s = np.full(shape, np.inf), np.ones(shape), np.zeros(shape)
-        self.way = np.zeros(shape, dtype=np.intp)
+        self.table, self.way = _empty((len(helpers), self.nodes), count)
         for some in _alike(tables):
             table = tables[some[0]]
             own = table.sonar_on_s.shape[1]
             nodes = (places[:, np.newaxis] * ways + np.arange(own)).ravel()
             starts = [helpers[number].free_at for number in some]
             its_s, chosen = table.ways.shortest_from(np.concatenate([table.leave.reshape(-1, 3), starts]))
+            way, sweep_s = places * ways + chosen, table.sonar_on_s[places, chosen]
             for place, number in enumerate(some, start=nodes.size):
+                its, home_s = self.table[number], tables[number].home_s[places, chosen]
                 for rows, poses in ((nodes, slice(nodes.size)), (self.start, place)):
-                    self.way[number, rows] = places * ways + chosen[poses]
-                    to_begin_s[number, rows] = its_s[poses]
-                    sweep_s[number, rows] = table.sonar_on_s[places, chosen[poses]]
-                    home_s[number, rows] = tables[number].home_s[places, chosen[poses]]
-        self.to_begin_s: FloatArray = to_begin_s.reshape(-1, count)
-        self.sweep_s: FloatArray = sweep_s.reshape(-1, count)
-        self.home_s: FloatArray = home_s.reshape(-1, count)
-        self.worth_m2 = np.array([one.worth_m2 for one in tables])
+                    self.way[number, rows] = way[poses]
+                    its[rows, 0], its[rows, 1], its[rows, 2] = its_s[poses], sweep_s[poses], home_s[poses]
+                its[:, 3] = tables[number].worth_m2
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
         self.lasts_s = np.array([one.lasts_until_s for one in helpers])
         self.until_s = np.minimum(self.lasts_s, deadline_s)
         self.deadline_s = deadline_s
-        self.alone_m2 = self.worth_m2.max(axis=0)
+        self.alone_m2 = self.table[:, self.start, 3].max(axis=0)
         sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
-        self.alone_s = sweeps_s + self._usual_way_s(to_begin_s)
+        self.alone_s = sweeps_s + self._usual_way_s(self.table[:, :, 0])
         rates = self.alone_m2 / self.alone_s
         self.later_m2ps = LATER_SHARE * float(rates.min())
         self.by_rate = np.argsort(-rates, kind="stable")
-        self.rank = np.argsort(self.by_rate, kind="stable")
-        self.alone_s_by_rate, self.alone_m2_by_rate = self.alone_s[self.by_rate], self.alone_m2[self.by_rate]
+        self.rank = np.empty_like(self.by_rate)
+        self.rank[self.by_rate] = places
 
     def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, dict[int, float]]:
         """What is removed by the deadline, and by number the share of each strip that is flown by then; `routes`: of
@@ -79,12 +73,11 @@ class Team:
         for one, route in enumerate(routes):
             at, now_s = self.start, self.helpers[one].free_s
             for place in route:
-                row = one * self.nodes + at
-                begins_s, sweep_s = now_s + self.to_begin_s[row, place], self.sweep_s[row, place]
-                at = self.way[one, at, place]
-                share = min(1.0, max(0.0, float((self.deadline_s - begins_s) / sweep_s)))
+                to_begin_s, sweep_s, _, worth_m2 = self.table[one, at, :, place].tolist()
+                begins_s, at = now_s + to_begin_s, self.way[one, at, place]
+                share = min(1.0, max(0.0, (self.deadline_s - begins_s) / sweep_s))
                 shares[self.strips[place].strip.number] = share
-                total_m2 += float(self.worth_m2[one, place]) * share
+                total_m2 += worth_m2 * share
                 now_s = begins_s + sweep_s + self.run_out_s[one]
         return total_m2, shares
 
@@ -96,6 +89,42 @@ class Team:
         least_s = np.append(nearest_s.min(axis=1), to_begin_s[:, self.start].min())
         finite_s = least_s[np.isfinite(least_s)].tolist()
         return median(finite_s) if finite_s else math.nan
+
+
+class Teams:
+    """Teams of the same helpers, each with strips of its own, whose tables lie one behind the other; strips and nodes
+    are as many as the team with the most of them has, those that others have not bring nothing.
+
+    `table`, shape (teams * helpers * nodes, 4, strips), `way`, (teams * helpers * nodes, strips), `by_rate` and `rank`,
+    (teams, strips), `start` and `later_m2ps`, (teams,): see `Team`. `alone`: `alone_s` and `alone_m2`, shape (teams, 2,
+    strips), and in order of `by_rate` `alone_by_rate`; `later`: what comes behind all strips, shape (teams, 2).
+    """
+
+    def __init__(self, teams: Sequence[Team]) -> None:
+        self.all, self.helpers, self.deadline_s = teams, teams[0].helpers, teams[0].deadline_s
+        self.strips, self.nodes = max(len(one.strips) for one in teams), max(one.nodes for one in teams)
+        self.run_out_s, self.lasts_s, self.until_s = teams[0].run_out_s, teams[0].lasts_s, teams[0].until_s
+        self.start = np.array([one.start for one in teams])
+        self.later_m2ps = np.array([one.later_m2ps for one in teams])
+        self.later = np.array([(HORIZON_S, HORIZON_S * one.later_m2ps) for one in teams])
+        table, way = _empty((len(teams), len(self.helpers), self.nodes), self.strips)
+        self.by_rate = np.tile(np.arange(self.strips), (len(teams), 1))
+        self.rank = self.by_rate.copy()
+        self.alone, self.alone_by_rate = np.zeros((2, len(teams), 2, self.strips))
+        for number, one in enumerate(teams):
+            own, nodes = len(one.strips), one.nodes
+            table[number, :, :nodes, :, :own], way[number, :, :nodes, :own] = one.table, one.way
+            self.by_rate[number, :own], self.rank[number, :own] = one.by_rate, one.rank
+            self.alone[number, :, :own] = one.alone_s, one.alone_m2
+            self.alone_by_rate[number, :, :own] = self.alone[number].take(one.by_rate, axis=1)
+        self.table, self.way = table.reshape(-1, 4, self.strips), way.reshape(-1, self.strips)
+
+
+def _empty(nodes: tuple[int, ...], strips: int) -> tuple[FloatArray, np.ndarray]:
+    """A table as that of `Team`, of nodes that no helper has, and the ways."""
+    table = np.zeros((*nodes, 4, strips))
+    table[..., 0, :], table[..., 1, :] = np.inf, 1.0
+    return table, np.zeros((*nodes, strips), dtype=np.intp)
 
 
 def _alike(tables: Sequence[StripTable]) -> list[list[int]]:

@@ -7,7 +7,7 @@ of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from coordinator.cut.ground import Ground
@@ -23,8 +23,9 @@ STAYS_FOR = 0.005  # share of what strips remove by which those cut anew must be
 TURNS_FOR = 0.02  # and by which those of the other heading must, as what is expected changes from one cut to the next
 BLOCKS_A_SWATH = 5  # cells are taken together in blocks, of which at least so many make a swath
 
-Flown = Callable[[Sequence[Counted]], Mapping[int, float]]
-"""Tells how far helpers come in time: by its place in these strips the share that they fly of each, if any."""
+Flown = Callable[[Sequence[Sequence[Counted]]], Sequence[Mapping[int, float]]]
+"""Tells how far helpers come in time with each of several choices of strips: by a strip's place in its choice the share
+that they fly of it, if any."""
 
 
 class Cutter:
@@ -97,31 +98,43 @@ class Cutter:
     def _best(self, left: Ground, time_m: float, opened: Sequence[Window], flown: Flown) -> tuple[list[Window], Ground]:
         """The windows by which helpers leave least, those of the open strips or some cut anew, and the ground as they
         leave it."""
-        stay = _counted(left, opened, self._kept.least_m2)
-        best, before_m2, kept = [one.window for one in stay], left.left_m2(), self._kept
-        after, rest_m2 = as_it_is = self._flown(left, stay, flown)
-        most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
-        turns = not best or self._searches % self._turns_each == 0
+        stay, kept = _counted(left, opened, self._kept.least_m2), self._kept
+        turns = not stay or self._searches % self._turns_each == 0
         self._searches += 1
-        for way in self._ways if turns else (self._kept,):
-            windows = way.windows(left, time_m)
-            anew = _counted(left, windows if self._room is None else self._room.flyable(self._block, windows))
-            after_anew, rest_m2 = as_it_is if anew == stay else self._flown(left, anew, flown)
+        ways = self._ways if turns else [kept]
+        cuts_anew = [self._anew(left, way.windows(left, time_m)) for way in ways]
+        before_m2, leaves = left.left_m2(), self._flown(left, [stay, *cuts_anew], flown)
+        best, (after, rest_m2) = stay, leaves[stay]
+        most_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR) * (1.0 + STAYS_FOR)
+        for way, anew in zip(ways, cuts_anew, strict=True):
+            after_anew, rest_m2 = leaves[anew]
             gained_m2 = (before_m2 - rest_m2) * (1.0 + TURNS_FOR if way is kept else 1.0)
             if gained_m2 > most_m2 or not best:
-                most_m2, best, after, self._kept = gained_m2, [one.window for one in anew], after_anew, way
-        return best, after
+                most_m2, best, after, self._kept = gained_m2, anew, after_anew, way
+        return [one.window for one in best], after
 
-    def _flown(self, ground: Ground, blocks: Sequence[Counted], flown: Flown) -> tuple[Ground, float]:
-        """The ground as helpers leave it that fly some windows by the best routes, and what is left of the objective
-        with what their metres cost at least."""
-        after, least_m2 = ground.copy(), 0.0
-        in_cells = [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in blocks]
-        for place, share in flown(in_cells).items():
-            window = blocks[place].window
-            after.fly(window, share)
-            least_m2 += share * self._kept.least_m2(window)
-        return after, after.left_m2() + least_m2
+    def _anew(self, ground: Ground, windows: Sequence[Window]) -> tuple[Counted, ...]:
+        """What windows that are cut anew count, as far as they can be flown."""
+        return _counted(ground, windows if self._room is None else self._room.flyable(self._block, windows))
+
+    def _flown(
+        self, ground: Ground, choices: Iterable[tuple[Counted, ...]], flown: Flown
+    ) -> dict[tuple[Counted, ...], tuple[Ground, float]]:
+        """The ground as helpers leave it that fly each of some choices of windows by the best routes, and what is left
+        of the objective with what their metres cost at least."""
+        leaves = dict[tuple[Counted, ...], tuple[Ground, float]]()
+        differ = list(dict.fromkeys(choices))
+        in_cells = [
+            [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in choice] for choice in differ
+        ]
+        for choice, shares in zip(differ, flown(in_cells), strict=True):
+            after, least_m2 = ground.copy(), 0.0
+            for place, share in shares.items():
+                window = choice[place].window
+                after.fly(window, share)
+                least_m2 += share * self._kept.least_m2(window)
+            leaves[choice] = after, after.left_m2() + least_m2
+        return leaves
 
     def _cuts(self, ground: Ground, windows: Sequence[Window]) -> list[Cut]:
         """What windows of cells bring if they are flown one after the other."""
@@ -139,7 +152,7 @@ class Cutter:
 
 def _counted(
     ground: Ground, windows: Sequence[Window], least_m2: Callable[[Window], float] | None = None
-) -> list[Counted]:
+) -> tuple[Counted, ...]:
     """What windows count if they are flown one after the other; one that counts no more than `least_m2` says is left
     out, and not flown."""
     left, found = ground.copy(), list[Counted]()
@@ -148,7 +161,7 @@ def _counted(
         if least_m2 is None or counts_m2 > least_m2(window):
             found.append(Counted(window, counts_m2))
             left.fly(window)
-    return found
+    return tuple(found)
 
 
 class OneHeading:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import permutations, product
+from itertools import compress, permutations, product
 
 import numpy as np
 import pytest
@@ -15,11 +15,12 @@ from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
 from coordinator import allocate
-from coordinator.allocate.routes import BEAM, HORIZON_S, Routes, RoutesAllocator, plan_routes
+from coordinator.allocate.plans import Plans
+from coordinator.allocate.routes import BEAM, Routes, RoutesAllocator, plan_each, plan_routes
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
-from coordinator.allocate.situation import Helper, OpenStrip, Situation
-from coordinator.allocate.team import MOST_STRIPS, Team
+from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip, Situation
+from coordinator.allocate.team import MOST_STRIPS, Team, Teams
 
 PLAN = RoutesAllocator()
 NEAR, FAR = open_strip(strip(2, y_m=100)), open_strip(strip(1, y_m=600))
@@ -143,6 +144,8 @@ class TestOneHelper:
 class TestWhatIsPromising:
     """What beams are chosen by."""
 
+    THIRD = open_strip(strip(3, x_m=300, y_m=100))
+
     @pytest.mark.parametrize("deadline_s", [3600.0, 200.0])
     def test_the_strips_left_bring_what_they_do_by_themselves_and_then_a_second_what_the_worst_does_by_half(
         self, deadline_s: float
@@ -152,8 +155,9 @@ class TestWhatIsPromising:
         assert team.alone_m2.tolist() == [350, 700]  # by number: the far one is 1
         assert team.by_rate.tolist() == [1, 0]
         assert team.later_m2ps == pytest.approx(0.5 * 350 / team.alone_s[0])
-        plan = allocate.routes._Plans.begun(team)
-        still_m2 = plan._still_m2(team, plan.ahead(team))
+        teams = Teams([team])
+        plan = Plans.begun(teams)
+        still_m2 = plan._still_m2(teams, plan.ahead(teams))
 
         def brings(time_s: float, *left: int) -> float:
             total_m2 = 0.0
@@ -185,13 +189,14 @@ class TestWhatIsPromising:
         assert found.strips == {"alpha": (1,)}
 
     def test_plans_that_serve_the_same_strips_and_end_at_the_same_places_are_one(self) -> None:
-        turns = np.array([[0, -1, 1], [1, -1, 0], [-1, 0, 1], [0, 1, -1]])
-        nodes = np.array([[4], [4], [4], [4]])
-        plans = allocate.routes._Plans(nodes, np.zeros((4, 1)), np.zeros((4, 1), dtype=np.bool_), turns, np.zeros(4))
-        assert plans.first_that_differ(10).tolist() == [0, 2, 3]
-        assert plans.first_that_differ(2).tolist() == [0, 2]
+        teams = Teams([Team([NEAR, FAR, self.THIRD], [helper()], 3600.0)] * 2)
+        plans = Plans.begun(teams).chosen(np.array([0, 0, 0, 0, 1]))
+        plans.nodes[:] = 4
+        plans.turn[:] = [[0, -1, 1], [1, -1, 0], [-1, 0, 1], [0, 1, -1], [0, -1, 1]]
+        assert plans.first_that_differ(teams, 10).tolist() == [0, 2, 3, 4]
+        assert plans.first_that_differ(teams, 2).tolist() == [0, 2, 4]
         plans.nodes[1], plans.is_done[3] = 5, True
-        assert plans.first_that_differ(10).tolist() == [0, 1, 2, 3]
+        assert plans.first_that_differ(teams, 10).tolist() == [0, 1, 2, 3, 4]
 
 
 class TestSeveralHelpers:
@@ -348,6 +353,15 @@ class TestAgainstAllOrders:
             patch.setattr(allocate.team, "LATER_SHARE", 0.0)
             found = routes(told.strips, told.helpers, until_s)
         assert found.removed_m2 >= by_rate_m2(told, until_s) - 1e-6
+
+    @settings(max_examples=40, deadline=None)
+    @given(told=situations(), data=st.data())
+    def test_planned_side_by_side_they_are_as_each_by_itself(self, told: Situation, data: st.DataObject) -> None:
+        until_s = min(told.deadline_s, HORIZON_S)
+        chosen = st.lists(st.booleans(), min_size=len(told.strips), max_size=len(told.strips))
+        choices = [[*compress(told.strips, data.draw(chosen))] for _ in range(3)]
+        found = plan_each(choices, told.helpers, until_s, BEAM)
+        assert found == [routes(strips, told.helpers, until_s) for strips in choices]
 
     @settings(max_examples=40, deadline=None)
     @given(told=situations(), data=st.data())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -67,7 +67,12 @@ def best_in(time_m: float, *, across: bool = False) -> Flown:
                 metres += share * length_m(cuts[place])
         return shares
 
-    return flown
+    return each(flown)
+
+
+def each(flown: Callable[[Sequence[Counted]], Mapping[int, float]]) -> Flown:
+    """What helpers fly of each choice of strips, as of one by itself."""
+    return lambda choices: [flown(cuts) for cuts in choices]
 
 
 def length_m(one: Counted) -> float:
@@ -225,7 +230,7 @@ class TestHeading:
                 first = {one.window: place for place, one in reversed(list(enumerate(cuts)))}
                 return {place: across if window.across else along for window, place in first.items()}
 
-            return flown
+            return each(flown)
 
         # Twelve strips of 100 m along, four of 300 m across: a look at all takes 27,000 m2, and a metre, with 100 m on
         # the way to each strip, costs 2.5 m2 at least. So 21,000 and 23,000 m2 are gained by flying all.
@@ -347,7 +352,7 @@ class TestBlocks:
         )
         grid = replace(self.FINE, rows=rows, columns=columns)
         return windows(
-            Cutter(grid, rules, 1e-3).cut(told, time_m, (), (), lambda cuts: dict.fromkeys(range(len(cuts)), 1.0))
+            Cutter(grid, rules, 1e-3).cut(told, time_m, (), (), each(lambda cuts: dict.fromkeys(range(len(cuts)), 1.0)))
         )
 
     @pytest.mark.parametrize(("width", "block"), [(1, 1), (5, 1), (9, 1), (10, 2), (20, 4), (23, 1), (40, 8), (41, 1)])
