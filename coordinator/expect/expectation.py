@@ -64,26 +64,29 @@ class ExpectedMap:
         surveys has said its plan."""
         fleet, rho = self._fleet, self._fleet.map.rho
         tracks = self._tracks.of(fleet.primaries)
-        primaries, helpers, largest = self._nats_so_far()
+        primaries, helpers, largest_levels = self._told_so_far()
         share, helpers_share = self._seabed.shares(primaries, tracks.flown)
         nats = primaries + helpers + share * tracks.ahead
-        largest = np.maximum(largest, share * tracks.largest_ahead)
         look_nats = -np.log1p(-np.minimum(self._p_detect * helpers_share, HIGHEST_P_DETECT))
-        more = np.maximum(look_nats - largest, 0.0) if rho > 0 else 0.0  # what it adds to the largest single look
+        if rho > 0:  # the largest single look counts for more, and of another what it adds to that
+            largest = np.maximum(NATS_PER_LEVEL * largest_levels, share * tracks.largest_ahead)
+            nats = largest * rho + nats * (1 - rho)
+            look_nats = np.maximum(look_nats - largest, 0.0) * rho + look_nats * (1 - rho)
         settled = fleet.map.settled_by(fleet.primaries, self._place.cells)
         hot, told_risk = self.hotspots.drawn()
         has_tiles = settled | (primaries + helpers > 0)
-        risk = np.where(hot & ~has_tiles, told_risk, rounded(np.exp(-(largest * rho + nats * (1 - rho)))))
+        risk = np.where(hot & ~has_tiles, told_risk, rounded(np.exp(-nats)))
         is_seen = settled | hot
         plans_are_known = all(one.plan is not None for one in fleet.primaries.values())
         return Expectation(
             risk=np.where(self._inside & (is_seen | plans_are_known), risk, 0.0),
-            look=rounded(-np.expm1(-(more * rho + look_nats * (1 - rho)))),
+            look=rounded(-np.expm1(-look_nats)),
             is_seen=is_seen,
         )
 
-    def _nats_so_far(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """-ln(1 - P_d) of all looks so far: summed over those of primaries and of helpers, and the largest of all."""
+    def _told_so_far(self) -> tuple[FloatArray, FloatArray, LevelArray]:
+        """-ln(1 - P_d) of all looks so far, summed over those of primaries and of helpers, and the level of the largest
+        of all."""
         shape, cells = self.grid.shape, self._place.cells
         primaries, helpers, nats = np.zeros((3, *shape))
         largest_levels = np.zeros(shape, dtype=np.uint8)
@@ -91,4 +94,4 @@ class ExpectedMap:
             sums = primaries if name in self._fleet.primaries else helpers
             sums += np.multiply(layer.sum_levels[cells], NATS_PER_LEVEL, out=nats)
             np.maximum(largest_levels, layer.largest_levels[cells], out=largest_levels)
-        return primaries, helpers, np.multiply(largest_levels, NATS_PER_LEVEL, out=nats)
+        return primaries, helpers, largest_levels
