@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 
@@ -18,8 +17,7 @@ MOST_CELLS = 12  # to a side of a strip that are looked at
 NAMED_SHARE = 0.25  # of a strip's risk, from which a track or a cause is named
 MOST_TRACKS = 3  # that are named
 NADIR_GAP, RANGE_END, BEYOND, BEST = "nadir gap", "range's end", "ends of tracks", "even where tracks see best"
-
-Value = TypeVar("Value", bound=Hashable)
+CAUSES = (BEYOND, NADIR_GAP, RANGE_END, BEST)  # of which the first that holds counts
 
 
 class Reasons:
@@ -48,18 +46,19 @@ class Reasons:
         nearest = apart_m.argmin(axis=0)
         places = np.arange(nearest.size)
         apart_m, is_beyond = apart_m[nearest, places], is_beyond[nearest, places]
-        causes = np.full(nearest.size, BEST, dtype=object)
-        for at in set(nearest.tolist()):
-            here = nearest == at
-            causes[here] = _causes(apart_m[here].tolist(), self._curves[beside[at][0]])
-        causes[is_beyond] = BEYOND
-        tracks = [beside[at] for at in _named(nearest.tolist(), weights)[:MOST_TRACKS]]
+        near_m, far_m = np.array([self._seen_best_m[name] for name, _ in beside])[nearest].T
+        holds = np.array([is_beyond, apart_m <= near_m, apart_m >= far_m, np.ones_like(is_beyond)])
+        tracks = [beside[at] for at in _named(nearest, weights)[:MOST_TRACKS]]
         by = "expected beside" if cut.foreseen else "seen badly by"
-        return f"{by} {self._in_words(tracks)}: {_listed(_named(causes.tolist(), weights))}"
+        return (
+            f"{by} {self._in_words(tracks)}: {_listed([CAUSES[one] for one in _named(holds.argmax(axis=0), weights)])}"
+        )
 
     @cached_property
-    def _curves(self) -> dict[str, DetectionCurve]:
-        return {name: curve_of(one, self._primaries.values()) for name, one in self._primaries.items()}
+    def _seen_best_m(self) -> dict[str, tuple[float, float]]:
+        """Between which ranges each primary sees best."""
+        curves = {name: curve_of(one, self._primaries.values()) for name, one in self._primaries.items()}
+        return {name: _best_m(curve) for name, curve in curves.items()}
 
     def _sampled(self, cut: Cut) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Places of some of a cut's cells, and what each weighs: its risk."""
@@ -98,21 +97,21 @@ def _apart(x_m: FloatArray, y_m: FloatArray, tracks: Sequence[PlannedTrack]) -> 
     return np.hypot(across, over), over > 0
 
 
-def _causes(apart_m: Sequence[float], curve: DetectionCurve) -> list[str]:
+def _best_m(curve: DetectionCurve) -> tuple[float, float]:
+    """From beyond which range to before which P(y) is half of its best, or more."""
     best = int(curve.p_detect.argmax())
     is_low = 2 * curve.p_detect < curve.p_detect[best]
     near_m = float(curve.range_m[:best][is_low[:best]].max(initial=-1.0))
-    far_m = float(curve.range_m[best:][is_low[best:]].min(initial=curve.range_m[-1]))
-    return [NADIR_GAP if one <= near_m else RANGE_END if one >= far_m else BEST for one in apart_m]
+    return near_m, float(curve.range_m[best:][is_low[best:]].min(initial=curve.range_m[-1]))
 
 
-def _named(values: Sequence[Value], weights: FloatArray) -> list[Value]:
-    """Those values that have their share of the weight, the heaviest first; the heaviest in any case."""
-    sums: dict[Value, float] = {}
-    for value, weight in zip(values, weights.tolist(), strict=True):
-        sums[value] = sums.get(value, 0.0) + weight
-    order = sorted(sums, key=lambda one: -sums[one])
-    least = NAMED_SHARE * sum(sums.values())
+def _named(values: np.ndarray, weights: FloatArray) -> list[int]:
+    """Those values, whole numbers from 0 on, that have their share of the weight, the heaviest first; the heaviest in
+    any case."""
+    sums = np.bincount(values, weights).tolist()
+    found = list(dict.fromkeys(values.tolist()))
+    order = sorted(found, key=lambda one: -sums[one])
+    least = NAMED_SHARE * sum(sums[one] for one in found)
     return [one for place, one in enumerate(order) if place == 0 or sums[one] >= least]
 
 
