@@ -86,7 +86,8 @@ def _best_apart(profits: Sequence[float], width: int) -> list[int]:
     column on."""
     most = [0.0] * (len(profits) + width)  # behind so many zeros: the most up to a window
     for place, here in enumerate(profits, start=width):
-        most[place] = max(most[place - 1], most[place - width] + here)
+        without, with_it = most[place - 1], most[place - width] + here
+        most[place] = with_it if with_it > without else without
     chosen: list[int] = []
     place = len(most) - 1
     while most[place] > 0:

@@ -125,7 +125,8 @@ class Cutter:
         leaves = dict[tuple[Counted, ...], tuple[Ground, float]]()
         differ = list(dict.fromkeys(choices))
         in_cells = [
-            [replace(one, window=one.window.in_cells(self._block, self._shape)) for one in choice] for choice in differ
+            [Counted(one.window.in_cells(self._block, self._shape), one.counts_m2) for one in choice]
+            for choice in differ
         ]
         for choice, shares in zip(differ, flown(in_cells), strict=True):
             after, least_m2 = ground.copy(), 0.0

@@ -16,7 +16,7 @@ from itertools import pairwise
 from coordinator.cut.bands import TOLERANCE, Bands
 from coordinator.cut.ground import Ground
 from coordinator.cut.window import Window
-from planner.types import GridSpec, Point, Strip
+from planner.types import GridSpec, Strip
 
 MOST_PASSES = 6  # of the search, each over what those before have left
 
@@ -111,11 +111,10 @@ def strip_of(grid: GridSpec, window: Window, number: int) -> Strip:
     first_along_m, length_m = window.first_row * grid.cell_m, window.rows * grid.cell_m
     heading_rad = grid.frame.heading_rad
     if window.across:
-        x_m, y_m = grid.frame.to_mission(first_across_m, first_along_m + length_m / 2)
+        start = grid.frame.to_mission(first_across_m, first_along_m + length_m / 2)
         heading_rad, length_m, width_m = (heading_rad + math.pi / 2) % (2 * math.pi), width_m, length_m
     else:
-        x_m, y_m = grid.frame.to_mission(first_across_m + width_m / 2, first_along_m)
-    start: Point = (float(x_m), float(y_m))
+        start = grid.frame.to_mission(first_across_m + width_m / 2, first_along_m)
     return Strip(number, start, heading_rad, length_m, width_m)
 
 
@@ -126,6 +125,8 @@ def cells_wide(grid: GridSpec, swath_m: float) -> int:
 
 def _pieces(first: int, end: int, shortest: int, longest: int) -> list[tuple[int, int]]:
     """A band of rows in equal pieces; where these would be too short, in longest ones, and a rest that is left out."""
+    if shortest <= end - first <= longest:
+        return [(first, end)]
     count = -(-(end - first) // longest)
     if end - first < count * shortest:
         edges = list(range(first, end + 1, longest))
