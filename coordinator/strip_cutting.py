@@ -88,7 +88,8 @@ class StripCutting:
                 return [dict.fromkeys(range(len(cuts)), 1.0) for cuts in choices]
             as_open = self._briefing.as_open
             strips = [[as_open(cut.strip(grid, place), cut) for place, cut in enumerate(cuts)] for cuts in choices]
-            return [routes.shares for routes in plan_each(strips, helpers, deadline_s, COMPARED_BEAM)]
+            found = plan_each([(some, helpers) for some in strips], deadline_s, COMPARED_BEAM)
+            return [routes.shares for routes in found]
 
         return flown
 

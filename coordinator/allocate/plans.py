@@ -68,7 +68,7 @@ class Plans:
             np.full((len(teams.all), 1 + 2 * helpers + teams.strips), -1), np.zeros((len(teams.all), helpers + 1))
         )
         plans.team[:], plans.nodes[:], plans.is_done[:] = np.arange(len(teams.all)), teams.start[:, np.newaxis], False
-        plans.free_s[:] = [one.free_s for one in teams.helpers]
+        plans.free_s[:] = teams.free_s
         return plans
 
     @property

@@ -56,36 +56,26 @@ class RoutesAllocator:
         if not situation.strips or all(one.sweeping for one in helpers):
             return {}
         deadline_s = min(situation.deadline_s, situation.now_s + HORIZON_S)
-        routes = plan_routes(situation.strips, helpers, deadline_s, self.beam)
+        freed = [  # each that is on its way as if it gave its task back
+            (one.task, replace(one, task=None, free_at=one.pose, free_s=situation.now_s))
+            for one in helpers
+            if one.task is not None and not one.sweeping
+        ]
+        turned_round: list[Choice] = [
+            ((*situation.strips, task), [free if one.vehicle == free.vehicle else one for one in helpers])
+            for task, free in freed
+        ]
+        routes, *others = plan_each([(situation.strips, helpers), *turned_round], deadline_s, self.beam)
         offers = {one.vehicle: routes.strips[one.vehicle][0] for one in situation.free if routes.strips[one.vehicle]}
         offers |= _to_idle(situation, offers)
-        for helper in helpers:
-            if helper.task is not None and not helper.sweeping:
-                other = self._turned_round(situation, helpers, helper, helper.task, routes.removed_m2, deadline_s)
-                if other is not None and other not in offers.values():
-                    offers[helper.vehicle] = other
+        for (task, free), its_routes in zip(freed, others, strict=True):
+            worth_m2 = removed_m2(task, free, expected_service(task, free), deadline_s)
+            route = its_routes.strips[free.vehicle]
+            better_m2 = its_routes.removed_m2 - routes.removed_m2 - worth_m2
+            is_better = route and better_m2 > situation.switch_margin * worth_m2
+            if is_better and route[0] != task.strip.number and route[0] not in offers.values():
+                offers[free.vehicle] = route[0]
         return offers
-
-    def _turned_round(
-        self,
-        situation: Situation,
-        helpers: Sequence[Helper],
-        helper: Helper,
-        task: OpenStrip,
-        planned_m2: float,
-        deadline_s: float,
-    ) -> int | None:
-        """The strip that a helper would be sent to if it gave its task back; None where that is not better by the
-        margin."""
-        free = replace(helper, task=None, free_at=helper.pose, free_s=situation.now_s)
-        worth_m2 = removed_m2(task, free, expected_service(task, free), deadline_s)
-        team = [free if one is helper else one for one in helpers]
-        routes = plan_routes((*situation.strips, task), team, deadline_s, self.beam)
-        route = routes.strips[helper.vehicle]
-        if not route or route[0] == task.strip.number:
-            return None
-        better_m2 = routes.removed_m2 - planned_m2 - worth_m2
-        return route[0] if better_m2 > situation.switch_margin * worth_m2 else None
 
 
 def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, int]:
@@ -96,22 +86,25 @@ def _to_idle(situation: Situation, offers: Mapping[str, int]) -> Mapping[str, in
     return GreedyAllocator().assign(replace(situation, helpers=idle, strips=strips))
 
 
+Choice = tuple[Sequence[OpenStrip], Sequence[Helper]]
+"""Strips that helpers are to choose from."""
+
+
 def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: float, beam: int) -> Routes:
     """The routes of a team from where and when each helper is free."""
-    (routes,) = plan_each([strips], helpers, deadline_s, beam)
+    (routes,) = plan_each([(strips, helpers)], deadline_s, beam)
     return routes
 
 
-def plan_each(
-    choices: Sequence[Sequence[OpenStrip]], helpers: Sequence[Helper], deadline_s: float, beam: int
-) -> list[Routes]:
-    """The same over each of several choices of strips. They are planned side by side, which hardly takes longer than
-    one by itself, as there are few plans in a beam."""
-    if not helpers or not any(choices):
-        return [Routes(0.0, {one.vehicle: () for one in helpers}, {}) for _ in choices]
-    teams = Teams([Team(strips, helpers, deadline_s) for strips in choices if strips])
-    found = iter(_planned(teams, beam))
-    return [next(found) if strips else Routes(0.0, {one.vehicle: () for one in helpers}, {}) for strips in choices]
+def plan_each(choices: Sequence[Choice], deadline_s: float, beam: int) -> list[Routes]:
+    """The same for each of several choices, all for the same helpers but for where and when they are free. They are
+    planned side by side, which hardly takes longer than one by itself, as there are few plans in a beam."""
+    teams = [Team(strips, helpers, deadline_s) for strips, helpers in choices if strips and helpers]
+    found = iter(_planned(Teams(teams), beam) if teams else ())
+    return [
+        next(found) if strips and helpers else Routes(0.0, {one.vehicle: () for one in helpers}, {})
+        for strips, helpers in choices
+    ]
 
 
 def _planned(teams: Teams, beam: int) -> list[Routes]:

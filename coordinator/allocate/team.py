@@ -92,12 +92,14 @@ class Team:
 
 
 class Teams:
-    """Teams of the same helpers, each with strips of its own, whose tables lie one behind the other; strips and nodes
-    are as many as the team with the most of them has, those that others have not bring nothing.
+    """Teams of the same helpers, but for where and when they are free, each with strips of its own, whose tables lie
+    one behind the other; strips and nodes are as many as the team with the most of them has, those that others have not
+    bring nothing.
 
     `table`, shape (teams * helpers * nodes, 4, strips), `way`, (teams * helpers * nodes, strips), `by_rate` and `rank`,
-    (teams, strips), `start` and `later_m2ps`, (teams,): see `Team`. `alone`: `alone_s` and `alone_m2`, shape (teams, 2,
-    strips), and in order of `by_rate` `alone_by_rate`; `later`: what comes behind all strips, shape (teams, 2).
+    (teams, strips), `start` and `later_m2ps`, (teams,): see `Team`. `free_s`: shape (teams, helpers). `alone`:
+    `alone_s` and `alone_m2`, shape (teams, 2, strips), and in order of `by_rate` `alone_by_rate`; `later`: what comes
+    behind all strips, shape (teams, 2).
     """
 
     def __init__(self, teams: Sequence[Team]) -> None:
@@ -105,6 +107,7 @@ class Teams:
         self.strips, self.nodes = max(len(one.strips) for one in teams), max(one.nodes for one in teams)
         self.run_out_s, self.lasts_s, self.until_s = teams[0].run_out_s, teams[0].lasts_s, teams[0].until_s
         self.start = np.array([one.start for one in teams])
+        self.free_s = np.array([[helper.free_s for helper in one.helpers] for one in teams], dtype=np.float64)
         self.later_m2ps = np.array([one.later_m2ps for one in teams])
         self.later = np.array([(HORIZON_S, HORIZON_S * one.later_m2ps) for one in teams])
         table, way = _empty((len(teams), len(self.helpers), self.nodes), self.strips)

@@ -359,9 +359,14 @@ class TestAgainstAllOrders:
     def test_planned_side_by_side_they_are_as_each_by_itself(self, told: Situation, data: st.DataObject) -> None:
         until_s = min(told.deadline_s, HORIZON_S)
         chosen = st.lists(st.booleans(), min_size=len(told.strips), max_size=len(told.strips))
-        choices = [[*compress(told.strips, data.draw(chosen))] for _ in range(3)]
-        found = plan_each(choices, told.helpers, until_s, BEAM)
-        assert found == [routes(strips, told.helpers, until_s) for strips in choices]
+        choices = [
+            (
+                [*compress(told.strips, data.draw(chosen))],
+                [replace(one, free_s=one.free_s + late_s) for one in told.helpers],
+            )
+            for late_s in (0, 0, 60)
+        ]
+        assert plan_each(choices, until_s, BEAM) == [routes(*choice, until_s) for choice in choices]
 
     @settings(max_examples=40, deadline=None)
     @given(told=situations(), data=st.data())
