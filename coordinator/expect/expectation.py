@@ -91,6 +91,8 @@ class ExpectedMap:
         primaries, helpers, nats = np.zeros((3, *shape))
         largest_levels = np.zeros(shape, dtype=np.uint8)
         for name, layer in self._fleet.map.layers.items():
+            if not layer.sum_levels[cells].any():
+                continue  # as most of a large fleet's elsewhere
             sums = primaries if name in self._fleet.primaries else helpers
             sums += np.multiply(layer.sum_levels[cells], NATS_PER_LEVEL, out=nats)
             np.maximum(largest_levels, layer.largest_levels[cells], out=largest_levels)
