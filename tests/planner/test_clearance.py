@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import nbinom
 
 from planner.clearance import (
     PRIOR_MINES,
@@ -34,6 +34,12 @@ def left_of(risk: float | np.ndarray, found: float, scatter: float = 0.0, place:
     return told
 
 
+def negative_binomial(mines: float, chance: float) -> Any:
+    from scipy.stats import nbinom  # it takes half a second to import
+
+    return nbinom(mines, chance)
+
+
 def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> None:
     told = left_of(0.5, 20)
     assert told.mean == pytest.approx(20.5)
@@ -43,7 +49,7 @@ def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> 
 
 @pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5)])
 def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: float) -> None:
-    told, true = left_of(risk, found), nbinom(found + PRIOR_MINES, 1.0 - risk)
+    told, true = left_of(risk, found), negative_binomial(found + PRIOR_MINES, 1.0 - risk)
     assert (told.low, told.high) == (true.ppf(0.05), true.ppf(0.95))
     assert told.none == pytest.approx(true.pmf(0))
     assert told.mean == pytest.approx(true.mean())
@@ -83,7 +89,7 @@ def test_where_mines_lie_denser_more_are_left() -> None:
 
 @pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0)])
 def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: float) -> None:
-    told, true = left_of(risk, found), nbinom(found + PRIOR_MINES, 1.0 - risk)
+    told, true = left_of(risk, found), negative_binomial(found + PRIOR_MINES, 1.0 - risk)
     for number in (0, 1, 3, 9.9, 30):
         assert told.chance_of_at_most(number) == pytest.approx(true.cdf(math.floor(number)))
     assert told.chance_of_at_most(-0.5) == 0.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.stats import nbinom
 
 from planner.clearance import PRIOR_MINES, MinesLeft, mines_left
 from planner.goal import Goal, Lane, goal_of_lane
@@ -23,6 +22,8 @@ def left_of(risk: float, found: float) -> MinesLeft:
 
 
 def test_of_100_that_are_found_25_may_be_left_for_a_clearance_of_80_percent() -> None:
+    from scipy.stats import nbinom  # it takes half a second to import
+
     left, true = left_of(0.15, 100.0), nbinom(100.0 + PRIOR_MINES, 0.85)
     goal = Goal(0.8, 0.9)
     assert goal.chance_now(left) == pytest.approx(true.cdf(25))

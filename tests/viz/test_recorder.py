@@ -12,6 +12,7 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -463,23 +464,28 @@ signal.pause()
     assert len(rows(path, f"/fleet/{PRIMARY}", "Transform3D:translation")) > 60
 
 
-SHORT = mission(tracks=5)
-FEW = [
-    received
-    for place, received in enumerate(SHORT)
-    if not isinstance(received.message, (Nav, TruthPose, CoverageTile, AgentState)) or place % 90 == 0
-]
+@cache
+def few() -> list[Received]:
+    """Of a short stream every message but most of those that come often."""
+    return [
+        received
+        for place, received in enumerate(mission(tracks=5))
+        if not isinstance(received.message, (Nav, TruthPose, CoverageTile, AgentState)) or place % 90 == 0
+    ]
 
 
 def test_the_short_stream_has_every_message_but_looks() -> None:
     without_modems = {topic.message for topic in TOPICS if not topic.has_platform}
-    assert {type(received.message) for received in FEW} == without_modems - {Look}
+    assert {type(received.message) for received in few()} == without_modems - {Look}
 
 
 @settings(max_examples=15)
-@given(order=st.permutations(range(len(FEW))), repeated=st.lists(st.integers(0, len(FEW) - 1), max_size=20))
-def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated: list[int]) -> None:
-    stream = [FEW[place] for place in (*order, *repeated)]
+@given(st.data())
+def test_any_order_is_drawn_and_ends_in_the_same_map(data: st.DataObject) -> None:
+    stream = [
+        *data.draw(st.permutations(few()), label="order"),
+        *data.draw(st.lists(st.sampled_from(few()), max_size=20), label="repeated"),
+    ]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "mission.rrd"
         recorder = Recorder(RecorderConfig(path, Story))
@@ -487,7 +493,7 @@ def test_any_order_is_drawn_and_ends_in_the_same_map(order: list[int], repeated:
             recorder.on_message(received)
         recorder.close()
         drawn = drawn_maps(path, "risk", 1)
-    np.testing.assert_array_equal(drawn[-1][1][..., 0], np.rint(risk_of(FEW, FEW[-1].header.sent_ms) * 255))
+    np.testing.assert_array_equal(drawn[-1][1][..., 0], np.rint(risk_of(few(), few()[-1].header.sent_ms) * 255))
 
 
 def test_the_table_tells_who_has_which_strip(messages: list[Received], recording: Path) -> None:

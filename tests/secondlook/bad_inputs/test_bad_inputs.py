@@ -48,7 +48,7 @@ LONGEST_LINE = 600  # characters
 COMMAND = typer.main.get_command(cli.app_for([]))
 
 
-class Loader(yaml.SafeLoader):
+class Loader(yaml.CSafeLoader):
     """Refuses a key that is given twice: one of its rows would be lost."""
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
