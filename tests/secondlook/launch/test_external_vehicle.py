@@ -132,7 +132,7 @@ def test_the_example_flies_a_mission_through_its_own_agent(tmp_path: Path) -> No
     """The vehicle speaks through the agent's process, and so goes on talking with it whatever becomes of the router."""
     with spread_fleet(tmp_path, loopback_endpoint(), *PATIENT, scenario=BAY) as fleet:
         own = loopback_endpoint()
-        fleet.router(20)
+        fleet.router(30)
         for role, more in ((("world",), ()), (("agent", "primary"), ()), (("agent", "helper"), ("--listen", own))):
             fleet.node(*role, more=more)
         fleet.node("coordinator")

@@ -20,14 +20,15 @@ BODY = ("--start", "-10", "-20", "--speed", "12", "--range", "15", "--run", "bay
 
 def test_a_vehicle_that_is_cut_off_is_lost_for_a_while_and_its_map_is_whole_in_the_end(tmp_path: Path) -> None:
     require(missing_for_namespaces())
-    longer = ("--set", "mission.deadline_factor=2.5")  # the helper is to have time for strips however slow it goes
+    # The helper is to have time for strips however slow it goes, and is lost when it is silent for some 3 s.
+    longer = ("--set", "mission.deadline_factor=2.5", "--set", "coordinator.lost_after_s=50")
     with (
         namespaces("ship", "helper") as hosts,
         spread_fleet(tmp_path, f"tls/{hosts.address}:7447", *longer, scenario=EXAMPLE / "bay.yaml") as fleet,
     ):
         certificates = make_certificates(tmp_path / "certificates", NAMES, hosts.address)
         made = {name: options(one) for name, one in certificates.items()}
-        fleet.router(10, *made["router"], before=hosts.within("hub"))
+        fleet.router(16, *made["router"], before=hosts.within("hub"))
         ship, helper = hosts.within("ship"), hosts.within("helper")
         fleet.node("world", more=made["world"], before=ship)
         fleet.node("agent", "primary", more=made["primary"], before=ship)

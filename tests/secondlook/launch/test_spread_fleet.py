@@ -13,7 +13,7 @@ from spread import PATIENT, SpreadFleet, interrupt, kill, loopback_endpoint, los
 
 from secondlook.launch.spread_fleet import nothing_in
 
-FACTOR = 15.0
+FACTOR = 25.0
 NODES = (("world",), ("agent", "primary"), ("agent", "helper"), ("coordinator",))
 
 
