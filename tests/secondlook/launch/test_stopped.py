@@ -7,10 +7,10 @@ import json
 import os
 import signal
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import pytest
 from flights import BRIEF, Flight, flight, until
 from stopped_run import PATIENCE_S
 
@@ -25,13 +25,7 @@ SLOW = (
     "vehicles.primary.endurance_s=360000",
 )  # some seconds of wall time in lockstep
 STOPPED_S = 1.2 * PATIENCE_S
-
-
-@pytest.fixture(scope="module")
-def digest(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Of the mission in lockstep, as nobody stops it."""
-    options = RunOptions(tmp_path_factory.mktemp("alone"), bus="local", record=False)
-    return str(run_mission(load_scenario(str(BRIEF), SLOW), options)["digest"])
+WHO = ("all", "the launcher")
 
 
 def ended(flying: Flight) -> dict[str, Any]:
@@ -42,14 +36,17 @@ def ended(flying: Flight) -> dict[str, Any]:
     return summary
 
 
-@pytest.mark.parametrize("who", ["all", "the launcher"])
-def test_a_fleet_that_was_stopped_goes_on(tmp_path: Path, digest: str, who: str) -> None:
-    with (
-        flight(tmp_path / "lockstep", "0", *SLOW, program=PROGRAM) as lockstep,
-        flight(tmp_path / "wall", f"{FACTOR:g}", program=PROGRAM) as wall,
-    ):
+def test_a_fleet_that_was_stopped_goes_on(tmp_path: Path) -> None:
+    """One in lockstep and one by the wall clock as a whole, and of as many others the launcher alone, all at once."""
+    with ExitStack() as stack:
+
+        def starts(name: str, factor: str, *settings: str) -> Flight:
+            return stack.enter_context(flight(tmp_path / name, factor, *settings, program=PROGRAM))
+
+        lockstep = [starts(f"lockstep, {who}", "0", *SLOW) for who in WHO]
+        wall = [starts(f"wall, {who}", f"{FACTOR:g}") for who in WHO]
         pids = []
-        for flying in (lockstep, wall):
+        for flying, who in zip(lockstep + wall, WHO * 2, strict=True):
             assert until(flying.is_under_way)
             pids += [flying.process.pid, *(flying.children().values() if who == "all" else ())]
             for pid in pids:
@@ -57,9 +54,12 @@ def test_a_fleet_that_was_stopped_goes_on(tmp_path: Path, digest: str, who: str)
         threading.Event().wait(STOPPED_S)  # for so long nothing is to happen
         for pid in pids:
             os.kill(pid, signal.SIGCONT)
-        stepped, timed = ended(lockstep), ended(wall)
-    assert stepped["digest"] == digest
-    assert (timed["ending"], timed["vehicles"]["primary"]["tracks"], timed["dropped"]) == ("over", 4, {})
-    assert timed["hotspots"]["revisited"] > 0
-    # Where the launcher alone is stopped the hub goes on until it finds that out.
-    assert timed["time"]["mission_s"] < (timed["time"]["wall_s"] - STOPPED_S + STOPPED_AFTER_S) * FACTOR
+        stepped, timed = [ended(one) for one in lockstep], [ended(one) for one in wall]
+    alone = RunOptions(tmp_path / "alone", bus="local", record=False)
+    alone.folder.mkdir()
+    assert {one["digest"] for one in stepped} == {run_mission(load_scenario(str(BRIEF), SLOW), alone)["digest"]}
+    for one in timed:
+        assert (one["ending"], one["vehicles"]["primary"]["tracks"], one["dropped"]) == ("over", 4, {})
+        assert one["hotspots"]["revisited"] > 0
+        # Where the launcher alone is stopped the hub goes on until it finds that out.
+        assert one["time"]["mission_s"] < (one["time"]["wall_s"] - STOPPED_S + STOPPED_AFTER_S) * FACTOR
