@@ -46,10 +46,11 @@ def told_s(folder: Path) -> float:
 
 @pytest.mark.parametrize("bus", ["local", "zenoh"])
 def test_a_killed_launcher_leaves_all_but_the_last_second(tmp_path: Path, bus: str) -> None:
-    with flight(tmp_path / "out", "--real-time", str(FACTOR), "--bus", bus) as flying:
+    few = ("--processes", "1") if bus == "zenoh" else ()  # each takes half a second to start
+    with flight(tmp_path / "out", "--real-time", str(FACTOR), "--bus", bus, *few) as flying:
         assert until(lambda: told_s(flying.folder) > 5)
         began_s, then_s = time.monotonic(), told_s(flying.folder)
-        assert until(lambda: time.monotonic() - began_s > 4)
+        assert until(lambda: time.monotonic() - began_s > 3)
         flying.process.send_signal(signal.SIGKILL)
         killed_s = then_s + FACTOR * (time.monotonic() - began_s)
         flying.process.wait()
@@ -103,7 +104,8 @@ def test_a_full_disk_ends_the_run_in_one_sentence(
     with_room_for: Call, tmp_path: Path, most_bytes: int, bus: str
 ) -> None:
     folder = tmp_path / "out"
-    code, out, err = with_room_for(most_bytes, "run", BRIEF, "--out", folder, "--bus", bus)
+    few = ("--processes", "1") if bus == "zenoh" else ()
+    code, out, err = with_room_for(most_bytes, "run", BRIEF, "--out", folder, "--bus", bus, *few)
     assert (code, without_expected(out)) == (1, "")
     (sentence,) = err.splitlines()
     path, _, what = sentence.partition(": ")

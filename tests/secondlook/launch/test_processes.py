@@ -32,6 +32,7 @@ from tests.viz.recordings import rows_so_far, verify
 SOON_S = 20.0
 PATIENCE_S = 8.0  # more than a busy machine keeps a process from its work
 HOSTS = ("world", "primary", "helper", "coordinator", "recorder")
+FEW_HOSTS, FEW = ("world", "recorder"), ("--processes", "1")  # each takes half a second to start
 ENOUGH_BYTES = 30_000  # of messages, more than 100 of them
 INTERRUPTED = r"interrupted at \d+ s of the mission"
 
@@ -90,8 +91,8 @@ def test_a_killed_process_ends_the_run_with_a_sentence_that_names_it(tmp_path: P
 
 
 def test_an_interrupted_run_says_so_and_leaves_what_it_had(tmp_path: Path) -> None:
-    with flight(tmp_path / "out", *LONG) as flying:
-        children = take_off(flying)
+    with flight(tmp_path / "out", *LONG, *FEW) as flying:
+        children = take_off(flying, FEW_HOSTS)
         flying.press_ctrl_c()
         printed = flying.finish(SOON_S)
         assert_gone(flying, children)
@@ -113,8 +114,8 @@ def test_a_run_on_the_local_bus_is_interrupted_alike(tmp_path: Path, number: sig
 
 
 def test_a_second_interrupt_waits_for_nobody(tmp_path: Path) -> None:
-    with flight(tmp_path / "out", *LONG, "--processes", "1") as flying:
-        children = take_off(flying, ("world", "recorder"))
+    with flight(tmp_path / "out", *LONG, *FEW) as flying:
+        children = take_off(flying, FEW_HOSTS)
         os.kill(children["recorder"], signal.SIGSTOP)
         flying.press_ctrl_c()
         assert has_ended(children["world"], SOON_S)
