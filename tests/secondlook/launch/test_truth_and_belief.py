@@ -34,9 +34,12 @@ TOLD = (
 )
 
 
+A_THIRD_OF_IT = "area.polygon_m=[[0, 0], [400, 0], [400, 400], [0, 400]]"
+
+
 def sigmas(correlation: float, rho: float) -> float:
     """By how many standard deviations more of 1000 targets are missed than the map at the mission's end says."""
-    settings = ("targets.count=1000", f"targets.correlation={correlation}", f"mission.rho={rho}")
+    settings = (A_THIRD_OF_IT, "targets.count=1000", f"targets.correlation={correlation}", f"mission.rho={rho}")
     risk, missed = flown("tellaro", 1, *settings).metrics.targets_met()
     assert missed.size == 1000
     return float((missed.sum() - risk.sum()) / math.sqrt((risk * (1.0 - risk)).sum()))
@@ -56,8 +59,8 @@ def test_independent_looks_miss_less_than_a_map_says_that_takes_them_for_one() -
 
 
 def test_what_is_true_of_targets_changes_nothing_that_agents_do() -> None:
-    plain = flown("tellaro", 1, "targets.count=1000", "targets.correlation=0.0", "mission.rho=0.0")
-    shared = flown("tellaro", 1, "targets.count=1000", "targets.correlation=1.0", "mission.rho=0.0")
+    plain = flown("tellaro", 1, A_THIRD_OF_IT, "targets.count=1000", "targets.correlation=0.0", "mission.rho=0.0")
+    shared = flown("tellaro", 1, A_THIRD_OF_IT, "targets.count=1000", "targets.correlation=1.0", "mission.rho=0.0")
     assert plain.summary["risk"] == shared.summary["risk"]
     assert [one.p_detect.tolist() for _, one in plain.all(Look)] == [
         one.p_detect.tolist() for _, one in shared.all(Look)
