@@ -39,6 +39,7 @@ from secondlook.testing import (
 )
 
 MakeFleet = Callable[..., Fleet]
+COARSE = {"area.cell_m": 10}  # on fewer cells strips are cut sooner
 FAILED, DONE = StripState.FAILED, StripState.DONE
 
 
@@ -154,7 +155,7 @@ class TestBadHelpers:
 
 class TestAHelperThatIsStartedAnew:
     def test_what_it_has_seen_before_counts_on(self, tmp_path: Path) -> None:
-        fleet = Fleet("tellaro", folder=tmp_path)
+        fleet = Fleet("tellaro", folder=tmp_path, overrides=COARSE)
 
         def first_done(heard: Heard) -> bool:
             last = heard.last("coord/strip/*")
@@ -248,7 +249,7 @@ def check_of_last(flight: Flight) -> None:
 
 class TestBadLinks:
     def test_whose_answers_come_too_late_has_one_strip_at_a_time(self, tmp_path: Path) -> None:
-        fleet = Fleet("two-helpers", folder=tmp_path)
+        fleet = Fleet("two-helpers", folder=tmp_path, overrides=COARSE)
         fleet.delay("coord/task/**", by_s=12)
         flight = fleet.run()
         assert any(one.message.reason.endswith("is at it after all") for one in flight.said(StripStatus))
@@ -272,7 +273,7 @@ class TestBadLinks:
 
     @pytest.mark.parametrize("name", ["tellaro", "patchy"])
     def test_of_a_fifth_of_all_words_lost_maps_converge_and_all_finish(self, tmp_path: Path, name: str) -> None:
-        fleet = Fleet(name, folder=tmp_path)
+        fleet = Fleet(name, folder=tmp_path, overrides=COARSE)
         fleet.drop("**", probability=0.2)
         flight = fleet.run()
         assert_maps_converged(flight)
