@@ -87,7 +87,7 @@ class Agent:
         if isinstance(message, Nav):
             self._hear_nav(message, received.header.sent_ms, now_ms)
         elif isinstance(message, RunInfo) and self.coverage is None:
-            self.coverage = CoverageLayer(self.vehicle, message.grid.spec)
+            self.coverage = CoverageLayer(self.vehicle, message.grid.spec, message.rho)
             self.region = Region(message.outline, message.hole_outlines, message.keep_out_outlines)
             self.keep_out = KeepOut(message.keep_out_outlines, message.keep_out_margin_m)
             self.endurance.keep_out_of(self.keep_out)

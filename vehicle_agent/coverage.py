@@ -10,7 +10,7 @@ from comms.node import Publication
 from comms.said.messages import CoverageTile, Look
 from comms.said.tally import tally
 from comms.said.topics import COVERAGE
-from planner.footprints.cells import look_on_grid
+from planner.footprints.cells import look_on_grid, over_cells
 from planner.risk import RiskLayer
 from planner.tiles import Tile, tiles, tiles_about, tiles_holding, tiles_within
 from planner.types import BoolArray, GridSpec, Strip
@@ -22,11 +22,16 @@ OFTEN_ENOUGH = 8  # times that a tile is said: where a fifth of all words is los
 class CoverageLayer:
     """Sums a vehicle's looks over the grid and publishes whole tiles, each under its next version.
 
+    `rho`: see `planner.risk.residual_risk`. Where it is above 0 the best of several looks counts more than the others,
+    and of noisy estimates the best is better by luck: there the noise of single bins is taken out first, by the mean
+    over those on a cell. With independent looks it does no harm, as the mean of their product is right as it is.
+
     `settled`: the cells that are, shape `grid.shape`; to be replaced by another array, not changed in place.
     """
 
-    def __init__(self, vehicle: str, grid: GridSpec) -> None:
+    def __init__(self, vehicle: str, grid: GridSpec, rho: float = 0.0) -> None:
         self.grid = grid
+        self._best_counts = rho > 0.0
         self.layer = RiskLayer(grid)
         self.settled: BoolArray = np.zeros(grid.shape, dtype=np.bool_)
         self._vehicle = vehicle
@@ -41,7 +46,8 @@ class CoverageLayer:
 
     def add(self, look: Look) -> None:
         """Adds a valid look."""
-        rows, columns, p_detect = look_on_grid(self.grid, look.geometry, look.p_detect)
+        p_detect = over_cells(self.grid, look.geometry, look.p_detect) if self._best_counts else look.p_detect
+        rows, columns, p_detect = look_on_grid(self.grid, look.geometry, p_detect)
         self.layer.add_look(rows, columns, p_detect)
         self._looked_at.update(tiles_within(self.grid, self._tiles, rows, columns))
 

@@ -47,6 +47,19 @@ def look_on_grid(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -
     return rows, columns, np.where(seen, p_detect[side, along_bin, range_bin], 0.0)
 
 
+def over_cells(grid: GridSpec, geometry: LookGeometry, p_detect: FloatArray) -> FloatArray:
+    """Of each range bin the mean P_d of those that a cell about its middle is wide, as far as they were seen; 0 where
+    the bin itself was not. `p_detect`: shape (2, along_bins, range_bins)."""
+    seen = p_detect > 0.0
+    total, count = p_detect.copy(), seen.astype(np.float64)
+    beside = round((grid.cell_m / geometry.range_bin_m - 1.0) / 2.0)
+    for bins in range(1, min(beside, geometry.range_bins - 1) + 1):
+        for many, one in ((total, p_detect), (count, seen)):
+            many[..., bins:] += one[..., :-bins]
+            many[..., :-bins] += one[..., bins:]
+    return np.where(seen, total / np.maximum(count, 1.0), 0.0)
+
+
 def _window(corners_m: list[float], centres_m: FloatArray) -> slice:
     """The cells along one axis of the grid with their centres between a look's corners, all in the sweep frame."""
     margin_m = 2 * EDGE_TOLERANCE_M  # one that a bin may begin early, one for rounding

@@ -334,7 +334,7 @@ class AgentWitness:
         """A message has reached it."""
         message = received.message
         if isinstance(message, RunInfo) and self.own is None:
-            self.own = CoverageLayer(self.node_id, message.grid.spec)
+            self.own = CoverageLayer(self.node_id, message.grid.spec, message.rho)
         elif self.own is None:
             return
         elif isinstance(message, MissionOver):

@@ -107,7 +107,7 @@ def _own_layer_is_told(flight: Flight, vehicle: str, life: Life) -> list[str]:
 
 def _summed_up(flight: Flight, vehicle: str, life: Life, until_ms: int) -> RiskLayer:
     """The looks since its start that reached an agent until then."""
-    own = CoverageLayer(vehicle, flight.run.grid.spec)
+    own = CoverageLayer(vehicle, flight.run.grid.spec, flight.run.rho)
     taken: set[tuple[int, int]] = set()
     for due_ms, one in reached(flight, vehicle, life):
         look = one.message

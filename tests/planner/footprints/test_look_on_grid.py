@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from planner.footprints.cells import EDGE_TOLERANCE_M, look_on_grid
+from planner.footprints.cells import EDGE_TOLERANCE_M, look_on_grid, over_cells
 from planner.types import FloatArray, GridSpec, LookGeometry, SweepFrame
 
 NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
@@ -113,6 +113,17 @@ class TestByHand:
         look[0, 0, 12], look[1, 0, 3] = 0.12, 0.3  # 0 m and 15 m east
         whole = on_whole_grid(self.GRID, geometry, look)
         assert whole[0].tolist() == [0.12, 0, 0, 0.3, 0, 0]
+
+    def test_the_mean_over_bins_is_of_those_on_a_cell_that_were_seen(self) -> None:
+        look = np.zeros((2, 1, 13))
+        look[1, 0, 4:13] = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9]  # from 4 m to 12 m
+        port, starboard = over_cells(self.GRID, look_at((10, 0), NORTH, (5, 1), (1, 13)), look)[:, 0]
+        assert not port.any()
+        assert not starboard[:4].any()
+        assert starboard[4:] == pytest.approx([0.2, 0.25, 0.3, 0.4, 0.5, 0.6, 0.7, 0.75, 0.8])
+        finer, coarser = (look_at((10, 0), NORTH, (5, bin_m), (1, 13)) for bin_m in (0.1, 5.0))
+        assert over_cells(self.GRID, finer, look)[1, 0, 4:] == pytest.approx([0.5] * 9)
+        assert (over_cells(self.GRID, coarser, look) == look).all()
 
     def test_halfway_between_two_range_bins_the_outer_one_counts(self) -> None:
         # Cells are 2.5, 7.5 and 12.5 m away: bins 1, 2 and 3.
