@@ -6,7 +6,7 @@ from __future__ import annotations
 from coordinator.agenda import Agenda, Item
 from coordinator.expect.contacts import KnownContacts
 from coordinator.fleet import KnownFleet
-from planner.clearance import mines_left_by, scatter_of_all
+from planner.clearance import CAUTIOUS_MINES, mines_left_by, scatter_of_all
 from planner.goal import Goal
 from planner.region import Region
 from planner.types import BoolArray
@@ -45,5 +45,6 @@ class GoalWatch:
         self._agenda.add(Item.GOAL, now_ms + LOOK_EVERY_MS)
         curves = [[curve for track, curve in one.curves.items() if track > 0] for one in self._fleet.vehicles.values()]
         scatter = scatter_of_all(one for one in curves if one)
-        left = mines_left_by(self._fleet.map, self._inside, self._contacts.mines, scatter, self._place)
+        found = self._contacts.mines
+        left = mines_left_by(self._fleet.map, self._inside, found, scatter, self._place, CAUTIOUS_MINES)
         return f"{goal.words}; {goal.words_now(left)}" if goal.is_reached(left) else ""

@@ -22,6 +22,9 @@ from planner.types import BoolArray, DetectionCurve, FloatArray
 
 PRIOR_MINES = 0.5
 """The gamma prior's shape, at a rate of 0: Jeffreys' prior of a Poisson process, half a mine found at any density."""
+CAUTIOUS_MINES = 1.0
+"""The same where a decision rests on it that few are left: one mine more than was found gives the upper limit of a
+Poisson process' mean that holds at any density (F. Garwood, Biometrika 28, 1936)."""
 UNKNOWN_SCATTER = 0.3
 """Taken for the spread of P(y) between tracks where fewer than two are known."""
 NODES = 9
@@ -60,12 +63,14 @@ def mines_left(
     found: float,
     scatter: float,
     weights: FloatArray | float = 1.0,
+    prior_mines: float = PRIOR_MINES,
 ) -> MinesLeft | None:
     """The mines left in the cells of `place`, given how many were `found` in those that were `searched`; None where
     nothing was seen, and nothing can be said.
 
     `risk`: residual risk by cell, in [0, 1]. `scatter`: relative standard deviation of what looks are taken to have
-    seen, see `scatter_of`. `weights`: how much denser mines lie in some cells than in others.
+    seen, see `scatter_of`. `weights`: how much denser mines lie in some cells than in others. `prior_mines`: see
+    PRIOR_MINES.
 
     Raises ValueError for a number found, or a scatter, that is negative or not finite.
     """
@@ -83,8 +88,8 @@ def mines_left(
             if scatter == 0.0 or node == 0.0:
                 return None
             continue
-        expected = (found + PRIOR_MINES) * left_m2 / seen_m2
-        chances = _sum(chances, share * _negative_binomial(found + PRIOR_MINES, expected))
+        expected = (found + prior_mines) * left_m2 / seen_m2
+        chances = _sum(chances, share * _negative_binomial(found + prior_mines, expected))
         means += share * expected
         within = float(((1.0 - missed) * area)[place].sum())
         cleared += share * (within / (within + left_m2) if within + left_m2 > 0.0 else 1.0)
@@ -102,7 +107,12 @@ def mines_left(
 
 
 def mines_left_by(
-    map_: FleetMap, inside: BoolArray, found: float, scatter: float, place: FloatArray | None = None
+    map_: FleetMap,
+    inside: BoolArray,
+    found: float,
+    scatter: float,
+    place: FloatArray | None = None,
+    prior_mines: float = PRIOR_MINES,
 ) -> MinesLeft | None:
     """The same by a fleet's map, of the area's cells, `inside`, or of a `place`, so much of each cell, 0 or more; from
     the number of cells that have each level, as there are few levels and many cells."""
@@ -114,7 +124,7 @@ def mines_left_by(
         weights = np.concatenate([weights, np.bincount(levels[some], place[some], minlength=risk.size)])
         risk, searched = np.tile(risk, 2), np.repeat([True, False], risk.size)
         in_place = ~searched
-    return mines_left(risk, searched, in_place, map_.grid.cell_area_m2, found, scatter, weights)
+    return mines_left(risk, searched, in_place, map_.grid.cell_area_m2, found, scatter, weights, prior_mines)
 
 
 def scatter_of_all(vehicles: Iterable[Sequence[DetectionCurve]]) -> float:

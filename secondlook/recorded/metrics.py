@@ -31,7 +31,7 @@ from comms.said.messages import (
     TruthTargets,
 )
 from comms.strip_books import StripBooks
-from planner.clearance import MinesLeft, mines_left_by, scatter_of_all
+from planner.clearance import PRIOR_MINES, MinesLeft, mines_left_by, scatter_of_all
 from planner.contacts import LISTED_FROM, ObjectsOnMap, SeenObjects
 from planner.fleet_map import FleetMap, VehicleLayer
 from planner.footprints import footprint_of
@@ -228,13 +228,13 @@ class Metrics:
         rows, columns = grid.cells_of(x_m, y_m)
         return np.clip(rows, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)
 
-    def mines_left(self, place: FloatArray | None = None) -> MinesLeft | None:
+    def mines_left(self, place: FloatArray | None = None, prior_mines: float = PRIOR_MINES) -> MinesLeft | None:
         """How many mines may be left in the area, or in so much of each cell, by the map and by what was found
-        anywhere; None where nothing was seen."""
+        anywhere; None where nothing was seen. `prior_mines`: see `planner.clearance.PRIOR_MINES`."""
         if self.map is None:
             return None
         scatter = scatter_of_all(list(one.values()) for one in self.curves.values())
-        return mines_left_by(self.map, self.inside, self.objects.mines, scatter, place)
+        return mines_left_by(self.map, self.inside, self.objects.mines, scatter, place, prior_mines)
 
     def mine_chances(self) -> tuple[SeenObjects, FloatArray]:
         """What contacts have told of, and with which chance each is a mine, shape (objects,)."""

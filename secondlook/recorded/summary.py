@@ -15,6 +15,7 @@ import numpy as np
 import shapely
 
 from comms.result import STRIP_TO_TASK, BusResult
+from planner.clearance import CAUTIOUS_MINES
 from secondlook.recorded.ground import RiskMap, risk_in_priorities
 from secondlook.recorded.metrics import Metrics
 from secondlook.recorded.observer import Observer
@@ -90,7 +91,7 @@ def _goal(scenario: Scenario, metrics: Metrics) -> dict[str, dict[str, Any]]:
     goal = scenario.mission.goal.goal
     area, fleet = metrics.area, metrics.map
     place = None if area is None or fleet is None else goal.place(area, fleet.grid)
-    left = metrics.mines_left(place)
+    left = metrics.mines_left(place, CAUTIOUS_MINES)
     truly_found = metrics.truly_found(None if goal.lane is None else goal.lane.outline)
     told = {
         "wanted": goal.words,

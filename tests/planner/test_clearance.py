@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.clearance import (
+    CAUTIOUS_MINES,
     PRIOR_MINES,
     UNKNOWN_SCATTER,
     MinesLeft,
@@ -53,6 +54,15 @@ def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: f
     assert (told.low, told.high) == (true.ppf(0.05), true.ppf(0.95))
     assert told.none == pytest.approx(true.pmf(0))
     assert told.mean == pytest.approx(true.mean())
+
+
+@pytest.mark.parametrize("found", [0, 1, 12])
+def test_with_one_mine_more_more_may_be_left(found: float) -> None:
+    told = mines_left(np.full(ALL.shape, 0.5), ALL, ALL, CELL_M2, found, 0.0, prior_mines=CAUTIOUS_MINES)
+    assert told is not None
+    true = negative_binomial(found + 1, 0.5)
+    assert (told.none, told.mean, told.high) == pytest.approx((true.pmf(0), true.mean(), true.ppf(0.95)))
+    assert told.none < left_of(0.5, found).none
 
 
 def test_what_was_found_elsewhere_tells_of_a_place_and_a_place_well_seen_is_cleared() -> None:
