@@ -3,6 +3,7 @@ that."""
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -12,7 +13,7 @@ import pytest
 
 from bench import figures
 from bench.figures import TABLES, compared_kept, kept, linked_kept, reliability_lines, written
-from bench.flown import ROOT, Mission, Table
+from bench.flown import ROOT, Case, Mission, Table
 from bench.rows import by
 from secondlook.compare.paired import interval_of_mean
 from secondlook.launch.run_display import mines_left_words
@@ -34,6 +35,24 @@ def test_a_mission_of_it_still_leaves_what_is_kept(name: str, tmp_path: Path) ->
     left = {name: round(row[name], 3) for name in mission.left}
     kept_of_it = {name: round(value, 3) for name, value in mission.left.items()}
     assert left == kept_of_it, f"stale: python -m bench.figures --fly {name}"
+
+
+def test_what_is_declared_to_be_flown_is_what_is_kept() -> None:
+    declared = {
+        "clearance": Counter(dict.fromkeys(figures.CALIBRATED, 40)),
+        "goals": Counter(dict(figures.GOALS)),
+        "intervals": Counter(dict.fromkeys((case for case, _ in figures.MANY_TIMES), 1)),
+        "reliability": Counter({(one, (figures.RELIABLE_TARGETS, *told.split())): 1 for one, told in figures.RELIABLE}),
+    }
+    for name, cases in declared.items():
+        assert Counter(case_of(row) for row in kept(name)["rows"]) == cases, name
+    missions = {case_of(row): row["held"]["missions"] for row in kept("intervals")["rows"]}
+    assert missions == dict(figures.MANY_TIMES)
+
+
+def case_of(row: dict[str, Any]) -> Case:
+    """What a row's mission was flown with."""
+    return row["scenario"], tuple(row["overrides"])
 
 
 def test_what_pages_say_beside_tables_is_what_is_kept() -> None:
