@@ -49,10 +49,9 @@ class Reasons:
         near_m, far_m = np.array([self._seen_best_m[name] for name, _ in beside])[nearest].T
         holds = np.array([is_beyond, apart_m <= near_m, apart_m >= far_m, np.ones_like(is_beyond)])
         tracks = [beside[at] for at in _named(nearest, weights)[:MOST_TRACKS]]
+        causes = [CAUSES[one] for one in _named(holds.argmax(axis=0), weights)]
         by = "expected beside" if cut.foreseen else "seen badly by"
-        return (
-            f"{by} {self._in_words(tracks)}: {_listed([CAUSES[one] for one in _named(holds.argmax(axis=0), weights)])}"
-        )
+        return f"{by} {self._in_words(tracks)}: {_listed(causes)}"
 
     @cached_property
     def _seen_best_m(self) -> dict[str, tuple[float, float]]:

@@ -29,7 +29,7 @@ class Lane:
 class Goal:
     """That of all mines there, those found and those left, at least the share `clearance` is found, in (0, 1], with a
     `chance` in (0, 1); with a clearance of 1, that none is left. There: in the area, or in a `lane`, of which a goal
-    can only be that none is left."""
+    can only be that none is left. What is told of mines left is reckoned with `planner.clearance.CAUTIOUS_MINES`."""
 
     clearance: float
     chance: float

@@ -24,7 +24,7 @@ class CoverageLayer:
 
     `rho`: see `planner.risk.residual_risk`. Where it is above 0 the best of several looks counts more than the others,
     and of noisy estimates the best is better by luck: there the noise of single bins is taken out first, by the mean
-    over those on a cell. With independent looks it does no harm, as the mean of their product is right as it is.
+    over those on a cell. With independent looks the noise does no harm: on average their product is right.
 
     `settled`: the cells that are, shape `grid.shape`; to be replaced by another array, not changed in place.
     """

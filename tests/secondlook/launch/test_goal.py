@@ -12,7 +12,7 @@ from flights import BRIEF
 
 import secondlook
 from comms.said.messages import MissionOver
-from planner.clearance import CAUTIOUS_MINES
+from planner.clearance import CAUTIOUS_MINES, PRIOR_MINES
 from planner.goal import Goal, Lane
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import RunOptions, run_mission
@@ -42,6 +42,21 @@ def test_it_ends_with_its_goal_on_both_buses_alike(tmp_path: Path) -> None:
     assert goal["chance"] == pytest.approx(left.chance_of_at_most(left.found * 0.7 / 0.3))
     assert goal["chance"] >= 0.9
     assert goal["true"] == (flight.summary["truth"]["missed_share"] <= 0.7)
+
+
+def test_it_ends_by_what_the_coordinator_has_heard_and_one_mine_more(tmp_path: Path) -> None:
+    scenario = load_scenario(str(BRIEF), ["mission.goal={kind: cleared, clearance: 0.37}"])
+    flight = Fleet(scenario, folder=tmp_path).run()
+    over = flight.said(MissionOver)[0]
+    metrics = Metrics()
+    for one in flight.messages():
+        if one.topic.due_ms(one.header.sent_ms) <= over.header.sent_ms:
+            metrics.hear(one)
+    assert scenario.mission.goal is not None
+    goal = scenario.mission.goal.goal
+    told, without = (goal.words_now(metrics.mines_left(prior_mines=mines)) for mines in (CAUTIOUS_MINES, PRIOR_MINES))
+    assert f"; {told}, " in over.message.reason
+    assert without not in over.message.reason
 
 
 def test_one_that_is_missed_says_by_how_much(tmp_path: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,7 +17,7 @@ from comms.said.messages import Look, TruthLook, TruthTargets
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.report import report_page
 from secondlook.scenario import load_scenario
-from secondlook.testing import Fleet, assert_repeats
+from secondlook.testing import Fleet, assert_maps_converged, assert_repeats
 
 ODD = (
     "targets={layout: {kind: lines, heading_deg: 70, rows_apart_m: 30, jitter_m: 2}, correlation: 0.7, aspect_deg: 90,"
@@ -72,6 +73,7 @@ def test_what_is_true_of_targets_changes_nothing_that_agents_do() -> None:
 def test_both_buses_fly_one_mission_with_all_of_it(tmp_path: Path) -> None:
     flight = assert_repeats(Fleet(load_scenario(str(BRIEF), ODD), folder=tmp_path), ("local", "zenoh"))
     assert flight.summary["at_odds"] == TOLD
+    assert_maps_converged(replace(flight, inside=None))  # with its looks, as they count by its rho
     own = [p for one in flight.said(TruthLook) for p in one.message.p_detect.tolist()]
     assert len(set(own)) > 10
     again = load_scenario(flight.folder / "scenario.yaml")
