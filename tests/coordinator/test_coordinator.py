@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, run_info
@@ -64,6 +66,14 @@ class TestFromHotspotToTask:
         found = sorted((one.start_x_m, one.start_y_m, one.length_m, one.vehicle) for one in told.strips().values())
         assert found == [(122.5, 50, 300, HELPER), (327.5, 50, 300, SECOND_HELPER)]
 
+    @pytest.mark.parametrize(("far_m", "sectors"), [(25.0, 2), (25.2, 1)])
+    def test_no_sector_is_narrower_than_four_swaths(self, far_m: float, sectors: int) -> None:
+        # 81 columns of 5 m: four swaths of 50 m are 40 of them, of 50.4 m more than that.
+        helpers = [replace(one, far_m=far_m) for one in TWO_HELPERS if one.role is Role.REVISIT]
+        node = coordinator((FLEET[0], *helpers), helpers_a_team=1).node.node
+        assert isinstance(node, Coordinator)
+        assert len(node._sectors.all) == sectors
+
     def test_where_tiles_have_come_the_map_counts(self) -> None:
         told = coordinator()
         risk = np.full(GRID.shape, 0.1)
@@ -110,6 +120,14 @@ class TestFromHotspotToTask:
         assert told.states() == {1: UNDER_WAY}
         told.keep_alive([PRIMARY, HELPER], 1)
         assert told.states() == {1: UNDER_WAY, 2: OPEN}
+
+    def test_where_another_is_free_it_is_cut_at_once(self) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.settle()
+        told.hotspot(ELSEWHERE, number=2)
+        told.settle()
+        assert told.states() == {1: UNDER_WAY, 2: OFFERED}
 
     def test_a_place_that_is_being_served_is_not_cut_again(self) -> None:
         told = with_a_helper()

@@ -68,6 +68,7 @@ class TestHowTheyAreLaid:
             ((120, 300), Window(0, 120, 0, 150)),
             ((300, 75), Window(0, 300, 0, 38)),  # strips stay long
             ((300, 74), Window(0, 150, 0, 74)),  # too long for its width
+            ((100, 40), Window(0, 100, 0, 20)),
             ((100, 39), Window(0, 50, 0, 39)),  # too narrow to be halved
             ((39, 300), Window(0, 39, 0, 150)),
         ],

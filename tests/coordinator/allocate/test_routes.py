@@ -239,6 +239,14 @@ class TestSeveralHelpers:
         assert routes([NEAR], [alpha, beta]).strips == {"alpha": (), "beta": (2,)}
         assert PLAN.assign(situation([NEAR], [alpha, beta])) == {"alpha": 2}
 
+    def test_who_had_left_the_rest_to_others_takes_what_those_leave(self) -> None:
+        # alpha has no time for it; beta would be on it at 350 s, for half of it, which brings less than its time may.
+        far = open_strip(strip(3, x_m=1000, y_m=100))
+        beta = helper("beta", x_m=1000, y_m=-600, refused=frozenset({1, 2}))
+        found = routes([NEAR, FAR, far], [helper(), beta], 400)
+        assert found.strips == {"alpha": (2, 1), "beta": (3,)}
+        assert found.removed_m2 == pytest.approx(2 * 700 + 350)
+
     def test_for_what_brings_little_nothing_that_brings_much_is_cut_off_by_the_deadline(self) -> None:
         # Two lanes of 600 s for each, and 400 s more: enough for the short strips, too, of 140 s.
         east = math.pi / 2

@@ -12,8 +12,10 @@ from situations import helper, open_strip, situations, strip
 
 from coordinator.allocate.service import StripTable, can_fly, expected_service, removed_m2
 from coordinator.allocate.situation import Situation
+from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.keep_out import KeepOut
+from planner.way_home import WayHome
 
 
 @settings(max_examples=60, deadline=None)
@@ -76,3 +78,10 @@ class TestByHand:
         found = self.TABLE.removed_m2(np.full((1, *self.TABLE.sonar_on_s.shape), begins_s), deadline_s)
         assert found[0, 0] == pytest.approx(removed)
         assert (found[0, 1] == 0).all()  # it has refused that one
+
+
+def test_a_current_tells_from_when_to_when_the_sonar_is_on() -> None:
+    # 2 m/s and 0.5 m/s from astern: 2.5 m/s over 95 m of way, 5 m of run-in, 200 m of strip and 5 m of run-out.
+    one = replace(helper(), way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0))
+    served = expected_service(open_strip(strip(1)), one)
+    assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((40, 120, 122))

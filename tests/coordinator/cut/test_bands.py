@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from coordinator.cut.bands import MOST_ADDED, Bands
+from coordinator.cut.ground import CELLS_AT_ONCE
 from coordinator.cut.window import Window
 from planner.types import FloatArray
 
@@ -50,6 +51,12 @@ class TestByHand:
     def test_nothing_gives_none(self) -> None:
         assert side_by_side(np.zeros((3, 8)), 2, 1.0, 0.0) == []
         assert side_by_side(np.ones((3, 8)), 2, 2.0, 0.0) == []  # worth just what it costs
+
+    def test_a_column_longer_than_what_is_worked_on_at_once_is_searched_whole(self) -> None:
+        rows = CELLS_AT_ONCE + 1
+        worth = np.zeros((rows, 2))
+        worth[-3:] = 1.0, 0.9
+        assert side_by_side(worth, 1, 0.5, 0.5) == [Window(rows - 3, rows, 0, 1), Window(rows - 3, rows, 1, 2)]
 
     @pytest.mark.parametrize("width", [MOST_ADDED, MOST_ADDED + 1])
     def test_wide_windows_are_summed_as_narrow_ones(self, width: int) -> None:

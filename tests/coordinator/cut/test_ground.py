@@ -122,6 +122,12 @@ class TestWorstFrom:
         assert one.worst_from() == pytest.approx(0.4 + 0.3 * 0.1)
 
 
+def test_a_block_is_seen_where_more_than_half_of_what_counts_of_it_is() -> None:
+    one = replace(ground(np.full((2, 6), 0.5)), is_seen=np.array([[1, 1, 1, 1, 1, 0], [0, 0, 1, 0, 1, 0]], dtype=bool))
+    one.risk[0, 4:], one.risk[1, 5] = 0.0, 0.0  # no second look goes there: one cell is left, and it is seen
+    assert one.in_blocks(2).is_seen.tolist() == [[False, True, True]]
+
+
 @pytest.mark.parametrize("size", [1, 2, 3, 4, 10, 11, 97])
 def test_from_which_risk_on_it_is_of_the_worst_is_a_quantile(size: int) -> None:
     risk = np.random.default_rng(size).uniform(0.01, 1.0, (1, size))

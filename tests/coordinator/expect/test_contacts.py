@@ -78,6 +78,17 @@ def test_where_no_second_look_goes_and_beyond_the_window_nothing_counts() -> Non
     assert not nowhere[0].any()
 
 
+@pytest.mark.parametrize("window", [(20, 21, 39, 40), (20, 21, 41, 42), (19, 20, 40, 41), (21, 22, 40, 41)])
+def test_a_contact_lies_in_its_cell_and_not_in_those_beside(window: tuple[int, int, int, int]) -> None:
+    told = fleet_with_contacts()
+    hear(told, (200.0, 102.5), first=41)
+    contacts, one = known(told), np.full((1, 1), 0.5)
+    assert contacts.doubtful(Window(20, 21, 40, 41)) == 1
+    assert contacts.worth(Window(20, 21, 40, 41), one, one) is not None
+    assert contacts.doubtful(Window(*window)) == 0
+    assert contacts.worth(Window(*window), one, one) is None
+
+
 def test_a_contact_that_comes_twice_is_one() -> None:
     told = fleet_with_contacts()
     before = known(told).mines

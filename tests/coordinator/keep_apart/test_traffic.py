@@ -22,6 +22,7 @@ from coordinator.keep_apart.traffic import Traffic
 from coordinator.vehicles import KnownVehicle, Offer
 from planner.dubins import Pose
 from planner.keep_out import KeepOut
+from planner.types import Strip
 
 SERVED, OTHER = strip(7, 0, 20, length_m=100), strip(8, 60, 20, length_m=100)
 NORTH = 0.0
@@ -95,6 +96,38 @@ def test_a_primary_that_revisits_sails_the_run_out_of_its_last_track(told: Told)
     course = told(Traffic(), primary)
     assert course is not None
     assert course.at(12.0) == pytest.approx((0, 318, NORTH))
+
+
+def test_a_primary_that_is_given_up_is_expected_along_its_tracks_while_it_is_heard_there() -> None:
+    # 300 m at 1.5 m/s; its track ends at 100 s.
+    plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 300, False),), (), (), "")
+    primary = KnownVehicle(vehicle("primary", Role.SURVEY), 0, plan=plan, finished_ms=0)
+    primary.state = AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 150, NORTH)
+    course = Traffic().course(primary, None, 0.0)
+    assert course is not None
+    assert course.at(100.0) == pytest.approx((0, 300, NORTH))
+
+
+@pytest.mark.parametrize(
+    ("mode", "strip_told"),
+    [(Mode.TRANSIT, SERVED), (Mode.REVISIT, SERVED), (Mode.IDLE, None), (Mode.RETURNING, None), (Mode.EMPTY, None)],
+)
+def test_a_course_begins_where_and_when_a_helper_was_heard(mode: Mode, strip_told: Strip | None) -> None:
+    one = replace(at(helper(), mode, 20, SERVED.number if strip_told else 0), heard_ms=500_001)
+    course = Traffic().course(one, strip_told, 510.0)
+    assert course is not None
+    assert course.start_s == 500.001
+    assert course.at(500.001) == pytest.approx((0, 20, NORTH))
+
+
+def test_who_is_on_its_way_home_is_expected_there_and_whose_battery_is_empty_where_it_lies() -> None:
+    # From 120 m north of its home, headed away from it.
+    for mode, then_m in ((Mode.RETURNING, 0), (Mode.EMPTY, 120)):
+        course = Traffic().course(at(helper(), mode, 120), None, 0.0)
+        assert course is not None
+        assert course.at(0.0) == pytest.approx((0, 120, NORTH))
+        assert course.at(course.arrives_s)[:2] == pytest.approx((0, then_m), abs=0.01)
+        assert course.at(200.0)[:2] == pytest.approx((0, then_m), abs=12)  # it circles
 
 
 def test_until_it_is_heard_there_a_helper_circles_where_it_was_sent() -> None:
