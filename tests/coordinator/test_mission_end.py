@@ -150,14 +150,30 @@ class TestTheEnd:
         assert [type(one.message) for one in told.settle()] == [StripStatus, MissionOver]
         assert told.tasks() == []
 
-    def test_it_says_so_again_for_10_s_until_all_have_answered(self) -> None:
+    @pytest.mark.parametrize(
+        ("before", "answer", "is_all"),
+        [
+            (Mode.IDLE, None, False),
+            (Mode.IDLE, Mode.IDLE, False),  # it may not have heard that it is over
+            (Mode.IDLE, Mode.FINISHED, True),
+            (Mode.FINISHED, None, False),
+            (Mode.FINISHED, Mode.FINISHED, True),
+        ],
+    )
+    def test_it_says_so_again_for_10_s_until_all_have_answered(
+        self, before: Mode, answer: Mode | None, is_all: bool
+    ) -> None:
         told = coordinator()
+        told.state(HELPER, before, at_ms=9_000)
         told.state(PRIMARY, Mode.FINISHED, at_ms=10_000)
         told.settle()
         over_ms = told.node.now_ms
+        told.state(PRIMARY, Mode.FINISHED, at_ms=over_ms + 5)
+        if answer is not None:
+            told.state(HELPER, answer)
         told.node.wait(60)
         times_ms = [one.at_ms - over_ms for one in told.node.said if isinstance(one.message, MissionOver)]
-        assert times_ms == [0, *range(10, 100, 10), *range(1000, 10_000, 1000)]
+        assert times_ms == ([0] if is_all else [0, *range(10, 100, 10), *range(1000, 10_000, 1000)])
 
     @pytest.mark.parametrize("missing", [0, 1])
     def test_it_says_so_again_where_tiles_have_not_arrived(self, missing: int) -> None:

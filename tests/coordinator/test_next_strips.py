@@ -198,6 +198,12 @@ def test_with_the_present_strip_the_next_is_given_back() -> None:
     assert any(one.reason == f"{HELPER} is told to give strip 1 back" for one in second)
 
 
+def test_who_is_to_tell_again_is_told_of_no_strip() -> None:
+    outbox = Outbox()
+    outbox.add_task(TaskAction.TELL_AGAIN, HELPER)
+    assert [one.message for one in outbox.empty()] == [Task(TaskAction.TELL_AGAIN, 0, 0, 0, 0, 0, 0)]
+
+
 def test_a_next_that_is_taken_back_in_the_moment_of_its_offer_is_not_offered() -> None:
     outbox, strip = Outbox(), replace(NO_STRIP, number=2)
     outbox.add_task(TaskAction.TAKE_NEXT, HELPER, strip)

@@ -56,6 +56,11 @@ class TestByTracks:
         share, _ = Seabed(GRID).shares(nats(0.5), NOTHING)
         assert share == pytest.approx(1.0)
 
+    def test_it_is_taken_for_no_less_than_a_tenth_and_no_more_than_ten_times_of_what_is_expected(self) -> None:
+        for found, expected, held in ((0.0, 0.95, 0.1), (0.999, 0.001, 10.0)):  # 0.1 / 1.05 and 1.099 / 0.101
+            share, _ = Seabed(GRID).shares(nats(found), nats(expected))
+            assert share == pytest.approx(held)
+
 
 class TestByHelpers:
     def test_helpers_that_find_half_are_expected_to_find_half(self) -> None:

@@ -21,6 +21,7 @@ from coordinator.keep_apart.courses import (
     STEP_S,
     Course,
     course,
+    lying_still,
     run_out_left_m,
     straight,
     survey_course,
@@ -52,6 +53,13 @@ class TestCourses:
         assert np.hypot(later[:, 0] - 100, later[:, 1] + 10) == pytest.approx(10)  # to starboard
         # All the time: 4 m on the circle from each step to the next.
         assert np.hypot(*np.diff(later[:, :2], axis=0).T) == pytest.approx(2 * 10 * math.sin(0.2))
+
+    def test_it_is_laid_for_900_s_beyond_its_paths_and_where_it_lies_still(self) -> None:
+        laid = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 100, 10)])
+        assert (laid.first, laid.end) == (3, 3 + (50 + 900) / STEP_S)
+        still = lying_still(Pose(7, 8, EAST), 5)
+        assert (still.first, still.end) == (3, 3 + 900 / STEP_S)
+        assert set(map(tuple, still.poses.tolist())) == {(7, 8, EAST)}
 
     def test_where_there_is_room_to_neither_side_it_is_expected_to_starboard_all_the_same(self) -> None:
         walls = KeepOut(
