@@ -368,6 +368,22 @@ class TestLooksThatComeLater:
         told.settle()
         assert told.states() == {1: DONE, 2: OFFERED}
 
+    @pytest.mark.parametrize(
+        ("name", "state"),
+        [
+            (SECOND_HELPER, TaskState.FAILED),
+            (SECOND_HELPER, TaskState.GIVEN_BACK),
+            (HELPER, TaskState.REFUSED),
+        ],
+    )
+    def test_another_s_word_and_a_refusal_tell_nothing_of_them(self, told: Told, name: str, state: TaskState) -> None:
+        self.done_by_word(told)
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.status(name, 1, state)
+        told.settle()
+        assert told.states() == {1: DONE}
+        assert len(told.tasks()) == 1
+
     def test_the_mission_is_not_over_before_that(self, told: Told) -> None:
         self.done_by_word(told)
         told.layer(PRIMARY, looked(0.9) * 0.1)
