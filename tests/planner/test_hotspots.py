@@ -169,6 +169,11 @@ class TestNumbers:
         back = update("##..## ##..##", gone.map)
         assert [hotspot.number for hotspot in back.changed] == [3]
 
+    def test_where_nothing_is_hot_there_is_no_hotspot_and_all_that_were_are_withdrawn(self) -> None:
+        assert update("......").map.hotspots == {}
+        none = update("......", update("##..## ##..##").map)
+        assert (none.changed, none.withdrawn, none.map.hotspots) == ((), {1: None, 2: None}, {})
+
     def test_a_patch_that_shrinks_below_the_least_size_is_withdrawn(self) -> None:
         first = update("#### ####")
         assert update("###. ....", first.map).withdrawn == {1: None}
