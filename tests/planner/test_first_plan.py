@@ -238,6 +238,14 @@ class TestOrder:
         assert [min(x for x, _ in part.vertices) for part in back] == [400, 200, 0]
         assert {part.track_heading_rad for part in back} == {math.pi}
 
+    def test_where_ways_are_as_long_to_the_millimetre_the_order_given_is_kept(self) -> None:
+        # From the middle between two that lie 200 m apart; which is 0.2 mm nearer does not decide.
+        west, east = (
+            Region(((x, -50.0), (x + 100, -50.0), (x + 100, 50.0), (x, 50.0))).about(0) for x in (-200.0002, 100.0)
+        )
+        for order in ([west, east], [east, west]):
+            assert [part.vertices for part in in_order(order, (0, 0))] == [part.vertices for part in order]
+
     def test_many_parts_are_taken_one_after_the_other(self) -> None:
         row = [
             Region(((x, 0.0), (x + 90, 0.0), (x + 90, 100.0), (x, 100.0))).about(0)
@@ -250,6 +258,14 @@ class TestBestHeading:
     def test_of_a_rectangle_is_along_its_longer_side(self) -> None:
         assert best_heading(RECTANGLE, 40, 145) == pytest.approx(math.pi / 2)
         assert first_plan(RECTANGLE, math.pi / 2, 40, 145).track_count == 3
+
+    @pytest.mark.parametrize("first", [0, 1, 2])
+    def test_of_a_triangle_is_along_its_longest_side_wherever_its_outline_begins(self, first: int) -> None:
+        # 2400 m east and 1800 m north is 3000 m; beside its middle, (1300, 950), the third corner lies 390 m off.
+        corners = ((100.0, 50.0), (1300 + 390 * 0.6, 950 - 390 * 0.8), (2500.0, 1850.0))
+        region = Region((*corners[first:], *corners[:first]))
+        assert best_heading(region, 40, 145) == pytest.approx(math.atan2(4, 3))
+        assert first_plan(region, math.atan2(4, 3), 40, 145).track_count == 2
 
     @settings(max_examples=30)
     @given(st.lists(st.tuples(st.integers(0, 900), st.integers(0, 900)), min_size=3, max_size=8), headings)
