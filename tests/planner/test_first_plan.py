@@ -151,6 +151,20 @@ class TestParts:
         parts = convex_parts(L_SHAPE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
 
+    def test_a_cut_may_end_at_the_next_boundary(self) -> None:
+        # A block with an arm along its south side, 100 m off. Cut at x = 100 m, 100, 400 and 600 m take 2, 3 and 4
+        # tracks; right across at y = 200 m it looks better at first: 700 and 500 m take 5 and 4. But what lies south of
+        # that must be cut again, and takes 2 and 3. So x = 100 m is cut from (100, 200) to the north alone.
+        block_and_arm = Region(
+            (
+                *((0.0, 0.0), (500.0, 0.0), (500.0, 100.0), (100.0, 100.0)),
+                *((100.0, 200.0), (700.0, 200.0), (700.0, 500.0), (0.0, 500.0)),
+            )
+        )
+        parts = convex_parts(block_and_arm, 0, lambda width_m: track_count(width_m, 40, 120))
+        sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
+        assert sizes_m == [(100, 500), (400, 100), (600, 300)]
+
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sum(shapely.Polygon(part.vertices).area for part in parts) == pytest.approx(600**2 - 200**2)
