@@ -40,6 +40,8 @@ def test_helpers_look_where_most_is_left() -> None:
     assert across(helpers=helpers).worst30([10]) == pytest.approx((4 * 0.5 + 2 * 0.25) / 6)
     # Two tracks take twice as long: 32 m are all once and 12 m twice; 0.25 is 0.125 and 0.0625.
     assert across(10.0, helpers=helpers).worst30([10]) == pytest.approx(0.125)
+    # Of looks that are half alike 0.75 counts as the root of 0.25: all 20 m come down to a half of it.
+    assert across(rho=0.5, helpers=HelperLooks(20.0, 0.75)).worst30([10]) == pytest.approx(0.25)
 
 
 def test_what_is_asked_and_not_seen_is_lost() -> None:
@@ -66,6 +68,11 @@ def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed
     wide = across(10.0, width_m=40.0)
     assert wide.with_one_more([]) == [32]
     assert wide.with_one_less([10, 30]) == [30]
+
+
+def test_two_tracks_are_moved_together_where_either_alone_would_leave_a_gap() -> None:
+    # Of the places, a metre apart, each sees 21: the first two see 2 to 22 and 23 to 43, the third 42 to the last one.
+    assert across(width_m=63.0).refined([12, 33, 52]) == [10, 31, 52]
 
 
 def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:

@@ -28,6 +28,10 @@ def test_what_is_known_less_well_may_lie_farther_apart() -> None:
     assert len(objects) == 1
     objects.hear(60.0, 0.0, 4.0, 0.8)
     assert len(objects) == 2
+    farther = Objects()
+    farther.hear(0.0, 0.0, 3.0, 0.8)
+    farther.hear(15.1, 0.0, 4.0, 0.8)
+    assert len(farther) == 2
 
 
 def test_who_knows_nothing_of_its_place_joins_no_more_than_what_is_near() -> None:
@@ -138,6 +142,9 @@ def test_a_look_at_what_is_sure_makes_nothing_surer() -> None:
 def test_a_look_that_sees_all_tells_mines_from_nothing() -> None:
     # A half chance has a variance of 0.25; where the other half is nothing, to see it or not tells all.
     assert surer_by(np.array([[0.5, 0.0, 0.5]]), 40.0) == pytest.approx(0.25)
+    # Who sees half of them and sees nothing, as in 3 of 4 cases, still takes it for a mine with 1 / 3: what is left of
+    # the variance is 3 / 4 times 1 / 3 times 2 / 3.
+    assert surer_by(np.array([[0.5, 0.0, 0.5]]), math.log(2)) == pytest.approx(0.25 - 3 / 4 * 1 / 3 * 2 / 3)
     # Where it is clutter its score must tell: by the overlap of the two densities less is learned.
     (by_score,) = surer_by(np.array([[0.5, 0.5, 0.0]]), 40.0)
     assert 0.15 < by_score < 0.25

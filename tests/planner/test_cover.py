@@ -90,6 +90,14 @@ class TestByHand:
         assert (len(found.offsets_m), found.range_m) == (1, 85)  # from 70 m: 40 to 70 m one way, 70 to 100 m the other
         assert len(fewest_tracks([(0, 30), (250, 280)], 40, 100).offsets_m) == 2
 
+    def test_of_covers_of_as_few_tracks_it_is_that_which_sees_the_nearest_first_and_then_leaves_least(self) -> None:
+        # A side sees 1 m, the other 5 m beyond. From 4 m 1 to 2 and 6 to 7 m are seen; for 0 to 1 m -2 m would do, too.
+        assert fewest_tracks([(0, 2), (6, 7)], 2, 3).offsets_m == (3, 4)
+        # With 11 m a side sees 9 m, the other 13 m beyond. For what begins at 24 m 29 m would do, too, but leaves 8 m
+        # from 40 m on; 35 m leaves 1 m at 33 m and 2 at 46 m.
+        left: list[Span] = [(0, 4), (5, 9), (24, 27), (31, 34), (37, 48)]
+        assert fewest_tracks(left, 2, 13).offsets_m == (11, 35, 44)
+
     def test_where_nothing_is_left_no_track_is_needed(self) -> None:
         assert fewest_tracks([], 40, 100).offsets_m == ()
 

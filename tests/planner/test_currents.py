@@ -13,6 +13,7 @@ from planner.currents import Current, FlowGrid, Sailing, made_good_mps
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import KeepOut
 from planner.sweep import pass_over
+from planner.types import Point
 from planner.way_home import WayHome
 from planner.ways import shortest_way
 
@@ -183,6 +184,17 @@ class TestFlowsFromPlaceToPlace:
         halfway_s = 100 / 1.5 * math.asin(0.75 / 2.5)
         assert np.interp(50, lengths_m, times_s) == pytest.approx(halfway_s, rel=1e-3)
 
+    def test_a_straight_way_home_is_reckoned_where_it_is(self) -> None:
+        sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
+
+        def time_s(home: Point, start: Pose) -> float:
+            return WayHome(home, sailing, 10.0).from_pose(start)[0]
+
+        # In the south no water flows; from 100 m north on it does so at 1.5 m/s, which leaves 2 m/s across it.
+        assert time_s((0, 0), Pose(0, -100, NORTH)) == pytest.approx(100 / 2.5)
+        assert time_s((0, 100), Pose(0, 200, SOUTH)) == pytest.approx(100 / 2)
+        assert time_s((100, 150), Pose(0, 150, EAST)) == pytest.approx(100 / 4)
+
     def test_a_turn_is_reckoned_where_it_is(self) -> None:
         sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
         # Half a turn to starboard from (0, 40) northward: a circle about (30, 40), from 40 to 70 m north and back.
@@ -193,6 +205,11 @@ class TestFlowsFromPlaceToPlace:
         took_s = float((30 * np.diff(steps) / mps).sum())
         path = DubinsPath(Pose(0, 40, NORTH), 30, (1, 0, 0), (30 * math.pi, 0, 0))
         assert sailing.path_s(path) == pytest.approx(took_s, rel=1e-4)
+        # The same with east and north, and so starboard and port, in each other's place.
+        flow_mps = AT_FIRST.east_mps.transpose(0, 2, 1)
+        turned = FlowGrid(AT_FIRST.y_m, AT_FIRST.x_m, AT_FIRST.time_s, np.zeros_like(flow_mps), flow_mps)
+        path = DubinsPath(Pose(40, 0, EAST), 30, (-1, 0, 0), (30 * math.pi, 0, 0))
+        assert Sailing(2.5, 1.5, grid=turned).path_s(path) == pytest.approx(took_s, rel=1e-4)
 
     def test_of_its_times_the_slowest_counts(self) -> None:
         sailing = Sailing(2.5, 1.5, grid=SHEAR)

@@ -93,6 +93,7 @@ class TestByHand:
         [
             (Pose(0, 0, NORTH), Pose(0, 0, NORTH), 0),
             (Pose(0, 0, NORTH), Pose(0, 70, NORTH), 70),
+            (Pose(0, 0, NORTH), Pose(0, 1e-8, NORTH), 1e-8),  # as near to each other as circles that are told apart
             (Pose(3, 4, 1.0), Pose(3 + 50 * math.sin(1), 4 + 50 * math.cos(1), 1.0), 50),
             (Pose(0, 0, NORTH), Pose(20, 0, SOUTH), 10 * math.pi),  # a half turn
             (Pose(0, 0, NORTH), Pose(-20, 0, SOUTH), 10 * math.pi),

@@ -151,6 +151,20 @@ class TestParts:
         parts = convex_parts(L_SHAPE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
 
+    def test_a_cut_may_end_at_the_next_boundary(self) -> None:
+        # A block with an arm along its south side, 100 m off. Cut at x = 100 m, 100, 400 and 600 m take 2, 3 and 4
+        # tracks; right across at y = 200 m it looks better at first: 700 and 500 m take 5 and 4. But what lies south of
+        # that must be cut again, and takes 2 and 3. So x = 100 m is cut from (100, 200) to the north alone.
+        block_and_arm = Region(
+            (
+                *((0.0, 0.0), (500.0, 0.0), (500.0, 100.0), (100.0, 100.0)),
+                *((100.0, 200.0), (700.0, 200.0), (700.0, 500.0), (0.0, 500.0)),
+            )
+        )
+        parts = convex_parts(block_and_arm, 0, lambda width_m: track_count(width_m, 40, 120))
+        sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
+        assert sizes_m == [(100, 500), (400, 100), (600, 300)]
+
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sum(shapely.Polygon(part.vertices).area for part in parts) == pytest.approx(600**2 - 200**2)
@@ -238,6 +252,14 @@ class TestOrder:
         assert [min(x for x, _ in part.vertices) for part in back] == [400, 200, 0]
         assert {part.track_heading_rad for part in back} == {math.pi}
 
+    def test_where_ways_are_as_long_to_the_millimetre_the_order_given_is_kept(self) -> None:
+        # From the middle between two that lie 200 m apart; which is 0.2 mm nearer does not decide.
+        west, east = (
+            Region(((x, -50.0), (x + 100, -50.0), (x + 100, 50.0), (x, 50.0))).about(0) for x in (-200.0002, 100.0)
+        )
+        for order in ([west, east], [east, west]):
+            assert [part.vertices for part in in_order(order, (0, 0))] == [part.vertices for part in order]
+
     def test_many_parts_are_taken_one_after_the_other(self) -> None:
         row = [
             Region(((x, 0.0), (x + 90, 0.0), (x + 90, 100.0), (x, 100.0))).about(0)
@@ -250,6 +272,14 @@ class TestBestHeading:
     def test_of_a_rectangle_is_along_its_longer_side(self) -> None:
         assert best_heading(RECTANGLE, 40, 145) == pytest.approx(math.pi / 2)
         assert first_plan(RECTANGLE, math.pi / 2, 40, 145).track_count == 3
+
+    @pytest.mark.parametrize("first", [0, 1, 2])
+    def test_of_a_triangle_is_along_its_longest_side_wherever_its_outline_begins(self, first: int) -> None:
+        # 2400 m east and 1800 m north is 3000 m; beside its middle, (1300, 950), the third corner lies 390 m off.
+        corners = ((100.0, 50.0), (1300 + 390 * 0.6, 950 - 390 * 0.8), (2500.0, 1850.0))
+        region = Region((*corners[first:], *corners[:first]))
+        assert best_heading(region, 40, 145) == pytest.approx(math.atan2(4, 3))
+        assert first_plan(region, math.atan2(4, 3), 40, 145).track_count == 2
 
     @settings(max_examples=30)
     @given(st.lists(st.tuples(st.integers(0, 900), st.integers(0, 900)), min_size=3, max_size=8), headings)

@@ -161,6 +161,16 @@ def test_a_window_alone_has_the_risk_that_it_has_in_the_whole(told: list[TileNew
         np.testing.assert_array_equal(levels == 0, fleet.risk[window] == 1)
 
 
+def test_a_window_is_told_in_levels_and_with_a_rho_in_parts_of_them() -> None:
+    window = (slice(0, 20), slice(0, 20))
+    for rho, counting in ((0.0, 80), (0.5, 16 * (0.5 * 50 + 0.5 * 80))):
+        fleet = FleetMap(GRID, rho)
+        tile("alpha", (0, 1), PLACES[0], 50).give(fleet)
+        tile("beta", (0, 1), PLACES[0], 30).give(fleet)
+        levels, _ = fleet.levels_within(window, ["alpha", "beta"])
+        assert (levels == counting).all()
+
+
 @given(published())
 def test_what_is_known_already_is_no_news(told: list[TileNews]) -> None:
     fleet = FleetMap(GRID)
@@ -219,6 +229,17 @@ def test_many_starts_in_any_order_end_in_one_map_and_take_no_more_memory(order: 
         assert not tile("alpha", (incarnation, 2), PLACES[0], 200).give(fleet)
     assert tile("alpha", (2 * MOST_STARTS + 1, 2), PLACES[0], 3).give(fleet)
     assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1)) + 2 * MOST_STARTS + 2
+
+
+def test_what_was_seen_at_a_point_is_the_sum_of_all_levels_of_its_cell_and_nothing_beyond_the_grid() -> None:
+    # Cells of 5 m: columns are centred at 0, 5, ..., 110 m, rows at 2.5, 7.5, ..., 107.5 m.
+    fleet = FleetMap(GRID)
+    for place in PLACES:
+        tile("alpha", (0, 1), place, 50).give(fleet)
+    tile("beta", (0, 1), PLACES[0], 30).give(fleet)
+    x_m = np.array([0.0, -2.4, 50.0, 110.0, 112.4, -2.6, 112.6, 50.0, 50.0])
+    y_m = np.array([2.5, 0.1, 50.0, 109.9, 50.0, 50.0, 50.0, -0.1, 110.1])
+    assert fleet.nats_at(x_m, y_m) == pytest.approx([1.6, 1.6, 1.6, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0])
 
 
 def test_layers_can_be_told_apart() -> None:

@@ -106,6 +106,19 @@ class TestFinding:
         expected = shapely.box(105, 200 - 17.5, 115, 200 - 7.5)
         assert shapely.Polygon(found.changed[0].outline).symmetric_difference(expected).area < 1e-6
 
+    def test_one_that_is_new_lies_where_it_is_also_far_from_where_nothing_has_changed(self) -> None:
+        def hot_from(first_column: int) -> BoolArray:
+            hot = NONE.copy()
+            hot[3:5, first_column : first_column + 2] = True
+            return hot
+
+        # Blocks of 15 m: the first one in the second row of blocks, then in the fourth column of it.
+        first = update_hotspots(GRID, hot_from(0), NONE, RISK, HotspotMap.empty(GRID), block_m=15, least_area_m2=0)
+        both = hot_from(0) | hot_from(9)
+        then = update_hotspots(GRID, both, NONE, RISK, first.map, block_m=15, least_area_m2=0)
+        # Rows from 15 to 25 m along, columns from 42.5 to 52.5 m across; the frame begins at (100, 200).
+        assert shapely.Polygon(then.changed[0].outline).equals(shapely.box(142.5, 215, 152.5, 225))
+
 
 class TestNumbers:
     def test_nothing_new_changes_nothing(self) -> None:
@@ -168,6 +181,11 @@ class TestNumbers:
         assert gone.withdrawn == {2: None}
         back = update("##..## ##..##", gone.map)
         assert [hotspot.number for hotspot in back.changed] == [3]
+
+    def test_where_nothing_is_hot_there_is_no_hotspot_and_all_that_were_are_withdrawn(self) -> None:
+        assert update("......").map.hotspots == {}
+        none = update("......", update("##..## ##..##").map)
+        assert (none.changed, none.withdrawn, none.map.hotspots) == ((), {1: None, 2: None}, {})
 
     def test_a_patch_that_shrinks_below_the_least_size_is_withdrawn(self) -> None:
         first = update("#### ####")

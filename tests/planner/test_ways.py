@@ -82,6 +82,17 @@ def test_the_margin_is_kept_to_the_zone_and_corners_are_turned_at_a_margin() -> 
     assert way_length_m(found(start, end, grown)) == pytest.approx(way_length_m(found(start, end)), abs=1e-6)
 
 
+def test_who_has_room_circles_about_a_zone_and_else_so_far_beside_it_as_chords_lie_beside_their_arcs() -> None:
+    # A path may lie 5 cm within it: of 6 m by 8 m the least circle is of 5 m.
+    block = KeepOut((((-3.05, -4.05), (3.05, -4.05), (3.05, 4.05), (-3.05, 4.05)),))
+    assert block.circling(Pose(-5.1, 0, NORTH), 5.1) == 1
+    assert block.circling(Pose(-5.0, 0, NORTH), 5.0) == -1
+    (just_as_large_m,) = block._part_radii_m.tolist()
+    for radius_m in (4.0, just_as_large_m):
+        for beside_m, side in ((0.01, -1), (0.03, 1)):
+            assert block.circling(Pose(-3 - beside_m - 2 * radius_m, 0, NORTH), radius_m) == side
+
+
 class TestNoWay:
     RING = KeepOut(
         (

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from comms.said.messages import Look, Maneuver, ManeuverKind, TruthLook
+from planner.currents import FlowGrid
 from planner.types import DetectionCurve, FloatArray, Point
 from sim_world.config import EstimateConfig, SensorConfig, TargetsConfig, VehicleConfig
 from sim_world.kinds import Mixture
 from sim_world.layouts import Given
 from sim_world.looks import Looks
 from sim_world.sonar import Seabed
+from sim_world.steadiness import STILL_WATER, Stream
 from sim_world.targets import Recogniser, make_targets
 from sim_world.vehicle import Stretch
 
@@ -42,6 +44,7 @@ def looked(
     targets: TargetsConfig,
     sensor: SensorConfig = SENSOR,
     seabed: Seabed | None = None,
+    current: Stream = STILL_WATER,
 ) -> list[tuple[Look, TruthLook]]:
     """What is told of the first 20 m of northward tracks at these x."""
     seabed = seabed or HalfTaken()
@@ -52,6 +55,7 @@ def looked(
         targets=make_targets(targets, AREA, 1),
         recogniser=Recogniser(sensor.curve, false_alarms_per_km2=0.0),
         seed=1,
+        current=current,
     )
     found = []
     for x_m in tracks:
@@ -79,6 +83,15 @@ def test_a_vehicle_that_is_blind_to_the_seabed_tells_the_curve_and_finds_what_it
     assert np.array_equal(told[True][1].p_detect, told[False][1].p_detect)
     assert told[True][1].detected == told[False][1].detected
     assert told[True][1].p_detect == pytest.approx(0.3)
+
+
+def test_a_look_suffers_from_the_current_where_the_vehicle_is_at_its_end() -> None:
+    # 1 m/s to the east 20 m north of the track's start, less and less before and behind; the vehicle makes 2 m/s.
+    east_mps = np.array([[[0.0], [1.0], [0.0]]])
+    grid = FlowGrid(np.array([0.0]), np.array([0.0, 20.0, 40.0]), np.array([0.0]), east_mps, np.zeros_like(east_mps))
+    sensor = replace(SENSOR, half_at_crab_rad=math.atan(0.5))
+    ((look, _),) = looked([100.0], TARGETS, sensor, current=Stream(1.0, 0.0, grid=grid))
+    assert look.p_detect == pytest.approx(0.3 / 2)
 
 
 def test_what_is_told_too_high_finds_no_more() -> None:

@@ -6,12 +6,13 @@ import math
 from dataclasses import replace
 
 import pytest
-from by_hand import PRIMARY, run_info
+from by_hand import PRIMARY, nav, run_info
 from one_node import OneNode
 
 from comms.said.announcement import Role, Vertex, Zone
 from comms.said.messages import (
     AgentState,
+    Hotspot,
     Maneuver,
     ManeuverKind,
     ManeuverState,
@@ -95,6 +96,8 @@ def test_a_track_that_takes_too_long_is_left_for_home_wherever_that_is_left_from
     orders = [one.message for one in node.said if isinstance(one.message, Maneuver)]
     assert [one.kind for one in orders] == [ManeuverKind.FOLLOW, ManeuverKind.GOTO][: 1 + goes_home]
     assert not goes_home or (orders[-1].end_x_m, orders[-1].end_y_m) == (0, 0)
+    # What is left is for helpers, at once: all of the area, 61 columns of 40 cells.
+    assert [hotspot.cells for hotspot in node.all(Hotspot)] == [61 * 40] * goes_home
 
 
 def test_no_track_is_begun_that_the_battery_does_not_last_for() -> None:
@@ -105,6 +108,23 @@ def test_no_track_is_begun_that_the_battery_does_not_last_for() -> None:
     assert [one.message.kind for one in node.said if isinstance(one.message, Maneuver)][-1] is ManeuverKind.GOTO
     assert node.all(Plan)[-1].tracks == ()
     assert node.all(AgentState)[-1].mode is Mode.RETURNING
+
+
+@pytest.mark.parametrize(("later_ms", "kind"), [(9_999, ManeuverKind.GOTO), (10_000, ManeuverKind.FOLLOW)])
+def test_who_sails_on_behind_a_track_is_reckoned_from_where_that_ends_and_then_from_where_it_says_it_is(
+    later_ms: int, kind: ManeuverKind
+) -> None:
+    # The first track ends 220 m to the north at 120 s, its run-out 10 s later. The second is refused, the third begins
+    # at (180, -20): for 120 s along it and some 160 s home the battery lasts, not for a way of 250 m before.
+    node = survey(500_000)
+    node.hear(f"veh/{PRIMARY}/nav", nav())
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.DONE, 0, ""), at_ms=120_000)
+    node.hear(f"veh/{PRIMARY}/nav", nav(180, -20))
+    refused = ManeuverStatus(2, ManeuverState.REFUSED, 0, "no rudder")
+    node.hear(f"veh/{PRIMARY}/maneuver_status", refused, at_ms=120_000 + later_ms)
+    order = node.last(Maneuver)
+    assert (order.number, order.kind) == (3, kind)
+    assert kind is ManeuverKind.GOTO or order.start_x_m == 180
 
 
 def test_round_ground_to_keep_out_of_it_is_farther_home_and_who_is_refused_asks_again() -> None:

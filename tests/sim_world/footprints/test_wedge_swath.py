@@ -27,6 +27,8 @@ def test_its_cells_reach_beyond_the_stretch_and_to_the_sectors_widest() -> None:
     # 2 bins beside the stretch, 3 ahead of it; 15 m times sin 45 degrees is 10.6 m.
     assert WedgeSwath.bins_of(SHAPE, 2, (5.0, 5.0)) == (5, 4)
     assert WedgeSwath.bins_of(SonarShape("wedge", 0.0, 15.0, math.pi / 2, 10.0), 1, (5.0, 5.0)) == (4, 4)
+    # Bins of 2 m across: as many more as it takes.
+    assert WedgeSwath.bins_of(SHAPE, 2, (5.0, 2.0)) == (5, 7)
 
 
 def test_by_hand_which_cells_are_seen() -> None:
