@@ -49,6 +49,7 @@ class Coordinator:
     `has_begun`: whether that announcement has come; from then on there are `fleet` and `ledger`.
     """
 
+    _first_number: int  # of strips, since it was started
     fleet: KnownFleet  # this and what follows: since the run's announcement
     _sectors: Sectors
     _strips: StripLife
@@ -59,7 +60,6 @@ class Coordinator:
 
     def __init__(self, config: CoordinatorConfig) -> None:
         self.config = config
-        self._first_number = 1
         self._agenda = Agenda()
         self._outbox = Outbox()
         self.has_begun = False

@@ -219,5 +219,5 @@ class OneHeading:
 
 def _block(width: int) -> int:
     """So many cells a side are taken together: as many as divide a swath and leave it enough blocks."""
-    sizes = (size for size in range(1, width + 1) if width % size == 0 and width // size >= BLOCKS_A_SWATH)
+    sizes = (size for size in range(1, width // BLOCKS_A_SWATH + 1) if width % size == 0)
     return max(sizes, default=1)
