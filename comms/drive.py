@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -51,6 +50,8 @@ class Setup:
 
 def identity_of(node_id: str, run: str, info: RunInfo) -> Identity:
     """Whose memory a node's is, in a run that is announced like this."""
+    from importlib.metadata import version  # noqa: PLC0415 - takes a process an eighth of its start; most keep none
+
     return Identity(
         node=node_id,
         run=run,

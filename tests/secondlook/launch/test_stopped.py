@@ -21,7 +21,7 @@ from secondlook.scenario import load_scenario
 PROGRAM = Path(__file__).parents[2] / "support" / "stopped_run.py"
 FACTOR = 20.0
 SLOW = (
-    "vehicles.primary.speed_mps=0.12",
+    "vehicles.primary.speed_mps=0.2",
     "vehicles.primary.endurance_s=360000",
 )  # some seconds of wall time in lockstep
 STOPPED_S = 1.2 * PATIENCE_S
@@ -52,6 +52,7 @@ def test_a_fleet_that_was_stopped_goes_on(tmp_path: Path) -> None:
             for pid in pids:
                 os.kill(pid, signal.SIGSTOP)
         threading.Event().wait(STOPPED_S)  # for so long nothing is to happen
+        assert [one.process.poll() for one in lockstep + wall] == [None] * 4  # none was over before
         for pid in pids:
             os.kill(pid, signal.SIGCONT)
         stepped, timed = [ended(one) for one in lockstep], [ended(one) for one in wall]
