@@ -120,6 +120,36 @@ def test_a_course_begins_where_and_when_a_helper_was_heard(mode: Mode, strip_tol
     assert course.at(500.001) == pytest.approx((0, 20, NORTH))
 
 
+def test_a_course_is_laid_anew_once_a_helper_says_that_it_is_on_its_way() -> None:
+    traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+    traffic.offered("helper", SERVED, *traffic.to_strip(one, None, SERVED, 0.0))
+    one.heard_ms = 3000
+    for mode, strip_told, start_s in ((Mode.IDLE, 0, 0.0), (Mode.TRANSIT, SERVED.number, 3.0)):
+        course = traffic.course(at(one, mode, 100, strip_told), SERVED, 3.0)
+        assert course is not None
+        assert course.start_s == start_s
+    one.heard_ms = 5000
+    course = traffic.course(at(one, Mode.TRANSIT, 96, SERVED.number), SERVED, 5.0)
+    assert course is not None
+    assert course.start_s == 3.0  # but once
+
+
+def test_a_helper_that_says_it_is_at_another_strip_is_expected_over_that() -> None:
+    traffic, one = Traffic(), helper()
+    for told, end_m in ((SERVED, (0, 125)), (OTHER, (60, 125))):  # 5 m behind its end
+        course = traffic.course(at(one, Mode.TRANSIT, -30, told.number), told, 0.0)
+        assert course is not None
+        assert course.at(course.arrives_s)[:2] == pytest.approx(end_m, abs=0.01)
+
+
+@pytest.mark.parametrize(("x_m", "y_m", "bearing_deg"), [(0, 200, 0), (60, 120, 90), (-60, 180, 315), (-60, 120, 270)])
+def test_a_helper_comes_to_where_it_is_to_wait_the_way_that_it_lies(x_m: float, y_m: float, bearing_deg: float) -> None:
+    course = Traffic().aside(at(helper(), Mode.IDLE, 120), None, (x_m, y_m), 0.0)
+    arrives = course.at(course.arrives_s)
+    assert arrives[:2] == pytest.approx((x_m, y_m), abs=0.01)
+    assert math.degrees(arrives.heading_rad) == pytest.approx(bearing_deg, abs=0.01)
+
+
 def test_who_is_on_its_way_home_is_expected_there_and_whose_battery_is_empty_where_it_lies() -> None:
     # From 120 m north of its home, headed away from it.
     for mode, then_m in ((Mode.RETURNING, 0), (Mode.EMPTY, 120)):
