@@ -21,12 +21,13 @@ from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import Ledger, StripRecord
-from coordinator.vehicles import Offer
+from coordinator.vehicles import MOST_FAILURES, Offer
 from planner.dubins import Pose
 
 CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
 LEVELS = np.zeros((60, 10), dtype=np.uint8)
 AHEAD = replace(CONFIG, ahead_ms=60_000)
+LEAVES = AgentState(Mode.RETURNING, 0, 0.1, 0, 122.5, 0, 0)
 
 
 class Known:
@@ -129,6 +130,20 @@ def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with
     (later,) = known.situation(140_000).helpers
     assert later.task is not None
     assert (later.task.strip.number, later.free_s, later.sweeping) == (2, 405.0, True)
+
+
+def test_who_has_failed_too_often_or_is_on_its_way_home_is_not_told_of_even_where_it_has_a_strip_still() -> None:
+    known = Known()
+    known.heard(HELPER, Mode.IDLE)
+    helper = known.fleet.vehicles[HELPER]
+    for failures, told in ((MOST_FAILURES - 1, 1), (MOST_FAILURES, 0)):
+        helper.failures = failures
+        assert len(known.situation(60_000).helpers) == told
+    known = Known()
+    at_work(known)
+    assert len(known.situation(60_000).helpers) == 1
+    known.fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 2, 60_000), LEAVES, 60_000)
+    assert known.situation(60_000).helpers == ()
 
 
 def test_where_nothing_is_offered_ahead_who_is_late_is_busy() -> None:

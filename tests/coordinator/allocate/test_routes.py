@@ -174,6 +174,13 @@ class TestWhatIsPromising:
         ]
         assert still_m2[0] == pytest.approx(expected)
 
+    def test_a_strip_takes_its_sweep_and_the_way_that_is_usual_where_helpers_have_unlike_many_ways_to_fly_it(
+        self,
+    ) -> None:
+        # Alpha flies one leg, 100 s of it, beta two. Between the strips it is 290 m and a run-in of 5 m, at 2 m/s.
+        team = Team([NEAR, FAR], [helper(), helper("beta", swath_m=30)], 3600)
+        assert team.alone_s == pytest.approx([100 + 147.5] * 2)
+
     @pytest.mark.parametrize(
         ("counts_m2", "best"), [([5, 7, 7, 3, 7 + 1e-7], 1), ([5, 7, 7, 3, 7.1], 4), ([5, 4, 3, 2, 1], 0)]
     )

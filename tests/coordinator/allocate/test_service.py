@@ -12,7 +12,7 @@ from situations import helper, open_strip, situations, strip
 
 from coordinator.allocate.service import StripTable, can_fly, expected_service, removed_m2
 from coordinator.allocate.situation import Situation
-from planner.currents import Sailing
+from planner.currents import FlowGrid, Sailing
 from planner.dubins import Pose
 from planner.keep_out import KeepOut
 from planner.way_home import WayHome
@@ -85,3 +85,16 @@ def test_a_current_tells_from_when_to_when_the_sonar_is_on() -> None:
     one = replace(helper(), way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0))
     served = expected_service(open_strip(strip(1)), one)
     assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((40, 120, 122))
+
+
+@pytest.mark.parametrize(("x_m", "y_m", "heading_rad"), [(0, 100, 0.0), (100, 0, np.pi / 2)])
+def test_on_the_way_to_a_strip_the_flow_half_way_there_counts(x_m: float, y_m: float, heading_rad: float) -> None:
+    # From astern, and rising to 0.9 m/s at 90 m; half-way over the 95 m to the run-in it is 0.475 m/s.
+    north, axis, flow = x_m == 0, np.array([0.0, 90.0]), np.array([0.0, 0.9])
+    speeds = flow[np.newaxis, :, np.newaxis] if north else flow[np.newaxis, np.newaxis, :]
+    still, nowhere = np.zeros_like(speeds), np.zeros(1)
+    grid = FlowGrid(nowhere, axis, nowhere, still, speeds) if north else FlowGrid(axis, nowhere, nowhere, speeds, still)
+    one = helper(way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.9, grid=grid), 6.0))
+    table = StripTable([open_strip(strip(1, x_m, y_m, heading_rad=heading_rad))], one)
+    to_begin_s = table.to_begin_s(np.array([[0, 0, heading_rad]]))
+    assert to_begin_s[0, 0, 0] == pytest.approx(95 / 2.475 + 5 / 2.9)

@@ -174,6 +174,16 @@ class TestCheck:
         right.changed("helper")
         assert right.check_s == 0
 
+    def test_who_is_sent_to_a_strip_is_checked_at_once(self) -> None:
+        one, far = known("helper", Role.REVISIT, Mode.IDLE, 200, 90), open_strip(strip(1, 200, 100))
+        right, fleet = right_of_way(), [Underway(primary(0), None), Underway(one, None)]
+        right.check(fleet, 0.0)
+        assert right.check_s > 0
+        departures = right.departures(fleet, 0.0)
+        departures.wait_s(helper("helper"), far)
+        right.offered("helper", 1, departures)
+        assert right.check_s == 0
+
     @pytest.mark.parametrize("now_s", [0.0, 10.0])
     def test_two_are_checked_when_they_may_be_near_enough(self, now_s: float) -> None:
         # Heard 400 m apart at 0 s, closing at 2 and 1.5 m/s at most: one that is free stands aside for what is expected
@@ -184,11 +194,26 @@ class TestCheck:
             assert right.check([Underway(primary(0), None), Underway(me, strip_)], now_s) == []
             assert right.check_s == pytest.approx((400 - near_m - 15 - 11) / 3.5)
 
+    def test_from_when_they_were_heard(self) -> None:
+        # At 10 s they are at least 400 m less 8 s and 6 s of their ways apart.
+        one, me = primary(0), known("helper", Role.REVISIT, Mode.IDLE, 400, 0)
+        one.heard_ms, me.heard_ms = 2000, 4000
+        right = right_of_way()
+        assert right.check([Underway(one, None), Underway(me, None)], 10.0) == []
+        assert right.check_s == pytest.approx(10 + (400 - 8 * 1.5 - 6 * 2 - 147 - 15 - 11) / 3.5)
+
     def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
         to = strip(7, 0, 20, length_m=100)
         at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, 140, 7)
         (told,) = right_of_way().check([Underway(primary(0), None), Underway(at_work, to)], 0.0)
         assert (told.name, told.gives_back) == ("helper", to)
+
+    def test_it_is_told_nothing_while_its_answer_to_an_offer_is_under_way(self) -> None:
+        to = strip(7, 0, 20, length_m=100)
+        idle = known("helper", Role.REVISIT, Mode.IDLE, 0, 140)
+        assert right_of_way().check([Underway(primary(0), None), Underway(idle, to)], 0.0) == []
+        (told,) = right_of_way().check([Underway(primary(0), None), Underway(idle, None)], 0.0)
+        assert told.name == "helper"  # it is in the way
 
     def test_it_does_not_before_it_is_50_s_from_there_or_begins_to_sweep(self) -> None:
         # It is at the strip's northern end in about 60 s, and meets the primary on it some 14 s later.

@@ -134,6 +134,14 @@ def test_a_course_is_laid_anew_once_a_helper_says_that_it_is_on_its_way() -> Non
     assert course.start_s == 3.0  # but once
 
 
+def test_a_helper_on_its_leg_sails_what_is_left_of_that_and_no_more() -> None:
+    traffic, one = Traffic(), helper()
+    traffic.course(at(one, Mode.TRANSIT, -30, SERVED.number), SERVED, 0.0)
+    course = traffic.course(at(one, Mode.REVISIT, 124.5, SERVED.number), SERVED, 0.0)
+    assert course is not None
+    assert course.arrives_s == pytest.approx(0.25)  # half a metre at 2 m/s
+
+
 def test_a_helper_that_says_it_is_at_another_strip_is_expected_over_that() -> None:
     traffic, one = Traffic(), helper()
     for told, end_m in ((SERVED, (0, 125)), (OTHER, (60, 125))):  # 5 m behind its end
@@ -196,13 +204,13 @@ def test_a_helper_that_took_another_way_is_expected_on_it() -> None:
     assert course.at(course.arrives_s)[:2] == pytest.approx((0, 200), abs=0.5)
     # It came there sooner than any way that is known to lead there: it circles from where it is.
     one.heard_ms = 20_000
-    for x_m in (12.0, 20.0):  # so far a circle of 6 m about the place may lead it, and 10 m farther
+    for x_m in (12.0, 21.4):  # so far a circle of 6 m about the place may lead it, and 10 m farther
         course = traffic.course(at(one, Mode.IDLE, 195, x_m=x_m), None, 22.0)
         assert course is not None
         assert course.at(20.0) == pytest.approx((x_m, 195, NORTH))
         assert course.arrives_s == pytest.approx(20.0, abs=0.01)
         one.heard_ms += 1  # it is not laid twice for one word
-    course = traffic.course(at(one, Mode.IDLE, 195, x_m=25.0), None, 22.0)
+    course = traffic.course(at(one, Mode.IDLE, 195, x_m=21.5), None, 22.0)
     assert course is not None
     assert course.arrives_s > 21.0
 
