@@ -134,6 +134,8 @@ class TestWhereSomethingMatters:
         laid = Laid()
         laid.sectors.cut_by(7_000, [Window(0, 20, 0, 20)])
         assert laid.to_cut() == {0: 7_000}
+        laid.sectors.cut_by(7_500, [Window(0, 20, 0, 20), Window(60, 70, 0, 5)])
+        assert laid.to_cut() == {0: 7_500, 1: 7_500}
         laid.sectors.cut_by(8_000)
         assert laid.to_cut() == {0: 8_000, 1: 8_000}
         laid.sectors.assign_by(9_000, Window(60, 70, 0, 5))
@@ -203,6 +205,7 @@ class TestTeams:
         assert self.better(laid) == 1
         laid.sectors.join("alpha", laid.north, 100_000)
         assert (laid.south.team, laid.north.team) == ({"beta"}, {"alpha", "gamma", "delta"})
+        assert (laid.south.present, laid.north.present) == (1, 3)
         assert laid.sectors.about(laid.fleet.vehicles["alpha"]) == [laid.north]
         assert laid.to_cut() == {0: 100_000, 1: 100_000}
 

@@ -174,6 +174,11 @@ class TestWhatIsPromising:
         ]
         assert still_m2[0] == pytest.approx(expected)
 
+    def test_what_is_begun_after_the_deadline_brings_nothing(self) -> None:
+        removed, shares = Team([NEAR, FAR], [helper()], 250).flown([[1, 0]])  # by number the far one is the first
+        assert removed == pytest.approx(700)
+        assert shares == {2: 1.0, 1: 0.0}
+
     def test_a_strip_takes_its_sweep_and_the_way_that_is_usual_where_helpers_have_unlike_many_ways_to_fly_it(
         self,
     ) -> None:

@@ -17,6 +17,7 @@ from coordinator.allocate.situation import Allocator, Helper, OpenStrip
 from coordinator.keep_apart.courses import too_close
 from coordinator.keep_apart.right_of_way import RightOfWay, Underway
 from coordinator.vehicles import KnownVehicle
+from planner.dubins import Pose
 from planner.types import Strip
 
 NORTH, WEST = 0.0, 1.5 * math.pi
@@ -104,6 +105,27 @@ class TestDepartures:
         me = known("helper", Role.REVISIT, Mode.IDLE, 0, -20)
         waits_s = self.wait_s(right_of_way(), [primary(-beside_m), me], strip(1, 0, 30, length_m=250))
         assert (waits_s == 0) is sets_out
+
+    def test_a_helper_at_work_goes_on_to_its_next_from_where_and_when_it_is_free(self) -> None:
+        # At 60 s, at its strip's end; told to leave it for another it sets out now, from where it is.
+        me = known("helper", Role.REVISIT, Mode.REVISIT, 0, 20, 7)
+        at_work, then = Underway(me, strip(7, 0, 20, length_m=100)), open_strip(strip(1, 0, 200))
+        free = helper("helper", free_at=Pose(0, 125, NORTH), free_s=60)
+        for one, start_s, y_m in ((free, 60.0, 125), (replace(free, task=then), 0.0, 20)):
+            departures = right_of_way().departures([at_work], 0.0)
+            assert departures.wait_s(one, then) == 0
+            _, course, _ = departures.ways["helper", 1]
+            assert course.start_s == start_s
+            assert course.at(start_s) == pytest.approx((0, y_m, NORTH))
+
+    def test_to_its_next_it_goes_without_waiting_or_not_at_all(self) -> None:
+        # Over its next one it meets the primary, which is ahead of it, from 60 s on.
+        to = strip(7, 0, 20, length_m=100)
+        at_work = Underway(known("helper", Role.REVISIT, Mode.REVISIT, 0, 20, 7), to)
+        free = helper("helper", free_at=Pose(0, 125, NORTH), free_s=60)
+        for x_m, waits_s in ((0, math.inf), (200, 0)):
+            departures = right_of_way().departures([Underway(primary(x_m, 100), None), at_work], 0.0)
+            assert departures.wait_s(free, open_strip(strip(1, 0, 200))) == waits_s
 
     def test_who_is_let_through_is_in_the_others_way_until_all_are_judged_anew(self) -> None:
         # Northwards along x = 0, and eastwards across that at 150 m, both there after about 75 s.
