@@ -10,6 +10,7 @@ import pytest
 from by_hand import HELPER, PRIMARY, run_info
 from sectors_by_hand import sector, whole
 
+from comms.said.announcement import Vertex, Zone
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripState
 from coordinator.allocate.service import Service
@@ -33,8 +34,9 @@ LEAVES = AgentState(Mode.RETURNING, 0, 0.1, 0, 122.5, 0, 0)
 class Known:
     """What a coordinator knows of the fleet by hand, and its briefing."""
 
-    def __init__(self, config: CoordinatorConfig = CONFIG) -> None:
-        self.fleet = KnownFleet(run_info(400, 400), config.silent_after_ms, config.lost_after_ms, 0)
+    def __init__(self, config: CoordinatorConfig = CONFIG, keep_out: tuple[Zone, ...] = ()) -> None:
+        run = replace(run_info(400, 400), keep_out=keep_out)
+        self.fleet = KnownFleet(run, config.silent_after_ms, config.lost_after_ms, 0)
         self.ledger = Ledger()
         self.briefing = Briefing(config, self.ledger, self.fleet, 0.7)
         self.sector = whole(self.fleet)
@@ -100,6 +102,19 @@ def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     assert told.now_s - helper.heard_s == 10
     known.fleet.vehicles[HELPER].refused.add(1)
     assert known.situation(60_000).helpers[0].refused == {1}
+
+
+def test_what_a_helper_cannot_fly_it_is_not_to_be_offered_beside_what_it_has_refused() -> None:
+    # The first strip runs north along 122.5 m, over the zone, the second along 222.5 m.
+    corners = ((115.0, 150.0), (130.0, 150.0), (130.0, 160.0), (115.0, 160.0))
+    known = Known(keep_out=(Zone(tuple(Vertex(*corner) for corner in corners)),))
+    known.heard(HELPER, Mode.IDLE)
+    for number, first in enumerate((20, 40), 1):
+        cut = Cut(Window(10, 70, first, first + 10), counts_m2=4200.0, removable_m2=2100.0)
+        known.ledger.open(cut.strip(known.fleet.map.grid, number), cut, 0, "")
+    assert known.situation(60_000).helpers[0].refused == {1}
+    known.fleet.vehicles[HELPER].refused.add(2)
+    assert known.situation(60_000).helpers[0].refused == {1, 2}
 
 
 def at_work(known: Known) -> StripRecord:

@@ -74,6 +74,13 @@ class TestOffers:
         asked = situation([self.near], [helper()])
         assert offers_let_through(Insists(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
 
+    @pytest.mark.parametrize(("clear", "offers"), [(6, [("alpha", 6)]), (7, [])])
+    def test_an_allocator_is_asked_six_times_for_one_that_may_be_offered(
+        self, clear: int, offers: list[tuple[str, int]]
+    ) -> None:
+        asked = situation([open_strip(strip(number, 100 * number)) for number in range(1, 9)], [helper()])
+        assert offers_let_through(NearestAllocator(), asked, Waits({clear}, math.inf)) == (offers, ASKED_LATER_S)
+
     def test_a_helper_gives_its_task_back_only_where_the_way_to_the_other_is_clear(self) -> None:
         class TurnsRound:
             def assign(self, asked: object) -> dict[str, int]:
