@@ -148,7 +148,7 @@ class TestWhatIsPromising:
 
     THIRD = open_strip(strip(3, x_m=300, y_m=100))
 
-    @pytest.mark.parametrize("deadline_s", [3600.0, 200.0])
+    @pytest.mark.parametrize("deadline_s", [3600.0, 300.0, 200.0])
     def test_the_strips_left_bring_what_they_do_by_themselves_and_then_a_second_what_the_worst_does_by_half(
         self, deadline_s: float
     ) -> None:

@@ -50,6 +50,16 @@ def test_of_all_ways_the_shortest_is_the_one_that_is_expected(told: Situation) -
                 assert ends_s.min() == pytest.approx(expected_service(job, there).ends_s)
 
 
+def test_strips_of_one_leg_and_of_two_are_each_as_by_itself() -> None:
+    one = helper(swath_m=30)
+    jobs = [open_strip(strip(1)), open_strip(replace(strip(2, x_m=100), width_m=30))]
+    _, free_s, leave = StripTable(jobs, one).best_from(one.pose, 0.0, np.inf)
+    for place, job in enumerate(jobs):
+        served = expected_service(job, one)
+        assert free_s[place] == pytest.approx(served.free_s)
+        assert leave[place] == pytest.approx(served.free_at)
+
+
 @pytest.mark.parametrize(("from_x_m", "can"), [(-30.0, False), (10.0, False), (50.0, True)])
 def test_what_lies_on_its_legs_keeps_a_helper_from_flying_a_strip(from_x_m: float, can: bool) -> None:
     zone = KeepOut((tuple((from_x_m + x_m, y_m) for x_m, y_m in ((0, 150), (60, 150), (60, 160), (0, 160))),))
