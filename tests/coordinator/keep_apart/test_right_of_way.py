@@ -134,6 +134,15 @@ class TestDepartures:
             departures = right_of_way().departures([Underway(primary(x_m, 100), None), at_work], 0.0)
             assert departures.wait_s(free, open_strip(strip(1, 0, 200))) == waits_s
 
+    @pytest.mark.parametrize(("begin_m", "waits_s"), [(50, 30), (185, 30), (186, 0)])
+    def test_a_sweep_that_begins_within_90_s_is_to_be_clear_to_its_end(self, begin_m: float, waits_s: float) -> None:
+        # Eastwards, 5 m of run-in before the strip; the primary crosses at 300 m after 150 s, and 30 s later is clear.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=math.pi / 2)
+        east = strip(1, begin_m, 0, heading_rad=math.pi / 2, length_m=400)
+        assert self.wait_s(right_of_way(), [primary(300, -225), me], east) == waits_s
+
     def test_who_is_let_through_is_in_the_others_way_until_all_are_judged_anew(self) -> None:
         # Northwards along x = 0, and eastwards across that at 150 m, both there after about 75 s.
         one, other = known("helper", Role.REVISIT, Mode.IDLE, 0, 0), known("second", Role.REVISIT, Mode.IDLE, -150, 150)
