@@ -112,12 +112,13 @@ def test_a_primary_that_is_given_up_is_expected_along_its_tracks_while_it_is_hea
     ("mode", "strip_told"),
     [(Mode.TRANSIT, SERVED), (Mode.REVISIT, SERVED), (Mode.IDLE, None), (Mode.RETURNING, None), (Mode.EMPTY, None)],
 )
-def test_a_course_begins_where_and_when_a_helper_was_heard(mode: Mode, strip_told: Strip | None) -> None:
-    one = replace(at(helper(), mode, 20, SERVED.number if strip_told else 0), heard_ms=500_001)
-    course = Traffic().course(one, strip_told, 510.0)
-    assert course is not None
-    assert course.start_s == 500.001
-    assert course.at(500.001) == pytest.approx((0, 20, NORTH))
+def test_a_course_begins_where_and_when_a_vehicle_was_heard(mode: Mode, strip_told: Strip | None) -> None:
+    primary = KnownVehicle(vehicle("primary", Role.SURVEY), 0)
+    for one in (at(helper(), mode, 20, SERVED.number if strip_told else 0), at(primary, Mode.TRANSIT, 20)):
+        course = Traffic().course(replace(one, heard_ms=500_001), strip_told, 510.0)
+        assert course is not None
+        assert course.start_s == 500.001
+        assert course.at(500.001) == pytest.approx((0, 20, NORTH))
 
 
 def test_a_course_is_laid_anew_once_a_helper_says_that_it_is_on_its_way() -> None:
