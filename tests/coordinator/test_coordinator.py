@@ -290,12 +290,6 @@ class TestLateRepeatedAndReordered:
         assert told.node.hear("run", run_info(900, 900)) == []
         assert told.states() == {1: ACCEPTED}
 
-    def test_one_that_is_started_later_gives_higher_numbers_a_thousand_each_second(self) -> None:
-        node = Coordinator(coordinator().node.node.config)  # type: ignore[attr-defined]
-        node.start(7_900)
-        node.on_message(received("run", run_info(400, 400)), 8_000)
-        assert node.ledger.next_number == 7001
-
     def test_before_the_run_is_announced_it_listens_to_nobody(self) -> None:
         config = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
         told = Told(OneNode(Coordinator(config), Role.COORDINATOR))

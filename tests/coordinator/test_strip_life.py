@@ -77,6 +77,13 @@ class TestALateAnswer:
         assert len(told.tasks()) == 2
 
 
+@pytest.mark.parametrize("state", [TaskState.ACCEPTED, TaskState.UNDER_WAY, TaskState.NEXT])
+def test_a_strip_that_was_never_given_is_to_be_given_back(state: TaskState) -> None:
+    told = coordinator()
+    told.status(HELPER, 99, state)
+    assert told.tasks() == [(HELPER, TaskAction.GIVE_BACK, 99)]
+
+
 class TestHowAStripGoesOn:
     def test_from_offer_to_done(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)
