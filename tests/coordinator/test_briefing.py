@@ -10,6 +10,7 @@ import pytest
 from by_hand import HELPER, PRIMARY, run_info
 from sectors_by_hand import sector, whole
 
+from comms.said.announcement import Vertex, Zone
 from comms.said.codec import Header
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripState
 from coordinator.allocate.service import Service
@@ -21,19 +22,21 @@ from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
 from coordinator.ledger import Ledger, StripRecord
-from coordinator.vehicles import Offer
+from coordinator.vehicles import MOST_FAILURES, Offer
 from planner.dubins import Pose
 
 CONFIG = CoordinatorConfig(GreedyAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2)
 LEVELS = np.zeros((60, 10), dtype=np.uint8)
 AHEAD = replace(CONFIG, ahead_ms=60_000)
+LEAVES = AgentState(Mode.RETURNING, 0, 0.1, 0, 122.5, 0, 0)
 
 
 class Known:
     """What a coordinator knows of the fleet by hand, and its briefing."""
 
-    def __init__(self, config: CoordinatorConfig = CONFIG) -> None:
-        self.fleet = KnownFleet(run_info(400, 400), config.silent_after_ms, config.lost_after_ms, 0)
+    def __init__(self, config: CoordinatorConfig = CONFIG, keep_out: tuple[Zone, ...] = ()) -> None:
+        run = replace(run_info(400, 400), keep_out=keep_out)
+        self.fleet = KnownFleet(run, config.silent_after_ms, config.lost_after_ms, 0)
         self.ledger = Ledger()
         self.briefing = Briefing(config, self.ledger, self.fleet, 0.7)
         self.sector = whole(self.fleet)
@@ -101,6 +104,19 @@ def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     assert known.situation(60_000).helpers[0].refused == {1}
 
 
+def test_what_a_helper_cannot_fly_it_is_not_to_be_offered_beside_what_it_has_refused() -> None:
+    # The first strip runs north along 122.5 m, over the zone, the second along 222.5 m.
+    corners = ((115.0, 150.0), (130.0, 150.0), (130.0, 160.0), (115.0, 160.0))
+    known = Known(keep_out=(Zone(tuple(Vertex(*corner) for corner in corners)),))
+    known.heard(HELPER, Mode.IDLE)
+    for number, first in enumerate((20, 40), 1):
+        cut = Cut(Window(10, 70, first, first + 10), counts_m2=4200.0, removable_m2=2100.0)
+        known.ledger.open(cut.strip(known.fleet.map.grid, number), cut, 0, "")
+    assert known.situation(60_000).helpers[0].refused == {1}
+    known.fleet.vehicles[HELPER].refused.add(2)
+    assert known.situation(60_000).helpers[0].refused == {1, 2}
+
+
 def at_work(known: Known) -> StripRecord:
     """Strip 1 is with the helper until 200 s; returns strip 2, which is open and expected to be served until 400 s."""
     cuts = [Cut(Window(10, 70, first, first + 10), counts_m2=4200.0, removable_m2=2100.0) for first in (20, 40)]
@@ -129,6 +145,20 @@ def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with
     (later,) = known.situation(140_000).helpers
     assert later.task is not None
     assert (later.task.strip.number, later.free_s, later.sweeping) == (2, 405.0, True)
+
+
+def test_who_has_failed_too_often_or_is_on_its_way_home_is_not_told_of_even_where_it_has_a_strip_still() -> None:
+    known = Known()
+    known.heard(HELPER, Mode.IDLE)
+    helper = known.fleet.vehicles[HELPER]
+    for failures, told in ((MOST_FAILURES - 1, 1), (MOST_FAILURES, 0)):
+        helper.failures = failures
+        assert len(known.situation(60_000).helpers) == told
+    known = Known()
+    at_work(known)
+    assert len(known.situation(60_000).helpers) == 1
+    known.fleet.vehicles[HELPER].hear_state(Header(HELPER, 0, 2, 60_000), LEAVES, 60_000)
+    assert known.situation(60_000).helpers == ()
 
 
 def test_where_nothing_is_offered_ahead_who_is_late_is_busy() -> None:

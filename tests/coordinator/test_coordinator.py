@@ -66,6 +66,15 @@ class TestFromHotspotToTask:
         found = sorted((one.start_x_m, one.start_y_m, one.length_m, one.vehicle) for one in told.strips().values())
         assert found == [(122.5, 50, 300, HELPER), (327.5, 50, 300, SECOND_HELPER)]
 
+    def test_of_two_sectors_a_helper_that_finds_nothing_in_its_own_serves_the_other(self) -> None:
+        told = coordinator(TWO_HELPERS, helpers_a_team=1)
+        told.hotspot(HOT)
+        told.hotspot((17.5, 50.0, 67.5, 350.0), number=2)
+        told.node.wait(1)
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.node.wait(1)
+        assert [name for name, _, _ in told.tasks()] == [HELPER, SECOND_HELPER]
+
     @pytest.mark.parametrize(("far_m", "sectors"), [(25.0, 2), (25.2, 1)])
     def test_no_sector_is_narrower_than_four_swaths(self, far_m: float, sectors: int) -> None:
         # 81 columns of 5 m: four swaths of 50 m are 40 of them, of 50.4 m more than that.

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from by_hand import HELPER
 from coordinator_by_hand import coordinator
 
+from coordinator.agenda import Item
 from coordinator.coordinator import Coordinator
 from coordinator.dispatch import _lies_inside
 from planner.types import GridSpec, Point, SweepFrame
@@ -16,6 +18,18 @@ def test_vehicles_are_kept_apart_by_whatever_is_asked_for(separation_m: float, k
     node = coordinator(separation_m=separation_m).node.node
     assert isinstance(node, Coordinator)
     assert (node._dispatch._right_of_way is not None) is keeps_apart
+
+
+def test_whoever_is_heard_when_a_check_is_due_or_later_has_it_made() -> None:
+    node = coordinator(separation_m=15.0).node.node
+    assert isinstance(node, Coordinator)
+    dispatch, right = node._dispatch, node._dispatch._right_of_way
+    assert right is not None
+    node._agenda.strike(Item.KEEP_APART, 90_000)
+    right.check_s = 90.0
+    for now_ms, due_ms in ((89_999, None), (90_000, 90_000)):
+        dispatch.note_state(HELPER, now_ms, does_another=False)
+        assert node._agenda.deadline_ms(Item.KEEP_APART) == due_ms
 
 
 @pytest.mark.parametrize(

@@ -5,10 +5,15 @@ from __future__ import annotations
 from itertools import product
 
 import pytest
+from by_hand import run_info
 from hypothesis import given
 from hypothesis import strategies as st
+from one_node import received
 
 from comms.said.messages import StripState
+from coordinator.allocate.simple import NoAllocator
+from coordinator.config import CoordinatorConfig
+from coordinator.coordinator import Coordinator
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
 from coordinator.ledger import TAKEN, WITH_A_VEHICLE, Ledger, StripRecord
@@ -223,3 +228,10 @@ def test_whatever_is_asked_of_it_the_books_are_in_order(moves: list[tuple[int, S
             assert ledger.strip_of(name) is next((one for one in at_work if one.vehicle == name), None)
             assert ledger.next_of(name) is next((one for one in to_come if one.vehicle == name), None)
         assert not any(one.vehicle for one in records if one.state is OPEN)
+
+
+def test_a_coordinator_gives_numbers_from_a_thousand_for_each_second_on_that_it_was_started_after() -> None:
+    node = Coordinator(CoordinatorConfig(NoAllocator(), 1.05, 30_000, 30_000, 30, 400, 0.3, 0.2))
+    node.start(7_900)
+    node.on_message(received("run", run_info()), 8_000)
+    assert node.ledger.next_number == 7001

@@ -42,6 +42,12 @@ def test_near_below_a_track_is_the_nadir_gap() -> None:
     assert why(lane(90, 110), primary(100, 250)) == "expected beside track 1: nadir gap"
 
 
+def test_where_a_track_sees_as_well_right_below_it_there_is_no_gap() -> None:
+    one = primary(100)
+    one.curves[1] = DetectionCurve(np.array([0.0, 60.0]), np.array([0.8, 0.8]))
+    assert why(lane(100, 100), one) == "expected beside track 1: even where tracks see best"
+
+
 def test_far_from_tracks_is_the_ranges_end() -> None:
     # From 170 m on, track 1 at 100 m is 70 m away or more; to 180 m, track 2 at 250 m likewise.
     assert why(lane(170, 180), primary(100, 250)) == "expected beside tracks 1 and 2: range's end"

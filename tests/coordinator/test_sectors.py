@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -24,6 +25,7 @@ from coordinator.sectors import STAYS_S, Sectors, laid_out
 from planner.types import Point
 
 SOUTH, NORTH = Window(0, 40, 0, 81), Window(40, 80, 0, 81)  # of 400 m by 400 m, in cells of 5 m
+WEST, EAST = Window(0, 80, 0, 40), Window(0, 80, 40, 81)
 HELPERS = ("alpha", "beta", "gamma", "delta")
 FLEET = (vehicle(PRIMARY, Role.SURVEY), *(vehicle(name, Role.REVISIT) for name in HELPERS))
 
@@ -31,13 +33,20 @@ FLEET = (vehicle(PRIMARY, Role.SURVEY), *(vehicle(name, Role.REVISIT) for name i
 class Laid:
     """Two sectors with two helpers each, worth the same a metre."""
 
-    def __init__(self) -> None:
+    def __init__(self, first: Window = SOUTH, second: Window = NORTH) -> None:
         self.fleet = KnownFleet(run_info(400, 400, vehicles=FLEET), 30_000, 30_000, 0)
         self.agenda = Agenda()
-        self.south, self.north = sector(self.fleet, SOUTH, 0, *HELPERS[:2]), sector(self.fleet, NORTH, 1, *HELPERS[2:])
+        self.south, self.north = sector(self.fleet, first, 0, *HELPERS[:2]), sector(self.fleet, second, 1, *HELPERS[2:])
         self.sectors = Sectors([self.south, self.north], self.fleet.map.grid, self.agenda)
         for one in self.sectors.all:
             one.price, one.is_worth, one.present = 2.0, True, 2
+
+    def told_hotspot(self, revision: int, *corners: Point) -> list[int]:
+        """The sectors for which a hotspot with these corners is news; without corners it is withdrawn."""
+        state = HotspotState.ACTIVE if corners else HotspotState.WITHDRAWN
+        message = Hotspot(revision, state, tuple(Vertex(*corner) for corner in corners), 0.9, 600, False, 0)
+        heard = received(f"agent/{PRIMARY}/hotspot/3", message, sequence=revision)
+        return [one.number for one in self.sectors.hear_hotspot(heard, message)]
 
     def to_cut(self) -> dict[int, int]:
         """By sector, when it is to be cut."""
@@ -83,10 +92,11 @@ class TestHowTheyAreLaid:
         found = laid_out(inside, {name: (0.0, float(place)) for place, name in enumerate(HELPERS)}, 2, 20)
         assert [window for window, _ in found] == [Window(0, 100, 0, 50), Window(0, 100, 50, 300)]
 
-    def test_what_is_too_small_stays_one(self) -> None:
-        inside = np.ones((30, 39), dtype=np.bool_)
+    @pytest.mark.parametrize(("rows", "columns"), [(30, 39), (39, 9)])
+    def test_what_is_too_small_stays_one(self, rows: int, columns: int) -> None:
+        inside = np.ones((rows, columns), dtype=np.bool_)
         homes = {name: (0.0, float(place)) for place, name in enumerate(HELPERS)}
-        assert laid_out(inside, homes, 1, 20) == [(Window(0, 30, 0, 39), sorted(HELPERS))]
+        assert laid_out(inside, homes, 1, 20) == [(Window(0, rows, 0, columns), sorted(HELPERS))]
 
     @given(
         st.tuples(st.integers(10, 90), st.integers(10, 90)),
@@ -124,6 +134,8 @@ class TestWhereSomethingMatters:
         laid = Laid()
         laid.sectors.cut_by(7_000, [Window(0, 20, 0, 20)])
         assert laid.to_cut() == {0: 7_000}
+        laid.sectors.cut_by(7_500, [Window(0, 20, 0, 20), Window(60, 70, 0, 5)])
+        assert laid.to_cut() == {0: 7_500, 1: 7_500}
         laid.sectors.cut_by(8_000)
         assert laid.to_cut() == {0: 8_000, 1: 8_000}
         laid.sectors.assign_by(9_000, Window(60, 70, 0, 5))
@@ -144,21 +156,18 @@ class TestWhereSomethingMatters:
 
     def test_a_hotspot_is_told_where_it_lies_and_where_it_lay(self) -> None:
         laid = Laid()
-
-        def told(revision: int, *corners: Point, state: HotspotState = HotspotState.ACTIVE) -> list[int]:
-            outline = tuple(Vertex(*corner) for corner in corners)
-            message = Hotspot(revision, state, outline, 0.9, 600, False, 0)
-            heard = received(f"agent/{PRIMARY}/hotspot/3", message, sequence=revision)
-            return [one.number for one in laid.sectors.hear_hotspot(heard, message)]
-
-        assert told(1, (20, 20), (60, 20), (60, 60)) == [0]
+        assert laid.told_hotspot(1, (20, 20), (60, 20), (60, 60)) == [0]
         assert laid.south.expected.hotspots.drawn()[0].any()
-        assert told(1, (20, 20), (60, 20), (60, 60)) == []
-        assert told(2, (20, 320), (60, 320), (60, 360)) == [0, 1]
+        assert laid.told_hotspot(1, (20, 20), (60, 20), (60, 60)) == []
+        assert laid.told_hotspot(2, (20, 320), (60, 320), (60, 360)) == [0, 1]
         assert not laid.south.expected.hotspots.drawn()[0].any()
         assert laid.north.expected.hotspots.drawn()[0].any()
-        assert told(3, state=HotspotState.WITHDRAWN) == [0, 1]
+        assert laid.told_hotspot(3) == [0, 1]
         assert not laid.north.expected.hotspots.drawn()[0].any()
+
+    def test_of_sectors_side_by_side_a_hotspot_is_told_the_one_in_which_it_lies(self) -> None:
+        assert Laid(WEST, EAST).told_hotspot(1, (20, 320), (60, 320), (60, 360)) == [0]
+        assert Laid(WEST, EAST).told_hotspot(1, (320, 20), (360, 20), (360, 60)) == [1]
 
 
 @pytest.mark.parametrize(
@@ -196,6 +205,7 @@ class TestTeams:
         assert self.better(laid) == 1
         laid.sectors.join("alpha", laid.north, 100_000)
         assert (laid.south.team, laid.north.team) == ({"beta"}, {"alpha", "gamma", "delta"})
+        assert (laid.south.present, laid.north.present) == (1, 3)
         assert laid.sectors.about(laid.fleet.vehicles["alpha"]) == [laid.north]
         assert laid.to_cut() == {0: 100_000, 1: 100_000}
 
@@ -219,6 +229,24 @@ class TestTeams:
         assert self.better(laid) is None
         laid.south.is_worth = False
         assert self.better(laid) == 1
+
+    @pytest.mark.parametrize(
+        ("price", "deadline_s", "lasts_s"),
+        [
+            (3.2, 1000, math.inf),  # 2000 m less the way of 150 m: 5920 beside 4000
+            (3.2, math.inf, 1000),
+            (3.01, math.inf, math.inf),  # four hours: 28 800 m
+        ],
+    )
+    def test_the_time_to_the_deadline_or_as_long_as_the_battery_lasts_counts(
+        self, price: float, deadline_s: float, lasts_s: float
+    ) -> None:
+        laid = Laid()
+        laid.north.price = price  # without the way there it would be clearly more
+        one = replace(helper(y_m=50), vehicle="alpha", lasts_until_s=100 + lasts_s)
+        assert laid.sectors.better_for(one, 100, 100 + deadline_s) is None
+        laid.north.price = 3.3
+        assert laid.sectors.better_for(one, 100, 100 + deadline_s) is laid.north
 
     def test_where_nobody_is_a_metre_counts_more(self) -> None:
         laid = Laid()

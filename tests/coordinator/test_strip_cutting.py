@@ -6,6 +6,7 @@ import math
 from dataclasses import replace
 
 import pytest
+from by_hand import FLEET, run_info, vehicle
 from coordinator_by_hand import RUN, coordinator
 from one_node import OneNode
 
@@ -33,3 +34,15 @@ def test_a_way_to_a_strip_is_reckoned_as_a_turn_about_a_swath_and_two_run_ins() 
 @pytest.mark.parametrize(("worth_risk", "least"), [(0.3, 0.3 * 0.7), (0.0, 0.001)])
 def test_a_metre_costs_at_least_what_a_look_is_to_be_worth_over_its_swath(worth_risk: float, least: float) -> None:
     assert cutter(worth_risk).price == pytest.approx(least * 50)
+
+
+@pytest.mark.parametrize(("sectors", "turns_each"), [(1, 1), (3, 3), (6, 4)])
+def test_of_as_many_cuts_as_there_are_sectors_and_four_at_most_one_tries_the_other_heading(
+    sectors: int, turns_each: int
+) -> None:
+    example = coordinator().node.node
+    assert isinstance(example, Coordinator)
+    node = Coordinator(replace(example.config, helpers_a_team=1))
+    helpers = (vehicle(f"helper-{number}", Role.REVISIT) for number in range(sectors))
+    OneNode(node, Role.COORDINATOR).hear("run", run_info(vehicles=(FLEET[0], *helpers)), at_ms=1)
+    assert [one._cutter._turns_each for one in node._cutting] == [turns_each] * sectors

@@ -77,6 +77,13 @@ class TestALateAnswer:
         assert len(told.tasks()) == 2
 
 
+@pytest.mark.parametrize("state", [TaskState.ACCEPTED, TaskState.UNDER_WAY, TaskState.NEXT])
+def test_a_strip_that_was_never_given_is_to_be_given_back(state: TaskState) -> None:
+    told = coordinator()
+    told.status(HELPER, 99, state)
+    assert told.tasks() == [(HELPER, TaskAction.GIVE_BACK, 99)]
+
+
 class TestHowAStripGoesOn:
     def test_from_offer_to_done(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY)
@@ -89,6 +96,21 @@ class TestHowAStripGoesOn:
         assert [one.revision for one in history] == [1, 2, 3, 4, 5]
         assert (history[-1].vehicle, history[-1].reason) == (HELPER, f"100% of it seen by {HELPER}")
         assert len(told.tasks()) == 1  # what it leaves, 0.3, is not worth another look
+
+    @pytest.mark.parametrize("by_word", [True, False])
+    def test_who_has_served_one_has_failed_at_none_in_a_row(self, by_word: bool) -> None:
+        told = with_a_helper(TaskState.UNDER_WAY)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        node.fleet.vehicles[HELPER].failures = 2
+        told.layer(HELPER, looked())
+        told.state(HELPER, Mode.IDLE)
+        if by_word:
+            told.status(HELPER, 1, TaskState.DONE)
+        else:
+            told.state(HELPER, Mode.IDLE)
+        assert told.states() == {1: DONE}
+        assert node.fleet.vehicles[HELPER].failures == 0
 
     def test_done_counts_only_where_the_map_shows_it(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)
@@ -270,8 +292,14 @@ class TestSilence:
         told.keep_alive([PRIMARY], 20)
         assert told.strips()[1].vehicle == SECOND_HELPER
         told.status(SECOND_HELPER, 1, TaskState.ACCEPTED)
+        told.state(SECOND_HELPER, Mode.TRANSIT, 1)
+        told_so = len(told.tasks())
+        for _ in range(2):
+            told.status(HELPER, 1, TaskState.UNDER_WAY)
+        assert told.tasks()[told_so:] == [(HELPER, TaskAction.GIVE_BACK, 1)]  # once
+        told.keep_alive([PRIMARY, SECOND_HELPER], 10)
         told.status(HELPER, 1, TaskState.UNDER_WAY)
-        assert told.tasks()[-1] == (HELPER, TaskAction.GIVE_BACK, 1)
+        assert told.tasks()[told_so:] == [(HELPER, TaskAction.GIVE_BACK, 1)] * 2
         told.status(HELPER, 1, TaskState.GIVEN_BACK)
         told.settle()
         assert (told.states(), told.strips()[1].vehicle) == ({1: ACCEPTED}, SECOND_HELPER)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from by_hand import PRIMARY, vehicle
 
 from comms.said.announcement import Role
 from comms.said.codec import Header
-from comms.said.messages import Curve, Plan, PlannedTrack
-from coordinator.vehicles import KnownVehicle
+from comms.said.messages import AgentState, Curve, Mode, Plan, PlannedTrack
+from coordinator.vehicles import KnownVehicle, expected_end_ms
 
 
 def curve(track: int, p_detect: float, points: int = 2) -> Curve:
@@ -37,3 +40,12 @@ def test_of_plans_that_of_the_latest_revision_is_news_and_counts() -> None:
     news = [primary.hear_survey(Header(PRIMARY, 0, number, 0), one) for number, one in enumerate(plans)]
     assert news == [True, False, False, True]
     assert primary.plan == plans[3]
+
+
+@pytest.mark.parametrize(("drift_mps", "takes_s"), [(0.0, 240), (0.5, 180)])
+def test_a_survey_ends_when_its_last_track_does_by_the_speed_over_the_ground(drift_mps: float, takes_s: float) -> None:
+    # 40 m of way, 20 m of run-in and 300 m of track, all northwards at 1.5 m/s through the water.
+    entry = replace(vehicle(PRIMARY, Role.SURVEY), drift_mps=drift_mps)
+    plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 300, False),), (), (), "")
+    state = AgentState(Mode.TRANSIT, 1, 1, 0, 0, -60, 0)
+    assert expected_end_ms(entry, state, plan, 10_000) == 10_000 + takes_s * 1000

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
-from coordinator.allocate.cbba import BUNDLE, HALF_LIFE_S, NOBODY, Bidder, CbbaAllocator, Claims, agreed
+from coordinator.allocate.cbba import BUNDLE, NOBODY, Bidder, CbbaAllocator, Claims, agreed
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.currents import Sailing
@@ -21,7 +21,7 @@ CBBA = CbbaAllocator()
 
 def score(reward_m2: float, ends_s: float) -> float:
     """A reward at the end of its sweep, seconds from now."""
-    return reward_m2 * 2 ** (-ends_s / HALF_LIFE_S)
+    return reward_m2 * 2 ** (-ends_s / 600)
 
 
 def alone(told: Situation, one: OpenStrip, free: Helper) -> float:
@@ -55,6 +55,13 @@ class TestBids:
         (alpha,) = agreed(told, told.strips)
         assert alpha.claims.bids == pytest.approx([score(700 * share, 150)])
         assert alpha.claims.winners.tolist() == [0]
+
+    def test_in_a_current_what_is_swept_of_a_strip_by_the_deadline_is_by_the_speed_over_the_ground(self) -> None:
+        # 2 m/s and 0.5 m/s from astern: the sweep begins after 40 s and ends after 120.
+        along = WayHome((0.0, 0.0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)
+        told = situation([open_strip(strip(1))], [helper(way_home=along)], 80)
+        (alpha,) = agreed(told, told.strips)
+        assert alpha.claims.bids == pytest.approx([score(350, 120)])
 
     def test_what_lies_on_the_way_is_put_in_before(self) -> None:
         # 2 is worth more and claimed first; it begins where the run-out of 1 ends, so that 1 delays nothing.

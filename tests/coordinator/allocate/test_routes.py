@@ -21,6 +21,8 @@ from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip, Situation
 from coordinator.allocate.team import MOST_STRIPS, Team, Teams
+from planner.currents import Sailing
+from planner.way_home import WayHome
 
 PLAN = RoutesAllocator()
 NEAR, FAR = open_strip(strip(2, y_m=100)), open_strip(strip(1, y_m=600))
@@ -146,7 +148,7 @@ class TestWhatIsPromising:
 
     THIRD = open_strip(strip(3, x_m=300, y_m=100))
 
-    @pytest.mark.parametrize("deadline_s", [3600.0, 200.0])
+    @pytest.mark.parametrize("deadline_s", [3600.0, 300.0, 200.0])
     def test_the_strips_left_bring_what_they_do_by_themselves_and_then_a_second_what_the_worst_does_by_half(
         self, deadline_s: float
     ) -> None:
@@ -173,6 +175,27 @@ class TestWhatIsPromising:
             brings(beta_s, 1, 0),  # alpha leaves the rest to beta
         ]
         assert still_m2[0] == pytest.approx(expected)
+        plan.is_done[0, 1] = True  # beta has no time any more
+        still_m2 = plan._still_m2(teams, plan.ahead(teams))
+        expected = [brings(max(0.0, deadline_s - free_s), left) for free_s, left in ((402.5, 1), (152.5, 0))]
+        assert still_m2[0] == pytest.approx([*expected, 0.0])
+
+    def test_what_is_begun_after_the_deadline_brings_nothing(self) -> None:
+        removed, shares = Team([NEAR, FAR], [helper()], 250).flown([[1, 0]])  # by number the far one is the first
+        assert removed == pytest.approx(700)
+        assert shares == {2: 1.0, 1: 0.0}
+
+    def test_a_strip_takes_its_sweep_and_the_way_that_is_usual_where_helpers_have_unlike_many_ways_to_fly_it(
+        self,
+    ) -> None:
+        # Alpha flies one leg, 100 s of it, beta two. Between the strips it is 290 m and a run-in of 5 m, at 2 m/s.
+        team = Team([NEAR, FAR], [helper(), helper("beta", swath_m=30)], 3600)
+        assert team.alone_s == pytest.approx([100 + 147.5] * 2)
+
+    def test_a_sweep_takes_what_it_does_the_way_in_which_it_is_soonest_over(self) -> None:
+        # In a current of 0.5 m/s from astern 80 s, against it 133 s; the way there 100 m at 2.5 m/s.
+        along = WayHome((0.0, 0.0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)
+        assert Team([NEAR], [helper(way_home=along)], 3600).alone_s == pytest.approx([80 + 40])
 
     @pytest.mark.parametrize(
         ("counts_m2", "best"), [([5, 7, 7, 3, 7 + 1e-7], 1), ([5, 7, 7, 3, 7.1], 4), ([5, 4, 3, 2, 1], 0)]

@@ -12,7 +12,7 @@ from situations import helper, open_strip, situations, strip
 
 from coordinator.allocate.service import StripTable, can_fly, expected_service, removed_m2
 from coordinator.allocate.situation import Situation
-from planner.currents import Sailing
+from planner.currents import FlowGrid, Sailing
 from planner.dubins import Pose
 from planner.keep_out import KeepOut
 from planner.way_home import WayHome
@@ -50,6 +50,16 @@ def test_of_all_ways_the_shortest_is_the_one_that_is_expected(told: Situation) -
                 assert ends_s.min() == pytest.approx(expected_service(job, there).ends_s)
 
 
+def test_strips_of_one_leg_and_of_two_are_each_as_by_itself() -> None:
+    one = helper(swath_m=30)
+    jobs = [open_strip(strip(1)), open_strip(replace(strip(2, x_m=100), width_m=30))]
+    _, free_s, leave = StripTable(jobs, one).best_from(one.pose, 0.0, np.inf)
+    for place, job in enumerate(jobs):
+        served = expected_service(job, one)
+        assert free_s[place] == pytest.approx(served.free_s)
+        assert leave[place] == pytest.approx(served.free_at)
+
+
 @pytest.mark.parametrize(("from_x_m", "can"), [(-30.0, False), (10.0, False), (50.0, True)])
 def test_what_lies_on_its_legs_keeps_a_helper_from_flying_a_strip(from_x_m: float, can: bool) -> None:
     zone = KeepOut((tuple((from_x_m + x_m, y_m) for x_m, y_m in ((0, 150), (60, 150), (60, 160), (0, 160))),))
@@ -85,3 +95,16 @@ def test_a_current_tells_from_when_to_when_the_sonar_is_on() -> None:
     one = replace(helper(), way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0))
     served = expected_service(open_strip(strip(1)), one)
     assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((40, 120, 122))
+
+
+@pytest.mark.parametrize(("x_m", "y_m", "heading_rad"), [(0, 100, 0.0), (100, 0, np.pi / 2)])
+def test_on_the_way_to_a_strip_the_flow_half_way_there_counts(x_m: float, y_m: float, heading_rad: float) -> None:
+    # From astern, and rising to 0.9 m/s at 90 m; half-way over the 95 m to the run-in it is 0.475 m/s.
+    north, axis, flow = x_m == 0, np.array([0.0, 90.0]), np.array([0.0, 0.9])
+    speeds = flow[np.newaxis, :, np.newaxis] if north else flow[np.newaxis, np.newaxis, :]
+    still, nowhere = np.zeros_like(speeds), np.zeros(1)
+    grid = FlowGrid(nowhere, axis, nowhere, still, speeds) if north else FlowGrid(axis, nowhere, nowhere, speeds, still)
+    one = helper(way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.9, grid=grid), 6.0))
+    table = StripTable([open_strip(strip(1, x_m, y_m, heading_rad=heading_rad))], one)
+    to_begin_s = table.to_begin_s(np.array([[0, 0, heading_rad]]))
+    assert to_begin_s[0, 0, 0] == pytest.approx(95 / 2.475 + 5 / 2.9)

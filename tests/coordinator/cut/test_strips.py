@@ -76,9 +76,17 @@ class TestByHand:
         windows = cut(hot(np.s_[:, 15:19]), replace(RULES, max_strip_m=110, overhead_m=10))
         assert windows == [Window(first, first + 20, 12, 22) for first in (0, 20, 40)]
 
-    def test_a_piece_is_never_shorter_than_a_strip_may_be(self) -> None:
-        windows = cut(hot(np.s_[0:25, 15:19]), replace(RULES, min_strip_m=90, max_strip_m=100))
-        assert windows == [Window(0, 20, 12, 22)]  # 125 m: 100 m, and 25 m left out
+    @pytest.mark.parametrize(
+        ("rows", "pieces"),
+        [
+            (25, [(0, 20)]),  # 125 m: 100 m, and 25 m left out
+            (35, [(0, 20)]),
+            (36, [(0, 18), (18, 36)]),
+        ],
+    )
+    def test_a_piece_is_never_shorter_than_a_strip_may_be(self, rows: int, pieces: list[tuple[int, int]]) -> None:
+        windows = cut(hot(np.s_[0:rows, 10:20]), replace(RULES, min_strip_m=90, max_strip_m=100))
+        assert windows == [Window(*piece, 10, 20) for piece in pieces]
 
     def test_what_is_too_short_is_left_out(self) -> None:
         full = hot(np.s_[10:15, 10:20])

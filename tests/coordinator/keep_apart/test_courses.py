@@ -29,7 +29,7 @@ from coordinator.keep_apart.courses import (
     too_close,
 )
 from planner.currents import Sailing
-from planner.dubins import Pose
+from planner.dubins import DubinsPath, Pose
 from planner.keep_out import KeepOut
 from planner.sweep import shortest_sweep
 
@@ -70,8 +70,10 @@ class TestCourses:
         circling = laid.poses[(np.arange(len(laid.poses)) + laid.first) * STEP_S >= 50]
         assert np.hypot(circling[:, 0] - 10, circling[:, 1] - 100) == pytest.approx(10)
 
-    def test_in_a_current_it_is_where_what_it_makes_good_takes_it(self) -> None:
-        with_it = course(Pose(0, 0, EAST), 5, Sailing(2, 1, EAST), 10, [straight(Pose(0, 0, EAST), 300, 10)])
+    @pytest.mark.parametrize("lengths_m", [(300.0, 0.0, 0.0), (100.0, 0.0, 200.0)])
+    def test_in_a_current_it_is_where_what_it_makes_good_takes_it(self, lengths_m: tuple[float, float, float]) -> None:
+        path = DubinsPath(Pose(0, 0, EAST), 10, (0, 0, 0), lengths_m)
+        with_it = course(Pose(0, 0, EAST), 5, Sailing(2, 1, EAST), 10, [path])
         assert with_it.at(25) == pytest.approx((60, 0, EAST))  # 20 s at 3 m/s
         assert with_it.arrives_s == pytest.approx(105)
 

@@ -17,6 +17,7 @@ from coordinator.allocate.situation import Allocator, Helper, OpenStrip
 from coordinator.keep_apart.courses import too_close
 from coordinator.keep_apart.right_of_way import RightOfWay, Underway
 from coordinator.vehicles import KnownVehicle
+from planner.dubins import Pose
 from planner.types import Strip
 
 NORTH, WEST = 0.0, 1.5 * math.pi
@@ -73,6 +74,13 @@ class TestOffers:
         asked = situation([self.near], [helper()])
         assert offers_let_through(Insists(), asked, Waits(set(), math.inf)) == ([], ASKED_LATER_S)
 
+    @pytest.mark.parametrize(("clear", "offers"), [(6, [("alpha", 6)]), (7, [])])
+    def test_an_allocator_is_asked_six_times_for_one_that_may_be_offered(
+        self, clear: int, offers: list[tuple[str, int]]
+    ) -> None:
+        asked = situation([open_strip(strip(number, 100 * number)) for number in range(1, 9)], [helper()])
+        assert offers_let_through(NearestAllocator(), asked, Waits({clear}, math.inf)) == (offers, ASKED_LATER_S)
+
     def test_a_helper_gives_its_task_back_only_where_the_way_to_the_other_is_clear(self) -> None:
         class TurnsRound:
             def assign(self, asked: object) -> dict[str, int]:
@@ -104,6 +112,36 @@ class TestDepartures:
         me = known("helper", Role.REVISIT, Mode.IDLE, 0, -20)
         waits_s = self.wait_s(right_of_way(), [primary(-beside_m), me], strip(1, 0, 30, length_m=250))
         assert (waits_s == 0) is sets_out
+
+    def test_a_helper_at_work_goes_on_to_its_next_from_where_and_when_it_is_free(self) -> None:
+        # At 60 s, at its strip's end; told to leave it for another it sets out now, from where it is.
+        me = known("helper", Role.REVISIT, Mode.REVISIT, 0, 20, 7)
+        at_work, then = Underway(me, strip(7, 0, 20, length_m=100)), open_strip(strip(1, 0, 200))
+        free = helper("helper", free_at=Pose(0, 125, NORTH), free_s=60)
+        for one, start_s, y_m in ((free, 60.0, 125), (replace(free, task=then), 0.0, 20)):
+            departures = right_of_way().departures([at_work], 0.0)
+            assert departures.wait_s(one, then) == 0
+            _, course, _ = departures.ways["helper", 1]
+            assert course.start_s == start_s
+            assert course.at(start_s) == pytest.approx((0, y_m, NORTH))
+
+    def test_to_its_next_it_goes_without_waiting_or_not_at_all(self) -> None:
+        # Over its next one it meets the primary, which is ahead of it, from 60 s on.
+        to = strip(7, 0, 20, length_m=100)
+        at_work = Underway(known("helper", Role.REVISIT, Mode.REVISIT, 0, 20, 7), to)
+        free = helper("helper", free_at=Pose(0, 125, NORTH), free_s=60)
+        for x_m, waits_s in ((0, math.inf), (200, 0)):
+            departures = right_of_way().departures([Underway(primary(x_m, 100), None), at_work], 0.0)
+            assert departures.wait_s(free, open_strip(strip(1, 0, 200))) == waits_s
+
+    @pytest.mark.parametrize(("begin_m", "waits_s"), [(50, 30), (185, 30), (186, 0)])
+    def test_a_sweep_that_begins_within_90_s_is_to_be_clear_to_its_end(self, begin_m: float, waits_s: float) -> None:
+        # Eastwards, 5 m of run-in before the strip; the primary crosses at 300 m after 150 s, and 30 s later is clear.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=math.pi / 2)
+        east = strip(1, begin_m, 0, heading_rad=math.pi / 2, length_m=400)
+        assert self.wait_s(right_of_way(), [primary(300, -225), me], east) == waits_s
 
     def test_who_is_let_through_is_in_the_others_way_until_all_are_judged_anew(self) -> None:
         # Northwards along x = 0, and eastwards across that at 150 m, both there after about 75 s.
@@ -174,6 +212,16 @@ class TestCheck:
         right.changed("helper")
         assert right.check_s == 0
 
+    def test_who_is_sent_to_a_strip_is_checked_at_once(self) -> None:
+        one, far = known("helper", Role.REVISIT, Mode.IDLE, 200, 90), open_strip(strip(1, 200, 100))
+        right, fleet = right_of_way(), [Underway(primary(0), None), Underway(one, None)]
+        right.check(fleet, 0.0)
+        assert right.check_s > 0
+        departures = right.departures(fleet, 0.0)
+        departures.wait_s(helper("helper"), far)
+        right.offered("helper", 1, departures)
+        assert right.check_s == 0
+
     @pytest.mark.parametrize("now_s", [0.0, 10.0])
     def test_two_are_checked_when_they_may_be_near_enough(self, now_s: float) -> None:
         # Heard 400 m apart at 0 s, closing at 2 and 1.5 m/s at most: one that is free stands aside for what is expected
@@ -184,11 +232,26 @@ class TestCheck:
             assert right.check([Underway(primary(0), None), Underway(me, strip_)], now_s) == []
             assert right.check_s == pytest.approx((400 - near_m - 15 - 11) / 3.5)
 
+    def test_from_when_they_were_heard(self) -> None:
+        # At 10 s they are at least 400 m less 8 s and 6 s of their ways apart.
+        one, me = primary(0), known("helper", Role.REVISIT, Mode.IDLE, 400, 0)
+        one.heard_ms, me.heard_ms = 2000, 4000
+        right = right_of_way()
+        assert right.check([Underway(one, None), Underway(me, None)], 10.0) == []
+        assert right.check_s == pytest.approx(10 + (400 - 8 * 1.5 - 6 * 2 - 147 - 15 - 11) / 3.5)
+
     def test_a_helper_at_work_gives_its_strip_back_to_a_primary(self) -> None:
         to = strip(7, 0, 20, length_m=100)
         at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, 140, 7)
         (told,) = right_of_way().check([Underway(primary(0), None), Underway(at_work, to)], 0.0)
         assert (told.name, told.gives_back) == ("helper", to)
+
+    def test_it_is_told_nothing_while_its_answer_to_an_offer_is_under_way(self) -> None:
+        to = strip(7, 0, 20, length_m=100)
+        idle = known("helper", Role.REVISIT, Mode.IDLE, 0, 140)
+        assert right_of_way().check([Underway(primary(0), None), Underway(idle, to)], 0.0) == []
+        (told,) = right_of_way().check([Underway(primary(0), None), Underway(idle, None)], 0.0)
+        assert told.name == "helper"  # it is in the way
 
     def test_it_does_not_before_it_is_50_s_from_there_or_begins_to_sweep(self) -> None:
         # It is at the strip's northern end in about 60 s, and meets the primary on it some 14 s later.

@@ -112,12 +112,51 @@ def test_a_primary_that_is_given_up_is_expected_along_its_tracks_while_it_is_hea
     ("mode", "strip_told"),
     [(Mode.TRANSIT, SERVED), (Mode.REVISIT, SERVED), (Mode.IDLE, None), (Mode.RETURNING, None), (Mode.EMPTY, None)],
 )
-def test_a_course_begins_where_and_when_a_helper_was_heard(mode: Mode, strip_told: Strip | None) -> None:
-    one = replace(at(helper(), mode, 20, SERVED.number if strip_told else 0), heard_ms=500_001)
-    course = Traffic().course(one, strip_told, 510.0)
+def test_a_course_begins_where_and_when_a_vehicle_was_heard(mode: Mode, strip_told: Strip | None) -> None:
+    primary = KnownVehicle(vehicle("primary", Role.SURVEY), 0)
+    for one in (at(helper(), mode, 20, SERVED.number if strip_told else 0), at(primary, Mode.TRANSIT, 20)):
+        course = Traffic().course(replace(one, heard_ms=500_001), strip_told, 510.0)
+        assert course is not None
+        assert course.start_s == 500.001
+        assert course.at(500.001) == pytest.approx((0, 20, NORTH))
+
+
+def test_a_course_is_laid_anew_once_a_helper_says_that_it_is_on_its_way() -> None:
+    traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+    traffic.offered("helper", SERVED, *traffic.to_strip(one, None, SERVED, 0.0))
+    one.heard_ms = 3000
+    for mode, strip_told, start_s in ((Mode.IDLE, 0, 0.0), (Mode.TRANSIT, SERVED.number, 3.0)):
+        course = traffic.course(at(one, mode, 100, strip_told), SERVED, 3.0)
+        assert course is not None
+        assert course.start_s == start_s
+    one.heard_ms = 5000
+    course = traffic.course(at(one, Mode.TRANSIT, 96, SERVED.number), SERVED, 5.0)
     assert course is not None
-    assert course.start_s == 500.001
-    assert course.at(500.001) == pytest.approx((0, 20, NORTH))
+    assert course.start_s == 3.0  # but once
+
+
+def test_a_helper_on_its_leg_sails_what_is_left_of_that_and_no_more() -> None:
+    traffic, one = Traffic(), helper()
+    traffic.course(at(one, Mode.TRANSIT, -30, SERVED.number), SERVED, 0.0)
+    course = traffic.course(at(one, Mode.REVISIT, 124.5, SERVED.number), SERVED, 0.0)
+    assert course is not None
+    assert course.arrives_s == pytest.approx(0.25)  # half a metre at 2 m/s
+
+
+def test_a_helper_that_says_it_is_at_another_strip_is_expected_over_that() -> None:
+    traffic, one = Traffic(), helper()
+    for told, end_m in ((SERVED, (0, 125)), (OTHER, (60, 125))):  # 5 m behind its end
+        course = traffic.course(at(one, Mode.TRANSIT, -30, told.number), told, 0.0)
+        assert course is not None
+        assert course.at(course.arrives_s)[:2] == pytest.approx(end_m, abs=0.01)
+
+
+@pytest.mark.parametrize(("x_m", "y_m", "bearing_deg"), [(0, 200, 0), (60, 120, 90), (-60, 180, 315), (-60, 120, 270)])
+def test_a_helper_comes_to_where_it_is_to_wait_the_way_that_it_lies(x_m: float, y_m: float, bearing_deg: float) -> None:
+    course = Traffic().aside(at(helper(), Mode.IDLE, 120), None, (x_m, y_m), 0.0)
+    arrives = course.at(course.arrives_s)
+    assert arrives[:2] == pytest.approx((x_m, y_m), abs=0.01)
+    assert math.degrees(arrives.heading_rad) == pytest.approx(bearing_deg, abs=0.01)
 
 
 def test_who_is_on_its_way_home_is_expected_there_and_whose_battery_is_empty_where_it_lies() -> None:
@@ -166,13 +205,13 @@ def test_a_helper_that_took_another_way_is_expected_on_it() -> None:
     assert course.at(course.arrives_s)[:2] == pytest.approx((0, 200), abs=0.5)
     # It came there sooner than any way that is known to lead there: it circles from where it is.
     one.heard_ms = 20_000
-    for x_m in (12.0, 20.0):  # so far a circle of 6 m about the place may lead it, and 10 m farther
+    for x_m in (12.0, 21.4):  # so far a circle of 6 m about the place may lead it, and 10 m farther
         course = traffic.course(at(one, Mode.IDLE, 195, x_m=x_m), None, 22.0)
         assert course is not None
         assert course.at(20.0) == pytest.approx((x_m, 195, NORTH))
         assert course.arrives_s == pytest.approx(20.0, abs=0.01)
         one.heard_ms += 1  # it is not laid twice for one word
-    course = traffic.course(at(one, Mode.IDLE, 195, x_m=25.0), None, 22.0)
+    course = traffic.course(at(one, Mode.IDLE, 195, x_m=21.5), None, 22.0)
     assert course is not None
     assert course.arrives_s > 21.0
 
