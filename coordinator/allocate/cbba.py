@@ -150,11 +150,11 @@ class _Routes:
         table = StripTable(considered, helper)
         to_begin_s, ways = table.ways.shortest_from(np.vstack([[helper.free_at], table.leave.reshape(-1, 3)]))
         numbers = np.arange(len(considered))
-        # From each of these to each strip: the time until it is free again, and from where it then sets out.
-        self._takes_s = to_begin_s + table.sonar_on_s[numbers, ways] + table.run_out_s[numbers, ways]
+        # From each of these to each strip: for how long the sonar is on and it then sails on, the time until it is free
+        # again, and from where it then sets out.
+        self._sweep_s, self._run_out_s = table.sonar_on_s[numbers, ways], table.run_out_s[numbers, ways]
+        self._takes_s = to_begin_s + self._sweep_s + self._run_out_s
         self._then = 1 + table.leave.shape[1] * numbers + ways
-        self._sweep_s = table.sonar_on_s[:, 0]
-        self._run_out_s = table.run_out_s[:, 0]
         self._home_s = table.home_s.max(axis=1)
         self._removable_m2 = table.worth_m2
 
@@ -165,26 +165,29 @@ class _Routes:
         froms, times_s, scores = [0], [self._helper.free_s], [0.0]
         for strip in path:
             times_s.append(times_s[-1] + float(self._takes_s[froms[-1], strip]))
-            scores.append(scores[-1] + float(self._score(strip, np.array(times_s[-1]))))
+            scores.append(scores[-1] + float(self._score(froms[-1], strip, np.array(times_s[-1]))))
             froms.append(int(self._then[froms[-1], strip]))
         # Each strip put in at each place, and after that what comes behind.
         free_s = np.array(times_s)[:, np.newaxis] + self._takes_s[froms]
-        where = self._then[froms]
-        gained = np.array(scores)[:, np.newaxis] - scores[-1] + self._score(np.arange(self._places.size), free_s)
+        where, every = self._then[froms], np.arange(self._places.size)
+        gained = np.array(scores)[:, np.newaxis] - scores[-1]
+        gained = gained + self._score(np.array(froms)[:, np.newaxis], every, free_s)
         for place, strip in enumerate(path):
             before = slice(place + 1)
-            free_s[before] += self._takes_s[where[before], strip]
-            where[before] = self._then[where[before], strip]
-            gained[before] += self._score(strip, free_s[before])
+            start = where[before]
+            free_s[before] += self._takes_s[start, strip]
+            gained[before] += self._score(start, strip, free_s[before])
+            where[before] = self._then[start, strip]
         gained[:, path] = 0.0
         gains, best = np.zeros(self._strips), np.zeros(self._strips, dtype=np.intp)
         gains[self._places], best[self._places] = gained.max(axis=0), gained.argmax(axis=0)
         return gains, best
 
-    def _score(self, strip: int | IntArray, free_s: FloatArray) -> FloatArray:
-        """What is removed of strips by the deadline, discounted, for times at which the helper is free again."""
-        ends_s = free_s - self._run_out_s[strip]
-        share = np.clip((self._deadline_s - ends_s) / self._sweep_s[strip] + 1, 0.0, 1.0)
+    def _score(self, start: int | IntArray, strip: int | IntArray, free_s: FloatArray) -> FloatArray:
+        """What is removed of strips by the deadline, discounted, for from where the helper sets out to each and when it
+        is free again."""
+        ends_s = free_s - self._run_out_s[start, strip]
+        share = np.clip((self._deadline_s - ends_s) / self._sweep_s[start, strip] + 1, 0.0, 1.0)
         worth = self._removable_m2[strip] * share * 0.5 ** ((ends_s - self._now_s) / HALF_LIFE_S)
         scores: FloatArray = np.where(ends_s + self._home_s[strip] <= self._helper.lasts_until_s, worth, 0.0)
         return scores

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from coordinator.allocate.cbba import BUNDLE, NOBODY, Bidder, CbbaAllocator, Cla
 from coordinator.allocate.service import expected_service, removed_m2
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.currents import Sailing
+from planner.dubins import Pose
 from planner.way_home import WayHome
 
 CBBA = CbbaAllocator()
@@ -62,6 +64,14 @@ class TestBids:
         told = situation([open_strip(strip(1))], [helper(way_home=along)], 80)
         (alpha,) = agreed(told, told.strips)
         assert alpha.claims.bids == pytest.approx([score(350, 120)])
+        # From the north end, against it, the sweep takes 200 m / 1.5 m/s.
+        north = replace(helper(y_m=400, way_home=along), free_at=Pose(0.0, 400.0, math.pi))
+        for deadline_s in (150, 1000):
+            told = situation([open_strip(strip(1))], [north], deadline_s)
+            served = expected_service(told.strips[0], north)
+            assert served.ends_s - served.begins_s == pytest.approx(200 / 1.5)
+            (alpha,) = agreed(told, told.strips)
+            assert alpha.claims.bids == pytest.approx([alone(told, told.strips[0], north)])
 
     def test_what_lies_on_the_way_is_put_in_before(self) -> None:
         # 2 is worth more and claimed first; it begins where the run-out of 1 ends, so that 1 delays nothing.
