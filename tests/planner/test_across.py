@@ -79,6 +79,10 @@ def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:
     wide = Across(12_000.0, [], GAPPED, 40.0, 5.0)
     assert wide.step_m == 3
     assert 0.99 < wide.worst30([100]) <= 1.0
+    # From its middle, bin 2000, all of it is seen, so far does P(y) reach.
+    assert Across(12_000.0, [], DetectionCurve(np.array([0.0, 6003.0]), np.full(2, 0.5)), 6000.0, 5.0).worst30(
+        [2000]
+    ) == pytest.approx(0.5)
 
 
 @given(

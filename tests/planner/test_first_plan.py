@@ -164,6 +164,12 @@ class TestParts:
         parts = convex_parts(block_and_arm, 0, lambda width_m: track_count(width_m, 40, 120))
         sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
         assert sizes_m == [(100, 500), (400, 100), (600, 300)]
+        # The same where no side runs along x = 100 m, as the arm's notch begins at 80 m: right across at y = 200 m 700,
+        # 100 and 500 m would take 5, 2 and 4 tracks, not 4, 2 and 4.
+        notched = Region((*block_and_arm.outline[:3], (80.0, 100.0), *block_and_arm.outline[4:]))
+        parts = convex_parts(notched, 0, lambda width_m: track_count(width_m, 40, 120))
+        sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
+        assert sizes_m == [(100, 400), (500, 100), (600, 300)]
 
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))

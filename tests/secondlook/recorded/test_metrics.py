@@ -122,6 +122,15 @@ class TestPaths:
         summary = stream.metrics.summary()["vehicles"]
         assert (summary[PRIMARY]["path_m"], summary[HELPER]["path_m"]) == (17.0, 0.0)
 
+    def test_how_near_two_came_is_followed_as_fast_as_a_current_may_bear_them(self) -> None:
+        # Each makes 2 m/s, and 1 m/s more with the current: 10 m apart they part until 100 m, then come as near as 4 m.
+        stream = begun(replace(RUN, vehicles=tuple(replace(one, speed_mps=2, drift_mps=1) for one in RUN.vehicles)))
+        for at_s in range(10, 51):
+            apart_m = 10 + 6 * (at_s - 10) if at_s < 25 else 4 + 6 * abs(at_s - 41)
+            for name, side in ((PRIMARY, -1), (HELPER, 1)):
+                stream.say(at_s, f"veh/{name}/nav", replace(nav(side * apart_m / 2), speed_mps=3))
+        assert stream.metrics.summary()["closest"] == [{"vehicles": [HELPER, PRIMARY], "closest_m": 4, "t_s": 41}]
+
     def test_the_share_flown_counts_valid_looks_of_primaries_over_planned_tracks(self) -> None:
         stream = begun()
         assert stream.metrics.share_flown() == 0
