@@ -48,7 +48,7 @@ def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> 
     assert told.clearance == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5)])
+@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5), (0.001, 1e7)])
 def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: float) -> None:
     told, true = left_of(risk, found), negative_binomial(found + PRIOR_MINES, 1.0 - risk)
     assert (told.low, told.high) == (true.ppf(0.05), true.ppf(0.95))

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
-from comms.said.announcement import RunInfo
+from comms.said.announcement import RunInfo, Vertex, Zone
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -142,8 +142,17 @@ class TestPaths:
         stream.say(2, f"veh/{HELPER}/look", look(track, 1, 0, 20, flat(0.5, 0, 25)))
         assert stream.metrics.share_flown() == pytest.approx(40 / 400)
 
+    def test_who_enters_ground_to_keep_out_of_is_told(self) -> None:
+        zone = Zone(tuple(Vertex(x_m, y_m) for x_m, y_m in ((10, 5), (20, 5), (20, 15), (10, 15))))
+        stream = begun(replace(RUN, keep_out=(zone,)))
+        for at_s, x_m in ((1, 0), (2, 8), (3, 22)):
+            stream.say(at_s, f"veh/{PRIMARY}/nav", nav(x_m, 10))
+            stream.say(at_s, f"veh/{HELPER}/nav", nav(x_m, 4))
+        assert stream.metrics.summary()["entered"] == [{"vehicle": PRIMARY, "zone": 1, "t_s": 3}]
+
     def test_a_primary_tells_its_tracks_and_ranges(self) -> None:
         stream = begun()
+        assert stream.metrics.summary()["vehicles"][PRIMARY]["tracks"] == 0
         tracks = tuple(PlannedTrack(n, 0, 0, 0, 0, 200, n < 3) for n in (1, 2, 3))
         stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (138, 120), (130, 129), ""))
         summary = stream.metrics.summary()["vehicles"]
