@@ -139,6 +139,17 @@ def test_what_objects_are_is_worked_out_once_until_there_is_news() -> None:
     assert objects.mines == pytest.approx(seen.chances(np.zeros(2))[:, 0].sum())
 
 
+def test_an_alarm_is_raised_again_once_in_a_thousand_times() -> None:
+    objects = Objects()
+    for place, often in enumerate((1, 1, 1, 2, 2)):
+        for _ in range(often):
+            objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+    chances = objects.seen().chances(np.full(5, 0.4))
+    # Who lies there is seen twice, and not once, 0.4 / 2 times as often.
+    alarms_to_clutter = chances[:, 2] / chances[:, 1]
+    assert alarms_to_clutter[3] == pytest.approx(alarms_to_clutter[0] * 0.001 / 0.2)
+
+
 def test_nothing_heard_is_no_mine() -> None:
     objects = Objects()
     assert len(objects) == 0

@@ -171,6 +171,11 @@ class TestParts:
         sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
         assert sizes_m == [(100, 400), (500, 100), (600, 300)]
 
+    def test_more_than_one_cut_is_followed_to_its_end_unless_a_plan_is_wanted_at_once(self) -> None:
+        region = Region(((800.0, 0.0), (700.0, 0.0), (500.0, 200.0), (0.0, 100.0), (200.0, 400.0), (300.0, 600.0)))
+        assert first_plan(region, 0, 40, 120).track_count == 6
+        assert first_plan(region, 0, 40, 120, thorough=False).track_count == 8
+
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sum(shapely.Polygon(part.vertices).area for part in parts) == pytest.approx(600**2 - 200**2)

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from comms.errors import RunawayError
 from comms.lockstep import clock as lockstep_clock
 from comms.lockstep.clock import Grant, LockstepClock, Round, Sent
-from comms.lockstep.events import Join, Kill
+from comms.lockstep.events import Freeze, Join, Kill
 from comms.said.routing import RosterNode, Routing
 
 RUN = Sent("run", 300)
@@ -211,6 +211,19 @@ def test_to_who_comes_back_only_what_is_sent_since_then_is_counted() -> None:
         (21, 2),
         (61, 1),
     ]
+
+
+def test_what_is_due_to_who_is_frozen_is_held_until_it_is_thawed() -> None:
+    clock = LockstepClock(Routing(ROSTER), 60_000, (Freeze("coordinator", 25, 50),))
+    told = []
+    while (turn := clock.next_round()) is not None:
+        for grant in turn.grants:
+            says = grant.node_id == "alpha" and grant.wake
+            wake_ms = {0: 20, 20: 30, 30: 60}.get(turn.now_ms) if says else None
+            clock.answer(grant.node_id, wake_ms, [STATE] if says else [])
+            told += [(turn.now_ms, grant.expected)] if grant.node_id == "coordinator" else []
+    # What is sent at 20 ms is due before, what is sent at 30 ms while it is frozen.
+    assert told == [(0, {}), (1, {"alpha": 1}), (21, {"alpha": 2}), (50, {"alpha": 3}), (61, {"alpha": 4})]
 
 
 class TestRunaway:
