@@ -103,6 +103,10 @@ class TestByHand:
         # from 4 m 0 to 1 and 7 to 11 m, and 1 m is left at 6, 1 m at 13 m.
         assert fewest_tracks([(0, 1), (6, 11), (13, 14)], 3, 9) == Cover((3, 7), 7, fewest=True)
 
+    def test_three_tracks_are_found_where_what_lies_last_needs_two(self) -> None:
+        # A side sees 2 m, the other 4 m beyond: 1 to 3 and 5 to 7 m, 3 to 5 and 7 to 9 m, 5 to 7 and 9 to 11 m.
+        assert fewest_tracks([(1, 3), (4, 11)], 1, 3) == Cover((4, 6, 8), 3, fewest=True)
+
     def test_where_nothing_is_left_no_track_is_needed(self) -> None:
         assert fewest_tracks([], 40, 100).offsets_m == ()
 

@@ -151,6 +151,12 @@ class TestParts:
         parts = convex_parts(L_SHAPE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
 
+    def test_of_many_corners_the_deepest_are_cut(self) -> None:
+        # Its south side has 16 dents, each of which is surveyed with the rest.
+        dented = tuple((25.0 * place, 9.0 * (place % 2)) for place in range(33))
+        parts = convex_parts(Region((*dented, *L_SHAPE.outline[2:])), 0, lambda width_m: track_count(width_m, 40, 120))
+        assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
+
     def test_a_cut_may_end_at_the_next_boundary(self) -> None:
         # A block with an arm along its south side, 100 m off. Cut at x = 100 m, 100, 400 and 600 m take 2, 3 and 4
         # tracks; right across at y = 200 m it looks better at first: 700 and 500 m take 5 and 4. But what lies south of

@@ -211,6 +211,7 @@ def test_to_who_comes_back_only_what_is_sent_since_then_is_counted() -> None:
         (21, 2),
         (61, 1),
     ]
+    assert clock.said_to_joiners == {"coordinator": {"alpha": 3}}
 
 
 def test_what_is_due_to_who_is_frozen_is_held_until_it_is_thawed() -> None:
@@ -223,6 +224,7 @@ def test_what_is_due_to_who_is_frozen_is_held_until_it_is_thawed() -> None:
             clock.answer(grant.node_id, wake_ms, [STATE] if says else [])
             told += [(turn.now_ms, grant.expected)] if grant.node_id == "coordinator" else []
     # What is sent at 20 ms is due before, what is sent at 30 ms while it is frozen.
+    assert clock.said_to_joiners == {}
     assert told == [(0, {}), (1, {"alpha": 1}), (21, {"alpha": 2}), (50, {"alpha": 3}), (61, {"alpha": 4})]
 
 

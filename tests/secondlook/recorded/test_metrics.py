@@ -306,6 +306,19 @@ class TestTruth:
         expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5)) / 5
         assert truth["predicted_missed_share"] == pytest.approx(expected)
 
+    def test_what_is_listed_is_held_against_the_targets(self) -> None:
+        stream = begun()
+        targets = tuple(TruthTarget(x_m, y_m) for x_m, y_m in ((3.0, 4.0), (17.0, 4.0), (30.0, 15.0)))
+        stream.say(0, "world/truth/targets", TruthTargets(targets))
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        look_truth = TruthLook(PRIMARY, 1, (0, 1, 2), np.array([0.9, 0.9, 0.9]), (0, 2))
+        stream.say(2, f"world/truth/look/{PRIMARY}", look_truth)
+        for number, (x_m, y_m) in enumerate(((3.5, 4.0), (23.0, 15.0))):
+            stream.say(2, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, y_m, 0.2, 0.9, 1))
+        truth = stream.metrics.summary()["truth"]
+        # Of the two that were detected the first one; and one that is none, on 10 cells of 100 m2.
+        assert (truth["listed_share"], truth["false_listed_per_km2"]) == (0.5, pytest.approx(1000))
+
     def test_without_targets_there_are_no_shares(self) -> None:
         stream = begun()
         stream.say(0, "world/truth/targets", TruthTargets(()))
