@@ -79,6 +79,12 @@ def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:
     wide = Across(12_000.0, [], GAPPED, 40.0, 5.0)
     assert wide.step_m == 3
     assert 0.99 < wide.worst30([100]) <= 1.0
+    # From its middle, bin 2000, all of it is seen, so far does P(y) reach.
+    far = DetectionCurve(np.array([0.0, 6003.0]), np.full(2, 0.5))
+    wide = Across(12_000.0, [], far, 6003.0, 5.0)
+    assert wide.worst30([2000]) == pytest.approx(0.5)
+    wide.ask_for([Measured(6000.0, far, 6003.0)])
+    assert (wide.lost_m([]), wide.worth([]).lost_m, wide.worth([2000]).lost_m) == (12_000, 12_000, 0)
 
 
 @given(
@@ -119,17 +125,22 @@ def test_moving_makes_nothing_worse(
     flown=st.lists(st.integers(-20, 220), max_size=3),
     bins=st.lists(st.integers(-20, 220), min_size=1, max_size=3),
     asked=st.lists(st.integers(-20, 220), max_size=3),
+    helped_m=st.sampled_from([0.0, 30.0]),
 )
 # Each is a survey in which a step that is left out, or another, leaves a track where it could be moved.
-@example([], [199], [99, 51])
-@example([], [180, 72], [28, 214, 194])
-@example([-8], [105, 127, 198], [180, 42])
-@example([100], [48], [128, 120])
-@example([130, 198, -12], [42, 170], [86, 150, 24])
-@example([-13, 208, 193], [90, 135], [])
-@example([174, 95, 100], [77, 181, 33], [])
-def test_no_track_can_be_moved_by_a_step_for_the_better(flown: list[int], bins: list[int], asked: list[int]) -> None:
-    ground = Across(200.0, [Measured(float(one), GAPPED, 30.0) for one in flown], GAPPED, 30.0, 5.0)
+@example([], [199], [99, 51], 0.0)
+@example([], [180, 72], [28, 214, 194], 0.0)
+@example([-8], [105, 127, 198], [180, 42], 0.0)
+@example([100], [48], [128, 120], 0.0)
+@example([130, 198, -12], [42, 170], [86, 150, 24], 0.0)
+@example([-13, 208, 193], [90, 135], [], 0.0)
+@example([174, 95, 100], [77, 181, 33], [], 0.0)
+@example([], [20, 30], [], 30.0)
+def test_no_track_can_be_moved_by_a_step_for_the_better(
+    flown: list[int], bins: list[int], asked: list[int], helped_m: float
+) -> None:
+    seen = [Measured(float(one), GAPPED, 30.0) for one in flown]
+    ground = Across(200.0, seen, GAPPED, 30.0, 5.0, helpers=HelperLooks(helped_m, 0.5))
     ground.ask_for([Measured(float(one), GAPPED, 30.0) for one in asked])
     found = ground.refined(bins)
     worth = ground.worth(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,7 @@ def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> 
     assert told.clearance == pytest.approx(0.5)
 
 
-@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5)])
+@pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5), (0.001, 1e7)])
 def test_it_is_the_negative_binomial_distribution_of_scipy(risk: float, found: float) -> None:
     told, true = left_of(risk, found), negative_binomial(found + PRIOR_MINES, 1.0 - risk)
     assert (told.low, told.high) == (true.ppf(0.05), true.ppf(0.95))
@@ -104,6 +104,8 @@ def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: floa
         assert told.chance_of_at_most(number) == pytest.approx(true.cdf(math.floor(number)))
     assert told.chance_of_at_most(-0.5) == 0.0
     assert told.chance_of_at_most(1e9) == pytest.approx(1.0)
+    # What is summed up may end short of 1.
+    assert replace(told, reached=np.array([0.5, 0.9, 1.0 - 1e-12])).at_most_with(1.0) == 2
     for chance in (0.1, 0.5, 0.9):
         assert told.at_most_with(chance) == true.ppf(chance)
     assert told.chance_of_at_most(told.at_most_with(1.0)) == pytest.approx(1.0)
@@ -216,4 +218,6 @@ def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None
     one, other = -math.log(0.6), -math.log(0.4)
     mean, deviation = (one + other) / 2, (other - one) / math.sqrt(2)
     assert scatter_of([curve(0.4), curve(0.6)]) == pytest.approx(deviation / mean / math.sqrt(2))
-    assert scatter_of([curve(0.5)]) == scatter_of([]) == UNKNOWN_SCATTER
+    # A track that has seen nothing tells nothing.
+    assert scatter_of([curve(0.4), curve(0.0), curve(0.6)]) == scatter_of([curve(0.4), curve(0.6)])
+    assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.contacts import LEAST_GATE_M, Objects, likelihood_ratio, surer_by
+from planner.contacts import LEAST_GATE_M, Objects, ObjectsOnMap, likelihood_ratio, surer_by
 
 
 def test_a_contact_near_another_is_of_the_same_object_and_one_farther_off_is_not() -> None:
@@ -125,6 +125,29 @@ def test_who_is_looked_at_and_not_seen_again_is_less_likely_to_lie_there() -> No
     poorly, well = seen.chances(np.full(60, 0.3)), seen.chances(np.where(once, 3.0, 0.3))
     assert well[once, 2].mean() > poorly[once, 2].mean() + 0.2
     assert (poorly[~once, 2] < 0.05).all()
+
+
+def test_what_objects_are_is_worked_out_once_until_there_is_news() -> None:
+    objects = ObjectsOnMap()
+    objects.hear(0.0, 0.0, 0.0, 0.6)
+    seen, chances = objects.known()
+    assert chances.tolist() == seen.chances(np.zeros(1)).tolist()
+    assert objects.known()[1] is chances
+    objects.hear(50.0, 0.0, 0.0, 0.7)
+    seen, chances = objects.known()
+    assert seen.x_m.tolist() == [0.0, 50.0]
+    assert objects.mines == pytest.approx(seen.chances(np.zeros(2))[:, 0].sum())
+
+
+def test_an_alarm_is_raised_again_once_in_a_thousand_times() -> None:
+    objects = Objects()
+    for place, often in enumerate((1, 1, 1, 2, 2)):
+        for _ in range(often):
+            objects.hear(10.0 * place, 0.0, 0.0, 0.6)
+    chances = objects.seen().chances(np.full(5, 0.4))
+    # Who lies there is seen twice, and not once, 0.4 / 2 times as often.
+    alarms_to_clutter = chances[:, 2] / chances[:, 1]
+    assert alarms_to_clutter[3] == pytest.approx(alarms_to_clutter[0] * 0.001 / 0.2)
 
 
 def test_nothing_heard_is_no_mine() -> None:

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner import cover
-from planner.cover import Span, fewest_tracks, spans_left
+from planner.cover import Cover, Span, fewest_tracks, spans_left
 from planner.spacing import adapt_range, track_count
 
 spans = st.lists(st.tuples(st.integers(0, 150), st.integers(1, 60)), min_size=1, max_size=4).map(
@@ -97,6 +97,15 @@ class TestByHand:
         # from 40 m on; 35 m leaves 1 m at 33 m and 2 at 46 m.
         left: list[Span] = [(0, 4), (5, 9), (24, 27), (31, 34), (37, 48)]
         assert fewest_tracks(left, 2, 13).offsets_m == (11, 35, 44)
+
+    def test_what_a_side_sees_at_once_is_rather_left_than_less_in_two_places(self) -> None:
+        # With 7 m a side sees 4 m, the other 10 m beyond. From 7 m 0 to 4 and 10 to 14 m are seen, and 4 m are left;
+        # from 4 m 0 to 1 and 7 to 11 m, and 1 m is left at 6, 1 m at 13 m.
+        assert fewest_tracks([(0, 1), (6, 11), (13, 14)], 3, 9) == Cover((3, 7), 7, fewest=True)
+
+    def test_three_tracks_are_found_where_what_lies_last_needs_two(self) -> None:
+        # A side sees 2 m, the other 4 m beyond: 1 to 3 and 5 to 7 m, 3 to 5 and 7 to 9 m, 5 to 7 and 9 to 11 m.
+        assert fewest_tracks([(1, 3), (4, 11)], 1, 3) == Cover((4, 6, 8), 3, fewest=True)
 
     def test_where_nothing_is_left_no_track_is_needed(self) -> None:
         assert fewest_tracks([], 40, 100).offsets_m == ()

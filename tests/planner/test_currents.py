@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -217,6 +218,9 @@ class TestFlowsFromPlaceToPlace:
             assert sailing.straight_s(100, Pose(300, 100, heading_rad)) == pytest.approx(100.0)
         assert SHEAR.until(1.0).time_s.tolist() == [0, 3600]
         assert AT_FIRST.time_s.tolist() == [0]
+        # At first, on the way from what was known before to what is known soon, both bear on it.
+        early = replace(SHEAR, time_s=np.array([-600.0, 0.5]))
+        assert early.until(0.2).time_s.tolist() == [-600, 0.5]
         assert (SHEAR.fastest_mps, sailing.slowest_mps) == (1.5, 1.0)
 
     @given(

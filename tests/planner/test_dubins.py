@@ -236,6 +236,18 @@ def test_the_lengths_of_many_paths_are_those_of_each(starts: list[Pose], ends: l
             assert length_m == pytest.approx(shortest_path(start, end, radius_m).length_m, abs=1e-6)
 
 
+def test_rounding_adds_no_loop_to_a_straight_path_among_many() -> None:
+    starts = np.array([[-26.0, -83.0, heading_rad / 100] for heading_rad in range(629)])
+    ends = starts + 70.6 * np.column_stack([np.sin(starts[:, 2]), np.cos(starts[:, 2]), np.zeros(629)])
+    assert np.diag(path_lengths_m(starts, ends, 10.0)) == pytest.approx(70.6)
+
+
+def test_the_lengths_of_many_paths_are_rounded_to_2_to_the_minus_24_m() -> None:
+    step_m = 2.0**-24
+    ends = np.array([[0.0, 100 + steps * step_m, NORTH] for steps in (-1.3, -0.4, 0.4, 0.6, 1.4)])
+    assert path_lengths_m(np.zeros((1, 3)), ends, 10.0).tolist() == [[100 + n * step_m for n in (-1, 0, 0, 1, 1)]]
+
+
 @pytest.mark.parametrize(("heading_rad", "side"), [(0.0, -1), (-0.0005, -1), (0.0005, -1), (0.002, -1), (-0.002, 1)])
 def test_many_paths_turn_to_port_where_either_side_is_as_short(heading_rad: float, side: int) -> None:
     behind = Pose(0, -100, heading_rad)  # by port 20 m times the heading shorter

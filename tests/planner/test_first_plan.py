@@ -151,6 +151,12 @@ class TestParts:
         parts = convex_parts(L_SHAPE, 0, lambda width_m: track_count(width_m, 40, 120))
         assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
 
+    def test_of_many_corners_the_deepest_are_cut(self) -> None:
+        # Its south side has 16 dents, each of which is surveyed with the rest.
+        dented = tuple((25.0 * place, 9.0 * (place % 2)) for place in range(33))
+        parts = convex_parts(Region((*dented, *L_SHAPE.outline[2:])), 0, lambda width_m: track_count(width_m, 40, 120))
+        assert sorted((round(part.width_m), round(part.length_m)) for part in parts) == [(300, 600), (500, 300)]
+
     def test_a_cut_may_end_at_the_next_boundary(self) -> None:
         # A block with an arm along its south side, 100 m off. Cut at x = 100 m, 100, 400 and 600 m take 2, 3 and 4
         # tracks; right across at y = 200 m it looks better at first: 700 and 500 m take 5 and 4. But what lies south of
@@ -164,6 +170,17 @@ class TestParts:
         parts = convex_parts(block_and_arm, 0, lambda width_m: track_count(width_m, 40, 120))
         sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
         assert sizes_m == [(100, 500), (400, 100), (600, 300)]
+        # The same where no side runs along x = 100 m, as the arm's notch begins at 80 m: right across at y = 200 m 700,
+        # 100 and 500 m would take 5, 2 and 4 tracks, not 4, 2 and 4.
+        notched = Region((*block_and_arm.outline[:3], (80.0, 100.0), *block_and_arm.outline[4:]))
+        parts = convex_parts(notched, 0, lambda width_m: track_count(width_m, 40, 120))
+        sizes_m = sorted((round(part.width_m), round(part.length_m)) for part in parts)
+        assert sizes_m == [(100, 400), (500, 100), (600, 300)]
+
+    def test_more_than_one_cut_is_followed_to_its_end_unless_a_plan_is_wanted_at_once(self) -> None:
+        region = Region(((800.0, 0.0), (700.0, 0.0), (500.0, 200.0), (0.0, 100.0), (200.0, 400.0), (300.0, 600.0)))
+        assert first_plan(region, 0, 40, 120).track_count == 6
+        assert first_plan(region, 0, 40, 120, thorough=False).track_count == 8
 
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from planner.outline import Corner, _any_in_triangle, outline
@@ -21,6 +21,11 @@ corners = st.tuples(st.integers(0, 9), st.integers(0, 9))
 
 
 @given(st.tuples(corners, corners, corners), st.sets(corners, max_size=60))
+# One on each side of the box about it.
+@example(((0, 0), (0, 4), (4, 4)), {(0, 2)})
+@example(((0, 0), (0, 4), (4, 4)), {(2, 4)})
+@example(((0, 0), (4, 4), (4, 0)), {(4, 2)})
+@example(((0, 0), (4, 4), (4, 0)), {(2, 0)})
 def test_whether_a_triangle_holds_any_vertex(triangle: tuple[Corner, Corner, Corner], vertices: set[Corner]) -> None:
     area = shapely.Polygon(triangle)
     assume(area.area > 0)

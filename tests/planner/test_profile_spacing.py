@@ -82,6 +82,8 @@ class TestThePapersExperiments:
         then = laid(ProfileSpacing(40, 130), part(first[0], planned_m=first[1:])).offsets_m
         assert worst30(first[0], *then) <= worst30(*first) + 1e-3
         assert max(abs(one - other) for one, other in zip(then, first[1:], strict=True)) <= 10
+        # Where more were planned than are still needed, no more are laid.
+        assert len(laid(ProfileSpacing(40, 130), part(planned_m=(*first, 300.0, 900.0))).offsets_m) == len(THEIRS)
 
     def test_of_a_wide_part_the_tracks_flown_first_are_moved(self) -> None:
         theirs = algorithm_1(ProfileSpacing(40, 130), 4000.0, 130)
@@ -110,6 +112,12 @@ class TestWantedRisk:
         # What eight leave already needs no more; more is allowed to be left, but nothing to be unseen.
         assert len(laid(planner, part(), SpacingTerms(5.0, wanted_risk=0.76)).offsets_m) == 8
         assert len(laid(planner, part(), SpacingTerms(5.0, wanted_risk=0.99)).offsets_m) <= 8
+
+    def test_fewer_than_algorithm_1_lays_where_they_see_as_much_and_more_may_be_left(self) -> None:
+        # 130 and 230 m see 0 to 105 and 155 to 260 m, 100 to 205 and 255 to 360 m.
+        for wanted_risk, offsets_m in ((None, (105, 180, 255)), (0.99, (130, 230))):
+            decision = laid(ProfileSpacing(40, 130), part(width_m=360.0), SpacingTerms(5.0, wanted_risk=wanted_risk))
+            assert decision.offsets_m == offsets_m
 
     def test_no_more_than_three_times_as_many(self) -> None:
         found = laid(ProfileSpacing(40, 130), part(), SpacingTerms(5.0, wanted_risk=0.01))
@@ -144,6 +152,7 @@ class TestOtherSonars:
 
     def test_one_that_sees_nothing_is_surveyed_with_as_algorithm_1_does(self) -> None:
         blind = DetectionCurve(np.array([0.0, 1.0]), np.zeros(2))
+        assert known_before(blind, 0.05) == Known(blind, 0, measured=False)
         first = FlownTrack(120.0, 0, single=False, curve=blind)
         decision = laid(ProfileSpacing(40, 130), PartSoFar(WIDTH_M, None, (first,), (), blind, 0))
         assert len(decision.offsets_m) == len(THEIRS) - 1

@@ -134,6 +134,15 @@ class TestShare:
         assert region.share(0, 0.5, 0).polygon.area == pytest.approx(5000 - 200)
         assert len(region.share(0, 0.7, 0).holes) == 1
 
+    def test_corners_at_its_tracks_ends_stay_as_they_were_drawn(self) -> None:
+        region = Region(((0, 0), (100, 10), (130, 70), (60, 120), (-20, 60)))
+        for heading_rad in np.arange(0.0, 6.3, 0.1).tolist():
+            whole, share = region.about(heading_rad), region.share(0.3, 0.7, heading_rad)
+            for corner in region.outline:
+                across_m = float(whole.frame.to_sweep(*corner)[0])
+                if 0.3 * whole.width_m < across_m < 0.7 * whole.width_m:
+                    assert corner in share.outline
+
     @pytest.mark.parametrize(("begin", "end"), [(0.5, 0.5), (0.6, 0.4), (-0.1, 0.5), (0, 1.1), (math.nan, 1)])
     def test_what_is_no_share_is_refused(self, begin: float, end: float) -> None:
         with pytest.raises(ValueError, match="a share runs from"):

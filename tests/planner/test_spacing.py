@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.spacing import RangeChoice, adapt_range, track_count, track_offsets
+from planner.spacing import TOLERANCE_M, RangeChoice, adapt_range, track_count, track_offsets
 
 WIDTH_M = 1212
 NADIR_GAP_M = 40
@@ -87,6 +87,11 @@ class TestTrackCount:
     def test_by_hand_for_a_range_of_120(self, width_m: float, tracks: int) -> None:
         assert track_count(width_m, 40, 120) == tracks
         assert len(track_offsets(max(width_m, 0), 40, 120)) == tracks
+
+    def test_a_range_may_be_a_micrometre_short_of_three_nadir_gaps(self) -> None:
+        assert track_count(100, 40, 120 - TOLERANCE_M) == 2
+        with pytest.raises(ValueError, match="at least three nadir gaps"):
+            track_count(100, 40, 120 - 2 * TOLERANCE_M)
 
     @pytest.mark.parametrize(
         ("width_m", "nadir_gap_m", "range_m"),

@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.dubins import Pose, shortest_path
+from planner.keep_out import KeepOut
 from planner.sweep import Sweep, distance_over, legs_over_strip, pass_over, shortest_sweep, sweeps_over
 from planner.types import Strip, Track
 
@@ -176,6 +177,17 @@ class TestShortestSweep:
         ways = sweeps_over(strip, 60, 10, 0, beside_m=85)
         assert [way.entry.x_m for way in ways] == pytest.approx([85, 85, -85, -85])
         assert [way.entry.y_m for way in ways] == pytest.approx([0, 100, 0, 100])
+
+    def test_none_enters_ground_to_keep_out_of_and_all_leave_room_to_turn(self) -> None:
+        def ways(x_m: float, y_m: float) -> int:
+            """How many stay out of 10 m square about a place; legs are 10, 30 and 50 m east, or 85 m to a side."""
+            zone = KeepOut((((x_m - 5, y_m - 5), (x_m + 5, y_m - 5), (x_m + 5, y_m + 5), (x_m - 5, y_m + 5)),))
+            beside = sweeps_over(Strip(1, (0, 0), NORTH, 100, 60), 60, 10, 0, beside_m=85, keep_out=zone)
+            return len(sweeps_over(self.STRIP, 20, 10, 0, keep_out=zone)) + len(beside)
+
+        assert ways(1000, 0) == 8
+        assert ways(30, 50) == 4  # on the leg in the middle
+        assert ways(85, 50) == 6  # on the leg to the right
 
     def test_a_sonar_that_looks_ahead_flies_its_pass_earlier(self) -> None:
         begun, ended = pass_over((0, 0), (0, 100), 10, lead_m=30)

@@ -39,6 +39,17 @@ def test_tiles_have_names_of_their_own(grid: GridSpec) -> None:
     assert len(set(tiles(grid))) == len(names)
 
 
+@pytest.mark.parametrize("part", [(1, 9, 0, 12), (0, 8, 0, 12), (0, 9, 1, 12), (0, 9, 0, 11), (2, 7, 3, 10)])
+def test_the_cells_of_a_part_of_a_grid_lie_where_those_of_the_grid_do(part: tuple[int, int, int, int]) -> None:
+    grid = GridSpec(SweepFrame(3, 4, 0.3), 5, 12, 9)
+    first_row, end_row, first_column, end_column = part
+    some = grid.part(*part)
+    assert some.shape == (end_row - first_row, end_column - first_column)
+    at = some.frame.to_mission(some.across_m[-1], some.along_m[0])
+    assert at == pytest.approx(grid.frame.to_mission(grid.across_m[end_column - 1], grid.along_m[first_row]))
+    assert grid.part(0, 9, 0, 12) is grid
+
+
 def test_the_tiles_of_the_papers_grid() -> None:
     every = tiles(grid_of(80, 243))
     assert len(every) == 4 * 13

@@ -35,11 +35,12 @@ class TestByHand:
         assert min(heading_rad, 2 * math.pi - heading_rad) == pytest.approx(2 * math.atan(10 / 100))
 
     def test_abeam_to_either_side_it_turns_there(self) -> None:
-        # To port: the centre is 30 m short of home, the tangent sqrt(30^2 - 10^2) long.
-        tangent_m = math.sqrt(30**2 - 10**2)
-        to_port = 10 * (math.pi / 2 + math.atan(10 / tangent_m)) + tangent_m
-        for x_m in (40.0, -40.0):
-            assert WAY.from_pose(Pose(x_m, 0, NORTH))[0] == pytest.approx(to_port / 2)
+        # Of 40 m the centre is 30 m short of home, the tangent sqrt(30^2 - 10^2) long.
+        for beside_m in (40.0, 25.0):
+            tangent_m = math.sqrt((beside_m - 10) ** 2 - 10**2)
+            way_m = 10 * (math.pi / 2 + math.atan(10 / tangent_m)) + tangent_m
+            for x_m in (beside_m, -beside_m):
+                assert WAY.from_pose(Pose(x_m, 0, NORTH))[0] == pytest.approx(way_m / 2)
 
     def test_who_is_there_has_no_way(self) -> None:
         assert WAY.from_pose(Pose(0.01, 0, SOUTH))[0] == 0.0

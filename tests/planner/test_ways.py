@@ -6,12 +6,13 @@ import math
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from zones import MARGIN_M, assert_keeps_radius, assert_stays_out, kept_out, places
 
-from planner.dubins import Pose, shortest_path
-from planner.keep_out import NOWHERE, KeepOut
+from planner.dubins import DubinsPath, Pose, shortest_path
+from planner.keep_out import NOWHERE, KeepOut, as_line
 from planner.ways import Way, shortest_way, way_length_m, way_lengths_m, way_or_direct
 
 NORTH, EAST, SOUTH, WEST = (number * math.pi / 2 for number in range(4))
@@ -40,6 +41,25 @@ def test_with_nothing_in_the_way_it_is_the_shortest_path() -> None:
     path = shortest_path(start, end, RADIUS_M)
     assert shortest_way(start, end, RADIUS_M, NOWHERE) == (path,)
     assert shortest_way(start, end, RADIUS_M, SQUARE) == (path,)
+
+
+def test_a_circle_is_judged_by_as_few_chords_as_lie_within_2_cm_of_it_and_to_its_end() -> None:
+    # Of a circle of 10 m a chord over an angle lies 10 (1 - cos(angle / 2)) beside it: 2 cm at 2 pi / 49.7.
+    circle = as_line(DubinsPath(Pose(-10, 0, NORTH), 10.0, (1, 0, 0), (20 * math.pi, 0, 0)))
+    assert len(shapely.get_coordinates(circle)) == 1 + 50 + 2  # the stretches behind it have no length
+    assert shapely.hausdorff_distance(circle, shapely.Point(0, 0).buffer(10, quad_segs=500).exterior) < 0.02
+    # A post stands right behind, where a circle to either side ends.
+    post = KeepOut((((-0.2, -0.7), (0.2, -0.7), (0.2, -0.3), (-0.2, -0.3)),))
+    assert post.circling(Pose(0, 0, NORTH), 10.0) is None
+    assert post.circling(Pose(0, 1, NORTH), 10.0) is None
+    assert post.circling(Pose(3, 0, NORTH), 10.0) == 1
+
+
+def test_who_is_told_a_way_may_come_nearer_but_not_within_the_zones() -> None:
+    assert [KeepOut(SQUARE.zones, margin_m).nearer() for margin_m in (2.0, 0.1)] == [
+        KeepOut(SQUARE.zones, margin_m) for margin_m in (1.75, 0.0)
+    ]
+    assert NOWHERE.nearer() == NOWHERE
 
 
 def test_past_a_square_it_goes_by_tangents_and_arcs_at_two_corners() -> None:

@@ -45,6 +45,7 @@ def looked(
     sensor: SensorConfig = SENSOR,
     seabed: Seabed | None = None,
     current: Stream = STILL_WATER,
+    offset_m: Point = (0.0, 0.0),
 ) -> list[tuple[Look, TruthLook]]:
     """What is told of the first 20 m of northward tracks at these x."""
     seabed = seabed or HalfTaken()
@@ -59,7 +60,7 @@ def looked(
     )
     found = []
     for x_m in tracks:
-        look, truth = looks.look(northward(x_m), 0.0, (0.0, 0.0), 0.0)
+        look, truth = looks.look(northward(x_m), 0.0, offset_m, 0.0)
         assert truth is not None
         found.append((look, truth))
     return found
@@ -83,6 +84,14 @@ def test_a_vehicle_that_is_blind_to_the_seabed_tells_the_curve_and_finds_what_it
     assert np.array_equal(told[True][1].p_detect, told[False][1].p_detect)
     assert told[True][1].detected == told[False][1].detected
     assert told[True][1].p_detect == pytest.approx(0.3)
+
+
+def test_a_look_holds_what_lies_where_the_vehicle_truly_is_and_tells_where_it_believes_to_be() -> None:
+    # It believes to be at (100, 0), and is 20 m east and 300 m north of there; it sees 100 m to a side, 20 m along.
+    places = ((25.0, 310.0), (215.0, 310.0), (225.0, 310.0), (110.0, 10.0), (110.0, 30.0), (300.0, 110.0))
+    ((look, truth),) = looked([100.0], TargetsConfig(6, Given(places)), offset_m=(20.0, 300.0))
+    assert (look.origin_x_m, look.origin_y_m) == (100.0, 0.0)
+    assert truth.targets == (0, 1)
 
 
 def test_a_look_suffers_from_the_current_where_the_vehicle_is_at_its_end() -> None:

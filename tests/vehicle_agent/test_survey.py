@@ -209,6 +209,8 @@ class TestThePapersExperiments:
         assert agent.last(Plan).r_eff_m == ()
         fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
         assert agent.last(Curve).track == 1
+        below_the_threshold = DetectionCurve(np.array([30.0, 70.0]), np.array([0.04, 0.04]))
+        assert on_its_way(survey(prior=below_the_threshold)).last(Curve).r_eff_m == 0
 
 
 class TestSpacingAtItsLimits:

@@ -23,7 +23,7 @@ from planner.footprints.side import SideLooking
 from planner.footprints.wedge import ForwardLooking
 from planner.region import Region
 from planner.spacing_planners import AdaptiveSpacing
-from planner.types import Point, SonarShape
+from planner.types import Point, SonarShape, Track
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
@@ -277,6 +277,14 @@ class TestGroundToKeepOutOf:
         begins = [(track.number, track.start_y_m) for track in tracks]
         assert begins == [(1, 0.0), (2, 600.0), (3, 0.0), (4, 600.0), (5, 0.0)]
         assert_each_begins_at_its_nearer_end(tracks)
+
+    def test_a_track_whose_ends_are_as_far_is_begun_as_it_was_laid(self) -> None:
+        far_off = (Zone((Vertex(2000, 2000), Vertex(2010, 2000), Vertex(2010, 2010))),)
+        node = node_of(surveyor(replace(announced(self.FIELD), keep_out=far_off, keep_out_margin_m=1.5)))
+        part = node._parts[0]
+        for begin_m, end_y_m in ((0, 300.0), (0, 299.0), (600, 301.0)):
+            before = [Track(0, 0.0, (0.0, 600.0), (0.0, end_y_m))]
+            assert node._legs(part, part.first(None), 1, before)[0].start[1] == begin_m
 
     def test_no_track_enters_it_where_it_divides_the_area(self) -> None:
         lane = ((-50.0, 250.0), (950.0, 250.0), (950.0, 310.0), (-50.0, 310.0))

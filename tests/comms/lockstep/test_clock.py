@@ -6,15 +6,15 @@ from collections import Counter
 from collections.abc import Sequence
 
 import pytest
-from fleets import ROSTER
+from fleets import ROSTER, with_modems
 from hypothesis import given
 from hypothesis import strategies as st
 
 from comms.errors import RunawayError
 from comms.lockstep import clock as lockstep_clock
 from comms.lockstep.clock import Grant, LockstepClock, Round, Sent
-from comms.lockstep.events import Join, Kill
-from comms.said.routing import Routing
+from comms.lockstep.events import Freeze, Join, Kill
+from comms.said.routing import RosterNode, Routing
 
 RUN = Sent("run", 300)
 NAV = Sent("veh/alpha/nav", 40)
@@ -107,16 +107,18 @@ def test_after_the_end_there_are_100_ms_for_last_words_once_all_agents_rest() ->
     assert not clock.timed_out
 
 
-def test_an_agent_that_does_not_rest_is_waited_for_10_s() -> None:
-    clock = started()
-    answer_all(clock, coordinator=(2000, []), alpha=(12_000, []))
-    clock.next_round()
-    clock.answer("coordinator", None, [OVER])
-    clock.next_round()
-    for node, wake_ms in (("world", None), ("alpha", 12_000), ("beta", None)):
-        clock.answer(node, wake_ms, [])
-    assert clock.next_round() == Round(12_000, (Grant("alpha", True, {}),))
-    clock.answer("alpha", 12_001, [])
+@pytest.mark.parametrize(("roster", "last_ms"), [(ROSTER, 12_000), (with_modems(ROSTER), 302_000)])
+def test_an_agent_that_does_not_rest_is_waited_for_10_s_and_5_minutes_where_it_hears_by_modem(
+    roster: tuple[RosterNode, ...], last_ms: int
+) -> None:
+    clock = LockstepClock(Routing(roster), 900_000)
+    wakes = {"coordinator": 2000, "alpha": last_ms}
+    while (turn := clock.next_round()) is not None and turn.now_ms < last_ms:
+        for grant in turn.grants:
+            over = turn.now_ms == 2000 and grant.node_id == "coordinator"
+            clock.answer(grant.node_id, None if over else wakes.get(grant.node_id), [OVER] if over else [])
+    assert turn == Round(last_ms, (Grant("alpha", True, {}),))
+    clock.answer("alpha", last_ms + 1, [])
     assert clock.next_round() is None
     assert not clock.timed_out
 
@@ -209,6 +211,21 @@ def test_to_who_comes_back_only_what_is_sent_since_then_is_counted() -> None:
         (21, 2),
         (61, 1),
     ]
+    assert clock.said_to_joiners == {"coordinator": {"alpha": 3}}
+
+
+def test_what_is_due_to_who_is_frozen_is_held_until_it_is_thawed() -> None:
+    clock = LockstepClock(Routing(ROSTER), 60_000, (Freeze("coordinator", 25, 50),))
+    told = []
+    while (turn := clock.next_round()) is not None:
+        for grant in turn.grants:
+            says = grant.node_id == "alpha" and grant.wake
+            wake_ms = {0: 20, 20: 30, 30: 60}.get(turn.now_ms) if says else None
+            clock.answer(grant.node_id, wake_ms, [STATE] if says else [])
+            told += [(turn.now_ms, grant.expected)] if grant.node_id == "coordinator" else []
+    # What is sent at 20 ms is due before, what is sent at 30 ms while it is frozen.
+    assert clock.said_to_joiners == {}
+    assert told == [(0, {}), (1, {"alpha": 1}), (21, {"alpha": 2}), (50, {"alpha": 3}), (61, {"alpha": 4})]
 
 
 class TestRunaway:

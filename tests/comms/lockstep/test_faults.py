@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import pytest
 from fleets import ROSTER, nav, state
 from hypothesis import given
@@ -74,6 +76,18 @@ def test_nothing_corrupted_is_as_it_was() -> None:
     for number in range(2000):  # each 255th is changed by the least that there is
         (delivery,) = deliver(faults, NAV, number)
         assert delivery.payload != payload_of(NAV, number, 0)
+
+
+def test_which_byte_is_corrupted_says_nothing_of_what_it_becomes() -> None:
+    faults = Faults(1, [MessageFault(FaultKind.CORRUPT)])
+    struck = Counter[tuple[int, int]]()
+    for number in range(2000):
+        (delivery,) = deliver(faults, NAV, number)
+        pairs = enumerate(zip(payload_of(NAV, number, 0), delivery.payload, strict=True))
+        struck.update((place % 2, (before ^ after) % 2) for place, (before, after) in pairs if before != after)
+    assert sum(struck.values()) == 2000
+    assert len(struck) == 4
+    assert min(struck.values()) > 400  # 500 expected, standard deviation 19
 
 
 def test_a_fault_by_chance_strikes_as_often_as_told_and_otherwise_for_another_seed() -> None:

@@ -16,7 +16,8 @@ def sonar(near_m: float, far_m: float) -> SideLooking:
 
 
 def test_it_is_found_by_its_name_and_another_is_not() -> None:
-    assert footprint_of(SonarShape("side", 40, 130)) == sonar(40, 130)
+    # It looks along a line, every 20 m where nothing else is told.
+    assert footprint_of(SonarShape("side", 40, 130, half_angle_rad=0.0, look_m=20.0)) == sonar(40, 130)
     with pytest.raises(ValueError, match="there is no footprint square; must be side"):
         footprint_of(SonarShape("square", 40, 130))
 

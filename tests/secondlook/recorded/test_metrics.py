@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
-from comms.said.announcement import RunInfo
+from comms.said.announcement import RunInfo, Vertex, Zone
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -122,6 +122,15 @@ class TestPaths:
         summary = stream.metrics.summary()["vehicles"]
         assert (summary[PRIMARY]["path_m"], summary[HELPER]["path_m"]) == (17.0, 0.0)
 
+    def test_how_near_two_came_is_followed_as_fast_as_a_current_may_bear_them(self) -> None:
+        # Each makes 2 m/s, and 1 m/s more with the current: 10 m apart they part until 100 m, then come as near as 4 m.
+        stream = begun(replace(RUN, vehicles=tuple(replace(one, speed_mps=2, drift_mps=1) for one in RUN.vehicles)))
+        for at_s in range(10, 51):
+            apart_m = 10 + 6 * (at_s - 10) if at_s < 25 else 4 + 6 * abs(at_s - 41)
+            for name, side in ((PRIMARY, -1), (HELPER, 1)):
+                stream.say(at_s, f"veh/{name}/nav", replace(nav(side * apart_m / 2), speed_mps=3))
+        assert stream.metrics.summary()["closest"] == [{"vehicles": [HELPER, PRIMARY], "closest_m": 4, "t_s": 41}]
+
     def test_the_share_flown_counts_valid_looks_of_primaries_over_planned_tracks(self) -> None:
         stream = begun()
         assert stream.metrics.share_flown() == 0
@@ -133,8 +142,17 @@ class TestPaths:
         stream.say(2, f"veh/{HELPER}/look", look(track, 1, 0, 20, flat(0.5, 0, 25)))
         assert stream.metrics.share_flown() == pytest.approx(40 / 400)
 
+    def test_who_enters_ground_to_keep_out_of_is_told(self) -> None:
+        zone = Zone(tuple(Vertex(x_m, y_m) for x_m, y_m in ((10, 5), (20, 5), (20, 15), (10, 15))))
+        stream = begun(replace(RUN, keep_out=(zone,)))
+        for at_s, x_m in ((1, 0), (2, 8), (3, 22)):
+            stream.say(at_s, f"veh/{PRIMARY}/nav", nav(x_m, 10))
+            stream.say(at_s, f"veh/{HELPER}/nav", nav(x_m, 4))
+        assert stream.metrics.summary()["entered"] == [{"vehicle": PRIMARY, "zone": 1, "t_s": 3}]
+
     def test_a_primary_tells_its_tracks_and_ranges(self) -> None:
         stream = begun()
+        assert stream.metrics.summary()["vehicles"][PRIMARY]["tracks"] == 0
         tracks = tuple(PlannedTrack(n, 0, 0, 0, 0, 200, n < 3) for n in (1, 2, 3))
         stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (138, 120), (130, 129), ""))
         summary = stream.metrics.summary()["vehicles"]
@@ -287,6 +305,19 @@ class TestTruth:
         assert (truth["targets"], truth["missed_share"]) == (5, 0.4)  # numbers 1 and 3
         expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5)) / 5
         assert truth["predicted_missed_share"] == pytest.approx(expected)
+
+    def test_what_is_listed_is_held_against_the_targets(self) -> None:
+        stream = begun()
+        targets = tuple(TruthTarget(x_m, y_m) for x_m, y_m in ((3.0, 4.0), (17.0, 4.0), (30.0, 15.0)))
+        stream.say(0, "world/truth/targets", TruthTargets(targets))
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        look_truth = TruthLook(PRIMARY, 1, (0, 1, 2), np.array([0.9, 0.9, 0.9]), (0, 2))
+        stream.say(2, f"world/truth/look/{PRIMARY}", look_truth)
+        for number, (x_m, y_m) in enumerate(((3.5, 4.0), (23.0, 15.0))):
+            stream.say(2, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, y_m, 0.2, 0.9, 1))
+        truth = stream.metrics.summary()["truth"]
+        # Of the two that were detected the first one; and one that is none, on 10 cells of 100 m2.
+        assert (truth["listed_share"], truth["false_listed_per_km2"]) == (0.5, pytest.approx(1000))
 
     def test_without_targets_there_are_no_shares(self) -> None:
         stream = begun()
