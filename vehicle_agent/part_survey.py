@@ -36,7 +36,7 @@ class PartSurvey:
         self._config = config
         self._terms = terms
         self._by_profile = isinstance(config.spacing, ProfilePlanner)  # to ask a protocol takes long
-        self._before_m: int | None = None
+        self._before_m: int | None  # this and the next: since the part's first tracks
         self._decision: SpacingDecision
         self._covered_m = 0.0
         self._looked: list[FlownTrack] = []

@@ -161,17 +161,6 @@ def test_agents_have_no_route_to_the_truth() -> None:
     assert {role.value for role in TRUTH_TARGETS.readers} == {"recorder", "observer"}
 
 
-def test_runaway_is_told_with_its_topics(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(clock, "MOST_ROUNDS_A_SECOND", 500)
-
-    def tick(now_ms: int) -> Step:
-        return says(say_nav("alpha"), wake_ms=now_ms + 1)
-
-    world = Scripted(starts=tick, wakes=tick)
-    with pytest.raises(RunawayError, match=r"^more than 500 rounds within simulated second 0; .* nav 500$"):
-        BUSES["local"]({"world": world}, Notes())
-
-
 def test_a_flood_of_messages_is_told_with_its_topics(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clock, "MOST_MESSAGES_A_SECOND", 100)
     world = Scripted(starts=lambda now_ms: says(*[say_nav("alpha")] * 101))
