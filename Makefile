@@ -68,7 +68,7 @@ MUTANTS_ARGS ?=
 mutants: .venv/.test-ready
 	@$(BIN)/python -m bench.mutants --sample $(SAMPLE) --seed $(SEED) $(MUTANTS_ARGS)
 
-# Three tests at a time, as many wait for a clock or a process. The processes they start, some hundreds, are not to compile
+# Four tests at a time, as many wait for a clock or a process. The processes they start, some hundreds, are not to compile
 # each module anew.
 test: export PYTHONDONTWRITEBYTECODE :=
 test: .venv/.test-ready
@@ -76,7 +76,7 @@ test: .venv/.test-ready
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	$(BIN)/pytest -n 3 --dist worksteal
+	$(BIN)/pytest -n 4 --dist worksteal
 
 # The examples' types and tests, as a user checks them: against the wheel, in an environment of its own, away from this
 # folder.
