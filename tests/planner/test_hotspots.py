@@ -249,7 +249,8 @@ class TestProperties:
         looked_at_last = rng.random(self.GRID.shape) < 0.05
         for _ in range(5):
             news = rng.random(self.GRID.shape) < change
-            news[:, int(rng.integers(self.GRID.columns)) :] = False  # so that not all blocks are touched
+            first, end = sorted(rng.integers(self.GRID.columns + 1, size=2).tolist())
+            news[:, :first], news[:, end:] = False, False  # so that not all blocks are touched
             risk: FloatArray = np.where(news, rng.random(self.GRID.shape), risk_before)
             risk_before = risk
             unsettled = ~hot & looked_at_last
