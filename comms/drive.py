@@ -50,7 +50,7 @@ class Setup:
 
 def identity_of(node_id: str, run: str, info: RunInfo) -> Identity:
     """Whose memory a node's is, in a run that is announced like this."""
-    from importlib.metadata import version  # noqa: PLC0415 - takes a process an eighth of its start; most keep none
+    from importlib.metadata import version  # noqa: PLC0415 - takes a twentieth of a process's start; most keep none
 
     return Identity(
         node=node_id,
