@@ -169,9 +169,8 @@ class _Routes:
             froms.append(int(self._then[froms[-1], strip]))
         # Each strip put in at each place, and after that what comes behind.
         free_s = np.array(times_s)[:, np.newaxis] + self._takes_s[froms]
-        where, every = self._then[froms], np.arange(self._places.size)
-        gained = np.array(scores)[:, np.newaxis] - scores[-1]
-        gained = gained + self._score(np.array(froms)[:, np.newaxis], every, free_s)
+        where, starts, strips = self._then[froms], np.array(froms)[:, np.newaxis], np.arange(self._places.size)
+        gained = np.array(scores)[:, np.newaxis] - scores[-1] + self._score(starts, strips, free_s)
         for place, strip in enumerate(path):
             before = slice(place + 1)
             start = where[before]
