@@ -15,13 +15,14 @@ from situations import at_work, helper, open_strip, situation, situations, strip
 
 from bench.planning_time import situation as large_situation
 from coordinator import allocate
-from coordinator.allocate.plans import Plans
+from coordinator.allocate.plans import LEAST_S, Plans
 from coordinator.allocate.routes import BEAM, Routes, RoutesAllocator, plan_each, plan_routes
-from coordinator.allocate.service import expected_service, removed_m2
+from coordinator.allocate.service import StripTable, expected_service, removed_m2
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import HORIZON_S, Helper, OpenStrip, Situation
 from coordinator.allocate.team import MOST_STRIPS, Team, Teams
 from planner.currents import Sailing
+from planner.dubins import Pose
 from planner.way_home import WayHome
 
 PLAN = RoutesAllocator()
@@ -58,21 +59,19 @@ def most_m2(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline_s: 
 
 
 def by_rate_m2(told: Situation, until_s: float) -> float:
-    """What is removed if again and again the helper that is free first goes to the strip that brings most a second."""
+    """What is removed if again and again the helper that is free first goes to the strip that brings most a second, by
+    the times, rounded, by which routes are planned."""
     helpers, left, total_m2 = list(told.helpers), list(told.strips), 0.0
-    while helpers:
+    while helpers and left:
         one = min(helpers, key=lambda helper: helper.free_s)
         helpers.remove(one)
-        gains = []
-        for job in left:
-            removed, behind = after([job], one, until_s)
-            if removed > 0:
-                gains.append((removed / (min(behind.free_s, until_s) - one.free_s), removed, job, behind))
-        if gains:
-            _, removed, job, behind = max(gains, key=lambda gain: gain[0])
-            total_m2 += removed
-            left.remove(job)
-            helpers.append(behind)
+        gained_m2, ends_s, leave = StripTable(left, one).best_from(one.free_at, one.free_s, until_s)
+        if gained_m2.any():
+            spent_s = np.maximum(np.minimum(ends_s, until_s) - one.free_s, LEAST_S)
+            best = int((gained_m2 / spent_s).argmax())
+            total_m2 += float(gained_m2[best])
+            left.pop(best)
+            helpers.append(replace(one, free_at=Pose(*leave[best].tolist()), free_s=float(ends_s[best])))
     return total_m2
 
 
