@@ -25,9 +25,9 @@ class CannotWriteError(UserError, FileError):
 
 
 @contextmanager
-def whole_file(path: Path) -> Iterator[BinaryIO]:
+def whole_file(path: Path, *, lasts: bool = True) -> Iterator[BinaryIO]:
     """A file to write, which takes its place, and that of one that is there, when all is written: whoever reads it
-    finds the old one or the new one, also after a crash. Raises CannotWriteError."""
+    finds the old one or the new one, also after a loss of power where it `lasts`. Raises CannotWriteError."""
     there = path.resolve()  # what a link leads to is written, and the link stays
     beside = there.with_name(f".{there.name}.{os.getpid()}.part")
     try:
@@ -38,8 +38,9 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         try:
             with beside.open("wb") as file:
                 yield file
-                file.flush()
-                os.fsync(file.fileno())
+                if lasts:
+                    file.flush()
+                    os.fsync(file.fileno())
             beside.replace(there)
         except BaseException:
             with contextlib.suppress(OSError):
@@ -49,9 +50,9 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
         raise CannotWriteError(path, error) from error
 
 
-def write_whole(path: Path, content: str) -> None:
+def write_whole(path: Path, content: str, *, lasts: bool = True) -> None:
     """Writes a text as a file, whole or not at all; see `whole_file`. Raises CannotWriteError."""
-    with whole_file(path) as file:
+    with whole_file(path, lasts=lasts) as file:
         file.write(content.encode())
 
 

@@ -88,6 +88,7 @@ class Faults:
     def __init__(self, seed: int, message_faults: Sequence[MessageFault] = (), cut_offs: Sequence[CutOff] = ()) -> None:
         self._seed = seed
         self._message_faults = tuple(message_faults)
+        self._concerned = dict[tuple[str, str], list[tuple[int, MessageFault]]]()  # by receiver and key
         self._cut_offs = tuple(cut_offs)
 
     def __bool__(self) -> bool:
@@ -108,14 +109,24 @@ class Faults:
         ):
             return []
         deliveries = [Delivery(payload)]
-        for number, fault in enumerate(self._message_faults):
-            if _concerns(fault, receiver.node_id, key, sent_ms):
+        for number, fault in self._concerning(receiver.node_id, key):
+            if fault.from_ms <= sent_ms and (fault.until_ms is None or sent_ms < fault.until_ms):
                 deliveries = [
                     struck
                     for place, one in enumerate(deliveries)
                     for struck in self._strike(fault, one, f"{number} {place} {receiver.node_id} {key}")
                 ]
         return deliveries
+
+    def _concerning(self, receiver: str, key: str) -> list[tuple[int, MessageFault]]:
+        """The faults that may strike messages under a key at a receiver, and their numbers."""
+        if (receiver, key) not in self._concerned:
+            self._concerned[receiver, key] = [
+                (number, fault)
+                for number, fault in enumerate(self._message_faults)
+                if fault.receiver in ("", receiver) and fault.expression.includes(key)
+            ]
+        return self._concerned[receiver, key]
 
     def _strike(self, fault: MessageFault, one: Delivery, place: str) -> list[Delivery]:
         chance = hashlib.blake2b(one.payload, key=f"{self._seed} {place}".encode()[:64], digest_size=24).digest()
@@ -135,15 +146,6 @@ class Faults:
                 corrupt = bytearray(one.payload)
                 corrupt[size % len(corrupt)] ^= 1 + chance[16] % 255
                 return [Delivery(bytes(corrupt), one.later_ms)]
-
-
-def _concerns(fault: MessageFault, receiver: str, key: str, sent_ms: int) -> bool:
-    return (
-        fault.receiver in ("", receiver)
-        and fault.from_ms <= sent_ms
-        and (fault.until_ms is None or sent_ms < fault.until_ms)
-        and fault.expression.includes(key)
-    )
 
 
 def _across(vehicle: str, receiver: RosterNode, writer: RosterNode, received: Received) -> bool:

@@ -31,14 +31,14 @@ ON_TRACK_M = 2.0
 @dataclass(frozen=True, eq=False)
 class Course:
     """`poses[k]`, shape (n, 3), is where the vehicle is `first + k` steps after the mission's start: x_m, y_m,
-    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle. `poses_at`: the same at
-    any times in s, shape (n,), between the steps exactly; before `start_s` as then."""
+    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle. `pose_at`: the same at
+    any time in s, between the steps exactly; before `start_s` as then."""
 
     start_s: float
     first: int
     poses: FloatArray
     arrives_s: float
-    poses_at: Callable[[FloatArray], FloatArray]
+    pose_at: Callable[[float], Pose]
     _asked: dict[float, Pose] = field(default_factory=dict)
     """What was asked for last, as many courses are laid against one at one time."""
 
@@ -51,7 +51,7 @@ class Course:
         """Where the vehicle is; before its start and after its last step as then."""
         if time_s not in self._asked:
             self._asked.clear()
-            self._asked[time_s] = Pose(*self.poses_at(np.array([min(time_s, (self.end - 1) * STEP_S)]))[0].tolist())
+            self._asked[time_s] = self.pose_at(min(time_s, (self.end - 1) * STEP_S))
         return self._asked[time_s]
 
     def later(self, steps: int) -> Course:
@@ -61,7 +61,7 @@ class Course:
             self,
             poses=np.concatenate([waiting, self.poses]),
             arrives_s=self.arrives_s + late_s,
-            poses_at=lambda times_s: self.poses_at(times_s - late_s),
+            pose_at=lambda time_s: self.pose_at(time_s - late_s),
             _asked={},
         )
 
@@ -85,29 +85,35 @@ def course(
     side = keep_out.circling(end, turn_radius_m) or 1
     circle = DubinsPath(end, turn_radius_m, (side, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
 
-    def poses_at(times_s: FloatArray) -> FloatArray:
-        way_m: FloatArray = speed_mps * (times_s - start_s)
-        if not still:
-            way_m = np.interp(times_s - start_s, knots_s, knots_m) + np.maximum(way_m - speed_mps * sails_s, 0.0)
-        parts, done, done_m = [], 0, 0.0
-        for path in paths:
-            to = int(np.searchsorted(way_m, done_m + path.length_m))
-            if to > done:
-                parts.append(path.poses_at(way_m[done:to] - done_m))
-            done, done_m = to, done_m + path.length_m
-        return np.concatenate([*parts, circle.poses_at(way_m[done:] - done_m)])
+    def way_m(sails_for_s: FloatArray) -> FloatArray:
+        still_m: FloatArray = speed_mps * sails_for_s
+        if still:
+            return still_m
+        return np.interp(sails_for_s, knots_s, knots_m) + np.maximum(still_m - speed_mps * sails_s, 0.0)
 
-    poses = poses_at(STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64))
-    return Course(start_s, first, poses, start_s + sails_s, poses_at)
+    def pose_at(time_s: float) -> Pose:
+        left_m = float(way_m(np.array(time_s - start_s)))
+        for path in paths:
+            if left_m < path.length_m:
+                return path.pose_at(left_m)
+            left_m -= path.length_m
+        return circle.pose_at(left_m)
+
+    times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
+    ways_m, parts, done, done_m = way_m(times_s - start_s), [], 0, 0.0
+    for path in paths:
+        to = int(np.searchsorted(ways_m, done_m + path.length_m))
+        if to > done:
+            parts.append(path.poses_at(ways_m[done:to] - done_m))
+        done, done_m = to, done_m + path.length_m
+    poses = np.concatenate([*parts, circle.poses_at(ways_m[done:] - done_m)])
+    return Course(start_s, first, poses, start_s + sails_s, pose_at)
 
 
 def lying_still(pose: Pose, from_s: float) -> Course:
     """The course of a vehicle that has not been under way yet."""
-
-    def poses_at(times_s: FloatArray) -> FloatArray:
-        return np.tile(np.array(pose, dtype=np.float64), (len(times_s), 1))
-
-    return Course(from_s, math.ceil(from_s / STEP_S), poses_at(np.zeros(math.ceil(AHEAD_S / STEP_S))), from_s, poses_at)
+    poses = np.tile(np.array(pose, dtype=np.float64), (math.ceil(AHEAD_S / STEP_S), 1))
+    return Course(from_s, math.ceil(from_s / STEP_S), poses, from_s, lambda _: pose)
 
 
 def survey_course(

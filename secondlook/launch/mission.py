@@ -73,7 +73,8 @@ class RunOptions:
     `viz.live_server.LiveServer`. `watch`: told each message in the order of sending; by raising `RunStopped` it ends
     the run early, which is no failure. `made`: told each node that acts under its id, when it is made in this process,
     again if it is started anew. `patience_s`: wall time after which a node that does not answer is given up. `outages`:
-    of the link, on purpose, beside those of the scenario; there are none without a link."""
+    of the link, on purpose, beside those of the scenario; there are none without a link. `lasts`: whether the files
+    have to outlast a loss of power, for which each is waited for until it is on the disk."""
 
     folder: Path
     bus: Bus = "zenoh"
@@ -86,6 +87,7 @@ class RunOptions:
     made: Made | None = None
     patience_s: float = PATIENCE_S
     outages: tuple[Outage, ...] = ()
+    lasts: bool = True
 
 
 def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
@@ -100,7 +102,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     check_bodies(scenario)
     fleet = build_fleet(scenario, record=options.record, mode=options.drive.mode, outages=options.outages)
     options.drive.hosts_apart(Routing(fleet.roster))  # refuses what does not fit
-    write_whole(options.folder / "scenario.yaml", scenario.to_yaml())
+    write_whole(options.folder / "scenario.yaml", scenario.to_yaml(), lasts=options.lasts)
     with room_kept(options.folder), log_to_file(options.folder / LOGS / "launcher.txt"):
         observer = Observer(
             options.folder,
@@ -108,6 +110,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
             progress=options.progress,
             watch=options.watch,
             deck_ms=deck_ms_of(scenario.link),
+            lasts=options.lasts,
         )
         run = _Run(scenario, fleet, observer, options)
         result, ending, failure = run.fly()
@@ -127,7 +130,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
         warn_of(summary)
         warn_of_batteries(summary)
     try:
-        write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n")
+        write_whole(options.folder / "summary.json", json.dumps(summary, indent=2) + "\n", lasts=options.lasts)
     except CannotWriteError as error:
         failure = failure or str(error)
     if failure is not None:
@@ -142,7 +145,7 @@ def run_in_passing(
     for all that keeps it from ending well, a full disk for one."""
     try:
         with passing_folder() as folder:
-            options = RunOptions(folder, bus="local", record=False, progress=progress, watch=watch)
+            options = RunOptions(folder, bus="local", record=False, progress=progress, watch=watch, lasts=False)
             return run_mission(scenario, options)
     except (UserError, OSError) as error:
         raise RunFailedError(str(error)) from error

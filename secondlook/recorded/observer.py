@@ -30,6 +30,7 @@ class Observer:
 
     `messages` counts them by topic. `progress` is told the figures every 10 simulated seconds. `watch` is told each
     message, last of all, and may raise RunStopped. `deck_ms`: what modems send before this does not cross the water.
+    `lasts`: whether risk.npz has to outlast a loss of power.
     """
 
     def __init__(
@@ -40,11 +41,12 @@ class Observer:
         progress: Progress | None = None,
         watch: Watch | None = None,
         deck_ms: int = 0,
+        lasts: bool = True,
     ) -> None:
         self.metrics = Metrics()
         self.link = LinkFigures(deck_ms)
         self.messages: Counter[str] = Counter()
-        self._folder = folder
+        self._folder, self._lasts = folder, lasts
         self._files = MissionFiles(folder, with_messages=with_messages)
         self._progress = progress
         self._progress_due_ms = 0
@@ -81,7 +83,7 @@ class Observer:
             for vehicle, layer in fleet.layers.items()
             for name, levels in (("sum_levels", layer.sum_levels), ("largest_levels", layer.largest_levels))
         }
-        with whole_file(self._folder / "risk.npz") as file:
+        with whole_file(self._folder / "risk.npz", lasts=self._lasts) as file:
             np.savez_compressed(
                 file,
                 allow_pickle=False,

@@ -84,7 +84,7 @@ class Seen:
         self.hotspots: set[HotspotState] = set()
         self.is_merged = self.gives_old_back = False
         self.modes: set[tuple[str, Mode]] = set()
-        self.is_empty = any(one.how == "empty" for one in flight.endings)
+        self.is_empty = any(one["ended"] == "empty" for one in flight.summary["vehicles"].values())
         self.dropped = set(flight.summary["dropped"])
         self.logged = set(witness.logged)
         self.noted = set(witness.noted)

@@ -223,6 +223,7 @@ class Fleet(Trouble):
                 made=made,
                 patience_s=self._patience_s,
                 outages=self.outages,
+                lasts=False,
             )
             summary = run_mission(self.scenario, options)
         if watch.error is not None:
