@@ -1,17 +1,18 @@
 """How near an allocator comes to who knows everything beforehand.
 
 python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--first-seed N] [--seconds S] [--jobs J]
-                            [--set KEY=VALUE] [--objective mean|worst30|both]
+                            [--set KEY=VALUE] [--objective mean|worst30|both] [--told]
 python -m bench.clairvoyant --run RUN [--seconds S]      a recorded run; --json for programs, with either
 
 For each seed: the bound on the residual risk (times m2) that a schedule can remove (`clairvoyant_bound` says why none
 removes more), the most that was removed by the best schedule found (`clairvoyant_schedule`, which begins with what the
 contenders flew) or by a contender, and what each contender removed; then what mean residual risk that leaves, and the
-ratios. All are counted alike, by the true P_d of the helpers, contenders look by look as they were flown; what the
-mission's map told, from what the vehicles made of their P_d, is compared with that at the end. The schedule is searched
-by the mean, or by another of the coordinator's objectives; what it and each contender leave of the worst 30 % stands in
-a table of its own. S is the processor time
-of the search for the schedule, which a busy machine makes longer but not worse.
+ratios: to the best by the objective, to the bound by the mean. All are counted alike, by the true P_d of the helpers,
+contenders look by look as they were flown; what the mission's map told, from what the vehicles made of their P_d, is
+compared with that at the end. The schedule is searched by the mean, or by another of the coordinator's objectives; what
+it and each contender leave of the worst 30 % stands in a table of its own. S is the processor time of the search for
+the schedule, which a busy machine makes longer but not worse. With `--told` the first contender flies once more, its
+coordinator told beforehand what the survey leaves: what is lacking then is not knowledge.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ import json
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
 from importlib import import_module
@@ -37,6 +39,7 @@ from bench.clairvoyant_schedule import best_schedule
 from bench.flown_looks import FlownLooks, legs_flown
 from bench.legs import Schedule, Simulator
 from bench.removable import Clairvoyance, Removable
+from bench.told import told_beforehand
 from comms.node import Received
 from coordinator.cut.ground import OBJECTIVES
 from secondlook.compare.flights import Failure, contenders, fly
@@ -48,6 +51,7 @@ from secondlook.launch.signals import signals_interrupt
 from secondlook.scenario import Scenario, load_scenario
 
 ROUNDING = 1e-9
+TOLD = "told"
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Row:
     same as the mission's map told. `there_m2`: all the risk that the survey alone left on `area_m2`. `found_m2`: what
     the best schedule found removes, of so many `legs`; `started_m2`: by how much the schedule that the search began
     with made the objective less. `worst30`: the residual risk of the worst 30 % that the survey, that schedule and
-    each contender leave. `search_s`: processor time of the search.
+    each contender leave. `search_s`: processor time of the search, by the `objective`.
 
     Raises ValueError where one of these contradicts another.
     """
@@ -83,6 +87,7 @@ class Row:
     measured_m2: dict[str, float | None]
     worst30: dict[str, float | None]
     search_s: float
+    objective: str = "mean"
 
     def __post_init__(self) -> None:
         self._hold("all that was there", self.there_m2, "the bound", self.bound_m2)
@@ -108,6 +113,23 @@ class Row:
         """The mean residual risk that the survey alone leaves, and what each of these does."""
         reached_m2 = {"survey": 0.0, "schedule": self.found_m2, **self.reached_m2}
         return {name: None if m2 is None else (self.there_m2 - m2) / self.area_m2 for name, m2 in reached_m2.items()}
+
+    @property
+    def gained(self) -> dict[str, float | None]:
+        """By how much less the objective is than the survey alone leaves it, with that schedule and by contender."""
+        weights, survey_worst = OBJECTIVES[self.objective], self.worst30["survey"] or 0.0
+        found = dict[str, float | None]()
+        for name in ("schedule", *self.removed_m2):
+            mean, worst, found[name] = self.left[name], self.worst30[name], None
+            if mean is not None and worst is not None:
+                fell = self.there_m2 / self.area_m2 - mean, survey_worst - worst
+                found[name] = weights.mean * fell[0] + weights.worst * fell[1]
+        return found
+
+    @property
+    def best_gained(self) -> float:
+        """The most of these."""
+        return max(gained for gained in self.gained.values() if gained is not None)
 
     @property
     def _all_m2(self) -> dict[str, float]:
@@ -144,6 +166,7 @@ def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seco
             **{name: one.worst30 if one else None for name, one in flown.items()},
         },
         search_s=seconds,
+        objective=objective,
     )
 
 
@@ -168,23 +191,27 @@ class Heard:
         return Flown(mission.gain_m2(left, OBJECTIVES["mean"]), mission.left(left).worst30_mean, measured_m2, legs)
 
 
-def one_seed(scenario: Scenario, names: Sequence[str], seconds: float, objective: str = "mean") -> Row:
-    """Flies the seed with each contender, and solves it."""
+def one_seed(
+    scenario: Scenario, names: Sequence[str], seconds: float, objective: str = "mean", *, told: bool = False
+) -> Row:
+    """Flies the seed with each contender, with the first one `told` as well, and solves it."""
     alone = Heard(contenders(scenario, ["none"])[0].scenario)
     survey = fly(alone.scenario, alone.hear)
     if isinstance(survey, Failure):
         raise ValueError(f"seed {scenario.seed}: {survey.failure}")
     mission = alone.clairvoyance.removable()
     flown: dict[str, Flown | None] = {}
-    for contender in contenders(scenario, names):
+    rivals = contenders(scenario, names)
+    for name, contender in [*((one.name, one) for one in rivals), *([(TOLD, rivals[0])] if told else [])]:
         heard = Heard(contender.scenario)
-        result = fly(contender.scenario, heard.hear)
+        with told_beforehand(mission) if name == TOLD else nullcontext():
+            result = fly(contender.scenario, heard.hear)
         if isinstance(result, Failure):
-            flown[contender.name] = None
+            flown[name] = None
             continue
         if not np.array_equal(heard.clairvoyance.removable().risk, mission.risk):
-            raise ValueError(f"seed {scenario.seed}: with {contender.name} the survey is another than without helpers")
-        flown[contender.name] = heard.flown(result.removed_m2)
+            raise ValueError(f"seed {scenario.seed}: with {name} the survey is another than without helpers")
+        flown[name] = heard.flown(result.removed_m2)
     return solve(mission, scenario.seed, flown, seconds, objective)
 
 
@@ -204,7 +231,8 @@ def one_run(folder: Path, seconds: float, objective: str) -> Row:
 
 
 def summary(rows: list[Row]) -> dict[str, Any]:
-    """Means and worst cases of the ratios; `measured`: of what the map told to what the looks remove, where any do."""
+    """Means and worst cases of the ratios; `to_best`: by the objective; `measured`: of what the map told to what the
+    looks remove, where any do."""
     told: dict[str, Any] = {"best_to_bound": _ratios([row.best_m2 / row.bound_m2 for row in rows])}
     for name in rows[0].removed_m2:
         flown = [(removed, row) for row in rows if (removed := row.removed_m2[name]) is not None]
@@ -212,7 +240,7 @@ def summary(rows: list[Row]) -> dict[str, Any]:
             measured = [row.measured_m2[name] or 0.0 for _, row in flown]
             told[name] = {
                 "missions": len(flown),
-                "to_best": _ratios([removed / row.best_m2 for removed, row in flown]),
+                "to_best": _ratios([(row.gained[name] or 0.0) / row.best_gained for _, row in flown]),
                 "to_bound": _ratios([removed / row.bound_m2 for removed, row in flown]),
                 "measured": _ratios(
                     [by_map / removed if removed else 1.0 for by_map, (removed, _) in zip(measured, flown, strict=True)]
@@ -240,6 +268,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--objective", choices=["mean", "worst30", "both"], default="mean")
+    parser.add_argument("--told", action="store_true", help="the first of them once more, told what the survey leaves")
     parser.add_argument("--run", type=Path)
     parser.add_argument("--json", action="store_true")
     return parser.parse_args()
@@ -268,7 +297,8 @@ def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
         task = progress.add_task("", total=arguments.seeds)
         seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
         missions = (scenario.model_copy(update={"seed": seed}) for seed in seeds)
-        solve = partial(one_seed, names=allocators, seconds=arguments.seconds, objective=arguments.objective)
+        objective, told = arguments.objective, arguments.told
+        solve = partial(one_seed, names=allocators, seconds=arguments.seconds, objective=objective, told=told)
         for mission, row in do_all(solve, missions, engine, count=arguments.seeds):
             if isinstance(row, Lost):
                 raise RunFailedError(f"seed {mission.seed}: {row.why}")

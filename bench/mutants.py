@@ -15,21 +15,26 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import importlib
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Container, Iterable, Sequence
+from collections.abc import Container, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from difflib import unified_diff
 from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
-from cosmic_ray.mutating import mutate_and_test
+from cosmic_ray.mutating import use_mutation
+from cosmic_ray.plugins import get_operator
 from cosmic_ray.work_db import WorkDB
 from cosmic_ray.work_item import TestOutcome, WorkerOutcome, WorkItem, WorkResult
 
@@ -47,6 +52,7 @@ CORE = (
 GOLDEN = "tests/secondlook/recorded/test_golden_replay.py"
 WIRED = ("test_zenoh_fleet", "test_host", "wall/")
 """Of the wider tests those that wait for a wire or a clock are left out."""
+LIBRARIES = ("hypothesis.strategies", "numpy", "pydantic", "shapely", "yaml")
 LIMITS_S = (120, 300, 900)
 """Longer than any of these tests take on a busy machine: who takes longer does not end."""
 
@@ -77,9 +83,7 @@ def tried_against(file: str, root: Path) -> tuple[list[str], list[str], list[str
     return names[0], names[1], [one for one in names[2] if one not in names[0]]
 
 
-def command(tests: Iterable[str]) -> str:
-    return f"{sys.executable} -m pytest -x -q -p no:cacheprovider --hypothesis-profile=mutants {' '.join(tests)}"
-
+PYTEST = ("-x", "-q", "-p", "no:cacheprovider", "--hypothesis-profile=mutants")
 
 # What follows runs in the processes, each with a copy of the folder of its own.
 
@@ -101,6 +105,9 @@ def set_up(numbers: Any) -> None:
     os.chdir(copy)
     os.environ["PYTHONPATH"] = str(copy)
     os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
+    sys.dont_write_bytecode = True
+    for library in LIBRARIES:
+        importlib.import_module(library)
 
 
 def of_all_here(tests: Sequence[str]) -> str:
@@ -111,17 +118,47 @@ def of_all_here(tests: Sequence[str]) -> str:
 
 def unchanged(tests: Sequence[str]) -> str:
     """What the tests say of the program as it is, if they do not pass."""
-    done = subprocess.run(command(tests).split(), capture_output=True, text=True, check=False)
+    command = [sys.executable, "-m", "pytest", *PYTEST, *tests]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     return done.stdout if done.returncode else ""
 
 
 def tried(mutant: Mutant, *, by_all: bool) -> WorkResult:
     """What came of it: against its own tests, then against those nearby, and `by_all` of its room."""
-    for tests, limit_s in zip(tried_against(mutant.file, Path.cwd())[: 3 if by_all else 2], LIMITS_S, strict=False):
-        result = mutate_and_test([mutant.spec()], command(tests), limit_s)
-        if result.test_outcome != TestOutcome.SURVIVED:
-            break
-    return result
+    with use_mutation(Path(mutant.file), get_operator(mutant.operator)(), mutant.occurrence) as (was, becomes):
+        for tests, limit_s in zip(tried_against(mutant.file, Path.cwd())[: 3 if by_all else 2], LIMITS_S, strict=False):
+            if (told := said_of(tests, limit_s)) != "passed":
+                break
+    names = f"a/{mutant.file}", f"b/{mutant.file}"
+    diff = ["--- mutation diff ---", *unified_diff(was.split("\n"), becomes.split("\n"), *names, lineterm="")]
+    outcome = TestOutcome.SURVIVED if told == "passed" else TestOutcome.KILLED
+    return WorkResult(WorkerOutcome.NORMAL, told, outcome, "\n".join(diff))
+
+
+def said_of(tests: Sequence[str], limit_s: float) -> str:
+    """`passed`, `failed` or `timeout`. Tests run in a fork of this process: most take less time than the libraries that
+    they import, which are here already."""
+    process = get_context("fork").Process(target=run_tests, args=(tests,))
+    process.start()
+    process.join(limit_s)
+    if process.exitcode is not None:
+        return "failed" if process.exitcode else "passed"
+    os.killpg(process.pid or 0, signal.SIGKILL)
+    process.join()
+    return "timeout"
+
+
+def run_tests(tests: Sequence[str]) -> None:
+    """Ends this process, with 0 if they pass. They import the copy's modules and none of the folder itself."""
+    os.setsid()
+    rooms = {path.name for path in ROOT.iterdir()}
+    for name in [name for name in sys.modules if name.split(".")[0] in rooms]:
+        del sys.modules[name]
+    sys.path[:] = [str(Path.cwd()), *(path for path in sys.path if Path(path) != ROOT)]
+    silence = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(silence, 1)
+    os.dup2(silence, 2)
+    os._exit(int(pytest.main([*PYTEST, "-W", "ignore::pytest.PytestAssertRewriteWarning", *tests])))
 
 
 # The judged survivors, and the report.

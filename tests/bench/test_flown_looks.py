@@ -14,6 +14,7 @@ from bench.flown_looks import FlownLooks, legs_flown
 from bench.legs import Leg, Simulator
 from bench.removable import Clairvoyance, Removable, leg_helpers
 from bench.swath import Swath
+from bench.told import told_beforehand
 from comms.node import Received
 from comms.said import topics
 from comms.said.codec import Header
@@ -191,6 +192,29 @@ class TestAFlownMission:
         assert left is not None
         assert row.worst30["none"] == survey > left > (row.left["greedy"] or 1.0)
 
+    def test_who_is_told_sends_helpers_where_the_survey_will_see_badly_and_nowhere_else(self, tmp_path: Path) -> None:
+        scenario, strips = load_scenario(BRIEF, (), 1), list[StripStatus]()
+        mission = everything(scenario)
+        mission.risk[:, : mission.grid.columns // 2] = 0.0  # as if it saw all of the half that lies towards the start
+
+        def watch(received: Received) -> None:
+            if isinstance(received.message, StripStatus):
+                strips.append(received.message)
+
+        with told_beforehand(mission):
+            run_mission(scenario, RunOptions(tmp_path, "local", record=False, watch=watch))
+        grid = build_fleet(scenario, record=False).run_info.grid.spec
+        assert {one.state for one in strips} >= {StripState.DONE}
+        for one in strips:
+            across_m, _ = grid.frame.to_sweep(one.start_x_m, one.start_y_m)
+            assert across_m >= grid.across_m[grid.columns // 2] - 5
+
+    def test_a_seed_is_flown_once_more_by_who_is_told(self) -> None:
+        row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 0.3, "both", told=True)
+        assert [*row.removed_m2] == ["plan", "told"]
+        assert row.removed_m2["told"] not in (row.removed_m2["plan"], None, 0.0)
+        assert set(summary([row])) == {"best_to_bound", "plan", "told"}
+
     def test_a_search_that_knows_it_begins_with_it(self) -> None:
         row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 0.3)
         plan_m2 = row.removed_m2["plan"]
@@ -243,7 +267,8 @@ class TestARow:
     def test_the_best_is_the_most_that_anybody_removed(self) -> None:
         assert (self.ROW.best_m2, self.ROW.best_by) == (60, "the best schedule")
         flown: dict[str, float | None] = {"plan": 50.0, "across": 70.0}
-        better = replace(self.ROW, removed_m2=flown, measured_m2=flown)
+        worst30 = {**self.ROW.worst30, "across": 0.6}
+        better = replace(self.ROW, removed_m2=flown, measured_m2=flown, worst30=worst30)
         assert (better.best_m2, better.best_by) == (70, "across")
         ratios = summary([better])
         assert ratios["across"]["to_best"]["most"] == 1
@@ -254,6 +279,15 @@ class TestARow:
         assert self.ROW.left == {
             "survey": 0.5, "schedule": 0.2, "bound": 0.1, "best": 0.2, "plan": 0.25, "none": None
         }  # fmt: skip
+
+    def test_what_is_gained_is_told_by_the_objective(self) -> None:
+        # The mean falls from 0.5 to 0.2 and 0.25, the worst 30 % from 0.9 to 0.5 and 0.6.
+        row = replace(self.ROW, objective="both")
+        schedule, plan = 0.7 * 0.3 + 0.3 * 0.4, 0.7 * 0.25 + 0.3 * 0.3
+        assert row.gained == {"schedule": pytest.approx(schedule), "plan": pytest.approx(plan), "none": None}
+        assert summary([row])["plan"]["to_best"]["least"] == pytest.approx(plan / schedule)
+        by_worst = summary([replace(self.ROW, objective="worst30")])["plan"]["to_best"]
+        assert by_worst["mean"] == pytest.approx(0.3 / 0.4)
 
     def test_what_contradicts_itself_is_told(self) -> None:
         told = r"seed 3: plan removes 80\.1 m2, and the bound must be at least that, not 80\.0 m2"
