@@ -32,6 +32,8 @@ ASKED = 6
 """An allocator is asked so often at most for offers that may be made."""
 ASKED_LATER_S = 20.0
 """What may not be offered for long is asked for again after this time."""
+LONG_S = 30.0
+"""A helper that would have to wait longer is not to wait unless any other strip would be begun still later."""
 
 
 class Gate(Protocol):
@@ -42,6 +44,9 @@ class Gate(Protocol):
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
         """How long a helper has to wait before it may set out to a strip; infinite for long."""
+
+    def begins_s(self, helper: Helper, one: OpenStrip) -> float:
+        """When it would begin to sweep that strip if it set out at once."""
 
 
 def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tuple[str, int]]:
@@ -63,21 +68,27 @@ def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -
     """The allocator's offers less those that must wait, and after how many seconds to ask again, infinite for never.
 
     A helper that would have to wait long for its strip is not to be offered it, and the allocator is asked again. That
-    holds for one that is to give its task back, too: else it would circle in another's way.
+    holds for one that is to give its task back, too: else it would circle in another's way. It waits all the same where
+    it would begin to sweep what it is given instead later still.
     """
     strips = {one.strip.number: one for one in situation.strips}
     again_s = math.inf
     passed: list[tuple[str, int]] = []
+    could_begin_s: dict[str, float] = {}
     for _ in range(ASKED):
         gate.begin()
         helpers = {helper.vehicle: helper for helper in situation.helpers}
         passed, long = [], {}
         for name, number in checked_offers(allocator.assign(situation), situation):
             wait_s = gate.wait_s(helpers[name], strips[number])
-            if wait_s == 0:
-                passed.append((name, number))
-            elif math.isinf(wait_s):
+            begins_s = gate.begins_s(helpers[name], strips[number]) + wait_s
+            if wait_s > LONG_S:
                 long[name] = helpers[name].refused | {number}
+                could_begin_s[name] = min(begins_s, could_begin_s.get(name, math.inf))
+            elif begins_s > could_begin_s.get(name, math.inf):
+                wait_s = ASKED_LATER_S
+            elif wait_s == 0:
+                passed.append((name, number))
             if wait_s > 0:
                 again_s = min(again_s, wait_s, ASKED_LATER_S)
         if not long:

@@ -29,8 +29,8 @@ MARGIN_M = 11.0
 """A helper gives way where it would come nearer than the separation and this."""
 SOON_MARGIN_M = 4.0
 """Vehicles that are nearer already when one sets out, as where they begin side by side, may come so near at once."""
-DELAYS_S = (0.0, 10.0, 20.0, 30.0)
-"""An offer that is clear so much later waits; else another is asked for."""
+DELAYS_S = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0)
+"""An offer that is clear so much later may wait; else another is asked for."""
 RESTS_S = 20.0
 """A way must be clear so long after its end, too."""
 STANDS_ASIDE_S = 60.0
@@ -297,6 +297,10 @@ class Departures:
                 self._agreed[name] = course
             return delay_s
         return math.inf
+
+    def begins_s(self, helper: Helper, one: OpenStrip) -> float:
+        """When the helper would begin to sweep a strip that was judged if it set out at once."""
+        return self.sweeps_s[helper.vehicle, one.strip.number]
 
     def is_free(self, name: str) -> bool:
         """Whether a vehicle has no strip."""

@@ -41,7 +41,8 @@ def right_of_way() -> RightOfWay:
 
 
 class Waits:
-    """Lets these strips through, and the others only after so many seconds."""
+    """Lets these strips through, and the others only after so many seconds. A strip would be begun after ten times as
+    many seconds as its number says."""
 
     def __init__(self, through: set[int], wait_s: float) -> None:
         self.through, self.seconds = through, wait_s
@@ -51,6 +52,9 @@ class Waits:
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
         return 0.0 if one.strip.number in self.through else self.seconds
+
+    def begins_s(self, helper: Helper, one: OpenStrip) -> float:
+        return 10.0 * one.strip.number
 
 
 class TestOffers:
@@ -65,6 +69,16 @@ class TestOffers:
     def test_an_offer_that_is_clear_soon_waits(self) -> None:
         asked = situation([self.near, self.far], [helper()])
         assert offers_let_through(GreedyAllocator(), asked, Waits({2}, 10)) == ([], 10)
+
+    @pytest.mark.parametrize(
+        ("other", "offers"), [(5, [("alpha", 5)]), (6, [])], ids=["it would be begun sooner", "it would be begun later"]
+    )
+    def test_for_a_long_wait_another_is_taken_only_if_that_is_begun_sooner(
+        self, other: int, offers: list[tuple[str, int]]
+    ) -> None:
+        # The first would be begun after 10 s and a wait of 40 s.
+        asked = situation([self.near, open_strip(strip(other, 300, 50))], [helper()])
+        assert offers_let_through(GreedyAllocator(), asked, Waits({other}, 40)) == (offers, ASKED_LATER_S)
 
     def test_an_allocator_that_insists_gets_nothing(self) -> None:
         class Insists:
