@@ -32,8 +32,6 @@ ASKED = 6
 """An allocator is asked so often at most for offers that may be made."""
 ASKED_LATER_S = 20.0
 """What may not be offered for long is asked for again after this time."""
-LONG_S = 30.0
-"""A helper that would have to wait longer is not to wait unless any other strip would be begun still later."""
 
 
 class Gate(Protocol):
@@ -44,9 +42,6 @@ class Gate(Protocol):
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
         """How long a helper has to wait before it may set out to a strip; infinite for long."""
-
-    def begins_s(self, helper: Helper, one: OpenStrip) -> float:
-        """When it would begin to sweep that strip if it set out at once."""
 
 
 def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tuple[str, int]]:
@@ -67,32 +62,27 @@ def checked_offers(offers: Mapping[str, int], situation: Situation) -> list[tupl
 def offers_let_through(allocator: Allocator, situation: Situation, gate: Gate) -> tuple[list[tuple[str, int]], float]:
     """The allocator's offers less those that must wait, and after how many seconds to ask again, infinite for never.
 
-    A helper that would have to wait long for its strip is not to be offered it, and the allocator is asked again. That
-    holds for one that is to give its task back, too: else it would circle in another's way. It waits all the same where
-    it would begin to sweep what it is given instead later still.
+    The allocator is told what must wait, and for how long, and asked again, until all that it offers may be made or
+    waits although it knows that. That holds for a helper that is to give its task back, too: else it would circle in
+    another's way.
     """
     strips = {one.strip.number: one for one in situation.strips}
     again_s = math.inf
     passed: list[tuple[str, int]] = []
-    could_begin_s: dict[str, float] = {}
     for _ in range(ASKED):
         gate.begin()
         helpers = {helper.vehicle: helper for helper in situation.helpers}
-        passed, long = [], {}
+        passed, told = [], dict[str, Helper]()
         for name, number in checked_offers(allocator.assign(situation), situation):
-            wait_s = gate.wait_s(helpers[name], strips[number])
-            begins_s = gate.begins_s(helpers[name], strips[number]) + wait_s
-            if wait_s > LONG_S:
-                long[name] = helpers[name].refused | {number}
-                could_begin_s[name] = min(begins_s, could_begin_s.get(name, math.inf))
-            elif begins_s > could_begin_s.get(name, math.inf):
-                wait_s = ASKED_LATER_S
-            elif wait_s == 0:
+            helper = helpers[name]
+            wait_s = gate.wait_s(helper, strips[number])
+            if wait_s == 0:
                 passed.append((name, number))
+            elif wait_s > helper.waits_s.get(number, 0.0):
+                told[name] = replace(helper, waits_s={**helper.waits_s, number: wait_s})
             if wait_s > 0:
                 again_s = min(again_s, wait_s, ASKED_LATER_S)
-        if not long:
+        if not told:
             break
-        helpers_now = (replace(one, refused=long.get(one.vehicle, one.refused)) for one in situation.helpers)
-        situation = replace(situation, helpers=tuple(helpers_now))
+        situation = replace(situation, helpers=tuple(told.get(one.vehicle, one) for one in situation.helpers))
     return passed, again_s

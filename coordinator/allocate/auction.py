@@ -15,6 +15,7 @@ import numpy as np
 from coordinator.allocate.service import StripTable
 from coordinator.allocate.situation import Helper, OpenStrip, Situation
 from planner.dubins import Pose
+from planner.types import FloatArray
 
 AT_ONCE = 3
 """Strips that a helper buys ahead."""
@@ -63,7 +64,7 @@ class _Bidder:
         self._table, self._deadline_s = StripTable(strips, helper), deadline_s
         self._pose, self._free_s = helper.free_at, helper.free_s
         self._unsold = np.ones(len(strips), dtype=np.bool_)
-        self._rate_strips()
+        self._rate_strips(helper.wait_s(strips))
 
     def bid(self) -> Bid | None:
         """Its best bid; None where nothing is left that it wants."""
@@ -85,6 +86,7 @@ class _Bidder:
         self._pose, self._free_s = Pose(*self._leave[place].tolist()), float(self._ends_s[place])
         self._rate_strips()
 
-    def _rate_strips(self) -> None:
-        removed_m2, self._ends_s, self._leave = self._table.best_from(self._pose, self._free_s, self._deadline_s)
+    def _rate_strips(self, wait_s: float | FloatArray = 0.0) -> None:
+        from_s = self._free_s + wait_s
+        removed_m2, self._ends_s, self._leave = self._table.best_from(self._pose, from_s, self._deadline_s)
         self._m2ps = removed_m2 / (self._ends_s - self._free_s)

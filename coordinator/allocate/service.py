@@ -62,7 +62,7 @@ def expected_service(one: OpenStrip, helper: Helper) -> Service:
         to_begin_s = helper.sailing.way_s(way) + helper.sailing.straight_s(helper.run_in_m, sweep.entry)
         sonar_on_s = _sonar_on_s(sweep, helper)
         run_out_s = helper.sailing.straight_s(helper.run_in_m, sweep.leave)
-    begins_s = helper.free_s + to_begin_s
+    begins_s = helper.free_s + helper.waits_s.get(one.strip.number, 0.0) + to_begin_s
     ends_s = begins_s + sonar_on_s
     return Service(
         begins_s=begins_s,
@@ -160,9 +160,11 @@ class StripTable:
         lasts = begins_s + self.sonar_on_s + self.home_s <= self.helper.lasts_until_s
         return np.where(lasts, self.worth_m2[:, np.newaxis] * share, 0.0)
 
-    def best_from(self, pose: Pose, free_s: float, deadline_s: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Of each strip, served from a pose at a time by the way that is shortest: what that removes, when it ends,
-        shape (strips,), and the pose in which it is left, shape (strips, 3)."""
+    def best_from(
+        self, pose: Pose, free_s: float | FloatArray, deadline_s: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Of each strip, served from a pose at a time, of all or of each, by the way that is shortest: what that
+        removes, when it ends, shape (strips,), and the pose in which it is left, shape (strips, 3)."""
         (to_begin_s,), (way,) = self.ways.shortest_from(np.array([pose], dtype=np.float64))
         strips = np.arange(to_begin_s.size)
         begins_s, sonar_on_s = free_s + to_begin_s, self.sonar_on_s[strips, way]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -39,7 +39,8 @@ class Helper:
     `beside_m`: how far beside the middle of what a leg covers it flies it, on either side; `lead_m`: how much earlier
     than over the ground that it sees. Times are seconds since the mission's start. `keep_out`: what it may not enter;
     strips that it cannot fly therefore are among those refused. `heard_s`: when it has said what is known of it, which
-    over a slow link may be minutes ago.
+    over a slow link may be minutes ago. `waits_s`: how long it must wait before it may set out, by number of the strip
+    to which that is known; from its task's strip if it has one.
     """
 
     vehicle: str
@@ -60,6 +61,11 @@ class Helper:
     keep_out: KeepOut = NOWHERE
     way_home: WayHome | None = None
     heard_s: float = 0.0
+    waits_s: Mapping[int, float] = field(default_factory=dict)
+
+    def wait_s(self, strips: Sequence[OpenStrip]) -> FloatArray:
+        """How long it must wait, free as it is, before it may set out to each of some strips."""
+        return np.array([self.waits_s.get(one.strip.number, 0.0) for one in strips], dtype=np.float64)
 
     @property
     def sailing(self) -> Sailing:

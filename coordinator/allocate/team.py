@@ -52,6 +52,8 @@ class Team:
                 for rows, poses in ((nodes, slice(nodes.size)), (self.start, place)):
                     self.way[number, rows] = way[poses]
                     its[rows, 0], its[rows, 1], its[rows, 2] = its_s[poses], sweep_s[poses], home_s[poses]
+                if helpers[number].task is None and helpers[number].waits_s:
+                    its[self.start, 0] += helpers[number].wait_s(self.strips)
                 its[:, 3] = tables[number].worth_m2
         self.run_out_s = np.array([one.run_in_m / one.speed_mps for one in helpers])
         self.lasts_s = np.array([one.lasts_until_s for one in helpers])

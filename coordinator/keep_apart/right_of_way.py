@@ -298,10 +298,6 @@ class Departures:
             return delay_s
         return math.inf
 
-    def begins_s(self, helper: Helper, one: OpenStrip) -> float:
-        """When the helper would begin to sweep a strip that was judged if it set out at once."""
-        return self.sweeps_s[helper.vehicle, one.strip.number]
-
     def is_free(self, name: str) -> bool:
         """Whether a vehicle has no strip."""
         return self._of(name).strip is None

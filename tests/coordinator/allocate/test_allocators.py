@@ -56,6 +56,10 @@ class TestServiceTime:
     def test_it_begins_where_and_when_the_helper_is_free(self) -> None:
         assert expected_service(open_strip(strip(1)), replace(HELPER, free_s=100)).ends_s == pytest.approx(250)
 
+    def test_it_begins_so_much_later_as_the_helper_must_wait(self) -> None:
+        served = expected_service(open_strip(strip(1)), helper(waits_s={1: 30.0, 2: 7.0}))
+        assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((80, 180, 182.5))
+
     @pytest.mark.parametrize(("deadline_s", "share"), [(50, 0), (100, 0.5), (150, 1), (math.inf, 1)])
     def test_what_is_flown_by_the_deadline_counts(self, deadline_s: float, share: float) -> None:
         served = expected_service(open_strip(strip(1)), HELPER)
@@ -100,6 +104,13 @@ class TestTheOthers:
 
 @pytest.mark.parametrize("name", [name for name in ALLOCATORS if name != "none"])
 class TestEveryAllocator:
+    @pytest.mark.parametrize("number", [1, 2])
+    def test_a_strip_to_which_a_helper_may_not_set_out_for_long_is_not_what_it_begins_with(
+        self, name: str, number: int
+    ) -> None:
+        told = situation([open_strip(strip(1)), open_strip(strip(2, y_m=600))], [helper(waits_s={number: math.inf})])
+        assert offers(name, told) == {"alpha": 3 - number}
+
     def test_one_helper_and_one_strip(self, name: str) -> None:
         assert offers(name, situation([open_strip(strip(1))], [HELPER])) == {"alpha": 1}
 

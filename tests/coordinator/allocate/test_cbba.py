@@ -114,6 +114,19 @@ class TestBids:
         (alpha,) = agreed(told, told.strips)
         assert len(alpha.bundle) == len(alpha.path) == BUNDLE
 
+    @pytest.mark.parametrize(("waits_s", "path"), [({}, [0, 1]), ({1: math.inf}, [1, 0]), ({1: 60.0}, [0, 1])])
+    def test_a_strip_to_which_a_helper_must_wait_long_comes_later(
+        self, waits_s: dict[int, float], path: list[int]
+    ) -> None:
+        strips = [open_strip(strip(1)), open_strip(strip(2, y_m=600))]
+        (bidder,) = agreed(situation(strips, [helper(waits_s=waits_s)]), strips)
+        assert bidder.path == path
+
+    def test_it_bids_by_when_it_may_be_there(self) -> None:
+        near = open_strip(strip(1))  # swept by 150 s, and a wait of 60 s
+        (bidder,) = agreed(situation([near], [helper(waits_s={1: 60.0})]), [near])
+        assert bidder.claims.bids[0] == pytest.approx(score(700, 210))
+
 
 class TestConflicts:
     def test_the_nearer_gets_it_and_the_other_what_is_left(self) -> None:

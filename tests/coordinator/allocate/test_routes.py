@@ -141,6 +141,28 @@ class TestOneHelper:
         assert routes([], [helper()]) == Routes(0.0, {"alpha": ()}, {})
         assert routes([NEAR], []) == Routes(0.0, {}, {})
 
+    @pytest.mark.parametrize(
+        ("wait_s", "deadline_s", "order", "removed_m2"),
+        [
+            (100, 500, (2, 1), 1400),
+            (150, 500, (2, 1), 1050),
+            (math.inf, 500, (1,), 700),
+            (math.inf, 3600, (1, 2), 1400),
+        ],
+    )
+    def test_what_a_helper_must_wait_for_is_begun_later_or_comes_later(
+        self, wait_s: float, deadline_s: float, order: tuple[int, ...], removed_m2: float
+    ) -> None:
+        # Without a wait the near one is swept from 50 s on, the far one from 300 s to 400 s.
+        found = routes([NEAR, FAR], [helper(waits_s={2: wait_s})], deadline_s)
+        assert found.strips == {"alpha": order}
+        assert found.removed_m2 == pytest.approx(removed_m2)
+
+    def test_a_helper_at_work_goes_on_without_a_wait(self) -> None:
+        # That is for one that were turned round.
+        busy = at_work(helper(waits_s={1: math.inf}), NEAR)
+        assert routes([FAR], [busy]).strips == {"alpha": (1,)}
+
 
 class TestWhatIsPromising:
     """What beams are chosen by."""

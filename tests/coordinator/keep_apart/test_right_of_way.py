@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 import pytest
@@ -13,7 +14,7 @@ from comms.said.announcement import Role
 from comms.said.messages import AgentState, Mode, Plan, PlannedTrack
 from coordinator.allocate.allocators import ASKED_LATER_S, offers_let_through
 from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
-from coordinator.allocate.situation import Allocator, Helper, OpenStrip
+from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 from coordinator.keep_apart.courses import too_close
 from coordinator.keep_apart.right_of_way import RightOfWay, Underway
 from coordinator.vehicles import KnownVehicle
@@ -41,8 +42,7 @@ def right_of_way() -> RightOfWay:
 
 
 class Waits:
-    """Lets these strips through, and the others only after so many seconds. A strip would be begun after ten times as
-    many seconds as its number says."""
+    """Lets these strips through, and the others only after so many seconds."""
 
     def __init__(self, through: set[int], wait_s: float) -> None:
         self.through, self.seconds = through, wait_s
@@ -52,9 +52,6 @@ class Waits:
 
     def wait_s(self, helper: Helper, one: OpenStrip) -> float:
         return 0.0 if one.strip.number in self.through else self.seconds
-
-    def begins_s(self, helper: Helper, one: OpenStrip) -> float:
-        return 10.0 * one.strip.number
 
 
 class TestOffers:
@@ -70,15 +67,26 @@ class TestOffers:
         asked = situation([self.near, self.far], [helper()])
         assert offers_let_through(GreedyAllocator(), asked, Waits({2}, 10)) == ([], 10)
 
-    @pytest.mark.parametrize(
-        ("other", "offers"), [(5, [("alpha", 5)]), (6, [])], ids=["it would be begun sooner", "it would be begun later"]
-    )
-    def test_for_a_long_wait_another_is_taken_only_if_that_is_begun_sooner(
-        self, other: int, offers: list[tuple[str, int]]
+    def test_an_allocator_is_told_how_long_a_helper_must_wait_for_each_strip_that_it_gives_it(self) -> None:
+        told = list[Mapping[int, float]]()
+
+        class Takes:
+            def assign(self, asked: Situation) -> dict[str, int]:
+                told.append(asked.helpers[0].waits_s)
+                return {"alpha": len(told)}
+
+        asked = situation([open_strip(strip(number)) for number in (1, 2, 3)], [helper()])
+        assert offers_let_through(Takes(), asked, Waits({3}, 40)) == ([("alpha", 3)], ASKED_LATER_S)
+        assert told == [{}, {1: 40}, {1: 40, 2: 40}]
+
+    @pytest.mark.parametrize(("wait_s", "offers", "again_s"), [(10, [], 10), (60, [("alpha", 2)], ASKED_LATER_S)])
+    def test_a_helper_waits_for_the_better_strip_unless_that_takes_too_long(
+        self, wait_s: float, offers: list[tuple[str, int]], again_s: float
     ) -> None:
-        # The first would be begun after 10 s and a wait of 40 s.
-        asked = situation([self.near, open_strip(strip(other, 300, 50))], [helper()])
-        assert offers_let_through(GreedyAllocator(), asked, Waits({other}, 40)) == (offers, ASKED_LATER_S)
+        # Done after 75 s and the wait the first removes 700 m2, the second 350 m2 after 50 s.
+        better, soon = open_strip(strip(1, 0, 50, 100), 1000), open_strip(strip(2, 0, 50, 50), 500)
+        asked = situation([better, soon], [helper()])
+        assert offers_let_through(GreedyAllocator(), asked, Waits({2}, wait_s)) == (offers, again_s)
 
     def test_an_allocator_that_insists_gets_nothing(self) -> None:
         class Insists:
