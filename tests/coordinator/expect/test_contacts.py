@@ -13,6 +13,7 @@ from coordinator.cut.window import Window
 from coordinator.expect.contacts import KnownContacts
 from planner.clearance import PRIOR_MINES
 from planner.contacts import surer_by
+from planner.types import FloatArray
 
 WHOLE = Window(0, GRID.rows, 0, GRID.columns)
 LOOK, ONES = np.full(GRID.shape, 0.5), np.ones(GRID.shape)
@@ -56,6 +57,45 @@ def test_it_is_by_how_much_it_makes_the_number_of_mines_surer_over_how_dense_the
     assert worth[0][about] == pytest.approx(by / density_m2 / 9, rel=0.01)
     assert worth[0][np.s_[0:40, :]].sum() == pytest.approx(by / density_m2, rel=0.01)
     np.testing.assert_array_equal(*worth)  # looks are independent for the map: the aspect does not matter
+
+
+def worth_of_one(x_m: float, y_m: float, sigma_m: float, weights: FloatArray = ONES) -> FloatArray:
+    """What a look along the tracks counts at the cells for one more contact alone."""
+    told = fleet_with_contacts()
+    told.node.hear(f"agent/{PRIMARY}/contact/41", Contact(x_m, y_m, sigma_m, DOUBTFUL, 41))
+    worth = known(told).worth(WHOLE, LOOK, weights)
+    assert worth is not None
+    along: FloatArray = np.where(np.arange(GRID.rows)[:, np.newaxis] < 40, worth[0], 0.0)  # the others lie farther up
+    return along
+
+
+@pytest.mark.parametrize(
+    ("sigma_m", "side"), [(0.5, 1), (5.0, 1), (5.1, 2), (15.0, 3), (20.0, 4), (20.1, 4), (90.0, 4)]
+)
+def test_it_is_spread_over_as_many_cells_as_the_object_may_lie_in_one_to_four_to_a_side(
+    sigma_m: float, side: int
+) -> None:
+    worth = worth_of_one(200.0, 102.5, sigma_m)  # row 20 and column 40
+    about = np.s_[20 - side : 21 + side, 40 - side : 41 + side]
+    assert np.count_nonzero(worth) == (2 * side + 1) ** 2
+    assert worth[about] == pytest.approx(np.full((2 * side + 1, 2 * side + 1), worth[20, 40]))
+    assert worth.sum() == pytest.approx(worth_of_one(200.0, 102.5, 1.0).sum(), rel=1e-3)
+
+
+def test_at_the_grids_edge_all_of_it_lies_on_the_cells_there_are() -> None:
+    whole = worth_of_one(200.0, 102.5, 10.0).sum()
+    corner = worth_of_one(400.0, 7.5, 10.0)  # row 1 of the first, column 80 of the last: two to a side
+    assert np.argwhere(corner).tolist() == [[row, column] for row in range(4) for column in range(78, 81)]
+    assert corner.sum() == pytest.approx(whole, rel=1e-3)
+    other = worth_of_one(5.0, 2.5, 5.0)  # row 0, column 1
+    assert np.argwhere(other).tolist() == [[row, column] for row in range(2) for column in range(3)]
+
+
+def test_it_counts_as_much_as_the_cells_do() -> None:
+    weights = ONES.copy()
+    weights[20, 39:42] = 0.0, 2.0, 3.0
+    plain, worth = worth_of_one(200.0, 102.5, 1.0), worth_of_one(200.0, 102.5, 1.0, weights)
+    assert worth == pytest.approx(plain * weights)
 
 
 def test_what_is_known_for_sure_counts_next_to_nothing() -> None:
