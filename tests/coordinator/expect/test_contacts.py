@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from by_hand import PRIMARY
+from by_hand import HELPER, PRIMARY
 from coordinator_by_hand import GRID, OPEN, Told, coordinator
 
 from comms.said.messages import Contact
@@ -127,6 +127,54 @@ def test_a_contact_lies_in_its_cell_and_not_in_those_beside(window: tuple[int, i
     assert contacts.worth(Window(20, 21, 40, 41), one, one) is not None
     assert contacts.doubtful(Window(*window)) == 0
     assert contacts.worth(Window(*window), one, one) is None
+
+
+def test_doubtful_is_what_is_a_mine_by_a_chance_between_5_and_95_in_100() -> None:
+    told = fleet_with_contacts()
+    for number in range(20):
+        score = 0.45 + 0.015 * number
+        told.node.hear(f"agent/{PRIMARY}/contact/{41 + number}", Contact(20.0 * number, 102.5, 1.0, score, 41 + number))
+    contacts = known(told)
+    # Scores up to 0.495 are of no mine; at 0.51 it is 1 in 10, at 0.69 94 and at 0.705 97 in 100.
+    doubtful = [number for number in range(20) if contacts.doubtful(Window(20, 21, 4 * number, 4 * number + 1))]
+    assert doubtful == list(range(4, 17))
+
+
+def test_in_a_part_of_the_map_it_counts_as_in_all_of_it() -> None:
+    told = fleet_with_contacts()
+    told.node.hear(f"agent/{PRIMARY}/contact/41", Contact(200.0, 102.5, 10.0, DOUBTFUL, 41))
+    part = Window(10, 40, 30, 70)
+    whole, there = known(told).worth(WHOLE, LOOK, ONES), known(told).worth(part, LOOK[part.cells], ONES[part.cells])
+    assert whole is not None
+    assert there is not None
+    assert there == pytest.approx(whole[:, *part.cells])
+    assert there.any()
+
+
+def test_of_the_cells_about_it_those_count_nothing_where_no_second_look_goes() -> None:
+    told = fleet_with_contacts()
+    hear(told, (200.0, 102.5), first=41)
+    look = LOOK.copy()
+    look[19:22, 41] = 0.0
+    plain, worth = known(told).worth(WHOLE, LOOK, ONES), known(told).worth(WHOLE, look, ONES)
+    assert plain is not None
+    assert worth is not None
+    plain[:, 19:22, 41] = 0.0
+    assert worth == pytest.approx(plain)
+
+
+def test_before_anything_was_seen_nothing_counts() -> None:
+    told = coordinator(contacts=True, idle=())
+    hear(told, (200.0, 102.5))
+    assert known(told).worth(WHOLE, LOOK, ONES) is None
+
+
+def test_of_one_number_contacts_of_other_vehicles_and_other_starts_are_others() -> None:
+    told = fleet_with_contacts()
+    for more, (name, incarnation) in enumerate([(PRIMARY, 1), (HELPER, 0), (HELPER, 1)], 1):
+        mine = Contact(30.0 * more, 200.0, 1.0, 0.9, 1)
+        told.node.hear(f"agent/{name}/contact/1", mine, incarnation=incarnation)
+        assert known(told).mines == pytest.approx(20 + more, abs=0.1)
 
 
 def test_a_contact_that_comes_twice_is_one() -> None:
