@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from by_hand import FLEET, HELPER, PRIMARY, vehicle
+from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, vehicle
 from coordinator_by_hand import (
     DONE,
     ELSEWHERE,
@@ -12,6 +12,7 @@ from coordinator_by_hand import (
     HOT_CELLS,
     OFFERED,
     OPEN,
+    TWO_HELPERS,
     Told,
     coordinator,
     looked,
@@ -398,6 +399,29 @@ class TestWhatHasNotArrived:
         told.node.wait_until(told.node.now_ms + 2)
         assert told.states() == ({1: OFFERED} if is_badly_seen else {})
         assert bool(told.node.all(MissionOver)) is not is_badly_seen
+
+    @pytest.mark.parametrize("doubtful", [False, True])
+    def test_when_nothing_is_waited_for_any_more_it_is_cut_by_all_that_was_heard_before_it_is_over(
+        self, doubtful: bool
+    ) -> None:
+        # The one of whom something has not arrived is silent; meanwhile contacts are heard, by which nothing is cut.
+        told = coordinator(TWO_HELPERS, contacts=True, deadline_s=10_000)
+        told.keep_alive([PRIMARY, HELPER], 1000)
+        told.layer(PRIMARY, np.full(GRID.shape, 0.05))  # too well seen for any look to be worth flying there
+        told.state(SECOND_HELPER, Mode.IDLE, tiles_told=ALL_TILES)
+        told.state(PRIMARY, Mode.FINISHED)
+        told.keep_alive([PRIMARY, HELPER], 200)
+        hear_contacts(told, 10)
+        for number in range(11, 31):
+            told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(12.0 * number, 350.0, 1.0, 0.1, number))
+        for number in range(31, 35) if doubtful else ():
+            place = 200.0, 20.0 * number - 500.0
+            told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(*place, 1.0, 0.62, number))
+        told.keep_alive([PRIMARY, HELPER], 99)
+        assert (told.strips(), told.node.all(MissionOver)) == ({}, [])
+        told.keep_alive([PRIMARY, HELPER], 15)
+        assert told.states() == ({1: OFFERED} if doubtful else {})
+        assert bool(told.node.all(MissionOver)) is not doubtful
 
     def test_at_the_deadline_it_is_not_waited_for_any_more(self) -> None:
         told = self.told_of_more()
