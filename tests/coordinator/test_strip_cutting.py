@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from by_hand import FLEET, run_info, vehicle
-from coordinator_by_hand import RUN, coordinator
+from by_hand import FLEET, PRIMARY, run_info, vehicle
+from coordinator_by_hand import GRID, RUN, coordinator
 from one_node import OneNode
 
 from comms.said.announcement import Role
+from comms.said.messages import Contact
 from coordinator.coordinator import Coordinator
 from coordinator.cut.cutter import Cutter
 from coordinator.cut.strips import CuttingRules
@@ -46,3 +48,19 @@ def test_of_as_many_cuts_as_there_are_sectors_and_four_at_most_one_tries_the_oth
     helpers = (vehicle(f"helper-{number}", Role.REVISIT) for number in range(sectors))
     OneNode(node, Role.COORDINATOR).hear("run", run_info(vehicles=(FLEET[0], *helpers)), at_ms=1)
     assert [one._cutter._turns_each for one in node._cutting] == [turns_each] * sectors
+
+
+@pytest.mark.parametrize(("x_m", "strips"), [(200.0, 1), (320.0, 0)])
+def test_for_contacts_where_no_second_look_goes_no_strip_is_cut(x_m: float, strips: int) -> None:
+    # The survey's area ends 250 m to the east; the ground is too well seen for any other look to be worth flying there.
+    told = coordinator(contacts=True, idle=(), area=((0, 0), (250, 0), (250, 400), (0, 400)))
+    told.layer(PRIMARY, np.full(GRID.shape, 0.05))
+    contacts = [(20.0 * number, 300.0, 0.9) for number in range(10)]
+    contacts += [(12.0 * number, 350.0, 0.1) for number in range(20)]
+    contacts += [(x_m + 3.0 * number, 100.0 + 20.0 * number, 0.62) for number in range(4)]
+    for number, (east_m, north_m, score) in enumerate(contacts, 1):
+        told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(east_m, north_m, 1.0, score, number))
+    told.plan(100.0, 200.0)
+    told.keep_alive((PRIMARY,), 125)
+    assert len(told.strips()) == strips
+    assert all(one.why.endswith("; 4 contacts that may be mines") for one in told.strips().values())
