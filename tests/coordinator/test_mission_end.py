@@ -296,6 +296,20 @@ class TestTheEnd:
         told.settle()
         assert len(told.node.all(MissionOver)) == 1
 
+    @pytest.mark.parametrize("first", [PRIMARY, "other"])
+    def test_the_deadline_is_by_the_end_of_the_last_primary(self, first: str) -> None:
+        told = coordinator((*FLEET, vehicle("other", Role.SURVEY)), idle=())
+        told.hotspot()
+        last = "other" if first == PRIMARY else PRIMARY
+        told.state(first, Mode.FINISHED, at_ms=10_000)
+        told.keep_alive((PRIMARY, "other"), 90)
+        told.state(last, Mode.FINISHED, at_ms=110_000)
+        assert told.node.wait_until(115_499) == []
+        said = told.node.wait_until(115_500)
+        assert MissionOver("1.05 times the last primary's end is reached, 1 strips are left") in [
+            one.message for one in said
+        ]
+
     def test_a_primary_that_is_silent_for_five_minutes_is_given_up(self) -> None:
         told = coordinator(idle=())
         told.hotspot()
@@ -419,6 +433,8 @@ class TestWhatHasNotArrived:
             told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(*place, 1.0, 0.62, number))
         told.keep_alive([PRIMARY, HELPER], 99)
         assert (told.strips(), told.node.all(MissionOver)) == ({}, [])
+        # It was asked after 1, 11 and 21 s, and not when it was lost.
+        assert told.tasks() == [(SECOND_HELPER, TaskAction.TELL_AGAIN, 0)] * 3
         told.keep_alive([PRIMARY, HELPER], 15)
         assert told.states() == ({1: OFFERED} if doubtful else {})
         assert bool(told.node.all(MissionOver)) is not doubtful
