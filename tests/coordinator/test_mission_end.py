@@ -123,6 +123,18 @@ class TestTheEnd:
         over = next(one for one in told.node.wait(1) if isinstance(one.message, MissionOver))
         assert over.at_ms < 12_100
 
+    def test_what_came_from_a_helper_that_was_lost_on_its_way_home_is_cut_by_as_soon_as_it_is_not_waited_for(
+        self,
+    ) -> None:
+        told = coordinator(deadline_s=1000)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=9_000)
+        told.state(HELPER, Mode.RETURNING, at_ms=9_001)
+        told.node.wait_until(12_000)
+        told.layer(HELPER, np.full(GRID.shape, 0.9))  # to be cut by within two minutes
+        told.node.wait_until(200_000)
+        over = next(one for one in told.node.said if isinstance(one.message, MissionOver))
+        assert 39_001 <= over.at_ms <= 39_003  # lost after 30 s
+
     def test_it_is_not_over_before_a_helper_is_home_that_goes_there(self) -> None:
         told = coordinator()
         told.state(HELPER, Mode.RETURNING, at_ms=10_000)
