@@ -224,7 +224,7 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
         yield Violation("vehicles keep out", entered.t_s, entered.vehicle, what)
     gives_way_s = {
         one.vehicle: (
-            _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0,
+            _surveyed_s(flight, one.vehicle) if one.role.surveys else 0.0,
             _out_of_work_s(flight, one.vehicle),
         )
         for one in flight.run.vehicles
@@ -240,6 +240,12 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
         if one.closest_m < flight.scenario.mission.separation_m and could and known and not told:
             what = f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other"
             yield Violation("vehicles keep apart", one.t_s, one.vehicles[0], what)
+
+
+def _surveyed_s(flight: Flight, name: str) -> float:
+    """When a primary first said that it has surveyed all, and may be told to give way; infinite if never."""
+    said = flight.said(AgentState, f"agent/{name}/state")
+    return min((one.t_s for one in said if one.message.mode is Mode.FINISHED), default=np.inf)
 
 
 def _out_of_work_s(flight: Flight, name: str) -> float:
