@@ -77,6 +77,7 @@ def log_to_file(path: Path) -> Iterator[None]:
         yield
     finally:
         root.removeHandler(handler)
-        handler.close()
+        with contextlib.suppress(OSError):  # what was not written until now does not fit either
+            handler.close()
         with contextlib.suppress(OSError):
             path.parent.rmdir()

@@ -19,7 +19,7 @@ from secondlook.errors import UserError
 from secondlook.fleet.link import ANSWER_CYCLES, SILENT_CYCLES, silent_after_ms_of, word_ms_of
 from secondlook.fleet.nodes import COORDINATOR
 from secondlook.recorded.mission import load_run
-from secondlook.storm.witness import Violation, Witness
+from secondlook.storm.witness import SURVEYING, Violation, Witness, where
 from secondlook.testing.flight import Flight, Heard
 from secondlook.testing.mission_assertions import assert_home_before_empty, assert_no_message_dropped
 from secondlook.testing.plan import TroublePlan
@@ -59,13 +59,13 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
     surveyed_s = 0.0
     for name in plan.scenario.survey_vehicles:
         if name in core:
-            surveyed_s = max(surveyed_s, _last_s(flight, name, Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING))
+            surveyed_s = max(surveyed_s, _last_s(flight, name, *SURVEYING))
         else:  # who has failed may say to the end that it is at a track, after a survey that went slowly
             states = flight.said(AgentState, f"agent/{name}/state")
             for before, one in pairwise(states):
-                is_at_work = one.message.mode in (Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING)
-                if is_at_work and _where(one.message) != _where(before.message):
+                if one.message.mode in SURVEYING and where(one.message) != where(before.message):
                     failed_s = max(failed_s, one.t_s)
+            failed_s = max(failed_s, witness.stirred_s(name))  # over a link its word of that may be lost for minutes
             surveyed_s = max(surveyed_s, witness.ended_s(name))  # or its word that it has ended comes late
     surveyed_s = max(surveyed_s, failed_s + GIVEN_UP_AFTER * silent_after_ms_of(plan.scenario) / 1000)
     ends_s = mission.ends_s(surveyed_s + _heard_within_s(plan)) + END_WITHIN_S
@@ -76,10 +76,6 @@ def _ends_in_time(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterat
 def _heard_within_s(plan: TroublePlan) -> float:
     """How long it may take until a word has crossed the water, and its answer: 0 where everybody hears everybody."""
     return HEARD_CYCLES * word_ms_of(plan.scenario) / 1000
-
-
-def _where(state: AgentState) -> tuple[Mode, int, float, float]:
-    return state.mode, state.works_on, state.x_m, state.y_m
 
 
 def _core_has_finished(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
@@ -224,7 +220,7 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
         yield Violation("vehicles keep out", entered.t_s, entered.vehicle, what)
     gives_way_s = {
         one.vehicle: (
-            _last_s(flight, one.vehicle, Mode.SURVEY) if one.role.surveys else 0.0,
+            _surveyed_s(flight, one.vehicle) if one.role.surveys else 0.0,
             _out_of_work_s(flight, one.vehicle),
         )
         for one in flight.run.vehicles
@@ -240,6 +236,12 @@ def _calm(flight: Flight, witness: Witness) -> Iterator[Violation]:
         if one.closest_m < flight.scenario.mission.separation_m and could and known and not told:
             what = f"{' and '.join(one.vehicles)} came within {one.closest_m:.1f} m of each other"
             yield Violation("vehicles keep apart", one.t_s, one.vehicles[0], what)
+
+
+def _surveyed_s(flight: Flight, name: str) -> float:
+    """When a primary first said that it has surveyed all, and may be told to give way; infinite if never."""
+    said = flight.said(AgentState, f"agent/{name}/state")
+    return min((one.t_s for one in said if one.message.mode is Mode.FINISHED), default=np.inf)
 
 
 def _out_of_work_s(flight: Flight, name: str) -> float:

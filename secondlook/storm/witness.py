@@ -20,6 +20,7 @@ from comms.said.messages import (
     Hotspot,
     Look,
     MissionOver,
+    Mode,
     StripState,
     Task,
     TaskAction,
@@ -36,6 +37,13 @@ from vehicle_agent.coverage import CoverageLayer
 from vehicle_agent.revisit import RevisitAgent
 
 _HAIR = 1e-9  # what sums of the same risk in another order may differ by, a cell
+SURVEYING = (Mode.TRANSIT, Mode.SURVEY, Mode.RETURNING)
+"""In which a primary is until it has surveyed all, or is home before."""
+
+
+def where(state: AgentState) -> tuple[Mode, int, float, float]:
+    """What a vehicle is at, and at what place: one for which that changes stirs."""
+    return state.mode, state.works_on, state.x_m, state.y_m
 
 
 @dataclass(frozen=True)
@@ -115,6 +123,11 @@ class Witness:
         heard = [at_s for one in self.coordinators for (name, _), at_s in one.ended_s.items() if name == vehicle]
         return max(heard, default=0.0)
 
+    def stirred_s(self, vehicle: str) -> float:
+        """When a vehicle said what a coordinator has heard last of it that told of another place or work in its survey
+        than what it had heard before; 0 if never. What it said of that before may have been lost."""
+        return max((one.stirred_s.get(vehicle, 0.0) for one in self.coordinators), default=0.0)
+
     def tell(self, found: Violation) -> None:
         """Something does not hold; said once of each node."""
         if (found.invariant, found.who) not in self._told:
@@ -155,7 +168,7 @@ class CoordinatorWitness:
     """Beside one start of the coordinator. `tiles`: of each vehicle, place and incarnation the newest that came.
 
     `over`: whether it has said that the mission is over. `may_rise`: see `Witness`. `ended_s`: of each start of
-    a vehicle when its first word came that it has ended its work.
+    a vehicle when its first word came that it has ended its work. `stirred_s`: see `Witness`.
     """
 
     node_id: str
@@ -167,6 +180,7 @@ class CoordinatorWitness:
     started_ms: int = 0
     over: bool = False
     ended_s: dict[tuple[str, int], float] = field(default_factory=dict)
+    stirred_s: dict[str, float] = field(default_factory=dict)
     _states: dict[str, tuple[Header, AgentState]] = field(default_factory=dict)  # the newest of each vehicle
     _hotspots: dict[tuple[str, int], dict[int, int]] = field(default_factory=dict)
     _answers: dict[tuple[str, int], tuple[int, int]] = field(default_factory=dict)
@@ -235,6 +249,10 @@ class CoordinatorWitness:
         before, vehicle = self._states.get(received.vehicle), received.vehicle
         if before is None or order_of(received.header) > order_of(before[0]):
             self._states[vehicle] = received.header, state
+            start = received.header.incarnation
+            is_told = before is not None and (before[0].incarnation, where(before[1])) == (start, where(state))
+            if state.mode in SURVEYING and not is_told:
+                self.stirred_s[vehicle] = received.header.sent_ms / 1000
             if state.mode.has_ended:
                 self.ended_s.setdefault((vehicle, received.header.incarnation), now_ms / 1000)
         else:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from by_hand import FLEET, HELPER, PRIMARY, vehicle
+from by_hand import FLEET, HELPER, PRIMARY, SECOND_HELPER, vehicle
 from coordinator_by_hand import (
     DONE,
     ELSEWHERE,
@@ -12,6 +12,7 @@ from coordinator_by_hand import (
     HOT_CELLS,
     OFFERED,
     OPEN,
+    TWO_HELPERS,
     Told,
     coordinator,
     looked,
@@ -121,6 +122,18 @@ class TestTheEnd:
         told.state(HELPER, Mode.HOME, tiles_told=ALL_TILES)
         over = next(one for one in told.node.wait(1) if isinstance(one.message, MissionOver))
         assert over.at_ms < 12_100
+
+    def test_what_came_from_a_helper_that_was_lost_on_its_way_home_is_cut_by_as_soon_as_it_is_not_waited_for(
+        self,
+    ) -> None:
+        told = coordinator(deadline_s=1000)
+        told.state(PRIMARY, Mode.FINISHED, at_ms=9_000)
+        told.state(HELPER, Mode.RETURNING, at_ms=9_001)
+        told.node.wait_until(12_000)
+        told.layer(HELPER, np.full(GRID.shape, 0.9))  # to be cut by within two minutes
+        told.node.wait_until(200_000)
+        over = next(one for one in told.node.said if isinstance(one.message, MissionOver))
+        assert 39_001 <= over.at_ms <= 39_003  # lost after 30 s
 
     def test_it_is_not_over_before_a_helper_is_home_that_goes_there(self) -> None:
         told = coordinator()
@@ -295,6 +308,20 @@ class TestTheEnd:
         told.settle()
         assert len(told.node.all(MissionOver)) == 1
 
+    @pytest.mark.parametrize("first", [PRIMARY, "other"])
+    def test_the_deadline_is_by_the_end_of_the_last_primary(self, first: str) -> None:
+        told = coordinator((*FLEET, vehicle("other", Role.SURVEY)), idle=())
+        told.hotspot()
+        last = "other" if first == PRIMARY else PRIMARY
+        told.state(first, Mode.FINISHED, at_ms=10_000)
+        told.keep_alive((PRIMARY, "other"), 90)
+        told.state(last, Mode.FINISHED, at_ms=110_000)
+        assert told.node.wait_until(115_499) == []
+        said = told.node.wait_until(115_500)
+        assert MissionOver("1.05 times the last primary's end is reached, 1 strips are left") in [
+            one.message for one in said
+        ]
+
     def test_a_primary_that_is_silent_for_five_minutes_is_given_up(self) -> None:
         told = coordinator(idle=())
         told.hotspot()
@@ -398,6 +425,31 @@ class TestWhatHasNotArrived:
         told.node.wait_until(told.node.now_ms + 2)
         assert told.states() == ({1: OFFERED} if is_badly_seen else {})
         assert bool(told.node.all(MissionOver)) is not is_badly_seen
+
+    @pytest.mark.parametrize("doubtful", [False, True])
+    def test_when_nothing_is_waited_for_any_more_it_is_cut_by_all_that_was_heard_before_it_is_over(
+        self, doubtful: bool
+    ) -> None:
+        # The one of whom something has not arrived is silent; meanwhile contacts are heard, by which nothing is cut.
+        told = coordinator(TWO_HELPERS, contacts=True, deadline_s=10_000)
+        told.keep_alive([PRIMARY, HELPER], 1000)
+        told.layer(PRIMARY, np.full(GRID.shape, 0.05))  # too well seen for any look to be worth flying there
+        told.state(SECOND_HELPER, Mode.IDLE, tiles_told=ALL_TILES)
+        told.state(PRIMARY, Mode.FINISHED)
+        told.keep_alive([PRIMARY, HELPER], 200)
+        hear_contacts(told, 10)
+        for number in range(11, 31):
+            told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(12.0 * number, 350.0, 1.0, 0.1, number))
+        for number in range(31, 35) if doubtful else ():
+            place = 200.0, 20.0 * number - 500.0
+            told.node.hear(f"agent/{PRIMARY}/contact/{number}", Contact(*place, 1.0, 0.62, number))
+        told.keep_alive([PRIMARY, HELPER], 99)
+        assert (told.strips(), told.node.all(MissionOver)) == ({}, [])
+        # It was asked after 1, 11 and 21 s, and not when it was lost.
+        assert told.tasks() == [(SECOND_HELPER, TaskAction.TELL_AGAIN, 0)] * 3
+        told.keep_alive([PRIMARY, HELPER], 15)
+        assert told.states() == ({1: OFFERED} if doubtful else {})
+        assert bool(told.node.all(MissionOver)) is not doubtful
 
     def test_at_the_deadline_it_is_not_waited_for_any_more(self) -> None:
         told = self.told_of_more()

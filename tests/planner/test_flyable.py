@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
@@ -25,9 +28,11 @@ def ends(tracks: list[Track]) -> list[tuple[int, float, float]]:
 
 
 def test_those_with_room_stay_as_they_are() -> None:
-    assert flyable_pieces([NORTH, SOUTH], NOWHERE, RADIUS_M, RUN_IN_M) == [NORTH, SOUTH]
+    numbered = [NORTH, replace(SOUTH, number=9)]
+    assert flyable_pieces(numbered, NOWHERE, RADIUS_M, RUN_IN_M) == numbered
     beyond = KeepOut((band(435.1, 500.0),))
     assert flyable_pieces([NORTH, SOUTH], beyond, RADIUS_M, RUN_IN_M) == [NORTH, SOUTH]
+    assert flyable_pieces([], beyond, RADIUS_M, RUN_IN_M) == []
 
 
 def test_one_ends_before_a_zone_with_room_to_turn_and_to_run_out() -> None:
@@ -50,6 +55,27 @@ def test_a_sonar_that_sees_ahead_flies_earlier_and_has_room_for_that() -> None:
     assert ends(flyable_pieces([SOUTH], zone, RADIUS_M, RUN_IN_M, 30.0)) == [(5, 335.0, 0.0)]
 
 
+@pytest.mark.parametrize(("free_m", "pieces"), [(90.0, [(4, 135.0, 155.0)]), (89.0, []), (30.0, [])])
+def test_a_piece_is_20_m_long_or_none(free_m: float, pieces: list[tuple[int, float, float]]) -> None:
+    # Between two zones, and off each 20 m for the turn and 15 m for run-in and run-out.
+    zones = KeepOut((band(-100.0, 100.0), band(100.0 + free_m, 500.0)))
+    found = flyable_pieces([NORTH], zones, RADIUS_M, RUN_IN_M)
+    assert ends(found) == pieces
+
+
+def test_a_piece_lies_on_its_track_whatever_way_that_heads() -> None:
+    # 400 m at a heading whose sine is 0.6 and whose cosine 0.8; the zone lies across it from 200 to 220 m.
+    frame = SweepFrame(50.0, -70.0, math.atan2(3, 4))
+    track = Track(4, 7.0, frame.to_mission(0.0, 0.0), frame.to_mission(0.0, 400.0))
+    zone = tuple(frame.to_mission(*corner) for corner in ((-99.0, 200.0), (99.0, 200.0), (99.0, 220.0), (-99.0, 220.0)))
+    first, second = flyable_pieces([track], KeepOut((zone,)), RADIUS_M, RUN_IN_M, 5.0)
+    # Each pass is flown 5 m earlier: off the zone lie 20 m of turn and 15 m of run-out, or of run-in.
+    for piece, number, start, end in ((first, 4, (50, -70), (152, 66)), (second, 5, (206, 138), (290, 250))):
+        assert (piece.number, piece.across_m) == (number, 7.0)
+        assert piece.start == pytest.approx(start)
+        assert piece.end == pytest.approx(end)
+
+
 class TestReachable:
     GROUND = shapely.box(0, 0, 100, 100)
     WALL = ((40.0, -1e4), (60.0, -1e4), (60.0, 1e4), (40.0, 1e4))
@@ -67,6 +93,23 @@ class TestReachable:
         assert reachable((80.0, 50.0), self.GROUND, box).area == pytest.approx(4000)
         assert box.are_parted((0.0, 50.0), (80.0, 50.0))
         assert not box.are_parted((0.0, 50.0), (200.0, 50.0))
+
+    def test_what_lies_in_the_margin_is_seen_from_beside_it_also_in_a_corner(self) -> None:
+        # An L about the north-east of the ground, whose inner corner is at (70, 60): what it leaves is 70 m by 60 m.
+        corner = KeepOut((((70, -50), (200, -50), (200, 200), (-50, 200), (-50, 60), (70, 60)),), 5.0)
+        found = reachable((10.0, 10.0), self.GROUND, corner)
+        assert found.area == pytest.approx(70 * 60)
+        assert found.bounds == pytest.approx((0, 0, 70, 60))
+        # An inlet too narrow to enter, 10 m wide, is seen from before its mouth as far in as twice the margin reaches.
+        inlet = KeepOut(
+            (((-200, 0), (45, 0), (45, 200), (-200, 200)), ((55, 0), (300, 0), (300, 200), (55, 200))), 20.0
+        )
+        assert reachable((0.0, -50.0), self.GROUND, inlet).area == pytest.approx(10 * 20)
+
+    def test_who_is_as_near_to_a_zone_as_a_path_may_be_comes_from_there(self) -> None:
+        walled = KeepOut((self.WALL,))
+        for within_m, area_m2 in ((0.04, 8000), (0.06, 0)):
+            assert reachable((40.0 + within_m, 50.0), self.GROUND, walled).area == pytest.approx(area_m2)
 
     def test_without_zones_all_is(self) -> None:
         assert reachable((0.0, 0.0), self.GROUND, NOWHERE) is self.GROUND

@@ -66,11 +66,19 @@ class TestFinding:
             found = update_hotspots(grid, hot, ~hot, np.ones(grid.shape), HotspotMap.empty(grid))
             assert [hotspot.cells for hotspot in found.changed] == [cells] * (cells == enough)
 
-    @pytest.mark.parametrize(("cell_m", "cells"), [(5, 100), (0.5, 1000), (3, 166), (600, 1)])
+    @pytest.mark.parametrize(("cell_m", "cells"), [(5, 100), (0.1, 5000), (3, 166), (600, 1)])
     def test_blocks_are_of_500_m_or_the_whole_cells_that_fit(self, cell_m: float, cells: int) -> None:
         grid = GridSpec(SweepFrame(0, 0, 0), cell_m, columns=cells + 1, rows=1)
         hot = np.ones(grid.shape, dtype=bool)
         found = update_hotspots(grid, hot, ~hot, np.ones(grid.shape), HotspotMap.empty(grid), least_area_m2=0)
+        assert [hotspot.cells for hotspot in found.changed] == [cells, 1]
+
+    @pytest.mark.parametrize(("block_m", "cells"), [(1.0, 4), (0.75, 3), (0.6, 2), (0.25, 1), (0.2, 1)])
+    def test_blocks_may_be_smaller_than_a_metre_and_are_of_one_cell_at_least(self, block_m: float, cells: int) -> None:
+        grid = GridSpec(SweepFrame(0, 0, 0), 0.25, columns=cells + 1, rows=1)
+        hot = np.ones(grid.shape, dtype=bool)
+        none = HotspotMap.empty(grid)
+        found = update_hotspots(grid, hot, ~hot, np.ones(grid.shape), none, block_m=block_m, least_area_m2=0)
         assert [hotspot.cells for hotspot in found.changed] == [cells, 1]
 
     def test_patches_are_cut_at_blocks_in_both_axes(self) -> None:
@@ -186,6 +194,25 @@ class TestNumbers:
         assert update("......").map.hotspots == {}
         none = update("......", update("##..## ##..##").map)
         assert (none.changed, none.withdrawn, none.map.hotspots) == ((), {1: None, 2: None}, {})
+
+    def test_those_withdrawn_come_in_the_order_of_their_first_cells_along_the_rows(self) -> None:
+        first = update(".....## .....##")
+        both = update("##...## ##...##", first.map)
+        assert list(update("......", both.map).withdrawn) == [2, 1]
+
+    def test_an_array_that_is_changed_in_place_is_held_against_what_it_was(self) -> None:
+        # The risk says nothing of it: with a threshold of 0 a cell may be hot without any.
+        hot, no_risk = cells_of("## ##"), np.zeros(GRID.shape)
+        first = update_hotspots(GRID, hot, NONE, no_risk, HotspotMap.empty(GRID), least_area_m2=100)
+        hot[0, 2] = True
+        then = update_hotspots(GRID, hot, NONE, no_risk, first.map, least_area_m2=100)
+        assert [(hotspot.number, hotspot.cells) for hotspot in then.changed] == [(1, 5)]
+
+    def test_the_map_stays_the_same_one_where_only_cells_that_are_not_hot_change(self) -> None:
+        first = update("## ##")
+        unsettled, risk = NONE.copy(), RISK.copy()
+        unsettled[4, 4], risk[0, 2] = True, 0.1
+        assert update("## ##", first.map, unsettled, risk).map is first.map
 
     def test_a_patch_that_shrinks_below_the_least_size_is_withdrawn(self) -> None:
         first = update("#### ####")

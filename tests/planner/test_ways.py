@@ -113,6 +113,27 @@ def test_who_has_room_circles_about_a_zone_and_else_so_far_beside_it_as_chords_l
             assert block.circling(Pose(-3 - beside_m - 2 * radius_m, 0, NORTH), radius_m) == side
 
 
+def test_where_there_is_no_room_to_turn_it_goes_straight_on_first_or_comes_straight_to_its_end() -> None:
+    # In a gap of 2 m, 5 m before its end: a turn over 5 m of way leads 1.3 m to the side.
+    gap = KeepOut((((-40, -50), (-1, -50), (-1, 50), (-40, 50)), ((1, -50), (40, -50), (40, 50), (1, 50))))
+    straight, way = found(Pose(0, 45, NORTH), Pose(50, 55, SOUTH), gap)
+    assert straight == DubinsPath(Pose(0, 45, NORTH), RADIUS_M, (0, 0, 0), (10, 0, 0))
+    assert (way.start, way.turns) == (Pose(0, 55, NORTH), (1, 0, 1))
+    assert way.lengths_m == pytest.approx((5 * math.pi, 30, 5 * math.pi))
+    way, straight = found(Pose(50, 55, NORTH), Pose(0, 45, SOUTH), gap)
+    assert straight.start == pytest.approx((0, 55, SOUTH))
+    assert (straight.turns, straight.lengths_m) == ((0, 0, 0), (10, 0, 0))
+    assert (way.start, way.turns) == (Pose(50, 55, NORTH), (-1, 0, -1))
+    assert way.lengths_m == pytest.approx((5 * math.pi, 30, 5 * math.pi))
+    # 15 m before its end it goes on 20 m, 25 m before it 40 m.
+    for north_m, first_m in ((35, 20), (25, 40)):
+        straight, way = found(Pose(0, north_m, NORTH), Pose(50, 55, SOUTH), gap)
+        assert (straight.lengths_m, way.start) == ((first_m, 0, 0), Pose(0, north_m + first_m, NORTH))
+    # Nor does it go straight on through a wall.
+    wall = KeepOut((*gap.zones, ((-10, 57), (10, 57), (10, 58), (-10, 58))))
+    assert shortest_way(Pose(0, 45, NORTH), Pose(50, 55, SOUTH), RADIUS_M, wall) is None
+
+
 class TestNoWay:
     RING = KeepOut(
         (

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.cut import cutter
-from coordinator.cut.cutter import SPARE_STRIPS, Cutter, Flown
+from coordinator.cut.cutter import Cutter, Flown
 from coordinator.cut.ground import OBJECTIVES, Ground
 from coordinator.cut.strips import Counted, Cut, CuttingRules
 from coordinator.cut.window import Window
@@ -95,8 +95,16 @@ class TestTime:
     @pytest.mark.parametrize("strips", [1, 3, 5])
     def test_so_many_are_cut_as_there_is_time_for_and_a_few_more_the_best_first(self, strips: int) -> None:
         cuts = cut(Cutter(GRID, RULES, LEAST, across=True), ground(TWELVE), (strips - 0.5) * STRIP_M, (), ())
-        assert strips + SPARE_STRIPS <= len(cuts) < 12
+        assert strips + 4 <= len(cuts) < 12
         assert windows(cuts) == [lane(number) for number in range(len(cuts))]
+
+    @pytest.mark.parametrize(("strips", "count"), [(0.5, 5), (1.0, 5), (1.25, 6), (3.0, 7)])
+    def test_four_are_to_spare_where_each_is_worth_far_less_than_the_one_before(
+        self, strips: float, count: int
+    ) -> None:
+        told = replace(ground(lanes(*(0.95 / 1.5**number for number in range(12)))), look=np.ones(GRID.shape))
+        cuts = cut(Cutter(GRID, RULES, 1e-3 * 25), told, strips * STRIP_M)
+        assert windows(cuts) == [lane(number) for number in range(count)]
 
     def test_what_is_just_enough_is_enough(self) -> None:
         # There is time for two: of the six that are worth much four are to spare, and none of those worth less.
@@ -118,13 +126,21 @@ class TestTime:
     def test_without_time_nothing_is_cut(self) -> None:
         assert cut(Cutter(GRID, RULES, LEAST, across=True), ground(TWELVE), 0.0, (), ()) == []
 
+    def test_without_time_what_is_open_is_left_as_it_is_also_where_it_pays_no_more(self) -> None:
+        assert windows(cut(Cutter(GRID, RULES, LEAST), ground(lanes(0.05)), 0.0, (), [lane(0)])) == [lane(0)]
+
+    def test_strips_along_the_tracks_are_cut_also_where_nobody_is_there_who_might_fly_them_yet(self) -> None:
+        cuts = Cutter(GRID, RULES, LEAST, across=True).cut(ground(lanes(0.9)), math.inf, (), (), each(lambda cuts: {}))
+        assert windows(cuts) == [lane(0)]
+
     def test_where_nothing_is_to_be_looked_at_nothing_is_cut(self) -> None:
         assert cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes()), math.inf, (), ()) == []
 
-    def test_the_price_rises_where_time_is_short_and_falls_again_never_below_the_least(self) -> None:
+    @pytest.mark.parametrize("strips", [2.5, 3.0])
+    def test_the_price_rises_where_time_is_short_and_falls_again_never_below_the_least(self, strips: float) -> None:
         cutter = Cutter(GRID, RULES, LEAST, across=True)
         least = price(cutter)
-        cut(cutter, ground(TWELVE), 2.5 * STRIP_M, (), ())
+        cut(cutter, ground(TWELVE), strips * STRIP_M, (), ())
         # Three strips are worth more than 400 m at this, and at 1.2 times as much they are not three.
         of_third, step = 0.85 * LOOK * 50 * 300 / STRIP_M, 1.2
         assert of_third / step <= price(cutter) < of_third
@@ -179,11 +195,12 @@ class TestWhatIsTold:
         assert found.counts_m2 == pytest.approx(2 * (0.7 + 0.3 / 0.3) * 600 * 25 * 0.4)
 
     def test_foreseen_is_what_is_for_the_most_part_not_seen_yet(self) -> None:
-        told = ground(lanes(0.8, 0.8))
+        told = ground(lanes(0.8, 0.8, 0.8))
         told.is_seen[29:, :10] = False  # 31 rows of 60
-        told.is_seen[31:, 10:] = False  # 29 rows
+        told.is_seen[31:, 10:20] = False  # 29 rows
+        told.is_seen[30:, 20:] = False  # a half
         cuts = cut(Cutter(GRID, RULES, LEAST, across=True), told, math.inf, (), ())
-        assert {one.window: one.foreseen for one in cuts} == {lane(0): True, lane(1): False}
+        assert {one.window: one.foreseen for one in cuts} == {lane(0): True, lane(1): False, lane(2): False}
 
     def test_the_ground_is_left_as_it_is(self) -> None:
         told = ground(TWELVE.copy())
@@ -222,7 +239,8 @@ class TestHeading:
         pieces = {Window(row, row + 10, column, column + 60, across=True) for row in (0, 10) for column in (0, 60)}
         assert set(windows(cuts)) == pieces
 
-    def test_they_turn_only_where_that_is_better_by_a_margin(self) -> None:
+    @pytest.mark.parametrize("weight", [1.0, 1e-4])
+    def test_they_turn_only_where_that_is_better_by_a_margin_whatever_a_cell_counts(self, weight: float) -> None:
         def helpers_that_fly(along: float, across: float) -> Flown:
             """So much of every strip, of those at one place of the first."""
 
@@ -235,15 +253,15 @@ class TestHeading:
         # Twelve strips of 100 m along, four of 300 m across: a look at all takes 27,000 m2, and a metre, with 100 m on
         # the way to each strip, costs 2.5 m2 at least. So 21,000 and 23,000 m2 are gained by flying all.
         even = 0.5 * 21 / 23
-        cutter = Cutter(GRID, RULES, LEAST, across=True)
-        told = self.ALL_HOT
+        cutter = Cutter(GRID, RULES, LEAST * weight, across=True)
+        told = replace(self.ALL_HOT, weights=self.ALL_HOT.weights * weight)
         opened = windows(cutter.cut(told, math.inf, (), (), helpers_that_fly(0.5, 0.3)))
         assert not opened[0].across
-        assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5, even * 1.015))) == opened
-        opened = windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5, even * 1.03)))
+        assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5, even * 1.024))) == opened
+        opened = windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5, even * 1.027)))
         assert opened[0].across
-        assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.015, even))) == opened
-        assert not cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.03, even))[0].window.across
+        assert windows(cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.024, even))) == opened
+        assert not cutter.cut(told, math.inf, (), opened, helpers_that_fly(0.5 * 1.027, even))[0].window.across
 
     def test_the_other_heading_may_be_tried_in_some_of_the_cuts_alone(self) -> None:
         cutter, told = Cutter(GRID, RULES, LEAST, across=True, turns_each=3), self.ALL_HOT
@@ -253,6 +271,10 @@ class TestHeading:
             opened = windows(cutter.cut(told, 2 * STRIP_M, (), opened, across))
             assert opened
             assert {one.across for one in opened} == {tried}
+        # Where none is open it is tried at once.
+        for flown in (across, along):
+            first = cutter.cut(told, 2 * STRIP_M, (), (), flown)[0]
+            assert first.window.across == (flown is across)
 
 
 class TestClaimed:
@@ -273,10 +295,13 @@ class TestClaimed:
 
 class TestOpenStrips:
     def test_they_stay_where_what_is_cut_anew_is_hardly_better(self) -> None:
-        risk = lanes(0.9)
+        # Eight columns of 0.9 are worth 5400 m2, the metres flown for them 1000: 22 m2 more are half a hundredth.
         opened = Window(0, 60, 2, 12)  # two columns aside, on which there is hardly anything
-        risk[:, 0:2] = 0.01
-        assert windows(cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), STRIP_M, (), [opened])) == [opened]
+        for beside, stays in ((0.014, opened), (0.015, lane(0))):  # 1500 m2 of it, of which a look takes half
+            risk = lanes(0.9)
+            risk[:, 0:2] = beside
+            cuts = cut(Cutter(GRID, RULES, LEAST, across=True), ground(risk), STRIP_M, (), [opened])
+            assert windows(cuts) == [stays]
 
     def test_they_are_cut_anew_where_that_is_better(self) -> None:
         opened = Window(0, 60, 2, 12)  # brings eight tenths of what the lane does
@@ -295,6 +320,10 @@ class TestOpenStrips:
 
     def test_they_are_dropped_where_they_pay_no_more(self) -> None:
         assert cut(Cutter(GRID, RULES, LEAST, across=True), ground(lanes(0.05)), math.inf, (), [lane(0)]) == []
+        # A look at 0.125 takes 937.5 m2 of a lane, just as much as 400 m cost at 2.34375 m2 each.
+        assert cut(Cutter(GRID, RULES, 2.34375 * 25 / 50), ground(lanes(0.125)), math.inf, (), [lane(0)]) == []
+        cuts = cut(Cutter(GRID, RULES, 2.34 * 25 / 50), ground(lanes(0.125)), math.inf, (), [lane(0)])
+        assert windows(cuts) == [lane(0)]
 
     def test_one_that_is_dropped_takes_nothing_from_those_that_lie_on_it(self) -> None:
         # 0.133 over a swath pays. The first has 0.13. The other has 0.16 alone, and 0.1 if the first were flown before;

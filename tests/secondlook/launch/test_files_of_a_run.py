@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import re
 import resource
@@ -26,6 +27,7 @@ from secondlook.cli import main as secondlook_main
 from secondlook.errors import UserError
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.launch.processes import RunFailedError
+from secondlook.launch.run_folder import log_to_file
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.scenario import load_scenario
 from tests.viz.recordings import rows
@@ -287,3 +289,9 @@ def test_a_report_that_cannot_be_written_is_no_success(
     said = f"{folder / 'report.html'}: No space left on device; must be a file that can be written\n"
     assert (stopped.value.code, capsys.readouterr().err) == (1, said)
     assert json.loads((folder / "summary.json").read_text())["ending"] == "over"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+def test_a_warning_for_which_a_full_disk_has_no_room_ends_nothing() -> None:
+    with log_to_file(Path("/dev/full")):
+        logging.getLogger("secondlook.mission").warning("too much")

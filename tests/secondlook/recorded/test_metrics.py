@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
+import shapely
 from by_hand import HELPER, PRIMARY, flat, look, nav, run_info
 from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
 
-from comms.said.announcement import RunInfo, Vertex, Zone
+from comms.said.announcement import Role, RunInfo, Vertex, Zone
 from comms.said.messages import (
     AgentState,
     Contact,
@@ -116,11 +117,11 @@ class TestBatteries:
 class TestPaths:
     def test_a_path_is_the_sum_of_its_steps_for_each_vehicle(self) -> None:
         stream = begun()
-        for place in ((0, 0), (3, 4), (3, 4), (3, 16)):
+        for place in ((0, 0), (3, 4), (3, 4), (3, 16.26)):
             stream.say(1, f"veh/{PRIMARY}/nav", nav(*place))
         stream.say(1, f"veh/{HELPER}/nav", nav(7, 7))
         summary = stream.metrics.summary()["vehicles"]
-        assert (summary[PRIMARY]["path_m"], summary[HELPER]["path_m"]) == (17.0, 0.0)
+        assert (summary[PRIMARY]["path_m"], summary[HELPER]["path_m"]) == (17.3, 0.0)
 
     def test_how_near_two_came_is_followed_as_fast_as_a_current_may_bear_them(self) -> None:
         # Each makes 2 m/s, and 1 m/s more with the current: 10 m apart they part until 100 m, then come as near as 4 m.
@@ -141,6 +142,9 @@ class TestPaths:
         stream.say(2, f"veh/{PRIMARY}/look", look(track, 2, 40, 20, flat(0.5, 0, 50), valid=False))
         stream.say(2, f"veh/{HELPER}/look", look(track, 1, 0, 20, flat(0.5, 0, 25)))
         assert stream.metrics.share_flown() == pytest.approx(40 / 400)
+        for number in (3, 4, 5, 6):
+            stream.say(3, f"veh/{PRIMARY}/look", look(track, number, 0, 20, flat(0.5, 0, 50)))
+        assert stream.metrics.share_flown() == 1.0  # 440 m, as some was flown twice
 
     def test_who_enters_ground_to_keep_out_of_is_told(self) -> None:
         zone = Zone(tuple(Vertex(x_m, y_m) for x_m, y_m in ((10, 5), (20, 5), (20, 15), (10, 15))))
@@ -172,6 +176,15 @@ class TestPaths:
         assert (summary["primary_s"], summary["vehicles"][PRIMARY]["ended_s"]) == (100, 100)
         assert summary["vehicles"][HELPER]["ended_s"] == 115
 
+    @pytest.mark.parametrize(("ends_s", "last_s"), [((100, 80), 100), ((80, 100), 100), ((100, None), None)])
+    def test_of_two_primaries_the_survey_ends_with_the_later_one(
+        self, ends_s: tuple[int, int | None], last_s: int | None
+    ) -> None:
+        stream = begun(replace(RUN, vehicles=tuple(replace(one, role=Role.SURVEY) for one in RUN.vehicles)))
+        for at_s, name in sorted((at_s, name) for at_s, name in zip(ends_s, (PRIMARY, HELPER), strict=True) if at_s):
+            stream.state(at_s, name, Mode.FINISHED)
+        assert stream.metrics.summary()["primary_s"] == last_s
+
     def test_a_primary_whose_survey_was_cut_short_has_not_ended_it(self) -> None:
         stream = begun()
         tracks = tuple(PlannedTrack(n, 0, 0, 0, 0, 200, n < 3) for n in (1, 2, 3))
@@ -192,6 +205,21 @@ class TestRisk:
         assert (risk["uncovered_share"], risk["worst30_mean"]) == (pytest.approx(0.5), 1.0)
         assert alone["mean"] == pytest.approx((4 * HALF + 6) / 10)
         assert alone["uncovered_share"] == pytest.approx(0.6)
+
+    @pytest.mark.parametrize(("role", "alone"), [(Role.SURVEY_REVISIT, HALF), (Role.SURVEY, math.exp(-2))])
+    def test_of_a_primary_that_takes_strips_itself_what_it_had_surveyed_before_stands_alone(
+        self, role: Role, alone: float
+    ) -> None:
+        stream = begun(replace(RUN, vehicles=tuple(replace(one, role=role) for one in RUN.vehicles[:1])))
+        stream.tile(90, PRIMARY, [[10] * 5] * 2)
+        stream.state(95, PRIMARY, Mode.SURVEY)
+        stream.tile(99, PRIMARY, [[LEVELS_OF_HALF] * 5] * 2, version=2)
+        stream.state(100, PRIMARY, Mode.FINISHED)
+        stream.tile(150, PRIMARY, [[100] * 5] * 2, version=3)
+        stream.state(160, PRIMARY, Mode.FINISHED)
+        summary = stream.metrics.summary()
+        assert summary["risk"]["mean"] == pytest.approx(math.exp(-2))
+        assert summary["risk_primary_alone"]["mean"] == pytest.approx(alone)
 
     def test_the_newest_tile_of_each_start_counts_however_they_come(self) -> None:
         stream = begun()
@@ -292,8 +320,9 @@ class TestTruth:
         run = run_info(40, 20, cell_m=10, heading_rad=math.radians(heading_deg))
         stream = begun(run)
         frame = run.grid.spec.frame
-        # Three on the cells of column 0, one of them at its edge, and two on column 3.
-        places = [frame.to_mission(u, v) for u, v in ((0, 2), (4.9, 5), (0, 19), (30, 3), (27, 12))]
+        # Three on the cells of column 0, one of them at its edge and one at the map's, two on column 3, and one beyond
+        # the last column, of which that tells.
+        places = [frame.to_mission(u, v) for u, v in ((0, 2), (4.9, 5), (0, 20), (30, 3), (27, 12), (46, 3))]
         targets = tuple(TruthTarget(float(x_m), float(y_m)) for x_m, y_m in places)
         stream.say(0, "world/truth/targets", TruthTargets(targets))
         stream.tile(1, PRIMARY, [[100, 0, 0, 50, 0], [100, 0, 0, 25, 0]])
@@ -302,8 +331,8 @@ class TestTruth:
             stream.say(2, f"world/truth/look/{PRIMARY}", look_truth)
         stream.say(3, f"world/truth/look/{HELPER}", TruthLook(HELPER, 1, (4, 99), np.array([0.5, 0.5]), (4, 99)))
         truth = stream.metrics.summary()["truth"]
-        assert (truth["targets"], truth["missed_share"]) == (5, 0.4)  # numbers 1 and 3
-        expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5)) / 5
+        assert (truth["targets"], truth["missed_share"]) == (6, 0.5)  # numbers 1, 3 and 5
+        expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5) + 1) / 6
         assert truth["predicted_missed_share"] == pytest.approx(expected)
 
     def test_what_is_listed_is_held_against_the_targets(self) -> None:
@@ -318,6 +347,20 @@ class TestTruth:
         truth = stream.metrics.summary()["truth"]
         # Of the two that were detected the first one; and one that is none, on 10 cells of 100 m2.
         assert (truth["listed_share"], truth["false_listed_per_km2"]) == (0.5, pytest.approx(1000))
+
+    def test_found_are_those_that_somebody_has_detected_of_all_or_of_some_ground(self) -> None:
+        stream = begun()
+        assert stream.metrics.truly_found() is None
+        targets = tuple(TruthTarget(x_m, y_m) for x_m, y_m in ((3.0, 4.0), (17.0, 4.0), (30.0, 15.0), (35.0, 15.0)))
+        stream.say(0, "world/truth/targets", TruthTargets(targets))
+        assert stream.metrics.truly_found() == 0.0
+        stream.say(1, f"world/truth/look/{PRIMARY}", TruthLook(PRIMARY, 1, (0,), np.array([0.9]), (0,)))
+        assert stream.metrics.truly_found() == 0.25
+        # The second one lies on the border.
+        assert stream.metrics.truly_found(shapely.box(0, 0, 17, 10)) == 0.5
+        assert stream.metrics.truly_found(shapely.box(0, 0, 16, 10)) == 1.0
+        assert stream.metrics.truly_found(shapely.box(20, 0, 40, 20)) == 0.0
+        assert stream.metrics.truly_found(shapely.box(0, 10, 20, 20)) == 1.0  # none lies there
 
     def test_without_targets_there_are_no_shares(self) -> None:
         stream = begun()

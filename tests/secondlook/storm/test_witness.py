@@ -7,7 +7,7 @@ import pytest
 from by_hand import HELPER, PRIMARY
 from coordinator_by_hand import GRID, coordinator
 
-from comms.said.messages import MissionOver, Mode
+from comms.said.messages import AgentState, MissionOver, Mode
 from coordinator.fleet import KnownFleet
 from planner.tiles import tiles
 from secondlook.storm.witness import Witness
@@ -39,3 +39,22 @@ def test_what_comes_after_the_end_without_the_state_that_tells_of_it_is_no_lack(
     told.layer(HELPER, np.full(GRID.shape, 0.5))
     assert [type(one.message) for one in told.node.wait_until(told.node.now_ms + 10)] == [MissionOver]
     assert witness.violations == []
+
+
+def test_a_vehicle_stirs_when_it_is_first_heard_of_elsewhere_or_started_anew() -> None:
+    told, witness = coordinator(), Witness()
+    witness.made("coordinator", told.node.node)
+    assert witness.stirred_s(PRIMARY) == 0
+
+    def say(at_s: int, mode: Mode, x_m: float = 0.0, incarnation: int = 0) -> float:
+        state = AgentState(mode, 1, 1.0, 0, x_m, 0.0, 0, 0, 0)
+        told.node.hear(f"agent/{PRIMARY}/state", state, sent_ms=at_s * 1000, incarnation=incarnation)
+        return witness.stirred_s(PRIMARY)
+
+    assert say(10, Mode.TRANSIT) == 10
+    assert say(20, Mode.TRANSIT) == 10
+    assert say(30, Mode.TRANSIT, 5.0) == 30  # whenever it went there
+    assert say(40, Mode.TRANSIT, 5.0) == 30
+    assert say(50, Mode.TRANSIT, 5.0, incarnation=1) == 50
+    assert say(60, Mode.FINISHED, 9.0, incarnation=1) == 50  # its survey is over: how long that was waited for is told
+    assert witness.stirred_s(HELPER) == 0

@@ -38,6 +38,8 @@ def test_by_hand_which_cells_are_seen() -> None:
     seen = np.broadcast_to(swath.sees(swath.along_m, swath.lateral_m), (2, 5, 4)).astype(int)
     assert seen[1].tolist() == [[1, 0, 0, 0], [1, 1, 0, 0], [1, 1, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
     assert seen[0].tolist() == seen[1].tolist()
+    p_detect = np.arange(1.0, 41.0).reshape(2, 5, 4)
+    assert swath.seen(p_detect)[1].tolist() == [[21, 0, 0, 0], [25, 26, 0, 0], [29, 30, 0, 0], [0] * 4, [0] * 4]
 
 
 @pytest.mark.parametrize(("lateral_m", "bearing_deg"), [(3.0, 90 + 36.8699), (-3.0, 90 - 36.8699), (0.0, 90)])
@@ -46,6 +48,12 @@ def test_a_place_is_seen_off_the_bow_from_where_the_stretch_begins(lateral_m: fl
     place = np.array([24.0]), np.array([lateral_m])
     assert swath.range_m(*place) == pytest.approx(math.hypot(4, lateral_m))
     assert np.degrees(swath.bearing_rad(*place)) == pytest.approx(bearing_deg)
+    assert swath.seen_from_m(np.array([24.0, 31.0])).tolist() == [20.0, 20.0]
+    # Wherever its bow points, and wherever the track ends.
+    range_m, bearing_rad, seen = swath.askew(*place, 0.3, 10.0)
+    assert range_m == pytest.approx(math.hypot(4, lateral_m))
+    assert np.degrees(bearing_rad) == pytest.approx(bearing_deg)
+    assert seen.all()
 
 
 def test_targets_in_the_sector_are_passed_and_others_are_not() -> None:
