@@ -551,8 +551,8 @@ class TestOffers:
 
     def test_who_is_at_no_strip_has_none_to_give_back(self) -> None:
         lives = Lives()
-        lives.state(HELPER, Mode.TRANSIT, 0)
-        lives.tell(HELPER, 0, TaskState.NEXT)
+        lives.state(HELPER, Mode.TRANSIT, 0, 30_000)
+        lives.tell(HELPER, 0, TaskState.NEXT, 60_000)
         assert lives.said() == []
 
 
