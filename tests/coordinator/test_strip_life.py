@@ -685,7 +685,7 @@ class TestWhatWasSeen:
         lives.inside[:] = False
         record = lives.given(HELPER)
         lives.tell(HELPER, record, TaskState.DONE)
-        assert record.state is DONE
+        assert (record.state, record.reason) == (DONE, f"100% of it seen by {HELPER}")
 
     def test_what_is_expected_of_looks_learns_from_it_where_it_lies(self) -> None:
         lives = Lives()
