@@ -413,6 +413,14 @@ class TestHowLongAnOfferWaits:
         fleet = [Underway(me, None), Underway(primary(300, -1.5 * crosses_s), None)]
         assert right_of_way().departures(fleet, 0.0).wait_s(helper("helper"), east) == waits_s
 
+    def test_what_it_meets_on_its_way_later_than_it_would_without_waiting_counts_too(self) -> None:
+        # The primary is at the crossing after 75 s, 5 s before it; a sweep that begins after 90 s is no matter yet.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=math.pi / 2)
+        departures = right_of_way().departures([Underway(me, None), Underway(primary(160, -112.5), None)], 0.0)
+        assert departures.wait_s(helper("helper"), open_strip(strip(1, 200, 0, 200, math.pi / 2))) == 30
+
     def test_one_that_waits_is_in_nobody_s_way(self) -> None:
         me, other = known("helper", Role.REVISIT, Mode.IDLE, 0, 0), known("second", Role.REVISIT, Mode.IDLE, 150, -150)
         assert me.state is not None
@@ -482,6 +490,31 @@ class TestWhatIsTold:
         (told,) = right_of_way().check(fleet, 0.0)
         assert told.place == pytest.approx((3 + 52.5 * math.sqrt(0.5), 90 + 52.5 * math.sqrt(0.5)))
 
+    @pytest.mark.parametrize("number", [0, 1, 2, 3, 5, 6, 7])
+    def test_each_eighth_of_a_circle_but_astern_is_tried(self, number: int) -> None:
+        x_m = 20 if number < 4 else -20
+        there = (x_m + 75 * math.sin(number * math.pi / 4), 90 + 75 * math.cos(number * math.pi / 4))
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, x_m, 90), None)]
+        (told,) = RightOfWay(15, lambda place: math.dist(place, there) < 1).check(fleet, 0.0)
+        assert told.place == pytest.approx(there)
+
+    def test_a_place_that_is_clear_for_two_minutes_is_not_taken_if_one_is_for_three(self) -> None:
+        # 75 m ahead the primary is near after some 125 s.
+        fleet = [Underway(primary(0, -60), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        ahead, beside = (3.0, 165.0), (78.0, 90.0)
+        both = RightOfWay(15, lambda place: min(math.dist(place, ahead), math.dist(place, beside)) < 1)
+        one = RightOfWay(15, lambda place: math.dist(place, ahead) < 1)
+        assert both.check(fleet, 0.0)[0].place == pytest.approx(beside)
+        assert one.check(fleet, 0.0)[0].place == pytest.approx(ahead)
+
+    def test_one_that_is_clear_for_three_minutes_and_no_longer_is_taken(self) -> None:
+        # 150 m ahead the primary is near after some 183 s.
+        fleet = [Underway(primary(0, -86), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        places = ((3, 240), (153, 90))
+        right = RightOfWay(30, lambda place: min(math.dist(place, one) for one in places) < 1)
+        (told,) = right.check(fleet, 0.0)
+        assert told.place == pytest.approx((3, 240))
+
     def test_or_else_for_one_minute(self) -> None:
         # Ahead all lies on the primary's track: it comes to 30 m ahead after some 95 s, in three minutes beyond all.
         fleet = [Underway(primary(0, -60), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
@@ -525,6 +558,16 @@ class TestWhatIsTold:
 
 
 class TestWhenItIsChecked:
+    def test_first_at_once(self) -> None:
+        assert right_of_way().check_s == 0
+
+    def test_two_that_may_just_now_be_near_enough_are_looked_at_and_then_a_second_later(self) -> None:
+        # 135 m of the primary's way, a circle of 12 m, and 26 m.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 173, 0)
+        right = right_of_way()
+        assert right.check([Underway(primary(0), None), Underway(me, None)], 0.0) == []
+        assert right.check_s == 1
+
     def test_where_nobody_gives_way_a_minute_and_a_half_later(self) -> None:
         right = right_of_way()
         assert right.check([Underway(primary(0), None)], 30.0) == []
@@ -540,10 +583,11 @@ class TestWhenItIsChecked:
         assert len(right.check([at_work, empty], 11.0)) == 1
 
     def test_all_of_a_sweep_50_s_before_it_begins(self) -> None:
-        # It begins after 60 s and meets who lies on the strip, or not, after 150 s.
+        # It begins after 60 s and is at its end, where it then circles, after 215 s; 3 s before it is 26 m from who
+        # lies behind that, or not.
         for x_m, told in ((0, ["helper"]), (60, [])):
             me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
-            to, right, empty = strip(7, 0, 125, length_m=300), right_of_way(), lying(x_m, 326)
+            to, right, empty = strip(7, 0, 125, length_m=300), right_of_way(), lying(x_m, 451)
             departures = right.departures([Underway(me, None)], 0.0)
             assert departures.wait_s(helper("helper"), open_strip(to)) == 0
             assert departures.sweeps_s["helper", 7] == pytest.approx(60)
