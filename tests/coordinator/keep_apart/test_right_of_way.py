@@ -542,6 +542,16 @@ class TestWhatIsTold:
             right.changed("helper")
             assert len(right.check([lying(0, 150), at_work], now_s)) == told
 
+    def test_who_stands_aside_is_sent_elsewhere_after_10_s(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        right = right_of_way()
+        (told,) = right.check(fleet, 0.0)
+        assert told.place is not None
+        fleet.append(lying(*told.place))
+        for now_s, times in ((9.9, 0), (10.0, 1)):
+            right.changed("helper")
+            assert len(right.check(fleet, now_s)) == times
+
     def test_where_it_has_nowhere_to_go_that_is_said_once_of_each_two(self, caplog: pytest.LogCaptureFixture) -> None:
         caplog.set_level("DEBUG", "secondlook.coordinator")
         right = RightOfWay(15, lambda place: False)
