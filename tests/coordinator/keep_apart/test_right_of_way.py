@@ -547,7 +547,7 @@ class TestWhatIsTold:
         right = right_of_way()
         (told,) = right.check(fleet, 0.0)
         assert told.place is not None
-        fleet.append(lying(*told.place))
+        fleet.append(lying(told.place[0] + 20, told.place[1]))
         for now_s, times in ((9.9, 0), (10.0, 1)):
             right.changed("helper")
             assert len(right.check(fleet, now_s)) == times
