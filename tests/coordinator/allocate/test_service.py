@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.allocate.service import StripTable, can_fly, expected_service, removed_m2
+from coordinator.allocate.service import Service, StripTable, can_fly, expected_service, removed_m2, tables_of
 from coordinator.allocate.situation import Situation
 from planner.currents import FlowGrid, Sailing
 from planner.dubins import Pose
@@ -108,3 +108,74 @@ def test_on_the_way_to_a_strip_the_flow_half_way_there_counts(x_m: float, y_m: f
     table = StripTable([open_strip(strip(1, x_m, y_m, heading_rad=heading_rad))], one)
     to_begin_s = table.to_begin_s(np.array([[0, 0, heading_rad]]))
     assert to_begin_s[0, 0, 0] == pytest.approx(95 / 2.475 + 5 / 2.9)
+
+
+@pytest.mark.parametrize(("time_s", "share"), [(99, 0), (100, 0), (125, 0.25), (199, 0.99), (200, 1), (300, 1)])
+def test_a_sweep_is_flown_evenly(time_s: float, share: float) -> None:
+    assert Service(100, 200, Pose(0, 0, 0), 205).share_by(time_s) == pytest.approx(share)
+
+
+@pytest.mark.parametrize("way_home", [None, WayHome((0.0, 0.0), Sailing(2.0), 6.0)])
+def test_a_battery_that_just_lasts_to_the_end_and_home_lasts(way_home: WayHome | None) -> None:
+    one = helper(way_home=way_home)
+    job = open_strip(strip(1))
+    served = expected_service(job, one)
+    ends_s = served.ends_s + float(one.home_s(np.array([served.free_at], dtype=np.float64))[0])
+    assert removed_m2(job, replace(one, lasts_until_s=ends_s), served, np.inf) == 700
+    assert removed_m2(job, replace(one, lasts_until_s=ends_s - 1e-6), served, np.inf) == 0
+
+
+def test_a_strip_that_cannot_be_flown_is_served_as_where_nothing_is_in_the_way() -> None:
+    zone = KeepOut((((-30.0, 150.0), (30.0, 150.0), (30.0, 160.0), (-30.0, 160.0)),))
+    job = open_strip(strip(1))
+    assert expected_service(job, replace(helper(), keep_out=zone)) == expected_service(job, helper())
+
+
+def test_of_two_ways_that_are_the_same_length_the_first_is_taken() -> None:
+    # Midway beside the strip and headed across it: either end is as far.
+    one = helper(x_m=-300, y_m=200, heading_rad=np.pi / 2)
+    table = StripTable([open_strip(strip(1))], one)
+    to_begin_s = table.to_begin_s(np.array([one.pose]))
+    assert to_begin_s[0, 0, 0] == pytest.approx(to_begin_s[0, 0, 1])
+    _, ways = table.ways.shortest_from(np.array([one.pose]))
+    assert ways.tolist() == [[0]]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        *({}, {"vehicle": "beta"}, {"p_detect": 0.4}, {"lasts_until_s": 100.0}, {"refused": frozenset({1})}),
+        *({"speed_mps": 1.5}, {"turn_radius_m": 7}, {"run_in_m": 6}, {"swath_m": 30}, {"beside_m": 5.0}),
+        *({"lead_m": 5.0}, {"keep_out": KeepOut((((900.0, 0.0), (950.0, 0.0), (950.0, 9.0)),))}),
+        {"way_home": WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)},
+    ],
+)
+def test_only_the_ways_of_those_that_fly_alike_are_worked_out_in_common(other: dict[str, object]) -> None:
+    jobs = [open_strip(strip(1)), open_strip(strip(2, x_m=200))]
+    one, two = helper(), replace(helper(), **other)  # type: ignore[arg-type]
+    tables = tables_of(jobs, [one, two])
+    flies_alike = not other or next(iter(other)) in ("vehicle", "p_detect", "lasts_until_s", "refused")
+    assert (tables[0].ways is tables[1].ways) is flies_alike
+    for table, its in zip(tables, (one, two), strict=True):
+        lone = StripTable(jobs, its)
+        assert table.helper is its
+        assert (table.worth_m2 == lone.worth_m2).all()
+        assert (table.sonar_on_s == lone.sonar_on_s).all()
+        assert (table.leave == lone.leave).all()
+
+
+class TestHowLongRunInsAndWaysHomeTake:
+    POSES = np.array([[[0, 100, 0.0], [0, 100, np.pi], [3, 4, 0.0]], [[9, 9, 0.0], [0, 0, np.pi], [5, 5, 0.0]]])
+
+    def test_run_ins_in_still_water(self) -> None:
+        assert helper().run_in_s(self.POSES).tolist() == [[2.5] * 3] * 2
+
+    def test_run_ins_in_a_current_are_by_the_speed_over_the_ground(self) -> None:
+        one = replace(helper(), way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0))
+        against = 5 / 1.5
+        assert one.run_in_s(self.POSES) == pytest.approx(np.array([[2, against, 2], [2, against, 2]]))
+
+    def test_home_is_reached_behind_the_run_out(self) -> None:
+        poses = np.array([[0, 100, np.pi], [0, 40, np.pi]])
+        assert helper().home_s(poses).tolist() == [0, 0]
+        assert helper(way_home=WayHome((0.0, 0.0), Sailing(2.0), 6.0)).home_s(poses) == pytest.approx([52.5, 22.5])
