@@ -141,7 +141,7 @@ def test_where_it_sees_best_it_sees_half_as_well_as_anywhere_or_better(apart_m: 
     ],
 )
 def test_between_which_ranges_it_sees_best(p_detect: tuple[float, ...], best_m: tuple[float, float]) -> None:
-    assert _best_m(DetectionCurve(np.arange(len(p_detect)) * 10.0, np.array(p_detect))) == best_m
+    assert _best_m(DetectionCurve(np.arange(0.0, 10.0 * len(p_detect), 10.0), np.array(p_detect))) == best_m
 
 
 def test_places_are_apart_from_a_track_and_beyond_its_ends() -> None:
