@@ -75,6 +75,7 @@ class TestPlannedTracks:
         found = expected(primary(known, other, curves={1: self.CLEAR_OF_EDGES}, tentative=1))
         # It sees 15 columns on either side, of 41 that column 60 may be; column 22 may be the first two of them.
         assert np.exp(-found.ahead[40, [60, 22]]) == pytest.approx([(30 * 0.5 + 11) / 41, (2 * 0.5 + 39) / 41])
+        assert np.exp(-found.largest_ahead[40, 60]) == pytest.approx((30 * 0.5 + 11) / 41)
         # Column 10 lies 50 m beside the known one, and further from the other than that may be moved.
         assert np.exp(-found.ahead[40, 10]) == pytest.approx(0.5)
         assert np.exp(-found.largest_ahead[40, 10]) == pytest.approx(0.5)
@@ -142,6 +143,13 @@ class TestPlannedTracks:
         seen = np.zeros(GRID.shape, dtype=np.bool_)
         seen[sees] = True
         assert ((found.ahead > 0) == seen).all()
+
+    @pytest.mark.parametrize(
+        "ends", [(700, 0, 700, 400), (-300, 0, -300, 400), (200, 600, 200, 900), (200, -600, 200, -300)]
+    )
+    def test_one_far_off_leaves_what_another_sees_as_it_is(self, ends: tuple[int, int, int, int]) -> None:
+        found = expected(primary(UP, PlannedTrack(2, 0, *ends, False), curves={1: LINEAR}))
+        assert (found.ahead == expected(primary(UP, curves={1: LINEAR})).ahead).all()
 
     def test_asked_again_it_tells_what_is_otherwise_by_then(self) -> None:
         known, other = PlannedTrack(1, 100, 100, 0, 100, 400, False), PlannedTrack(2, 300, 300, 400, 300, 0, False)

@@ -221,6 +221,8 @@ class TestCheck:
         departures.wait_s(helper("helper"), far)
         right.offered("helper", 1, departures)
         assert right.check_s == 0
+        # It is expected on the way that was found clear, though it has not answered yet.
+        assert right._traffic.course(one, far.strip, 3.0) is departures.ways["helper", 1][1]
 
     @pytest.mark.parametrize("now_s", [0.0, 10.0])
     def test_two_are_checked_when_they_may_be_near_enough(self, now_s: float) -> None:
@@ -329,6 +331,10 @@ class TestWhoGivesWay:
         departures.wait_s(helper("alpha"), open_strip(to))
         right.offered("alpha", 8, departures)
         assert right.check([Underway(second, to), first], 0.5) == [Instruction("alpha", to, None)]
+
+    def test_who_lies_at_home_is_in_nobody_s_way(self) -> None:
+        at_work, _ = busy_helper(0, 0)
+        assert right_of_way().check([at_work, Underway(known("home", Role.REVISIT, Mode.HOME, 0, 60), None)], 0.0) == []
 
     def test_who_is_lost_is_in_nobody_s_way(self) -> None:
         at_work, _ = busy_helper(0, 0)
