@@ -111,7 +111,12 @@ class TestPlannedTracks:
         assert p_detect(found.ahead[44]) == pytest.approx(0.5 * (1 - 0.225))
 
     @pytest.mark.parametrize(
-        "ends", [(120.0, 60.0, 250.0, 340.0), (320.0, 90.0, 60.0, 130.0), (-40.0, 430.0, 90.0, 300.0)]
+        "ends",
+        [
+            *((120.0, 60.0, 250.0, 340.0), (320.0, 90.0, 60.0, 130.0), (-40.0, 430.0, 90.0, 300.0)),
+            *((201.0, -600.0, 201.0, 100.0), (201.0, 300.0, 201.0, 1000.0)),  # and one that begins or ends far off
+            *((-600.0, 201.0, 100.0, 201.0), (300.0, 201.0, 1000.0, 201.0)),
+        ],
     )
     def test_one_askew_makes_of_each_cell_what_its_range_and_its_ends_let(
         self, ends: tuple[float, float, float, float]
