@@ -176,6 +176,7 @@ class TestPlannedTracks:
             assert (found.flown == anew.flown).all()
             assert (found.ahead == anew.ahead).all()
             assert (found.largest_ahead == anew.largest_ahead).all()
+            assert (len(asked._beside._now), len(asked._laid._now)) == (2, 1)  # of this round alone
 
     def test_what_is_not_asked_for_in_a_round_is_forgotten(self) -> None:
         kept, made = _Kept[str](), list[str]()
