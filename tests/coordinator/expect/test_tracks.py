@@ -80,6 +80,13 @@ class TestPlannedTracks:
         assert np.exp(-found.ahead[40, 10]) == pytest.approx(0.5)
         assert np.exp(-found.largest_ahead[40, 10]) == pytest.approx(0.5)
 
+    def test_of_two_such_the_looks_count_and_the_largest_single_one(self) -> None:
+        first, second = PlannedTrack(1, 100, 100, 0, 100, 400, False), PlannedTrack(2, 140, 140, 400, 140, 0, False)
+        found = expected(primary(first, second, curves={1: self.CLEAR_OF_EDGES}, tentative=2))
+        # Column 38 may lie from 170 to 210 m beside them: nine columns that the second sees, and six the first one too.
+        assert np.exp(-found.ahead[40, 38]) == pytest.approx((6 * 0.25 + 3 * 0.5) / 9)
+        assert np.exp(-found.largest_ahead[40, 38]) == pytest.approx(0.5)
+
     def test_so_may_one_that_runs_across_the_grid(self) -> None:
         known, other = PlannedTrack(1, 0, 0, 102.5, 400, 102.5, False), PlannedTrack(2, 0, 400, 302.5, 0, 302.5, False)
         found = expected(primary(known, other, curves={1: self.CLEAR_OF_EDGES}, tentative=1))
@@ -144,7 +151,8 @@ class TestPlannedTracks:
     def test_one_beside_the_grid_sees_as_far_as_it_reaches(
         self, ends: tuple[float, float, float, float], sees: tuple[slice, slice]
     ) -> None:
-        found = expected(primary(PlannedTrack(1, 0, *ends, False), curves={1: LINEAR}))
+        linear = DetectionCurve(np.array([0.0, 50.0, 100.0]), np.array([0.5, 0.25, 0.0]))
+        found = expected(primary(PlannedTrack(1, 0, *ends, False), curves={1: linear}))
         seen = np.zeros(GRID.shape, dtype=np.bool_)
         seen[sees] = True
         assert ((found.ahead > 0) == seen).all()

@@ -20,6 +20,7 @@ from coordinator.allocate.situation import OpenStrip
 from coordinator.keep_apart.courses import (
     STEP_S,
     Course,
+    _nearest_m,
     course,
     lying_still,
     run_out_left_m,
@@ -266,6 +267,23 @@ class TestCourses:
 
 
 class TestTooClose:
+    def test_between_two_steps_both_go_straight(self) -> None:
+        apart = np.array([[3.0, 4.0], [3.0, 4.0], [6.0, 8.0], [3.0, 4.0], [-3.0, 4.0], [0.4, -0.3], [-0.4, -0.3]])
+        assert _nearest_m(apart) == pytest.approx([5, 5, 5, 4, 0.7 / math.hypot(3.4, 4.3), 0.3])
+
+    def test_in_less_than_a_step_too(self) -> None:
+        one, other = ahead(0, 0, NORTH, 2), ahead(3, 40, SOUTH, 2)
+        assert too_close(one, other, 20, 8.2, 8.4) == too_close(one, other, 20, 8.2, 10.1)
+        assert too_close(one, other, 20, 8.2, 8.4) is not None
+        assert too_close(one, other, 20, 5000, 5001) is None  # of then nothing is known
+
+    def test_to_the_first_step_behind_the_time_that_is_asked_for(self) -> None:
+        one, other = ahead(0, 0, NORTH, 2), ahead(3, 48, SOUTH, 2)  # 24 m apart at 6 s, 16 m at 8 s
+        assert too_close(one, other, 20, 4.5, 5.9) is None
+        found = too_close(one, other, 20, 4.5, 6.0)
+        assert found is not None
+        assert found.time_s == 6
+
     def test_two_that_meet_head_on(self) -> None:
         north, south = ahead(0, 0, NORTH, 2), ahead(5, 400, SOUTH, 2)
         found = too_close(north, south, 20, 0, 600)
