@@ -176,6 +176,17 @@ class TestWhatItDoes:
 
 
 class TestStates:
+    def test_of_one_that_was_never_heard_nothing_is_held_against_it(self) -> None:
+        one = KnownVehicle(vehicle("one", Role.REVISIT), 0)
+        assert (one.silent, one.lost, one.ended_early, one.finished_ms, one.expected_end_ms) == (
+            *[False] * 3,
+            None,
+            None,
+        )
+        assert (one.asked_back, one.agreed_next, one.failures, one.unanswered) == (0, 0, 0, 0)
+        assert one.is_trusted
+        assert heard(one, state())  # its first message of all, by start and number
+
     def test_the_newest_counts_and_tells_when_it_was_heard(self) -> None:
         one = KnownVehicle(vehicle("one", Role.REVISIT), 0, silent=True, lost=True)
         assert heard(one, state(), sent_ms=1000, sequence=3)
