@@ -112,6 +112,14 @@ class TestPlannedTracks:
         plain = expected(primary(replace(UP, start_x_m=201, end_x_m=201), curves={1: LINEAR}))
         assert turned.ahead == pytest.approx(plain.ahead, abs=1e-9)
 
+    def test_wherever_the_grid_lies_and_a_track_begins(self) -> None:
+        east = PlannedTrack(1, 0, -600, 201, 100, 201, False)
+        found = ExpectedTracks(replace(GRID, frame=SweepFrame(3000, 0, 0))).of(
+            {PRIMARY: primary(replace(east, start_x_m=2400, end_x_m=3100), curves={1: LINEAR})}
+        )
+        assert found.ahead.any()
+        assert found.ahead == pytest.approx(expected(primary(east, curves={1: LINEAR})).ahead)
+
     def test_a_track_across_the_rows(self) -> None:
         found = expected(primary(PlannedTrack(1, 0, 0, 200, 400, 200, False), curves={1: LINEAR}))
         # Row 44 is centred at 222.5 m.
