@@ -59,6 +59,8 @@ class TestCourses:
     def test_it_is_laid_for_900_s_beyond_its_paths_and_where_it_lies_still(self) -> None:
         laid = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 100, 10)])
         assert (laid.first, laid.end) == (3, 3 + (50 + 900) / STEP_S)
+        longer = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 102, 10)])
+        assert longer.end == 3 + 476  # 951 s
         still = lying_still(Pose(7, 8, EAST), 5)
         assert (still.first, still.end) == (3, 3 + 900 / STEP_S)
         assert set(map(tuple, still.poses.tolist())) == {(7, 8, EAST)}
@@ -75,6 +77,7 @@ class TestCourses:
         assert laid.at(laid.arrives_s)[:2] == pytest.approx(then.pose_at(77)[:2], abs=1e-6)
         end = laid.at((laid.end - 1) * STEP_S)
         assert laid.at(laid.end * STEP_S) == laid.at(1e9) == end
+        assert len(laid._asked) == 1  # what was asked for last
         # It circles at its speed, whatever the current.
         circle_s = math.tau * 10 / 2
         assert laid.at(laid.arrives_s + circle_s)[:2] == pytest.approx(laid.at(laid.arrives_s)[:2], abs=1e-6)
@@ -120,6 +123,18 @@ class TestCourses:
         assert later.at(10) == pytest.approx((20, 0, EAST))
         assert at_once.at(10).y_m > 1
         assert later.arrives_s == pytest.approx(at_once.arrives_s, abs=2)
+
+    @pytest.mark.parametrize("swath_m", [50, 30])
+    def test_who_is_on_the_first_leg_goes_on_over_it_and_then_over_the_others(self, swath_m: float) -> None:
+        free = helper(swath_m=swath_m)
+        sweep, _ = shortest_sweep(sweeps(strip(1), free), free.pose, free.turn_radius_m)
+        begin = sweep.passes[0].begin
+        whole = sweep_course(begin, 0, Sailing(2), 6, sweep)
+        on_it = whole.at(40)
+        assert on_it.y_m == pytest.approx(begin.y_m + 80)
+        laid = sweep_course(on_it, 40, Sailing(2), 6, sweep, entered=True)
+        assert laid.arrives_s == pytest.approx(whole.arrives_s)
+        assert laid.at(90)[:2] == pytest.approx(whole.at(90)[:2])
 
     def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
         one, free = strip(1, 0, 0, length_m=4000), helper(x_m=0, y_m=-100)
@@ -306,6 +321,24 @@ class TestTooClose:
         assert found is not None
         assert found.distance_m == pytest.approx(5)
         assert found.time_s == 0.5
+
+    def test_two_that_were_told_at_different_times(self) -> None:
+        later = course(Pose(5, 384, SOUTH), 8, Sailing(2), 10, [straight(Pose(5, 384, SOUTH), 2000, 10)])
+        assert later.first == 4
+        for one, other in ((ahead(0, 0, NORTH, 2), later), (later, ahead(0, 0, NORTH, 2))):
+            found = too_close(one, other, 20, 0, 600)
+            assert found is not None
+            assert (found.distance_m, found.time_s) == (pytest.approx(5), 94)  # as from 400 m at 0 s
+
+    def test_just_as_near_as_they_may_they_are_not_too_close(self) -> None:
+        assert too_close(ahead(0, 0, NORTH, 2), ahead(20, 0, NORTH, 2), 20, 0, 300) is None
+        # From 25 m to 24 m, after 3.5 s or 14 s.
+        still = lying_still(Pose(24, 7, NORTH), 0)
+        for speed_mps in (2.0, 0.5):
+            assert too_close(ahead(0, 0, NORTH, speed_mps), still, 30, 0, 30) is None
+
+    def test_two_that_begin_near_may_stay_so(self) -> None:
+        assert too_close(ahead(0, 0, NORTH, 2), ahead(10, 0, NORTH, 2), 20, 0, 300) is None
 
     def test_one_that_passes_later(self) -> None:
         assert too_close(ahead(0, -100, NORTH, 2), ahead(-400, 0, EAST, 2), 20, 0, 600) is None
