@@ -204,7 +204,7 @@ class TestCourses:
         [
             # 20 m of run-in and of run-out; the track itself takes 200 s.
             (AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0), (0, 300 - 1.5 * 90, NORTH), 100 + 20 / 1.5),
-            (AgentState(Mode.SURVEY, 1, 1, 9_000, 0, 310, 0), (0, 300, NORTH), 10 + 20 / 1.5),  # that is past
+            (AgentState(Mode.SURVEY, 1, 1, 1, 0, 310, 0), (0, 300, NORTH), 10 + 20 / 1.5),  # that is past
             (AgentState(Mode.SURVEY, 1, 1, 0, 0, -20, 0), (0, -20, NORTH), 10 + 340 / 1.5),
             (AgentState(Mode.SURVEY, 2, 1, 100_000, 0, -20, 0), (0, -20, NORTH), 10 + 340 / 1.5),
             (AgentState(Mode.TRANSIT, 1, 1, 100_000, 0, -20, 0), (0, -20, NORTH), 10 + 340 / 1.5),
@@ -328,7 +328,7 @@ class TestTooClose:
         for one, other in ((ahead(0, 0, NORTH, 2), later), (later, ahead(0, 0, NORTH, 2))):
             found = too_close(one, other, 20, 0, 600)
             assert found is not None
-            assert (found.distance_m, found.time_s) == (pytest.approx(5), 94)  # as from 400 m at 0 s
+            assert [found.distance_m, found.time_s] == pytest.approx([5, 94])  # as from 400 m at 0 s
 
     def test_just_as_near_as_they_may_they_are_not_too_close(self) -> None:
         assert too_close(ahead(0, 0, NORTH, 2), ahead(20, 0, NORTH, 2), 20, 0, 300) is None
@@ -336,6 +336,11 @@ class TestTooClose:
         still = lying_still(Pose(24, 7, NORTH), 0)
         for speed_mps in (2.0, 0.5):
             assert too_close(ahead(0, 0, NORTH, speed_mps), still, 30, 0, 30) is None
+
+    def test_two_that_begin_just_as_near_as_they_may_come_no_nearer(self) -> None:
+        found = too_close(ahead(0, 0, NORTH, 2), lying_still(Pose(19.2, 5.6, NORTH), 0), math.hypot(19.2, 5.6), 0, 30)
+        assert found is not None
+        assert found.distance_m == pytest.approx(19.2)
 
     def test_two_that_begin_near_may_stay_so(self) -> None:
         assert too_close(ahead(0, 0, NORTH, 2), ahead(10, 0, NORTH, 2), 20, 0, 300) is None
