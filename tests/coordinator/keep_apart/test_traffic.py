@@ -129,6 +129,10 @@ def test_a_course_is_laid_anew_once_a_helper_says_that_it_is_on_its_way() -> Non
         course = traffic.course(at(one, mode, 100, strip_told), SERVED, 3.0)
         assert course is not None
         assert course.start_s == start_s
+    alone, course = Traffic().course(one, SERVED, 3.0), traffic.course(one, SERVED, 3.0)
+    assert alone is not None
+    assert course is not None
+    assert course.arrives_s == pytest.approx(alone.arrives_s)  # with its way to the strip
     one.heard_ms = 5000
     course = traffic.course(at(one, Mode.TRANSIT, 96, SERVED.number), SERVED, 5.0)
     assert course is not None
@@ -342,7 +346,43 @@ class TestWhatIsKnown:
         assert later.at(62.0) == pytest.approx((0, 129, NORTH))
 
 
+class TestWhereItIs:
+    def test_who_is_told_something_is_where_its_course_has_led_it_since_it_was_heard(self) -> None:
+        one = at(helper(), Mode.TRANSIT, -40, SERVED.number)  # it is at -20 m after 10 s
+        assert Traffic().holding(one, SERVED, 10.0).at(10.0) == pytest.approx((0, -20, NORTH))
+        assert Traffic().aside(one, SERVED, (60.0, 0.0), 10.0).at(10.0) == pytest.approx((0, -20, NORTH))
+
+    def test_or_where_it_was_heard_if_nobody_knows_its_course(self) -> None:
+        assert Traffic().holding(at(helper(), Mode.HOME, 9), None, 10.0).at(10.0) == (0, 9, NORTH)
+
+    def test_who_was_only_on_its_way_to_a_strip_has_no_run_out_of_it(self) -> None:
+        traffic, one = Traffic(), helper()
+        traffic.course(at(one, Mode.TRANSIT, 0, 7), SERVED, 0.0)
+        assert traffic.holding(at(one, Mode.IDLE, 120), None, 0.0).at(1.0).heading_rad == pytest.approx(1 / 3)
+
+    def test_of_a_strip_that_it_has_begun_before_anybody_here_knew_all_is_expected(self) -> None:
+        course = Traffic().course(at(helper(), Mode.REVISIT, 70, SERVED.number), SERVED, 0.0)
+        assert course is not None
+        assert course.arrives_s > 55  # what is left of it would take 27.5 s
+
+
 class TestErrands:
+    @pytest.mark.parametrize(("heard_ms", "is_sent"), [(39_990, True), (40_000, False)])
+    def test_who_is_heard_when_it_should_be_there_rests_where_it_is(self, heard_ms: int, is_sent: bool) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+        sent = traffic.course(one, None, 0.0)
+        one.heard_ms = heard_ms
+        assert (traffic.course(at(one, Mode.IDLE, 200), None, 40.0) is sent) is is_sent
+
+    def test_who_is_heard_elsewhere_in_the_moment_in_which_it_is_sent_goes_there_from_there(self) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 12.0)
+        one.heard_ms = 12_000
+        course = traffic.course(at(one, Mode.IDLE, 120, x_m=-40.0), None, 12.0)
+        assert course is not None
+        assert course.at(12.0) == pytest.approx((-40, 120, NORTH))
+
     @pytest.mark.parametrize(("aside_m", "is_on_course"), [(9.9, True), (10.0, True), (10.1, False)])
     def test_who_is_heard_10_m_off_its_course_is_on_it(self, aside_m: float, is_on_course: bool) -> None:
         traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
