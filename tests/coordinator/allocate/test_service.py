@@ -100,13 +100,15 @@ def test_a_current_tells_from_when_to_when_the_sonar_is_on() -> None:
 @pytest.mark.parametrize(("x_m", "y_m", "heading_rad"), [(0, 100, 0.0), (100, 0, np.pi / 2)])
 def test_on_the_way_to_a_strip_the_flow_half_way_there_counts(x_m: float, y_m: float, heading_rad: float) -> None:
     # From astern, and rising to 0.9 m/s at 90 m; half-way over the 95 m to the run-in it is 0.475 m/s.
-    north, axis, flow = x_m == 0, np.array([0.0, 90.0]), np.array([0.0, 0.9])
+    # All of it 30 m east and 20 m south of the origin.
+    north, flow = x_m == 0, np.array([0.0, 0.9])
+    axis = np.array([-20.0, 70.0]) if north else np.array([30.0, 120.0])
     speeds = flow[np.newaxis, :, np.newaxis] if north else flow[np.newaxis, np.newaxis, :]
     still, nowhere = np.zeros_like(speeds), np.zeros(1)
     grid = FlowGrid(nowhere, axis, nowhere, still, speeds) if north else FlowGrid(axis, nowhere, nowhere, speeds, still)
     one = helper(way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.9, grid=grid), 6.0))
-    table = StripTable([open_strip(strip(1, x_m, y_m, heading_rad=heading_rad))], one)
-    to_begin_s = table.to_begin_s(np.array([[0, 0, heading_rad]]))
+    table = StripTable([open_strip(strip(1, 30 + x_m, -20 + y_m, heading_rad=heading_rad))], one)
+    to_begin_s = table.to_begin_s(np.array([[30, -20, heading_rad]]))
     assert to_begin_s[0, 0, 0] == pytest.approx(95 / 2.475 + 5 / 2.9)
 
 
@@ -179,3 +181,27 @@ class TestHowLongRunInsAndWaysHomeTake:
         poses = np.array([[0, 100, np.pi], [0, 40, np.pi]])
         assert helper().home_s(poses).tolist() == [0, 0]
         assert helper(way_home=WayHome((0.0, 0.0), Sailing(2.0), 6.0)).home_s(poses) == pytest.approx([52.5, 22.5])
+
+
+def test_of_the_ways_over_a_strip_that_with_the_current_is_taken() -> None:
+    # 0.5 m/s to the north: 200 m take 80 s with it and 133 s against it; from the side either end is as far.
+    one = helper(x_m=-300, y_m=200, heading_rad=np.pi / 2, way_home=WayHome((0, 0), Sailing(2.0, 0.5, 0.0), 6.0))
+    table = StripTable([open_strip(strip(1))], one)
+    assert sorted(set(table.sonar_on_s[0].round(6).tolist())) == pytest.approx([80, 200 / 1.5])
+    to_begin_s, ways = table.ways.shortest_from(np.array([one.pose]))
+    assert table.sonar_on_s[0, ways[0, 0]] == pytest.approx(80)
+    assert table.run_out_s[0, ways[0, 0]] == pytest.approx(2)
+    assert table.leave[0, ways[0, 0]] == pytest.approx([0, 305, 0])
+    removed, free_s, _ = table.best_from(one.pose, 10.0, np.inf)
+    assert (removed[0], free_s[0]) == pytest.approx((700, 10 + to_begin_s[0, 0] + 82))
+
+
+def test_the_battery_must_last_home_from_the_end_of_the_way_that_is_flown() -> None:
+    one = helper(way_home=WayHome((0.0, -50.0), Sailing(2.0), 6.0))
+    job = open_strip(strip(1))
+    served = expected_service(job, one)
+    home_s = float(one.home_s(np.array([served.free_at], dtype=np.float64))[0])
+    assert home_s > 355 / 2
+    for spare_s, removed in ((0.01, 700), (-0.01, 0)):
+        table = StripTable([job], replace(one, lasts_until_s=served.ends_s + home_s + spare_s))
+        assert table.best_from(one.pose, 0.0, np.inf)[0] == pytest.approx([removed])
