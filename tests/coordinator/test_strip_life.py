@@ -787,7 +787,7 @@ class TestLooksThatAreDue:
         lives.life.find_overdue([], 10_000)
         assert lives.life.awaited == []
         assert lives.vehicle(HELPER).failures == 0
-        assert lives.east.expected.now().look.max() < 0.7
+        assert lives.east.expected.now().look.max() < 0.4
         assert lives.due() == []
 
     def test_where_less_has_come_in_time_its_vehicle_has_failed_there(self, lives: Lives) -> None:
