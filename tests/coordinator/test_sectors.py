@@ -229,6 +229,10 @@ class TestWhereSomethingMatters:
         assert laid.told_hotspot(3) == [0, 1]
         assert not laid.north.expected.hotspots.drawn()[0].any()
 
+    def test_a_hotspot_is_told_where_any_of_its_corners_lies(self) -> None:
+        for south_m, north_m, touched in ((100, 200.4, [0, 1]), (199.6, 300, [0, 1]), (200.4, 300, [1])):
+            assert Laid().told_hotspot(1, (20, south_m), (60, south_m), (60, north_m)) == touched
+
     def test_of_sectors_side_by_side_a_hotspot_is_told_the_one_in_which_it_lies(self) -> None:
         assert Laid(WEST, EAST).told_hotspot(1, (20, 320), (60, 320), (60, 360)) == [0]
         assert Laid(WEST, EAST).told_hotspot(1, (320, 20), (360, 20), (360, 60)) == [1]
@@ -277,7 +281,7 @@ class TestTeams:
         laid = Laid()
         laid.sectors.join("alpha", laid.north, 100_000)
         laid.south.price = 10.0
-        assert self.better(laid, 100 + 599.9) is None
+        assert self.better(laid, 100 + 599.99) is None
         assert self.better(laid, 100 + 600) == 0
 
     def test_where_nothing_is_left_nobody_stays(self) -> None:
@@ -327,6 +331,7 @@ class TestTeams:
 
     def test_who_comes_to_neither_in_time_stays(self) -> None:
         laid, one = Laid(), replace(helper(y_m=-150), vehicle="alpha", lasts_until_s=1e6)
+        laid.north.price = 9.0
         assert laid.sectors.better_for(one, 100, 110) is None
 
     def test_of_equals_that_with_the_lower_number(self) -> None:

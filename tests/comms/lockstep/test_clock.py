@@ -324,6 +324,11 @@ class TestEventsOfNodes:
         granted(clock, "alpha", {0: 20, 20: 30}, {20: [STATE], 30: [STATE]})
         assert (clock.now_ms, clock.rounds) == (30, 4)
 
+    def test_mail_to_who_was_killed_is_not_due_after_the_time_limit_either(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 500, (Kill("coordinator", 400),))
+        assert granted(clock, "alpha", {0: 500}, {500: [STATE]}) == [(0, True, True), (500, True, False)]
+        assert not clock.timed_out
+
     def test_who_was_told_of_the_end_rests_also_where_another_was_killed(self) -> None:
         clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("beta", 25),))
         assert granted(clock, "coordinator", {0: 30, 30: 500}, {30: [OVER]})[-1] == (30, True, False)
