@@ -250,6 +250,10 @@ class TestRunaway:
         wake_world(clock, [500, 999, 1000, 1999, 2000, 2001, 9000], 2, 2, 3, 1, 4, 0)
         assert clock.messages == {"nav": 12}
         clock = started()
+        wake_world(clock, [1998, 1999], 5)
+        with pytest.raises(RunawayError, match=r"within simulated second 1;"):
+            clock.next_round()
+        clock = started()
         wake_world(clock, [999, 1000, 1001, 1002], 4, 3, 2)
         with pytest.raises(
             RunawayError, match=r"^more than 4 messages within simulated second 1; messages in it: nav 5$"
