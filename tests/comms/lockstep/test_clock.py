@@ -249,6 +249,11 @@ class TestRunaway:
         clock = started()
         wake_world(clock, [500, 999, 1000, 1999, 2000, 2001, 9000], 2, 2, 3, 1, 4, 0)
         assert clock.messages == {"nav": 12}
+        clock = LockstepClock(Routing(ROSTER), 60_000)
+        clock.publish("clock", [RUN])  # before the first second
+        clock.next_round()
+        answer_all(clock, world=(2, [NAV] * 4))
+        assert clock.next_round() is not None
         clock = started()
         wake_world(clock, [1998, 1999], 5)
         with pytest.raises(RunawayError, match=r"within simulated second 1;"):
