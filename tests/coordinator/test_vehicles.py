@@ -223,9 +223,9 @@ class TestStates:
         self, told: AgentState, incarnation: int, stirs: bool
     ) -> None:
         one = KnownVehicle(vehicle("one", Role.REVISIT), 0)
-        heard(one, state(Mode.TRANSIT, 1, 3, 4), sent_ms=1000)
+        heard(one, state(Mode.TRANSIT, 1, 3, 4), sent_ms=1000, sequence=5)
         assert one.stirred_ms == 1000
-        heard(one, told, sent_ms=2000, sequence=1, incarnation=incarnation)
+        heard(one, told, sent_ms=2000, sequence=6, incarnation=incarnation)
         assert one.stirred_ms == (2000 if stirs else 1000)
 
     def test_it_has_surveyed_all_when_it_first_says_so(self) -> None:
@@ -321,7 +321,8 @@ class TestTrust:
         one.gave_way.add(1)  # it was told to give it back to let another pass
         assert not one.is_not_for_it(first)
         one.note_refusal(1)
-        assert (one.refused, one.gave_way) == ({1}, set())
+        one.note_refusal(5)
+        assert (one.refused, one.gave_way) == ({1, 5}, set())
         assert one.is_not_for_it(first)
 
     def test_of_a_strip_only_what_is_newer_than_all_that_it_has_told_is_news(self) -> None:
