@@ -152,6 +152,8 @@ def test_places_are_apart_from_a_track_and_beyond_its_ends() -> None:
     assert apart_m[0] == pytest.approx([10, 10, np.hypot(5, 10)])
     assert is_beyond[0].tolist() == [False, True, True]
     assert apart_m.shape == is_beyond.shape == (2, 3)
+    short_m, _ = _apart(np.array([4.0]), np.array([7.25]), [PlannedTrack(2, 0, 7, 7, 7, 7.5, False)])
+    assert short_m == pytest.approx(np.array([[3.0]]))
 
 
 def test_at_most_twelve_cells_to_a_side_are_looked_at_evenly_with_both_ends() -> None:
