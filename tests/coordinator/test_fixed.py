@@ -13,7 +13,7 @@ from one_node import OneNode
 from situations import at_work, helper, open_strip, situation, strip
 
 from comms.said.announcement import Role, Vertex, Zone
-from comms.said.messages import AgentState, Mode, StripStatus, TaskState
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripStatus, TaskState
 from coordinator.coordinator import Coordinator
 from coordinator.cut.window import Window
 from coordinator.fixed import FixedRoutes, _lanes
@@ -200,6 +200,14 @@ class TestWhatLanesAre:
         told.settle()
         assert list(told.states())[:2] == [1, 2]
 
+    def test_one_is_no_wider_than_the_area(self) -> None:
+        told = coordinator(strips="lanes")
+        narrow = Told(OneNode(Coordinator(told.node.node.config), Role.COORDINATOR))  # type: ignore[attr-defined]
+        narrow.node.hear("run", run_info(20, 400), at_ms=1)
+        narrow.state(HELPER, Mode.IDLE)
+        narrow.settle()
+        assert [(one.width_m, one.length_m) for one in narrow.strips().values()] == [(25, 400)]  # five columns
+
     def test_where_no_cell_is_inside_there_is_none(self) -> None:
         inside = np.zeros((10, 20), dtype=np.bool_)
         inside[3:8, 2:6] = inside[5:9, 17:] = True
@@ -232,6 +240,24 @@ def test_each_is_offered_the_next_of_its_own_that_is_there_and_that_it_has_not_r
 
 
 class TestBeforehand:
+    def test_nothing_is_planned_before_all_primaries_have_said_their_plans_and_all_helpers_were_heard(self) -> None:
+        second = vehicle("another", Role.SURVEY)
+        told = coordinator((*TWO_HELPERS[:2], second), idle=(), strips="beforehand")
+        told.plan(60.0, 180.0)
+        told.settle()
+        track = PlannedTrack(1, 300, 300, 0, 300, 400, False)
+        told.node.hear("agent/another/plan", Plan(1, (track,), (60,), (), ""))
+        told.keep_alive([PRIMARY, "another"], 1)
+        told.settle()
+        assert told.strips() == {}
+        told.state(HELPER, Mode.IDLE)
+        told.settle()
+        assert told.strips() != {}
+        told = coordinator((*TWO_HELPERS[:2], second), strips="beforehand", deadline_s=2000.0)
+        told.plan(60.0, 180.0)
+        told.settle()
+        assert told.strips() == {}
+
     def test_nothing_is_planned_before_the_primary_has_said_its_plan(self) -> None:
         told = coordinator(strips="beforehand")
         told.hotspot()
