@@ -254,6 +254,7 @@ class TestBeforehand:
         told.settle()
         assert told.strips() != {}
         told = coordinator((*TWO_HELPERS[:2], second), strips="beforehand", deadline_s=2000.0)
+        told.hotspot()
         told.plan(60.0, 180.0)
         told.settle()
         assert told.strips() == {}

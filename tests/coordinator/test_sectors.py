@@ -20,6 +20,7 @@ from comms.said.announcement import Role, Vertex
 from comms.said.codec import Header
 from comms.said.messages import CoverageTile, Hotspot, HotspotState, Plan, PlannedTrack
 from coordinator.agenda import Agenda, Item
+from coordinator.allocate.situation import Helper
 from coordinator.coordinator import Coordinator, _sectors
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
@@ -333,6 +334,13 @@ class TestTeams:
         laid, one = Laid(), replace(helper(y_m=-150), vehicle="alpha", lasts_until_s=1e6)
         laid.north.price = 9.0
         assert laid.sectors.better_for(one, 100, 110) is None
+
+    @pytest.mark.parametrize(("y_m", "joins"), [(29_199, True), (29_201, False)])
+    def test_while_nobody_can_tell_when_it_ends_there_are_four_hours(self, y_m: float, joins: bool) -> None:
+        # 28 800 m at 2 m/s, and 400 m is where the north ends.
+        laid = Laid()
+        one: Helper = replace(helper(y_m=y_m), vehicle="alpha", lasts_until_s=math.inf)
+        assert (laid.sectors.better_for(one, 100, math.inf) is laid.north) is joins
 
     def test_of_equals_that_with_the_lower_number(self) -> None:
         laid = Laid()
