@@ -81,6 +81,12 @@ class TestBids:
         assert alpha.claims.bids == pytest.approx([score(700, 150), score(2100, 255)])
         assert CBBA.assign(told) == {"alpha": 1}
 
+    def test_also_before_two_that_follow_each_other(self) -> None:
+        jobs = [open_strip(strip(1)), open_strip(strip(2, y_m=310), 3000), open_strip(strip(3, y_m=520), 9000)]
+        (alpha,) = agreed(situation(jobs, [helper()]), jobs)
+        assert (alpha.bundle, alpha.path) == ([2, 1, 0], [0, 1, 2])
+        assert alpha.claims.bids == pytest.approx([score(700, 150), score(2100, 255), score(6300, 360)])
+
     def test_a_bid_is_less_what_the_strips_behind_it_lose(self) -> None:
         # Side by side, 12 m apart: 1 is left at y = 305 m after 152.5 s, half a circle of 6 m leads onto 2, on which it
         # is 5 m of run-in later. So 2 ends 9.42 + 2.5 + 100 s later than 1 is left.
