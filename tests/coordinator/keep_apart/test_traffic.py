@@ -157,9 +157,9 @@ def test_a_helper_that_says_it_is_at_another_strip_is_expected_over_that() -> No
 
 @pytest.mark.parametrize(("x_m", "y_m", "bearing_deg"), [(0, 200, 0), (60, 120, 90), (-60, 180, 315), (-60, 120, 270)])
 def test_a_helper_comes_to_where_it_is_to_wait_the_way_that_it_lies(x_m: float, y_m: float, bearing_deg: float) -> None:
-    course = Traffic().aside(at(helper(), Mode.IDLE, 120), None, (x_m, y_m), 0.0)
+    course = Traffic().aside(at(helper(), Mode.IDLE, 120, x_m=15.0), None, (15 + x_m, y_m), 0.0)
     arrives = course.at(course.arrives_s)
-    assert arrives[:2] == pytest.approx((x_m, y_m), abs=0.01)
+    assert arrives[:2] == pytest.approx((15 + x_m, y_m), abs=0.01)
     assert math.degrees(arrives.heading_rad) == pytest.approx(bearing_deg, abs=0.01)
 
 
@@ -277,7 +277,8 @@ class TestWhatIsKnown:
 
     def test_one_that_surveys_and_revisits_circles_when_it_has_surveyed(self) -> None:
         entry = replace(vehicle("primary", Role.SURVEY), role=Role.SURVEY_REVISIT)
-        course = Traffic().course(at(KnownVehicle(entry, 0, finished_ms=0), Mode.IDLE, 120), None, 0.0)
+        one = KnownVehicle(entry, 0, finished_ms=0, plan=surveyor().plan)  # of which a track is left
+        course = Traffic().course(at(one, Mode.IDLE, 120), None, 0.0)
         assert course is not None
         assert course.at(math.pi * 20 / 1.5) == pytest.approx((40, 120, math.pi))  # half round
 
@@ -313,6 +314,7 @@ class TestWhatIsKnown:
             surveyor(mode=Mode.TRANSIT),
             replace(first, plan=replace(first.plan, revision=2)),
             replace(first, plan=None),
+            first,
         ):
             laid = traffic.course(other, None, 20.0)
             assert laid is not course
@@ -393,6 +395,14 @@ class TestErrands:
         assert (found is sent) is is_on_course
         assert traffic.course(one, None, 12.0) is found  # and the way from there stays as it is
 
+    def test_who_is_22_m_from_where_it_was_sent_is_there(self) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+        one.heard_ms = 10_000
+        course = traffic.course(at(one, Mode.IDLE, 200, x_m=22.0), None, 12.0)
+        assert course is not None
+        assert course.arrives_s == 10
+
     def test_who_is_sent_to_a_strip_is_not_sent_aside_any_more(self) -> None:
         traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
         traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
@@ -410,3 +420,13 @@ def test_a_strip_that_leads_through_ground_to_keep_out_of_is_expected_to_be_flow
     course = Traffic(wall).course(at(helper(), Mode.TRANSIT, -30, SERVED.number), SERVED, 0.0)
     assert course is not None
     assert course.at(course.arrives_s)[:2] == pytest.approx((0, 125), abs=0.01)
+
+
+def test_a_strip_in_a_dead_end_is_expected_to_be_flown_into_that() -> None:
+    # Walls to both sides of it and right before it, where the helper is: the way leads round to its far end.
+    walls = ((-40, -20, 40, -10), (-40, -20, -30, 140), (30, -20, 40, 140))
+    outlines = tuple(((x0, y0), (x1, y0), (x1, y1), (x0, y1)) for x0, y0, x1, y1 in walls)
+    for keep_out, end_m in ((KeepOut(outlines, 1.5), (0, 15)), (KeepOut(()), (0, 125))):
+        course = Traffic(keep_out).course(at(helper(), Mode.TRANSIT, -60, SERVED.number), SERVED, 0.0)
+        assert course is not None
+        assert course.at(course.arrives_s)[:2] == pytest.approx(end_m, abs=0.01)
