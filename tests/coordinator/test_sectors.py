@@ -156,6 +156,13 @@ class TestWhereSomethingMatters:
         for beside_m, window in ((0.0, Window(6, 28, 4, 14)), (7.0, Window(4, 30, 3, 15))):
             assert Laid().sectors._window_about(x_m, y_m, beside_m) == window
 
+    def test_where_there_is_one_sector_all_matters_in_it_wherever_it_lies(self) -> None:
+        laid = Laid()
+        sectors = Sectors([laid.south], laid.fleet.map.grid, Agenda())
+        far = Plan(1, (PlannedTrack(1, 0, 0, 2000, 400, 2000, False),), (), (), "")
+        assert sectors.surveyed_by(KnownVehicle(vehicle(PRIMARY, Role.SURVEY), 0, plan=far)) == [laid.south]
+        assert laid.sectors.surveyed_by(KnownVehicle(vehicle(PRIMARY, Role.SURVEY), 0, plan=far)) == []
+
     def test_one_that_surveys_and_takes_strips_matters_where_it_does_either(self) -> None:
         laid = Laid()
         both = replace(vehicle("alpha", Role.SURVEY), role=Role.SURVEY_REVISIT)
