@@ -156,6 +156,16 @@ class TestWhereSomethingMatters:
         for beside_m, window in ((0.0, Window(6, 28, 4, 14)), (7.0, Window(4, 30, 3, 15))):
             assert Laid().sectors._window_about(x_m, y_m, beside_m) == window
 
+    def test_where_there_is_one_sector_it_is_told_of_each_hotspot(self) -> None:
+        laid = Laid()
+        laid.sectors = Sectors([laid.south], laid.fleet.map.grid, Agenda())
+        assert laid.told_hotspot(1, (20, 320), (60, 320), (60, 360)) == [0]
+
+    def test_of_helpers_for_two_teams_and_a_half_there_are_two(self) -> None:
+        homes = {name: (0.0, float(place)) for place, name in enumerate("abcde")}
+        found = laid_out(np.ones((100, 300), dtype=np.bool_), homes, 2, 20)
+        assert found == [(Window(0, 100, 0, 150), ["a", "b"]), (Window(0, 100, 150, 300), ["c", "d", "e"])]
+
     def test_where_there_is_one_sector_all_matters_in_it_wherever_it_lies(self) -> None:
         laid = Laid()
         sectors = Sectors([laid.south], laid.fleet.map.grid, Agenda())
@@ -294,7 +304,7 @@ class TestTeams:
 
     def test_where_nothing_is_left_nobody_stays(self) -> None:
         laid = Laid()
-        laid.south.is_worth = False
+        laid.south.is_worth, laid.north.price = False, 0.0005  # 0.9 in all
         assert self.better(laid) == 1
         laid.north.is_worth = False
         assert self.better(laid) is None
