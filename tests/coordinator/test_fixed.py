@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import Literal
 
@@ -279,6 +280,14 @@ class TestBeforehand:
             routes.append(sum(one.state is not WITHDRAWN for one in told.strips().values()))
         assert routes[0] > routes[1] == 2
         assert routes[2] == 1
+
+    @pytest.mark.parametrize(("p_detect", "most"), [(0.7, 1), (0.3, 2)])
+    def test_a_place_that_is_worth_another_look_is_planned_twice(self, p_detect: float, most: int) -> None:
+        poor = (TWO_HELPERS[0], replace(TWO_HELPERS[1], p_detect=p_detect))
+        told = coordinator(poor, strips="beforehand", deadline_s=3000.0)
+        told.plan(60.0, 180.0, 300.0)
+        told.settle()
+        assert max(Counter((one.start_x_m, one.start_y_m) for one in told.strips().values()).values()) == most
 
     def test_strips_stay_as_first_planned(self) -> None:
         told = coordinator(strips="beforehand")
