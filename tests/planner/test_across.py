@@ -7,7 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from planner.across import MEAN_WEIGHT, Across, HelperLooks, Measured
+from planner import across as across_module
+from planner.across import MEAN_WEIGHT, Across, HelperLooks, Measured, Worth, _moves
 from planner.types import DetectionCurve
 
 HALF = DetectionCurve(np.array([0.0, 10.0]), np.array([0.5, 0.5]))
@@ -62,6 +63,43 @@ def test_tracks_lie_within_the_width_or_no_farther_outside_than_those_that_are_a
     assert (ground._first, ground._last) == (0, 40)
     ground.ask_for([Measured(-3.5, HALF, 10.0), Measured(20.0, HALF, 10.0), Measured(43.5, HALF, 10.0)])
     assert (ground._first, ground._last) == (-3, 43)
+    coarse = across(width_m=12_001.0)
+    assert (coarse._first, coarse._last) == (0, 4000)
+    coarse.ask_for([Measured(-7.0, HALF, 10.0), Measured(12_008.0, HALF, 10.0)])
+    assert (coarse._first, coarse._last) == (-2, 4002)
+    between = across(width_m=20.5)
+    assert (between._first, between._last) == (0, 20)
+
+
+def test_bins_are_of_so_many_whole_metres_that_there_are_no_more_than_5000() -> None:
+    assert [across(width_m=width_m).step_m for width_m in (0.4, 5000.0, 5000.5, 10_000.0, 10_001.0)] == [1, 1, 2, 2, 3]
+
+
+def test_a_bin_is_seen_where_all_of_it_is_beyond_the_nadir_gap_and_not_beyond_the_range() -> None:
+    # From 50 m 9 to 40 m either side, of these 9 to 30 m within r_eff; at 9 m itself nothing is seen.
+    ground = Across(100.0, [], GAPPED, 30.0, 5.0)
+    ground.ask_for([Measured(50.0, GAPPED, 30.0)])
+    assert (ground.lost_m([]), ground.worth([]).lost_m) == (60, 60)
+    assert (ground.lost_m([Measured(50.0, GAPPED, 25.0)]), ground.lost_m([Measured(50.0, GAPPED, 30.0)])) == (10, 0)
+    # From 55 m 15 to 45 m and 65 to 95 m are seen, of what is asked 15 to 40 m and 65 to 90 m; within r_eff 25 to 45 m
+    # and 65 to 85 m, of 20 to 40 m and 60 to 80 m.
+    assert ground.lost_m([Measured(55.0, GAPPED, 30.0)]) == ground.worth([55]).lost_m == 5 + 5 + 5
+    assert ground.worth([50]).lost_m == 0
+
+
+def test_a_track_so_far_outside_that_it_sees_nothing_changes_nothing() -> None:
+    ground = across(10.0, width_m=30.0)
+    ground.ask_for([Measured(-11.0, HALF, 10.0), Measured(41.0, HALF, 10.0), Measured(20.0, HALF, 10.0)])
+    for far in (-900, -11, 41, 900):
+        assert ground.worth([20, far]) == ground.worth([20])
+    assert ground.worth([-10]) != ground.worth([])
+
+
+def test_better_is_what_loses_less_and_else_leaves_less_by_more_than_a_millionth() -> None:
+    assert Worth(4.0, 0.9).is_better(Worth(5.0, 0.1))
+    assert Worth(4.0, 0.3).is_better(Worth(4.0, 0.300002))
+    assert not Worth(4.0, 0.3).is_better(Worth(4.0, 0.3000005))
+    assert not Worth(5.0, 0.1).is_better(Worth(4.0, 0.9))
 
 
 def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed() -> None:
@@ -73,6 +111,61 @@ def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed
 def test_two_tracks_are_moved_together_where_either_alone_would_leave_a_gap() -> None:
     # Of the places, a metre apart, each sees 21: the first two see 2 to 22 and 23 to 43, the third 42 to the last one.
     assert across(width_m=63.0).refined([12, 33, 52]) == [10, 31, 52]
+
+
+def test_tracks_are_moved_one_by_one_two_by_two_all_from_one_on_drawn_out_and_every_second() -> None:
+    farthest = sorted((group, tuple(shifts[-1].tolist())) for group, shifts in _moves(4))
+    assert farthest == [
+        ((0,), (32,)),
+        ((0, 1), (32, 32)),
+        ((0, 1, 2, 3), (8, 16, 24, 32)),
+        ((0, 1, 2, 3), (32, 32, 32, 32)),
+        ((0, 2), (32, 32)),
+        ((1,), (32,)),
+        ((1, 2), (32, 32)),
+        ((1, 2, 3), (11, 21, 32)),
+        ((1, 2, 3), (32, 32, 32)),
+        ((1, 3), (32, 32)),
+        ((2,), (32,)),
+        ((2, 3), (16, 32)),
+        ((2, 3), (32, 32)),
+        ((3,), (32,)),
+    ]
+    (group, shifts) = _moves(1)[0]
+    assert (group, shifts.ravel().tolist()) == ((0,), [-1, 1, -2, 2, -4, 4, -8, 8, -16, 16, -32, 32])
+
+
+def moved_in_turn(ground: Across, bins: list[int], rounds: int) -> list[int]:
+    """The first ten of some tracks moved one way after the other, each time to where they are worth most."""
+    found = sorted(min(max(one, ground._first), ground._last) for one in bins)
+    for group, shifts in _moves(min(len(found), 10)) * rounds:
+        tried = []
+        for shift in shifts.tolist():
+            moved = list(found)
+            for index, by in zip(group, shift, strict=True):
+                moved[index] = min(max(moved[index] + by, ground._first), ground._last)
+            tried.append(moved)
+        best = min(tried, key=ground.worth)
+        if ground.worth(best).is_better(ground.worth(found)):
+            found = best
+    return sorted(found)
+
+
+@pytest.mark.parametrize("rounds", [1, 3])
+@pytest.mark.parametrize("seed", range(4))
+def test_ways_to_move_are_gone_through_in_turn(seed: int, rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(across_module, "MOST_ROUNDS", rounds)
+    rng = np.random.default_rng(seed)
+    flown = [Measured(float(one), GAPPED, 30.0) for one in rng.integers(0, 400, 2)]
+    rho = 0.4 if seed % 2 else 0.0
+    ground = Across(700.0, flown, GAPPED, 30.0, 5.0, rho, HelperLooks(30.0 * seed, 0.5))
+    ground.ask_for([Measured(float(one), GAPPED, 30.0) for one in rng.integers(-20, 720, 4)])
+    bins = rng.integers(0, 700, (4, 12, 7, 3)[seed]).tolist()
+    assert ground.refined(bins) == moved_in_turn(ground, bins, rounds)
+
+
+def test_where_there_is_no_track_none_is_moved() -> None:
+    assert across().refined([]) == []
 
 
 def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:
