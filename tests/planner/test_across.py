@@ -41,6 +41,9 @@ def test_helpers_look_where_most_is_left() -> None:
     assert across(helpers=helpers).worst30([10]) == pytest.approx((4 * 0.5 + 2 * 0.25) / 6)
     # Two tracks take twice as long: 32 m are all once and 12 m twice; 0.25 is 0.125 and 0.0625.
     assert across(10.0, helpers=helpers).worst30([10]) == pytest.approx(0.125)
+    # 5 to 10 m are seen twice. Half a metre for each of two tracks: of one of those metres seen once.
+    twice = across(15.0, width_m=10.0, helpers=HelperLooks(0.5, 0.5))
+    assert twice.worth([0]).risk == pytest.approx(0.5 + MEAN_WEIGHT * (4 * 0.5 + 6 * 0.25) / 10)
     # Of looks that are half alike 0.75 counts as the root of 0.25: all 20 m come down to a half of it.
     assert across(rho=0.5, helpers=HelperLooks(20.0, 0.75)).worst30([10]) == pytest.approx(0.25)
 
@@ -110,6 +113,16 @@ def test_one_more_goes_where_nothing_is_seen_and_one_less_where_it_is_not_missed
     assert wide.with_one_less([10, 30]) == [30]
 
 
+def test_one_more_may_go_where_the_width_ends_and_no_farther() -> None:
+    far, near = (
+        DetectionCurve(np.array([0.0, 17.0]), np.full(2, 0.5)),
+        DetectionCurve(np.array([0.0, 3.0]), np.full(2, 0.5)),
+    )
+    seen = [Measured(17.0, far, 17.0)]  # from 34 m on nothing is; tried is every eighth metre
+    assert Across(40.0, seen, near, 3.0, 1.0).with_one_more([]) == [40]
+    assert Across(39.0, seen, near, 3.0, 1.0).with_one_more([]) == [32]
+
+
 def test_two_tracks_are_moved_together_where_either_alone_would_leave_a_gap() -> None:
     # Of the places, a metre apart, each sees 21: the first two see 2 to 22 and 23 to 43, the third 42 to the last one.
     assert across(width_m=63.0).refined([12, 33, 52]) == [10, 31, 52]
@@ -166,6 +179,13 @@ def test_ways_to_move_are_gone_through_in_turn(seed: int, rounds: int, monkeypat
     assert ground.refined(bins) == moved_in_turn(ground, bins, rounds)
 
 
+def test_of_two_places_just_as_good_the_left_one_is_taken() -> None:
+    ground = across(31.0, width_m=62.0)
+    ground.ask_for([Measured(10.0, HALF, 10.0), Measured(52.0, HALF, 10.0)])
+    assert ground.worth([31 - 16]) == ground.worth([31 + 16])  # the first places tried that are better
+    assert ground.refined([31]) == [10]
+
+
 def test_where_there_is_no_track_none_is_moved() -> None:
     assert across().refined([]) == []
 
@@ -183,7 +203,24 @@ def test_a_wide_part_is_looked_at_in_coarser_bins() -> None:
     # Cells of 6 m are two bins of 3 m each; of the 2000 those that begin 1800 to 2198 bins on are seen.
     near = DetectionCurve(np.array([0.0, 600.0]), np.full(2, 0.5))
     wide = Across(12_000.0, [], near, 600.0, 6.0)
-    assert wide.worth([1999]).risk == pytest.approx(1.0 + MEAN_WEIGHT * (1.0 - 0.5 * 200 / 2000))
+    risk = 1.0 + MEAN_WEIGHT * (1.0 - 0.5 * 200 / 2000)
+    assert wide.worth([1999]).risk == pytest.approx(risk)
+    flown = Across(12_000.0, [Measured(5997.0, near, 600.0)], near, 600.0, 6.0)
+    assert flown.worth([]).risk == pytest.approx(risk)
+    wide.ask_for([Measured(5997.0, near, 600.0)])
+    assert wide.lost_m([]) == 1200
+    helped = Across(12_000.0, [Measured(-900.0, near, 600.0)], near, 600.0, 6.0, helpers=HelperLooks(6000.0, 0.5))
+    assert helped.worth([]).risk == pytest.approx(1.0 + MEAN_WEIGHT * 0.75)
+
+
+def test_a_narrow_part_has_a_bin_and_what_is_left_of_the_last_one_counts_as_one() -> None:
+    narrow = across(width_m=0.4)
+    narrow.ask_for([Measured(5.0, HALF, 10.0)])
+    assert narrow.lost_m([]) == 1
+    between = across(width_m=20.5)
+    between.ask_for([Measured(11.0, HALF, 10.0)])
+    assert between.lost_m([]) == 20
+    assert across(11.0, width_m=4.0).worst30([]) == pytest.approx(1.0)  # of the first cell, which it does not see
 
 
 @given(

@@ -237,6 +237,19 @@ class TestOptimality:
         range_m = rng.randint(46, 50)
         assert fewest_tracks(after_a_survey(rng, 1212, 40, range_m), 40, range_m).fewest
 
+    def test_what_surveys_leave_takes_few_steps_to_prove(self) -> None:
+        steps = []
+        for seed in range(200):
+            rng = random.Random(seed)
+            range_m = rng.randint(11, 29)
+            left = after_a_survey(rng, 303, 10, range_m)
+            cells = sum(cover._run(int(near_m), int(far_m)) for near_m, far_m in left)
+            search = cover._Search(cells, 10, range_m)
+            assert search.fewest()[1]
+            steps.append(search._steps)
+        # Counted as it is: what is no bound of what a part needs at least leaves more to be tried.
+        assert sum(steps) <= 3590
+
 
 class TestRefusals:
     @pytest.mark.parametrize(
