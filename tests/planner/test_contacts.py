@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.contacts import Objects, ObjectsOnMap, likelihood_ratio, surer_by
+from planner.contacts import LISTED_FROM, Objects, ObjectsOnMap, likelihood_ratio, surer_by
 from planner.fleet_map import FleetMap
 from planner.risk import NATS_PER_LEVEL
 from planner.types import BoolArray, GridSpec, SweepFrame
@@ -70,6 +70,8 @@ def test_an_object_lies_at_the_mean_of_its_contacts_each_by_how_sure_it_is() -> 
     assert (seen.sigma_m.tolist(), seen.contacts.tolist()) == ([2.0], [3.0])
     ratios = (12 * s * (1 - s) / (16 * o * (1 - o) ** 2) for s, o in ((0.2, 0.8), (0.1, 11 / 15), (0.4, 14 / 15)))
     assert seen.log_ratio == pytest.approx([sum(map(math.log, ratios))])
+    objects.hear(2.4, -4.3, 2.5, 0.7)
+    assert objects.seen().sigma_m.tolist() == [2.5]
 
 
 def test_of_two_just_as_near_a_contact_is_of_the_one_heard_of_first() -> None:
@@ -206,6 +208,7 @@ def test_what_objects_are_is_worked_out_once_until_there_is_news() -> None:
     objects.hear(50.0, 0.0, 0.0, 0.7)
     seen, chances = objects.known()
     assert seen.x_m.tolist() == [0.0, 50.0]
+    assert (seen.along.tolist(), seen.across.tolist()) == ([True, True], [False, False])
     assert objects.mines == pytest.approx(seen.chances(np.zeros(2))[:, 0].sum())
 
 
@@ -281,6 +284,17 @@ def test_what_objects_are_goes_by_what_the_map_has_seen_at_their_places_so_far()
     assert chances.tolist() == seen.chances(nats).tolist() != unseen.tolist()
     assert objects.known()[1] is chances
     assert objects.mines == pytest.approx(chances[0, 0] + chances[1, 0])
+
+
+def test_what_is_seen_hundreds_of_times_where_next_to_nothing_was_looked_at_still_is_something() -> None:
+    objects = Objects()
+    for _ in range(300):
+        objects.hear(0.0, 0.0, 0.0, 0.6)
+    assert objects.seen().chances(np.zeros(1))[0] == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_what_is_as_likely_a_mine_as_not_is_listed_and_that_of_which_nothing_is_known_is_not() -> None:
+    assert 1 / 3 < LISTED_FROM < 0.5
 
 
 def test_nothing_heard_is_no_mine() -> None:
