@@ -65,6 +65,45 @@ def test_with_one_mine_more_more_may_be_left(found: float) -> None:
     assert told.none < left_of(0.5, found).none
 
 
+@pytest.mark.parametrize(("scatter", "exact"), [(0.1, 1e-9), (0.3, 1e-3)])
+def test_with_scatter_it_is_a_mixture_by_nine_nodes_of_how_much_was_seen(scatter: float, exact: float) -> None:
+    west = np.broadcast_to(np.arange(10) < 3, ALL.shape)
+    told = left_of(np.where(west, 0.6, 0.2), 12, scatter, place=west)
+    mean, clearance, numbers = 0.0, 0.0, np.arange(200)
+    reached = np.zeros(numbers.size)
+    for node, weight in zip(*np.polynomial.hermite_e.hermegauss(9), strict=True):
+        share = weight / math.sqrt(2 * math.pi)
+        exponent = max(1.0 + scatter * node, 1e-9)
+        here, elsewhere = 0.6**exponent, 0.2**exponent
+        expected = 12.5 * 3 * here / (3 * (1 - here) + 7 * (1 - elsewhere))
+        mean += share * min(expected, 1e6)
+        clearance += share * (1 - here)
+        reached += share * negative_binomial(12.5, 12.5 / (12.5 + expected)).cdf(numbers)
+    if scatter < 0.2:
+        assert told.mean == pytest.approx(mean, rel=exact)
+    assert told.clearance == pytest.approx(clearance, rel=exact)
+    assert told.none == pytest.approx(reached[0], rel=exact)
+    assert [told.chance_of_at_most(number) for number in (0, 4, 9, 25)] == pytest.approx(
+        reached[[0, 4, 9, 25]], rel=exact
+    )
+    assert [told.low, told.high] == np.searchsorted(reached, [0.05, 0.95]).tolist()
+
+
+def test_of_a_place_without_a_cell_nothing_is_left() -> None:
+    told = left_of(0.5, 12, 0.1, place=~ALL)
+    assert (told.mean, told.low, told.high, told.none) == (0.0, 0, 0, 1.0)
+    assert told.clearance == pytest.approx(1.0)
+    assert told.at_most_with(0.0) == 0
+
+
+def test_of_an_area_of_which_a_hundredth_of_a_square_metre_was_seen_something_can_be_said() -> None:
+    one = np.zeros(ALL.shape, dtype=np.bool_)
+    one[2, 3] = True
+    told = mines_left(np.full(ALL.shape, 0.9), one, one, 0.1, 2.0, 0.0)
+    assert told is not None
+    assert told.mean == pytest.approx(2.5 * 9)
+
+
 def test_what_was_found_elsewhere_tells_of_a_place_and_a_place_well_seen_is_cleared() -> None:
     risk = np.full(ALL.shape, 0.5)
     risk[:, :2] = 0.0
@@ -135,8 +174,12 @@ def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None
     west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
     told = mines_left_by(fleet, inside, 20.0, 0.1, (inside & west).astype(np.float64) if of_a_part else None)
     expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, 20.0, 0.1)
+    place = (inside & west).astype(np.float64) if of_a_part else None
+    cautious = mines_left_by(fleet, inside, 20.0, 0.1, place, CAUTIOUS_MINES)
     assert told is not None
     assert expected is not None
+    assert cautious is not None
+    assert cautious.mean == pytest.approx(told.mean * 21.0 / 20.5)
     assert told.mean == pytest.approx(expected.mean, rel=1e-3 if rho else 1e-9)
     assert told.clearance == pytest.approx(expected.clearance, rel=1e-3 if rho else 1e-9)
     assert (told.low, told.high) == (expected.low, expected.high)
@@ -218,6 +261,15 @@ def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None
     one, other = -math.log(0.6), -math.log(0.4)
     mean, deviation = (one + other) / 2, (other - one) / math.sqrt(2)
     assert scatter_of([curve(0.4), curve(0.6)]) == pytest.approx(deviation / mean / math.sqrt(2))
+    # Summed up over range: of one alike up to 10 m and half as much 30 m farther on, of the other twice that.
+    one, other = -math.log(0.9), -math.log(0.95)
+    falling = DetectionCurve(np.array([0.0, 10.0, 40.0]), np.array([0.1, 0.1, 0.05]))
+    twice = replace(falling, p_detect=1.0 - (1.0 - falling.p_detect) ** 2)
+    three_times = replace(falling, p_detect=1.0 - (1.0 - falling.p_detect) ** 3)
+    assert scatter_of([falling, twice, three_times]) == pytest.approx(1.0 / 2.0 / math.sqrt(3))
+    flat = DetectionCurve(np.array([0.0, 25.0]), np.array([0.1, 0.1]))
+    areas = np.array([10 * one + 30 * (one + other) / 2, 25 * one])
+    assert scatter_of([falling, flat]) == pytest.approx(areas.std(ddof=1) / areas.mean() / math.sqrt(2))
     # A track that has seen nothing tells nothing.
     assert scatter_of([curve(0.4), curve(0.0), curve(0.6)]) == scatter_of([curve(0.4), curve(0.6)])
     assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER
