@@ -72,9 +72,9 @@ def test_many_straights_and_turns_take_as_long_as_each_alone() -> None:
 
 def test_a_turn_is_reckoned_by_sixteen_headings_and_a_straight_by_eight_places() -> None:
     points, weights = np.polynomial.legendre.leggauss(16)
-    mps = EASTWARD.made_good_mps(math.pi / 2 * (points + 1), ZERO, ZERO)
-    half_s = 5 * math.pi * float((weights / mps).sum())
-    assert EASTWARD.turns_s(10, np.array([0, 0, NORTH]), np.array(math.pi)) == pytest.approx(half_s, rel=1e-12)
+    mps = EASTWARD.made_good_mps(math.pi * (points + 1), ZERO, ZERO)
+    circle_s = 10 * math.pi * float((weights / mps).sum())
+    assert EASTWARD.turns_s(10, np.array([0, 0, NORTH]), np.array(2 * math.pi)) == pytest.approx(circle_s, rel=1e-12)
     points, weights = np.polynomial.legendre.leggauss(8)
     mps = np.sqrt(2.5**2 - (1.5 * (points + 1) / 2) ** 2)
     straight_s = Sailing(2.5, 1.5, grid=AT_FIRST).straight_s(100, Pose(10, 0, NORTH))
@@ -209,6 +209,22 @@ class TestFlowsFromPlaceToPlace:
         grid = FlowGrid(np.array([0.0, 10.0]), np.array([0.0, 10.0]), np.array([0.0]), corners, -corners)
         # A quarter east and half north: 1.25 in the south, 3.5 in the north.
         assert grid.flow_mps(0, (2.5, 5)) == pytest.approx((2.375, -2.375))
+        assert Current(6.0, 0.0, grid=grid).flow_mps(0) == pytest.approx((1.0, -1.0))  # where the frame begins
+
+    @pytest.mark.parametrize("heading_rad", [0.4, 2.1, 3.9, 5.6])
+    @pytest.mark.parametrize("turn", [-1, 0, 1])
+    def test_a_way_takes_as_long_as_its_steps_where_they_lead(self, heading_rad: float, turn: int) -> None:
+        east_mps, north_mps = np.array([[[0.1, 0.9], [-0.5, 0.3]]]), np.array([[[0.7, -0.2], [0.4, -0.9]]])
+        axes = np.array([-60.0, 80.0]), np.array([-90.0, 70.0])
+        sailing = Sailing(2.0, 1.1, grid=FlowGrid(*axes, np.array([0.0]), east_mps, north_mps))
+        path = DubinsPath(Pose(7.0, -4.0, heading_rad), 15.0, (turn, 0, 0), (40.0, 0.0, 0.0))
+        x_m, y_m, courses_rad = path.poses_at((np.arange(2000) + 0.5) * 40 / 2000).T
+        took_s = float((40 / 2000 / sailing.made_good_mps(courses_rad, x_m, y_m)).sum())
+        assert sailing.path_s(path) == pytest.approx(took_s, rel=1e-6)
+        for place in zip(x_m[::500], y_m[::500], courses_rad[::500], strict=True):
+            flow_mps = Current(1.1, 0.0, grid=sailing.grid).flow_mps(0, place[:2])
+            alone_mps = float(sailing.made_good_mps(*(np.array(one) for one in (place[2], place[0], place[1]))))
+            assert alone_mps == pytest.approx(made_good_mps(place[2], 2.0, flow_mps))
 
     def test_along_an_axis_of_one_place_it_is_the_same_everywhere(self) -> None:
         flows = np.array([[[1.0, 2.0]]])
