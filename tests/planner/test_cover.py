@@ -103,6 +103,11 @@ class TestByHand:
         # from 4 m 0 to 1 and 7 to 11 m, and 1 m is left at 6, 1 m at 13 m.
         assert fewest_tracks([(0, 1), (6, 11), (13, 14)], 3, 9) == Cover((3, 7), 7, fewest=True)
 
+    def test_a_track_that_leaves_a_run_is_taken_only_if_there_are_tracks_for_that(self) -> None:
+        # From 5 m 6 to 11 m are seen with a range of 6 m.
+        assert fewest_tracks([(6, 8), (9, 11)], 1, 9) == Cover((5,), 6, fewest=True)
+        assert len(fewest_tracks([(2, 5), (7, 16)], 1, 9).offsets_m) == 2
+
     def test_three_tracks_are_found_where_what_lies_last_needs_two(self) -> None:
         # A side sees 2 m, the other 4 m beyond: 1 to 3 and 5 to 7 m, 3 to 5 and 7 to 9 m, 5 to 7 and 9 to 11 m.
         assert fewest_tracks([(1, 3), (4, 11)], 1, 3) == Cover((4, 6, 8), 3, fewest=True)
@@ -132,6 +137,15 @@ class TestByHand:
         found = fewest_tracks(left, 40, 66)
         assert (best.fewest, found.fewest) == (True, False)
         assert len(found.offsets_m) > len(best.offsets_m)
+
+    def test_once_the_fewest_are_found_a_smaller_range_is_looked_for_as_long(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        left: list[Span] = [(0, 4), (5, 9), (24, 27), (31, 34), (37, 48)]
+        found = fewest_tracks(left, 2, 40)
+        monkeypatch.setattr(cover, "STEPS_FOR_ANY", 0)
+        assert fewest_tracks(left, 2, 40) == found
+        assert found.range_m < 40
 
 
 class TestSearch:
@@ -273,6 +287,7 @@ class TestRefusals:
             ([(0, 10)], 40, float("inf"), "finite and 0 or more"),
             ([(0, 10)], float("nan"), 100, "finite and 0 or more"),
             ([(-5, 10)], 40, 100, "must lie at 0 or more"),
+            ([(20, 30), (-0.5, 10)], 40, 100, "must lie at 0 or more, not from -0.5 to 10 m"),
             ([(0, float("inf"))], 40, 100, "must lie at 0 or more"),
         ],
     )
