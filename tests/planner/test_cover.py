@@ -114,6 +114,7 @@ class TestByHand:
 
     def test_where_nothing_is_left_no_track_is_needed(self) -> None:
         assert fewest_tracks([], 40, 100).offsets_m == ()
+        assert fewest_tracks([(5, 5), (320, 400)], 40, 100) == fewest_tracks([(320, 400)], 40, 100)
 
     def test_lengths_between_whole_metres(self) -> None:
         # Counted inward: a nadir gap of 40.2 m as 41 m, a range of 99.9 m as 99 m, 3.5 to 59.2 m as 3 to 60 m.
