@@ -108,6 +108,12 @@ class TestByHand:
         assert fewest_tracks([(6, 8), (9, 11)], 1, 9) == Cover((5,), 6, fewest=True)
         assert len(fewest_tracks([(2, 5), (7, 16)], 1, 9).offsets_m) == 2
 
+    def test_two_tracks_are_found_that_see_something_with_the_first_cell_of_a_side_or_the_last(self) -> None:
+        # From 3 m 6 to 10 m are seen, from 7 m 0 to 4 m and 10 to 14 m.
+        assert len(fewest_tracks([(1, 2), (6, 9), (10, 13)], 3, 7).offsets_m) == 2
+        # From 3 m 8 to 15 m are seen, from 10 m -2 to 5 m and 15 to 22 m.
+        assert len(fewest_tracks([(1, 4), (8, 9), (11, 14), (15, 16)], 5, 12).offsets_m) == 2
+
     def test_three_tracks_are_found_where_what_lies_last_needs_two(self) -> None:
         # A side sees 2 m, the other 4 m beyond: 1 to 3 and 5 to 7 m, 3 to 5 and 7 to 9 m, 5 to 7 and 9 to 11 m.
         assert fewest_tracks([(1, 3), (4, 11)], 1, 3) == Cover((4, 6, 8), 3, fewest=True)
