@@ -46,6 +46,8 @@ def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> 
     assert told.mean == pytest.approx(20.5)
     assert told.none == pytest.approx(0.5**20.5)
     assert told.clearance == pytest.approx(0.5)
+    assert told == left_of(0.5, 20) != left_of(0.5, 21)
+    assert "reached" not in repr(told)  # hundreds of numbers
 
 
 @pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5), (0.001, 1e7)])
@@ -220,7 +222,9 @@ def test_where_nothing_was_seen_nothing_can_be_said() -> None:
     assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, 0, 0.2) is None
 
 
-@pytest.mark.parametrize(("found", "scatter"), [(-1.0, 0.0), (math.nan, 0.0), (3.0, -0.1), (3.0, math.inf)])
+@pytest.mark.parametrize(
+    ("found", "scatter"), [(-1.0, 0.0), (math.nan, 0.0), (3.0, -0.1), (3.0, math.inf), (math.inf, 0.1)]
+)
 def test_what_makes_no_sense_is_refused(found: float, scatter: float) -> None:
     with pytest.raises(ValueError, match="found and scatter must be at least 0 and finite"):
         left_of(0.5, found, scatter)
