@@ -98,6 +98,11 @@ def test_of_a_place_without_a_cell_nothing_is_left() -> None:
     assert told.at_most_with(0.0) == 0
 
 
+def test_where_looks_may_have_seen_nothing_at_all_a_place_that_is_surely_seen_is_no_mistake() -> None:
+    risk = np.where(np.arange(10) < 3, 0.0, 0.5)
+    assert 0.0 < left_of(risk, 12, 0.5).none < left_of(risk, 12, 0.1).clearance
+
+
 def test_of_an_area_of_which_a_hundredth_of_a_square_metre_was_seen_something_can_be_said() -> None:
     one = np.zeros(ALL.shape, dtype=np.bool_)
     one[2, 3] = True
@@ -147,6 +152,8 @@ def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: floa
     assert told.chance_of_at_most(1e9) == pytest.approx(1.0)
     # What is summed up may end short of 1.
     assert replace(told, reached=np.array([0.5, 0.9, 1.0 - 1e-12])).at_most_with(1.0) == 2
+    few = replace(told, reached=np.array([0.5, 0.9, 1.0]))
+    assert [few.chance_of_at_most(number) for number in (0, 1, 2, 7)] == [0.5, 0.9, 1.0, 1.0]
     for chance in (0.1, 0.5, 0.9):
         assert told.at_most_with(chance) == true.ppf(chance)
     assert told.chance_of_at_most(told.at_most_with(1.0)) == pytest.approx(1.0)
