@@ -101,6 +101,11 @@ def test_of_a_place_without_a_cell_nothing_is_left() -> None:
 def test_where_looks_may_have_seen_nothing_at_all_a_place_that_is_surely_seen_is_no_mistake() -> None:
     risk = np.where(np.arange(10) < 3, 0.0, 0.5)
     assert 0.0 < left_of(risk, 12, 0.5).none < left_of(risk, 12, 0.1).clearance
+    assert left_of(risk, 12, 1.0).reached[-1] == pytest.approx(1.0)
+
+
+def test_no_more_numbers_of_mines_are_told_of_than_count() -> None:
+    assert 40 < left_of(0.5, 3).reached.size < 100
 
 
 def test_of_an_area_of_which_a_hundredth_of_a_square_metre_was_seen_something_can_be_said() -> None:
@@ -283,4 +288,4 @@ def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None
     assert scatter_of([falling, flat]) == pytest.approx(areas.std(ddof=1) / areas.mean() / math.sqrt(2))
     # A track that has seen nothing tells nothing.
     assert scatter_of([curve(0.4), curve(0.0), curve(0.6)]) == scatter_of([curve(0.4), curve(0.6)])
-    assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER
+    assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER == 0.3
