@@ -286,6 +286,9 @@ def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None
     flat = DetectionCurve(np.array([0.0, 25.0]), np.array([0.1, 0.1]))
     areas = np.array([10 * one + 30 * (one + other) / 2, 25 * one])
     assert scatter_of([falling, flat]) == pytest.approx(areas.std(ddof=1) / areas.mean() / math.sqrt(2))
+    # So are tracks of a sonar that hardly sees anything.
+    little = [curve(1.0 - math.exp(-0.004)), curve(1.0 - math.exp(-0.008))]
+    assert scatter_of(little) == pytest.approx(0.002 / 0.006)
     # A track that has seen nothing tells nothing.
     assert scatter_of([curve(0.4), curve(0.0), curve(0.6)]) == scatter_of([curve(0.4), curve(0.6)])
     assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER == 0.3
