@@ -91,6 +91,13 @@ def test_with_scatter_it_is_a_mixture_by_nine_nodes_of_how_much_was_seen(scatter
     assert [told.low, told.high] == np.searchsorted(reached, [0.05, 0.95]).tolist()
 
 
+@pytest.mark.parametrize("scatter", [0.0, 0.3, 0.5, 0.9])
+def test_the_mean_is_that_of_the_chances_also_where_looks_may_have_seen_nothing(scatter: float) -> None:
+    told = left_of(0.4, 12, scatter)
+    assert told.mean == pytest.approx((1.0 - told.reached).sum(), rel=1e-3)
+    assert 0.0 < told.clearance < 1.0
+
+
 def test_of_a_place_without_a_cell_nothing_is_left() -> None:
     told = left_of(0.5, 12, 0.1, place=~ALL)
     assert (told.mean, told.low, told.high, told.none) == (0.0, 0, 0, 1.0)

@@ -145,6 +145,16 @@ class TestByHand:
         assert (best.fewest, found.fewest) == (True, False)
         assert len(found.offsets_m) > len(best.offsets_m)
 
+    def test_a_search_with_less_time_than_a_cover_has_tracks_ends_all_the_same(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        left = after_a_survey(random.Random(31), 1212, 40, 66)
+        monkeypatch.setattr(cover, "MOST_STEPS", 0)
+        monkeypatch.setattr(cover, "STEPS_FOR_ANY", 5)
+        found = fewest_tracks(left, 40, 66)
+        assert not found.fewest
+        assert len(found.offsets_m) > 5
+
     def test_once_the_fewest_are_found_a_smaller_range_is_looked_for_as_long(
         self, monkeypatch: pytest.MonkeyPatch
     ) -> None:
