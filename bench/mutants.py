@@ -182,7 +182,7 @@ def judged() -> list[Judged]:
 def changed(diff: str) -> tuple[str, str]:
     """The lines as they were and as they are, without what surrounds them."""
     lines = [line for line in diff.splitlines() if not line.startswith(("---", "+++"))]
-    was, becomes = (" ".join(line[1:].strip() for line in lines if line.startswith(sign)) for sign in "-+")
+    was, becomes = (" ".join(line[1:].strip() for line in lines if line.startswith(sign)).strip() for sign in "-+")
     return was, becomes
 
 

@@ -45,8 +45,8 @@ class StripLife:
         inside: BoolArray,
         sectors: Sectors,
         outbox: Outbox,
-        answer_within_ms: int = ANSWER_WITHIN_MS,
-        looks_within_ms: int = 0,
+        answer_within_ms: int,
+        looks_within_ms: int,
     ) -> None:
         self.ledger = ledger
         self._fleet = fleet
@@ -81,7 +81,7 @@ class StripLife:
         """Withdraws an open strip, where none is cut any more."""
         self._move(record, StripState.WITHDRAWN, now_ms, "no longer worth a second look, or part of another strip")
 
-    def offer(self, number: int, name: str, expected: Service, now_ms: int, *, as_next: bool = False) -> None:
+    def offer(self, number: int, name: str, expected: Service, now_ms: int, *, as_next: bool) -> None:
         """Offers an open strip to a vehicle. `expected`: how the service is expected to go. `as_next`: it is to serve
         it when it is done with the strip that it has."""
         record, vehicle = self.ledger.get(number), self._fleet.vehicles[name]

@@ -77,7 +77,7 @@ def mines_left(
     if not (0.0 <= found < math.inf and 0.0 <= scatter < math.inf):
         raise ValueError(f"found and scatter must be at least 0 and finite, not {found} and {scatter}")
     nodes, shares = np.polynomial.hermite_e.hermegauss(NODES)
-    chances, means, cleared = np.zeros(1), 0.0, 0.0
+    chances, means, cleared, kept = np.zeros(1), 0.0, 0.0, 0.0
     shares = shares / shares.sum()
     area = np.broadcast_to(np.asarray(weights, dtype=np.float64) * cell_area_m2, risk.shape)
     for node, share in zip(nodes.tolist(), shares.tolist(), strict=True):
@@ -88,6 +88,7 @@ def mines_left(
             if scatter == 0.0 or node == 0.0:
                 return None
             continue
+        kept += share
         expected = (found + prior_mines) * left_m2 / seen_m2
         chances = _sum(chances, share * _negative_binomial(found + prior_mines, expected))
         means += share * expected
@@ -97,11 +98,11 @@ def mines_left(
     reached = chances.cumsum() / total
     return MinesLeft(
         found=found,
-        mean=means,
+        mean=means / kept,
         low=int(np.searchsorted(reached, LOW)),
         high=int(np.searchsorted(reached, HIGH)),
         none=float(chances[0]) / total,
-        clearance=cleared,
+        clearance=cleared / kept,
         reached=reached,
     )
 

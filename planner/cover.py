@@ -118,7 +118,8 @@ class _Search:
     def fewest(self) -> tuple[list[int], bool]:
         """Offsets of tracks that cover the cells, and whether they are proven to be the fewest."""
         tracks, proven = self._least(self._cells)[0], True
-        while (found := self.with_tracks(tracks, max(MOST_STEPS - self._steps, STEPS_FOR_ANY))) is None:
+        # So many tracks as suffice in whatever order they are tried are found in as many steps.
+        while (found := self.with_tracks(tracks, max(MOST_STEPS - self._steps, STEPS_FOR_ANY, tracks))) is None:
             proven &= self._steps <= MOST_STEPS
             tracks += 1
         return found, proven

@@ -101,7 +101,7 @@ def _mixed(one: Value, other: Value, share: Value) -> Value:
 
 def _node(axis: list[float], at: float) -> tuple[int, float]:
     """The node before a place on an axis, and how far it is on the way to the next, [0, 1]."""
-    if at <= axis[0] or len(axis) == 1:
+    if at <= axis[0]:
         return 0, 0.0
     if at >= axis[-1]:
         return len(axis) - 1, 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 from typing import Literal
 
@@ -9,9 +10,14 @@ import numpy as np
 import pytest
 from by_hand import HELPER, PRIMARY, SECOND_HELPER, run_info, vehicle
 from coordinator_by_hand import DONE, ELSEWHERE, GRID, HOT, OFFERED, OPEN, TWO_HELPERS, WITHDRAWN, Told, coordinator
+from one_node import OneNode
+from situations import at_work, helper, open_strip, situation, strip
 
-from comms.said.announcement import Role
-from comms.said.messages import AgentState, Mode, StripStatus, TaskState
+from comms.said.announcement import Role, Vertex, Zone
+from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripStatus, TaskState
+from coordinator.coordinator import Coordinator
+from coordinator.cut.window import Window
+from coordinator.fixed import FixedRoutes, _lanes
 from planner.region import Region
 from planner.types import BoolArray
 
@@ -153,8 +159,107 @@ class TestSharing:
         assert flown == [1, 2, 3, 4, 10]  # 5 to 9 are the other's; 10 is where 4 is
         assert at_x_m(told)[9:] == [22.5, 72.5, 122.5, 172.5]
 
+    def test_of_two_at_one_place_the_first_name_has_the_first_lanes(self) -> None:
+        vehicles = (TWO_HELPERS[0], vehicle("west", Role.REVISIT), vehicle("a-west", Role.REVISIT))
+        told = coordinator(vehicles, idle=("west", "a-west"), strips="lanes")
+        assert {name: told.strips()[number].start_x_m for name, _, number in told.tasks()} == {
+            "a-west": 172.5,
+            "west": 222.5,
+        }
+
+    @pytest.mark.parametrize(("x_m", "first_m"), [(202.4, 22.5), (202.5, 22.5), (202.6, 377.5)])
+    def test_who_lies_beyond_the_middle_begins_at_the_far_end(self, x_m: float, first_m: float) -> None:
+        told = coordinator(idle=(), strips="lanes")
+        told.node.hear(f"agent/{HELPER}/state", AgentState(Mode.IDLE, 0, 1, 0, x_m, 0, 0, 0, 0))
+        told.settle()
+        assert at_x_m(told)[0] == first_m
+
+    def test_who_is_wider_has_more(self) -> None:
+        # 30 m beside 50 m of 81 columns: 30 and 51.
+        narrow = (*TWO_HELPERS[:1], replace(TWO_HELPERS[1], far_m=15.0), TWO_HELPERS[2])
+        told = coordinator(narrow, idle=BOTH, strips="lanes")
+        assert {one.width_m: one.start_x_m for one in told.strips().values() if one.start_x_m < 200} == {
+            **dict.fromkeys([30.0], 12.5),
+            **dict.fromkeys([50.0], 172.5),
+        }
+
+
+class TestWhatLanesAre:
+    def test_a_lane_is_worth_what_the_poorest_look_takes_of_its_cells_inside_and_is_foreseen(self) -> None:
+        poor = (*TWO_HELPERS[:2], replace(TWO_HELPERS[2], p_detect=0.4))
+        told = coordinator(poor, idle=BOTH, strips="lanes", area=DENTED)
+        inside = Region(DENTED).inside(GRID)
+        for one in told.strips().values():
+            assert one.removable_m2 == pytest.approx(0.4 * 25 * inside[cells_of(one)].sum(), rel=1e-3)
+            assert (one.foreseen, one.why) == (True, "a lane")
+
+    def test_who_has_failed_at_its_last_lane_begins_anew(self) -> None:
+        told = coordinator(strips="lanes", area=((0.0, 0.0), (40.0, 0.0), (40.0, 400.0), (0.0, 400.0)))
+        assert told.states() == {1: OFFERED}
+        told.status(HELPER, 1, TaskState.FAILED, "no")
+        told.keep_alive([PRIMARY, HELPER], 1)
+        told.settle()
+        assert list(told.states())[:2] == [1, 2]
+
+    def test_one_is_no_wider_than_the_area(self) -> None:
+        told = coordinator(strips="lanes")
+        narrow = Told(OneNode(Coordinator(told.node.node.config), Role.COORDINATOR))  # type: ignore[attr-defined]
+        narrow.node.hear("run", run_info(20, 400), at_ms=1)
+        narrow.state(HELPER, Mode.IDLE)
+        narrow.settle()
+        assert [(one.width_m, one.length_m) for one in narrow.strips().values()] == [(25, 400)]  # five columns
+
+    def test_where_no_cell_is_inside_there_is_none(self) -> None:
+        inside = np.zeros((10, 20), dtype=np.bool_)
+        inside[3:8, 2:6] = inside[5:9, 17:] = True
+        assert _lanes(inside, 0, 20, 4) == [Window(3, 8, 0, 4), Window(3, 8, 4, 8), Window(5, 9, 16, 20)]
+        assert _lanes(inside, 14, 19, 4) == [Window(5, 9, 14, 18), Window(5, 9, 16, 20)]
+        assert _lanes(inside, 0, 20, 20) == [Window(3, 9, 0, 20)]
+
+    def test_what_cannot_be_flown_of_them_is_left_out(self) -> None:
+        # A zone right across the first two lanes: 1.5 m off it stays a run-out of 5 m, and a turn of 6 m after that.
+        told = coordinator(idle=(), strips="lanes")
+        config = told.node.node.config  # type: ignore[attr-defined]
+        zone = Zone(tuple(Vertex(*corner) for corner in ((-20, 200), (90, 200), (90, 220), (-20, 220))))
+        told = Told(OneNode(Coordinator(config), Role.COORDINATOR))
+        told.node.hear("run", replace(run_info(400, 400), keep_out=(zone,), keep_out_margin_m=1.5), at_ms=1)
+        told.state(PRIMARY, Mode.SURVEY, 1)
+        told.state(HELPER, Mode.IDLE)
+        told.settle()
+        lanes = [(one.start_x_m, one.start_y_m, one.length_m) for _, one in sorted(told.strips().items())]
+        assert lanes[4:] == [(x_m, 0, 400) for x_m in (122.5, 172.5, 222.5, 272.5, 322.5, 372.5, 377.5)]
+        assert lanes[:4] == [(x_m, y_m, long_m) for x_m in (22.5, 72.5) for y_m, long_m in ((0, 185), (235, 165))]
+
+
+def test_each_is_offered_the_next_of_its_own_that_is_there_and_that_it_has_not_refused() -> None:
+    routes = FixedRoutes({"alpha": [4, 2, 3, 1], "beta": [6, 5], "gamma": [9]})
+    jobs = [open_strip(strip(number)) for number in (1, 2, 3, 5, 6)]
+    alpha = helper("alpha", refused=frozenset({2}))
+    told = situation(jobs, [alpha, at_work(helper("beta"), jobs[0]), helper("gamma"), helper("delta")])
+    assert routes.assign(told) == {"alpha": 3}
+    assert routes.assign(situation(jobs, [helper("alpha"), helper("beta")])) == {"alpha": 2, "beta": 6}
+
 
 class TestBeforehand:
+    def test_nothing_is_planned_before_all_primaries_have_said_their_plans_and_all_helpers_were_heard(self) -> None:
+        second = vehicle("another", Role.SURVEY)
+        told = coordinator((*TWO_HELPERS[:2], second), idle=(), strips="beforehand")
+        told.plan(60.0, 180.0)
+        told.settle()
+        track = PlannedTrack(1, 300, 300, 0, 300, 400, False)
+        told.node.hear("agent/another/plan", Plan(1, (track,), (60,), (), ""))
+        told.keep_alive([PRIMARY, "another"], 1)
+        told.settle()
+        assert told.strips() == {}
+        told.state(HELPER, Mode.IDLE)
+        told.settle()
+        assert told.strips() != {}
+        told = coordinator((*TWO_HELPERS[:2], second), strips="beforehand", deadline_s=2000.0)
+        told.hotspot()
+        told.plan(60.0, 180.0)
+        told.settle()
+        assert told.strips() == {}
+
     def test_nothing_is_planned_before_the_primary_has_said_its_plan(self) -> None:
         told = coordinator(strips="beforehand")
         told.hotspot()
@@ -175,6 +280,14 @@ class TestBeforehand:
             routes.append(sum(one.state is not WITHDRAWN for one in told.strips().values()))
         assert routes[0] > routes[1] == 2
         assert routes[2] == 1
+
+    @pytest.mark.parametrize(("p_detect", "most"), [(0.7, 1), (0.3, 2)])
+    def test_a_place_that_is_worth_another_look_is_planned_twice(self, p_detect: float, most: int) -> None:
+        poor = (TWO_HELPERS[0], replace(TWO_HELPERS[1], p_detect=p_detect))
+        told = coordinator(poor, strips="beforehand", deadline_s=3000.0)
+        told.plan(60.0, 180.0, 300.0)
+        told.settle()
+        assert max(Counter((one.start_x_m, one.start_y_m) for one in told.strips().values()).values()) == most
 
     def test_strips_stay_as_first_planned(self) -> None:
         told = coordinator(strips="beforehand")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from by_hand import PRIMARY, SECOND_HELPER, vehicle
@@ -12,7 +14,7 @@ from comms.said.announcement import Role
 from comms.said.messages import Plan, PlannedTrack
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
-from coordinator.reasons import Reasons
+from coordinator.reasons import Reasons, _apart, _best_m, _evenly, _listed
 from coordinator.vehicles import KnownVehicle
 from planner.types import DetectionCurve, GridSpec, SweepFrame
 from secondlook.testing.checks.any_mail import any_message
@@ -96,3 +98,89 @@ def test_whatever_the_plan_it_is_told_in_words(plan: Plan, foreseen: bool, risk:
     told = why(lane(0, 50, foreseen=foreseen), one, risk=np.full(GRID.shape, risk))
     assert told.startswith("expected" if foreseen else ("seen badly", "badly seen"))
     assert (": " in told) is bool(plan.tracks)
+
+
+@pytest.mark.parametrize(
+    ("weights", "words"),
+    [
+        ((1, 1, 1, 1), "tracks 1, 2 and 3"),
+        ((4, 1, 2, 3), "tracks 1 and 4"),
+        ((3, 1, 0, 0), "tracks 1 and 2"),
+        ((3, 0.99, 0, 0), "track 1"),
+        ((0, 0.99, 3, 0), "track 3"),
+    ],
+)
+def test_three_tracks_at_most_are_named_and_from_a_quarter_of_the_risk_on(
+    weights: tuple[float, ...], words: str
+) -> None:
+    # One row right below each of four tracks, which are looked at all.
+    tracks = tuple(PlannedTrack(n, 0, 300, 2.5 + 5 * n, 320, 2.5 + 5 * n, False) for n in range(1, 5))
+    one = KnownVehicle(vehicle(PRIMARY, Role.SURVEY), 0, plan=Plan(1, tracks, (60,), (), ""), curves={1: CURVE})
+    risk = np.zeros(GRID.shape)
+    risk[1:5, 60:64] = np.array(weights)[:, np.newaxis]
+    told = why(Cut(Window(1, 5, 60, 64), 100, 100, foreseen=True), one, risk=risk)
+    assert told == f"expected beside {words}: nadir gap"
+
+
+@pytest.mark.parametrize(
+    ("apart_m", "cause"),
+    [(15, "nadir gap"), (16, "even where tracks see best"), (69, "even where tracks see best"), (70, "range's end")],
+)
+def test_where_it_sees_best_it_sees_half_as_well_as_anywhere_or_better(apart_m: float, cause: str) -> None:
+    assert why(lane(200, 200), primary(200 - apart_m)) == f"expected beside track 1: {cause}"
+    assert why(lane(200, 200), primary(200 + apart_m)) == f"expected beside track 1: {cause}"
+
+
+@pytest.mark.parametrize(
+    ("p_detect", "best_m"),
+    [
+        ((0.4, 0.8, 0.4), (-1.0, 20.0)),  # just half of it is not low
+        ((0.39, 0.8, 0.39), (0.0, 20.0)),
+        ((0.1, 0.3, 0.39, 0.8, 0.5, 0.39, 0.1), (20.0, 50.0)),
+        ((0.8, 0.1, 0.8, 0.1, 0.1), (-1.0, 10.0)),  # of two that are best the first
+    ],
+)
+def test_between_which_ranges_it_sees_best(p_detect: tuple[float, ...], best_m: tuple[float, float]) -> None:
+    assert _best_m(DetectionCurve(np.arange(0.0, 10.0 * len(p_detect), 10.0), np.array(p_detect))) == best_m
+
+
+def test_places_are_apart_from_a_track_and_beyond_its_ends() -> None:
+    # From (10, 20) 50 m up a slope of 3 to 4; beside it, before it, and behind it aside.
+    slope = PlannedTrack(1, 0, 10, 20, 40, 60, False)
+    x_m, y_m = np.array([25 + 8.0, 10 - 6.0, 40 + 3.0 - 8.0]), np.array([40 - 6.0, 20 - 8.0, 60 + 4.0 + 6.0])
+    apart_m, is_beyond = _apart(x_m, y_m, [slope, replace(slope, start_x_m=0.0, end_x_m=30.0)])
+    assert apart_m[0] == pytest.approx([10, 10, np.hypot(5, 10)])
+    assert is_beyond[0].tolist() == [False, True, True]
+    assert apart_m.shape == is_beyond.shape == (2, 3)
+    short_m, _ = _apart(np.array([4.0]), np.array([7.25]), [PlannedTrack(2, 0, 7, 7, 7, 7.5, False)])
+    assert short_m == pytest.approx(np.array([[3.0]]))
+
+
+def test_at_most_twelve_cells_to_a_side_are_looked_at_evenly_with_both_ends() -> None:
+    assert _evenly(5, 9) == [5, 6, 7, 8]
+    assert _evenly(3, 4) == [3]
+    assert _evenly(10, 22) == list(range(10, 22))
+    assert _evenly(10, 33) == list(range(10, 33, 2))
+    assert _evenly(0, 112) == [0, 10, 20, 30, 40, 50, 61, 71, 81, 91, 101, 111]
+
+
+def test_words_are_listed_with_an_and_before_the_last() -> None:
+    assert [_listed(words) for words in (["a"], ["a", "b"], ["a", "b", "c"])] == ["a", "a and b", "a, b and c"]
+
+
+def test_of_ground_without_risk_each_place_weighs_the_same() -> None:
+    told = why(lane(90, 110), primary(100, 250), risk=np.zeros(GRID.shape))
+    assert told == "expected beside track 1: nadir gap"
+
+
+def test_of_several_primaries_each_sees_as_its_own_curve_tells_and_tracks_are_told_in_order() -> None:
+    one, other = primary(100), primary(0, 250, name="a-second")
+    other.curves = {1: DetectionCurve(np.array([0.0, 20, 25, 90]), np.array([0.8, 0.8, 0.1, 0.0]))}
+    assert why(lane(130, 150), one, other) == f"expected beside {PRIMARY}'s track 1: even where tracks see best"
+    assert why(lane(200, 220), one, other) == "expected beside a-second's track 2: range's end"
+    half = np.zeros(GRID.shape)
+    half[:, 34], half[:, 36] = 1.0, 2.0
+    assert (
+        why(lane(170, 180), one, other, risk=half)
+        == f"expected beside a-second's track 2 and {PRIMARY}'s track 1: range's end"
+    )

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from by_hand import PRIMARY, run_info, vehicle
+from coordinator_by_hand import coordinator
 from hypothesis import given
 from hypothesis import strategies as st
 from one_node import received
@@ -17,11 +18,15 @@ from situations import helper
 
 from comms.said.announcement import Role, Vertex
 from comms.said.codec import Header
-from comms.said.messages import Hotspot, HotspotState, Plan, PlannedTrack
+from comms.said.messages import CoverageTile, Hotspot, HotspotState, Plan, PlannedTrack
 from coordinator.agenda import Agenda, Item
+from coordinator.allocate.situation import Helper
+from coordinator.coordinator import Coordinator, _sectors
 from coordinator.cut.window import Window
 from coordinator.fleet import KnownFleet
-from coordinator.sectors import STAYS_S, Sectors, laid_out
+from coordinator.sectors import Sector, Sectors, laid_out
+from coordinator.vehicles import KnownVehicle
+from planner.tiles import tiles
 from planner.types import Point
 
 SOUTH, NORTH = Window(0, 40, 0, 81), Window(40, 80, 0, 81)  # of 400 m by 400 m, in cells of 5 m
@@ -130,6 +135,83 @@ class TestWhereSomethingMatters:
         assert laid.sectors.touched(Window(39, 41, 3, 9)) == [laid.south, laid.north]
         assert laid.sectors.touched(Window(40, 41, 3, 9)) == [laid.north]
 
+    def test_a_strip_lies_east_of_the_middle_or_west(self) -> None:
+        laid = Laid(WEST, EAST)
+        for first, end, number in ((0, 79, 0), (0, 80, 1), (39, 40, 0), (39, 41, 1), (70, 81, 1)):
+            assert laid.sectors.of(Window(70, 78, first, end)).number == number
+
+    def test_what_is_learnt_is_learnt_where_it_lies(self) -> None:
+        laid = Laid()
+        levels, settled = np.full((80, 81), 4, dtype=np.uint8), np.ones((80, 81), dtype=np.bool_)
+        for tile in tiles(laid.fleet.map.grid):
+            part = levels[tile.window]
+            told = CoverageTile(1, tile.first_row, tile.first_column, part, part, settled[tile.window])
+            assert laid.fleet.hear_tile(received(f"agent/alpha/coverage/{tile.name}", told), told)
+        laid.sectors.learn(Window(0, 20, 0, 30), "alpha", np.zeros((20, 30), dtype=np.uint8), 0.7)
+        assert laid.south.expected.now().look.max() < 0.4
+        assert laid.north.expected.now().look == pytest.approx(0.7)
+
+    def test_the_cells_about_places_are_those_beside_them_too(self) -> None:
+        x_m, y_m = np.array([22.0, 61.0]), np.array([138.0, 31.0])
+        for beside_m, window in ((0.0, Window(6, 28, 4, 14)), (7.0, Window(4, 30, 3, 15))):
+            assert Laid().sectors._window_about(x_m, y_m, beside_m) == window
+
+    def test_where_there_is_one_sector_it_is_told_of_each_hotspot(self) -> None:
+        laid = Laid()
+        laid.sectors = Sectors([laid.south], laid.fleet.map.grid, Agenda())
+        assert laid.told_hotspot(1, (20, 320), (60, 320), (60, 360)) == [0]
+
+    def test_of_helpers_for_two_teams_and_a_half_there_are_two(self) -> None:
+        homes = {name: (0.0, float(place)) for place, name in enumerate("abcde")}
+        found = laid_out(np.ones((100, 300), dtype=np.bool_), homes, 2, 20)
+        assert found == [(Window(0, 100, 0, 150), ["a", "b"]), (Window(0, 100, 150, 300), ["c", "d", "e"])]
+
+    def test_where_there_is_one_sector_all_matters_in_it_wherever_it_lies(self) -> None:
+        laid = Laid()
+        sectors = Sectors([laid.south], laid.fleet.map.grid, Agenda())
+        far = Plan(1, (PlannedTrack(1, 0, 0, 2000, 400, 2000, False),), (), (), "")
+        assert sectors.surveyed_by(KnownVehicle(vehicle(PRIMARY, Role.SURVEY), 0, plan=far)) == [laid.south]
+        assert laid.sectors.surveyed_by(KnownVehicle(vehicle(PRIMARY, Role.SURVEY), 0, plan=far)) == []
+
+    def test_one_that_surveys_and_takes_strips_matters_where_it_does_either(self) -> None:
+        laid = Laid()
+        both = replace(vehicle("alpha", Role.SURVEY), role=Role.SURVEY_REVISIT)
+        for y_m, numbers in ((20.0, [0]), (380.0, [1, 0])):
+            one = KnownVehicle(both, 0, plan=Plan(1, (PlannedTrack(1, 0, 0, y_m, 400, y_m, False),), (), (), ""))
+            assert [sector.number for sector in laid.sectors.about(one)] == numbers
+        assert laid.sectors.about(KnownVehicle(vehicle("nobody", Role.REVISIT), 0)) == []
+
+    def test_of_three_teams_each_has_a_third(self) -> None:
+        names = ("a", "b", "c", "d", "e", "f")
+        homes = {name: (0.0, 300.0 - place) for place, name in enumerate(names)}
+        assert laid_out(np.ones((100, 300), dtype=np.bool_), homes, 2, 20) == [
+            (Window(0, 100, 0, 100), ["e", "f"]),
+            (Window(0, 100, 100, 200), ["c", "d"]),
+            (Window(0, 100, 200, 300), ["a", "b"]),
+        ]
+
+    @pytest.mark.parametrize(("columns", "at"), [(slice(0, 10), 20), (slice(290, 300), 280), (slice(30, 60), 45)])
+    def test_none_is_narrower_than_the_least_wherever_the_area_lies(self, columns: slice, at: int) -> None:
+        inside = np.zeros((100, 300), dtype=np.bool_)
+        inside[:, columns] = True
+        homes = {name: (0.0, float(place)) for place, name in enumerate(HELPERS)}
+        assert [window for window, _ in laid_out(inside, homes, 2, 20)] == [
+            Window(0, 100, 0, at),
+            Window(0, 100, at, 300),
+        ]
+
+    @pytest.mark.parametrize(("side_m", "count"), [(390, 1), (400, 2)])
+    def test_one_is_four_swaths_wide_and_long(self, side_m: float, count: int) -> None:
+        # 390 m are 79 columns and 78 rows, 400 m 81 and 80; four swaths of 50 m are 40.
+        fleet = (
+            vehicle(PRIMARY, Role.SURVEY),
+            *(vehicle(name, Role.REVISIT) for name in (*HELPERS, "epsilon", "zeta")),
+        )
+        node = coordinator(fleet, idle=()).node.node
+        assert isinstance(node, Coordinator)
+        known = KnownFleet(run_info(side_m, side_m, vehicles=fleet), 30_000, 30_000, 0)
+        assert len(_sectors(node.config, known, np.ones(known.map.grid.shape, dtype=np.bool_), 0.7)) == count
+
     def test_what_is_cut_is_what_the_news_touches(self) -> None:
         laid = Laid()
         laid.sectors.cut_by(7_000, [Window(0, 20, 0, 20)])
@@ -164,6 +246,10 @@ class TestWhereSomethingMatters:
         assert laid.north.expected.hotspots.drawn()[0].any()
         assert laid.told_hotspot(3) == [0, 1]
         assert not laid.north.expected.hotspots.drawn()[0].any()
+
+    def test_a_hotspot_is_told_where_any_of_its_corners_lies(self) -> None:
+        for south_m, north_m, touched in ((100, 200.4, [0, 1]), (199.6, 300, [0, 1]), (200.4, 300, [1])):
+            assert Laid().told_hotspot(1, (20, south_m), (60, south_m), (60, north_m)) == touched
 
     def test_of_sectors_side_by_side_a_hotspot_is_told_the_one_in_which_it_lies(self) -> None:
         assert Laid(WEST, EAST).told_hotspot(1, (20, 320), (60, 320), (60, 360)) == [0]
@@ -213,12 +299,12 @@ class TestTeams:
         laid = Laid()
         laid.sectors.join("alpha", laid.north, 100_000)
         laid.south.price = 10.0
-        assert self.better(laid, 100 + STAYS_S - 1) is None
-        assert self.better(laid, 100 + STAYS_S) == 0
+        assert self.better(laid, 100 + 599.99) is None
+        assert self.better(laid, 100 + 600) == 0
 
     def test_where_nothing_is_left_nobody_stays(self) -> None:
         laid = Laid()
-        laid.south.is_worth = False
+        laid.south.is_worth, laid.north.price = False, 0.0005  # 0.9 in all
         assert self.better(laid) == 1
         laid.north.is_worth = False
         assert self.better(laid) is None
@@ -247,6 +333,49 @@ class TestTeams:
         assert laid.sectors.better_for(one, 100, 100 + deadline_s) is None
         laid.north.price = 3.3
         assert laid.sectors.better_for(one, 100, 100 + deadline_s) is laid.north
+
+    def test_half_as_much_again_and_more_is_clearly_more(self) -> None:
+        laid = Laid()
+        for price, joins in ((3.0, None), (3.001, 1)):  # right between both, 2000 m to fly in either
+            laid.north.price = price
+            assert self.better(laid, y_m=200) == joins
+
+    def test_where_nobody_is_a_metre_counts_three_times(self) -> None:
+        laid = Laid()
+        laid.north.present = 0
+        for price, joins in ((1.0, None), (1.001, 1)):
+            laid.north.price = price
+            assert self.better(laid, y_m=200) == joins
+
+    def test_who_comes_to_neither_in_time_stays(self) -> None:
+        laid, one = Laid(), replace(helper(y_m=-150), vehicle="alpha", lasts_until_s=1e6)
+        laid.north.price = 9.0
+        assert laid.sectors.better_for(one, 100, 110) is None
+
+    @pytest.mark.parametrize(("y_m", "joins"), [(29_199, True), (29_201, False)])
+    def test_while_nobody_can_tell_when_it_ends_there_are_four_hours(self, y_m: float, joins: bool) -> None:
+        # 28 800 m at 2 m/s, and 400 m is where the north ends.
+        laid = Laid()
+        one: Helper = replace(helper(y_m=y_m), vehicle="alpha", lasts_until_s=math.inf)
+        assert (laid.sectors.better_for(one, 100, math.inf) is laid.north) is joins
+
+    def test_of_equals_that_with_the_lower_number(self) -> None:
+        laid = Laid()
+        east = sector(laid.fleet, Window(40, 80, 40, 81), 2)
+        east.price, east.is_worth, east.present = 2.0, True, 2
+        laid.south.is_worth = False
+        sectors = Sectors(
+            [laid.south, sector(laid.fleet, Window(40, 80, 0, 40), 1), east], laid.fleet.map.grid, Agenda()
+        )
+        middle = sectors.all[1]
+        middle.price, middle.is_worth, middle.present = 2.0, True, 2
+        one = replace(helper(x_m=200, y_m=50), vehicle="alpha", lasts_until_s=1e6)
+        assert sectors.better_for(one, 0, 1000) is middle
+
+    def test_of_one_in_which_nothing_was_cut_yet_nothing_is_known(self) -> None:
+        laid = Laid()
+        new = Sector(2, SOUTH, set(), laid.south.expected)
+        assert (new.price, new.is_worth, new.present) == (0, False, 0)
 
     def test_where_nobody_is_a_metre_counts_more(self) -> None:
         laid = Laid()

@@ -46,6 +46,8 @@ def test_of_an_area_that_is_half_seen_about_as_many_are_left_as_were_found() -> 
     assert told.mean == pytest.approx(20.5)
     assert told.none == pytest.approx(0.5**20.5)
     assert told.clearance == pytest.approx(0.5)
+    assert told == left_of(0.5, 20) != left_of(0.5, 21)
+    assert "reached" not in repr(told)  # hundreds of numbers
 
 
 @pytest.mark.parametrize(("risk", "found"), [(0.2, 40), (0.5, 3), (0.05, 0), (0.9, 12), (0.01, 200.5), (0.001, 1e7)])
@@ -63,6 +65,62 @@ def test_with_one_mine_more_more_may_be_left(found: float) -> None:
     true = negative_binomial(found + 1, 0.5)
     assert (told.none, told.mean, told.high) == pytest.approx((true.pmf(0), true.mean(), true.ppf(0.95)))
     assert told.none < left_of(0.5, found).none
+
+
+@pytest.mark.parametrize(("scatter", "exact"), [(0.1, 1e-9), (0.3, 1e-3)])
+def test_with_scatter_it_is_a_mixture_by_nine_nodes_of_how_much_was_seen(scatter: float, exact: float) -> None:
+    west = np.broadcast_to(np.arange(10) < 3, ALL.shape)
+    told = left_of(np.where(west, 0.6, 0.2), 12, scatter, place=west)
+    mean, clearance, numbers = 0.0, 0.0, np.arange(200)
+    reached = np.zeros(numbers.size)
+    for node, weight in zip(*np.polynomial.hermite_e.hermegauss(9), strict=True):
+        share = weight / math.sqrt(2 * math.pi)
+        exponent = max(1.0 + scatter * node, 1e-9)
+        here, elsewhere = 0.6**exponent, 0.2**exponent
+        expected = 12.5 * 3 * here / (3 * (1 - here) + 7 * (1 - elsewhere))
+        mean += share * min(expected, 1e6)
+        clearance += share * (1 - here)
+        reached += share * negative_binomial(12.5, 12.5 / (12.5 + expected)).cdf(numbers)
+    if scatter < 0.2:
+        assert told.mean == pytest.approx(mean, rel=exact)
+    assert told.clearance == pytest.approx(clearance, rel=exact)
+    assert told.none == pytest.approx(reached[0], rel=exact)
+    assert [told.chance_of_at_most(number) for number in (0, 4, 9, 25)] == pytest.approx(
+        reached[[0, 4, 9, 25]], rel=exact
+    )
+    assert [told.low, told.high] == np.searchsorted(reached, [0.05, 0.95]).tolist()
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.3, 0.5, 0.9])
+def test_the_mean_is_that_of_the_chances_also_where_looks_may_have_seen_nothing(scatter: float) -> None:
+    told = left_of(0.4, 12, scatter)
+    assert told.mean == pytest.approx((1.0 - told.reached).sum(), rel=1e-3)
+    assert 0.0 < told.clearance < 1.0
+
+
+def test_of_a_place_without_a_cell_nothing_is_left() -> None:
+    told = left_of(0.5, 12, 0.1, place=~ALL)
+    assert (told.mean, told.low, told.high, told.none) == (0.0, 0, 0, 1.0)
+    assert told.clearance == pytest.approx(1.0)
+    assert told.at_most_with(0.0) == 0
+
+
+def test_where_looks_may_have_seen_nothing_at_all_a_place_that_is_surely_seen_is_no_mistake() -> None:
+    risk = np.where(np.arange(10) < 3, 0.0, 0.5)
+    assert 0.0 < left_of(risk, 12, 0.5).none < left_of(risk, 12, 0.1).clearance
+    assert left_of(risk, 12, 1.0).reached[-1] == pytest.approx(1.0)
+
+
+def test_no_more_numbers_of_mines_are_told_of_than_count() -> None:
+    assert 40 < left_of(0.5, 3).reached.size < 100
+
+
+def test_of_an_area_of_which_a_hundredth_of_a_square_metre_was_seen_something_can_be_said() -> None:
+    one = np.zeros(ALL.shape, dtype=np.bool_)
+    one[2, 3] = True
+    told = mines_left(np.full(ALL.shape, 0.9), one, one, 0.1, 2.0, 0.0)
+    assert told is not None
+    assert told.mean == pytest.approx(2.5 * 9)
 
 
 def test_what_was_found_elsewhere_tells_of_a_place_and_a_place_well_seen_is_cleared() -> None:
@@ -106,6 +164,8 @@ def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: floa
     assert told.chance_of_at_most(1e9) == pytest.approx(1.0)
     # What is summed up may end short of 1.
     assert replace(told, reached=np.array([0.5, 0.9, 1.0 - 1e-12])).at_most_with(1.0) == 2
+    few = replace(told, reached=np.array([0.5, 0.9, 1.0]))
+    assert [few.chance_of_at_most(number) for number in (0, 1, 2, 7)] == [0.5, 0.9, 1.0, 1.0]
     for chance in (0.1, 0.5, 0.9):
         assert told.at_most_with(chance) == true.ppf(chance)
     assert told.chance_of_at_most(told.at_most_with(1.0)) == pytest.approx(1.0)
@@ -135,8 +195,12 @@ def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None
     west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
     told = mines_left_by(fleet, inside, 20.0, 0.1, (inside & west).astype(np.float64) if of_a_part else None)
     expected = mines_left(fleet.risk, inside, inside & west if of_a_part else inside, CELL_M2, 20.0, 0.1)
+    place = (inside & west).astype(np.float64) if of_a_part else None
+    cautious = mines_left_by(fleet, inside, 20.0, 0.1, place, CAUTIOUS_MINES)
     assert told is not None
     assert expected is not None
+    assert cautious is not None
+    assert cautious.mean == pytest.approx(told.mean * 21.0 / 20.5)
     assert told.mean == pytest.approx(expected.mean, rel=1e-3 if rho else 1e-9)
     assert told.clearance == pytest.approx(expected.clearance, rel=1e-3 if rho else 1e-9)
     assert (told.low, told.high) == (expected.low, expected.high)
@@ -177,7 +241,9 @@ def test_where_nothing_was_seen_nothing_can_be_said() -> None:
     assert mines_left(np.ones(ALL.shape), ALL, ALL, CELL_M2, 0, 0.2) is None
 
 
-@pytest.mark.parametrize(("found", "scatter"), [(-1.0, 0.0), (math.nan, 0.0), (3.0, -0.1), (3.0, math.inf)])
+@pytest.mark.parametrize(
+    ("found", "scatter"), [(-1.0, 0.0), (math.nan, 0.0), (3.0, -0.1), (3.0, math.inf), (math.inf, 0.1)]
+)
 def test_what_makes_no_sense_is_refused(found: float, scatter: float) -> None:
     with pytest.raises(ValueError, match="found and scatter must be at least 0 and finite"):
         left_of(0.5, found, scatter)
@@ -218,6 +284,18 @@ def test_tracks_that_saw_alike_tell_surely_and_such_that_differ_do_not() -> None
     one, other = -math.log(0.6), -math.log(0.4)
     mean, deviation = (one + other) / 2, (other - one) / math.sqrt(2)
     assert scatter_of([curve(0.4), curve(0.6)]) == pytest.approx(deviation / mean / math.sqrt(2))
+    # Summed up over range: of one alike up to 10 m and half as much 30 m farther on, of the other twice that.
+    one, other = -math.log(0.9), -math.log(0.95)
+    falling = DetectionCurve(np.array([0.0, 10.0, 40.0]), np.array([0.1, 0.1, 0.05]))
+    twice = replace(falling, p_detect=1.0 - (1.0 - falling.p_detect) ** 2)
+    three_times = replace(falling, p_detect=1.0 - (1.0 - falling.p_detect) ** 3)
+    assert scatter_of([falling, twice, three_times]) == pytest.approx(1.0 / 2.0 / math.sqrt(3))
+    flat = DetectionCurve(np.array([0.0, 25.0]), np.array([0.1, 0.1]))
+    areas = np.array([10 * one + 30 * (one + other) / 2, 25 * one])
+    assert scatter_of([falling, flat]) == pytest.approx(areas.std(ddof=1) / areas.mean() / math.sqrt(2))
+    # So are tracks of a sonar that hardly sees anything.
+    little = [curve(1.0 - math.exp(-0.004)), curve(1.0 - math.exp(-0.008))]
+    assert scatter_of(little) == pytest.approx(0.002 / 0.006)
     # A track that has seen nothing tells nothing.
     assert scatter_of([curve(0.4), curve(0.0), curve(0.6)]) == scatter_of([curve(0.4), curve(0.6)])
-    assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER
+    assert scatter_of([curve(0.5)]) == scatter_of([]) == scatter_of([curve(0.0)] * 2) == UNKNOWN_SCATTER == 0.3

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.contacts import LEAST_GATE_M, Objects, ObjectsOnMap, likelihood_ratio, surer_by
+from planner.contacts import LISTED_FROM, Objects, ObjectsOnMap, likelihood_ratio, surer_by
+from planner.fleet_map import FleetMap
+from planner.risk import NATS_PER_LEVEL
+from planner.types import BoolArray, GridSpec, SweepFrame
 
 
 def test_a_contact_near_another_is_of_the_same_object_and_one_farther_off_is_not() -> None:
     objects = Objects()
     objects.hear(100.0, 100.0, 0.0, 0.8)
-    objects.hear(100.0 + LEAST_GATE_M, 100.0, 0.0, 0.7)
+    objects.hear(102.0, 100.0, 0.0, 0.7)
     assert len(objects) == 1
-    objects.hear(100.0, 104.0, 0.0, 0.7)
+    objects.hear(101.0, 102.1, 0.0, 0.7)
     assert len(objects) == 2
 
 
@@ -37,10 +41,73 @@ def test_what_is_known_less_well_may_lie_farther_apart() -> None:
 def test_who_knows_nothing_of_its_place_joins_no_more_than_what_is_near() -> None:
     objects = Objects()
     objects.hear(0.0, 0.0, 1e9, 0.8)
-    objects.hear(59.0, 0.0, 0.0, 0.8)
+    objects.hear(60.0, 0.0, 0.0, 0.8)  # which is as good as certain, and where the object lies from now on
     assert len(objects) == 1
-    objects.hear(-61.0, 0.0, 1e9, 0.8)
+    objects.hear(-0.5, 0.0, 1e9, 0.8)
     assert len(objects) == 2
+
+
+@pytest.mark.parametrize(("east_m", "north_m"), [(56.9, 0), (-56.9, 0), (0, 56.9), (0, -56.9), (40, -40), (-40, 40)])
+def test_an_object_is_found_from_wherever_it_is_within_reach(east_m: float, north_m: float) -> None:
+    objects = Objects()
+    objects.hear(10.0, -10.0, 19.0, 0.8)
+    objects.hear(10.0 + east_m, -10.0 + north_m, 0.0, 0.8)
+    assert len(objects) == 1
+    objects.hear(10.0 + 1.2 * east_m, -10.0 + 1.2 * north_m, 0.0, 0.8)  # the object has moved to where it is sure
+    objects.hear(10.0 - 0.1 * east_m, -10.0 - 0.1 * north_m, 0.0, 0.8)
+    assert len(objects) == 2
+
+
+def test_an_object_lies_at_the_mean_of_its_contacts_each_by_how_sure_it_is() -> None:
+    objects = Objects()
+    objects.hear(0.0, 0.0, 2.0, 0.6)
+    objects.hear(3.0, -6.0, 1.0, 0.55)
+    seen = objects.seen()
+    assert (seen.x_m.tolist(), seen.y_m.tolist()) == (pytest.approx([2.4]), pytest.approx([-4.8]))
+    objects.hear(2.4, -4.3, 0.05, 0.7)  # none is surer than to a decimetre
+    seen = objects.seen()
+    assert seen.y_m == pytest.approx([(-4.8 * 2 / 4.0 - 4.3 * 100.0) / (2 / 4.0 + 100.0)])
+    assert (seen.sigma_m.tolist(), seen.contacts.tolist()) == ([2.0], [3.0])
+    ratios = (12 * s * (1 - s) / (16 * o * (1 - o) ** 2) for s, o in ((0.2, 0.8), (0.1, 11 / 15), (0.4, 14 / 15)))
+    assert seen.log_ratio == pytest.approx([sum(map(math.log, ratios))])
+    objects.hear(2.4, -4.3, 2.5, 0.7)
+    assert objects.seen().sigma_m.tolist() == [2.5]
+
+
+def test_of_two_just_as_near_a_contact_is_of_the_one_heard_of_first() -> None:
+    objects = Objects()
+    for x_m in (1.0, 5.0, 3.0):
+        objects.hear(x_m, 0.0, 0.5, 0.8)
+    seen = objects.seen()
+    assert dict(zip(seen.x_m.tolist(), seen.contacts.tolist(), strict=True)) == {2.0: 2.0, 5.0: 1.0}
+
+
+def test_objects_are_told_by_place_from_west_to_east_and_south_to_north() -> None:
+    objects = Objects()
+    for x_m, y_m in ((50.0, 0.0), (-50.0, 0.0), (-50.0, -40.0), (10.0, 90.0), (10.0, -90.0)):
+        objects.hear(x_m, y_m, 0.0, 0.8)
+    seen = objects.seen()
+    assert list(zip(seen.x_m.tolist(), seen.y_m.tolist(), strict=True)) == [
+        *((-50.0, -40.0), (-50.0, 0.0), (10.0, -90.0), (10.0, 90.0), (50.0, 0.0)),
+    ]
+
+
+def test_a_score_that_only_a_mine_has_or_none_is_as_good_as_sure() -> None:
+    objects = Objects()
+    for x_m, scores in ((0.0, [0.8]), (50.0, [0.3]), (100.0, [0.8, 0.8, 0.3])):
+        for score in scores:
+            objects.hear(x_m, 0.0, 0.3, score)
+    seen = objects.seen()
+    assert seen.log_ratio.tolist() == [50.0, -50.0, 50.0]
+    assert seen.along.all()
+    assert not seen.across.any()
+
+
+def test_an_object_lies_within_three_deviations_and_within_2_to_60_m() -> None:
+    objects = Objects()
+    for place, sigma_m in enumerate((0.1, 5.0, 30.0)):
+        objects.hear(200.0 * place, 0.0, sigma_m, 0.8)
+    assert objects.seen().gate_m.tolist() == [2.0, 15.0, 60.0]
 
 
 def test_the_nearest_is_taken_and_the_surer_place_counts_more() -> None:
@@ -73,6 +140,11 @@ def test_a_ratio_is_that_of_the_densities_of_mines_and_of_false_alarms() -> None
     assert likelihood_ratio(0.3) == 0.0
     assert likelihood_ratio(0.8) == math.inf
     assert likelihood_ratio(0.0) == likelihood_ratio(1.0) == 0.0
+    # Mines score above 0.5, false alarms below 0.75.
+    assert likelihood_ratio(0.5) == 0.0
+    assert likelihood_ratio(0.75) == math.inf
+    over = 0.74 / 0.75
+    assert likelihood_ratio(0.74) == pytest.approx(12 * 0.48 * 0.52 / (16 * over * (1 - over) ** 2))
 
 
 def test_what_was_heard_before_is_not_heard_again() -> None:
@@ -136,6 +208,7 @@ def test_what_objects_are_is_worked_out_once_until_there_is_news() -> None:
     objects.hear(50.0, 0.0, 0.0, 0.7)
     seen, chances = objects.known()
     assert seen.x_m.tolist() == [0.0, 50.0]
+    assert (seen.along.tolist(), seen.across.tolist()) == ([True, True], [False, False])
     assert objects.mines == pytest.approx(seen.chances(np.zeros(2))[:, 0].sum())
 
 
@@ -148,6 +221,80 @@ def test_an_alarm_is_raised_again_once_in_a_thousand_times() -> None:
     # Who lies there is seen twice, and not once, 0.4 / 2 times as often.
     alarms_to_clutter = chances[:, 2] / chances[:, 1]
     assert alarms_to_clutter[3] == pytest.approx(alarms_to_clutter[0] * 0.001 / 0.2)
+
+
+@settings(max_examples=40)
+@given(
+    heard=st.lists(
+        st.lists(st.sampled_from([0.4, 0.55, 0.6, 0.7, 0.8]), min_size=1, max_size=4), min_size=1, max_size=6
+    ),
+    nats=st.lists(st.sampled_from([0.0, 0.2, 1.1, 4.0]), min_size=6, max_size=6),
+)
+def test_chances_are_those_under_which_what_was_heard_is_likeliest(heard: list[list[float]], nats: list[float]) -> None:
+    """By Bayes' rule for each, and the shares from all of them, again and again."""
+    objects, likely = Objects(), []
+    for place, (scores, seen_nats) in enumerate(zip(heard, nats, strict=False)):
+        for score in scores:
+            objects.hear(50.0 * place, 0.0, 0.0, score)
+        often, mean = len(scores), max(seen_nats, 1e-3)
+        seen_so_often = mean**often * math.exp(-mean) / math.factorial(often) / (1.0 - math.exp(-mean))
+        logs = [math.log(ratio) if 0.0 < (ratio := likelihood_ratio(one)) < math.inf else 0.0 for one in scores]
+        sure = 50.0 * (scores.count(0.8) - scores.count(0.4))
+        ratio = math.exp(min(max(sum(logs) + sure, -50.0), 50.0))
+        likely.append([seen_so_often * ratio, seen_so_often, 0.001 ** (often - 1)])
+    shares = [1 / 3] * 3
+    for _ in range(200):
+        weighed = [[one * share for one, share in zip(row, shares, strict=True)] for row in likely]
+        found = [[one / sum(row) for one in row] for row in weighed]
+        shares = [max(sum(column) / len(found), 1e-6) for column in zip(*found, strict=True)]
+    told = objects.seen().chances(np.array(nats[: len(heard)]))
+    assert told == pytest.approx(np.array(found), rel=1e-6, abs=1e-12)
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """The one tile of a map of 2 by 3 cells."""
+
+    sum_levels: np.ndarray
+    largest_levels: np.ndarray
+    version: int = 1
+    first_row: int = 0
+    first_column: int = 0
+    settled: BoolArray = field(default_factory=lambda: np.ones((2, 3), dtype=np.bool_))
+
+
+def test_what_objects_are_goes_by_what_the_map_has_seen_at_their_places_so_far() -> None:
+    fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 10.0, columns=3, rows=2))
+    objects = ObjectsOnMap()
+    objects.hear(5.0, 15.0, 0.0, 0.6, ("primary", 1))
+    objects.hear(25.0, 5.0, 0.0, 0.6)
+    objects.hear(25.0, 5.0, 0.0, 0.7)
+    assert len(objects) == 2
+    unseen = objects.known()[1]
+    objects.hear(25.0, 5.0, 0.0, 0.7, ("primary", 1))
+    assert objects.known()[1] is unseen
+    objects.map = fleet
+    assert objects.known()[1] is not unseen
+    assert objects.known()[1].tolist() == unseen.tolist()
+    levels = np.arange(10, 70, 10, dtype=np.uint8).reshape(2, 3)
+    fleet.join("primary", 0, Tile(levels, levels))
+    seen, chances = objects.known()
+    nats = fleet.nats_at(seen.x_m, seen.y_m)
+    assert nats == pytest.approx(NATS_PER_LEVEL * np.array([40.0, 30.0]))
+    assert chances.tolist() == seen.chances(nats).tolist() != unseen.tolist()
+    assert objects.known()[1] is chances
+    assert objects.mines == pytest.approx(chances[0, 0] + chances[1, 0])
+
+
+def test_what_is_seen_hundreds_of_times_where_next_to_nothing_was_looked_at_still_is_something() -> None:
+    objects = Objects()
+    for _ in range(300):
+        objects.hear(0.0, 0.0, 0.0, 0.6)
+    assert objects.seen().chances(np.zeros(1))[0] == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_what_is_as_likely_a_mine_as_not_is_listed_and_that_of_which_nothing_is_known_is_not() -> None:
+    assert 1 / 3 < LISTED_FROM < 0.5
 
 
 def test_nothing_heard_is_no_mine() -> None:
@@ -171,6 +318,20 @@ def test_a_look_that_sees_all_tells_mines_from_nothing() -> None:
     # Where it is clutter its score must tell: by the overlap of the two densities less is learned.
     (by_score,) = surer_by(np.array([[0.5, 0.5, 0.0]]), 40.0)
     assert 0.15 < by_score < 0.25
+
+
+def test_what_is_learned_is_the_variance_of_what_is_believed_after_a_look() -> None:
+    mine, clutter, nothing, sees = 0.5, 0.3, 0.2, 0.6
+    scores = np.arange(0.025, 1.0, 0.05)  # as many as are told apart
+    up, over = np.clip(2 * scores - 1, 0, 1), np.clip(scores / 0.75, 0, 1)
+    of_mines, of_others = 12 * up * (1 - up), 16 * over * (1 - over) ** 2
+    of_mines, of_others = of_mines / of_mines.sum(), of_others / of_others.sum()
+    found = [(mine * sees * one, clutter * sees * other) for one, other in zip(of_mines, of_others, strict=True)]
+    found.append((mine * 0.4, clutter * 0.4 + nothing))
+    expected = sum((one + other) * (one / (one + other) - mine) ** 2 for one, other in found if one + other > 0.0)
+    chances = np.array([[mine, clutter, nothing], [nothing, mine, clutter]])
+    by = surer_by(chances, np.array([-math.log(1 - sees), 0.0]))
+    assert by == pytest.approx([expected, 0.0], abs=1e-9)
 
 
 @given(

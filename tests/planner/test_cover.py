@@ -103,18 +103,36 @@ class TestByHand:
         # from 4 m 0 to 1 and 7 to 11 m, and 1 m is left at 6, 1 m at 13 m.
         assert fewest_tracks([(0, 1), (6, 11), (13, 14)], 3, 9) == Cover((3, 7), 7, fewest=True)
 
+    def test_a_track_that_leaves_a_run_is_taken_only_if_there_are_tracks_for_that(self) -> None:
+        # From 5 m 6 to 11 m are seen with a range of 6 m.
+        assert fewest_tracks([(6, 8), (9, 11)], 1, 9) == Cover((5,), 6, fewest=True)
+        assert len(fewest_tracks([(2, 5), (7, 16)], 1, 9).offsets_m) == 2
+
+    def test_two_tracks_are_found_that_see_something_with_the_first_cell_of_a_side_or_the_last(self) -> None:
+        # From 3 m 6 to 10 m are seen, from 7 m 0 to 4 m and 10 to 14 m.
+        assert len(fewest_tracks([(1, 2), (6, 9), (10, 13)], 3, 7).offsets_m) == 2
+        # From 3 m 8 to 15 m are seen, from 10 m -2 to 5 m and 15 to 22 m.
+        assert len(fewest_tracks([(1, 4), (8, 9), (11, 14), (15, 16)], 5, 12).offsets_m) == 2
+
     def test_three_tracks_are_found_where_what_lies_last_needs_two(self) -> None:
         # A side sees 2 m, the other 4 m beyond: 1 to 3 and 5 to 7 m, 3 to 5 and 7 to 9 m, 5 to 7 and 9 to 11 m.
         assert fewest_tracks([(1, 3), (4, 11)], 1, 3) == Cover((4, 6, 8), 3, fewest=True)
 
     def test_where_nothing_is_left_no_track_is_needed(self) -> None:
         assert fewest_tracks([], 40, 100).offsets_m == ()
+        assert fewest_tracks([(5, 5), (320, 400)], 40, 100) == fewest_tracks([(320, 400)], 40, 100)
 
     def test_lengths_between_whole_metres(self) -> None:
         # Counted inward: a nadir gap of 40.2 m as 41 m, a range of 99.9 m as 99 m, 3.5 to 59.2 m as 3 to 60 m.
         found = fewest_tracks([(3.5, 59.2)], 40.2, 99.9)
         assert (len(found.offsets_m), found.range_m) == (1, 98)
         assert seen(found.offsets_m[0], 40.2, 99.9, np.arange(3.5, 59.2, 0.05)).all()
+
+    def test_rounding_makes_no_length_a_metre_longer_or_shorter(self) -> None:
+        for by_m in (-1e-7, 1e-7):
+            found = fewest_tracks([(3 + by_m, 60 - by_m), (200 - by_m, 290 + by_m)], 40 + by_m, 100 - by_m)
+            assert found == fewest_tracks([(3, 60), (200, 290)], 40, 100)
+        assert spans_left(100, 10, [(50, 30), (70 + 1e-7, 30)]) == [(0, 20)]
 
     def test_a_search_that_takes_too_long_gives_a_cover_that_may_not_be_the_fewest(
         self, monkeypatch: pytest.MonkeyPatch
@@ -126,6 +144,44 @@ class TestByHand:
         found = fewest_tracks(left, 40, 66)
         assert (best.fewest, found.fewest) == (True, False)
         assert len(found.offsets_m) > len(best.offsets_m)
+
+    def test_a_search_with_less_time_than_a_cover_has_tracks_ends_all_the_same(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        left = after_a_survey(random.Random(31), 1212, 40, 66)
+        monkeypatch.setattr(cover, "MOST_STEPS", 0)
+        monkeypatch.setattr(cover, "STEPS_FOR_ANY", 5)
+        found = fewest_tracks(left, 40, 66)
+        assert not found.fewest
+        assert len(found.offsets_m) > 5
+
+    def test_once_the_fewest_are_found_a_smaller_range_is_looked_for_as_long(
+        self, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        left: list[Span] = [(0, 4), (5, 9), (24, 27), (31, 34), (37, 48)]
+        found = fewest_tracks(left, 2, 40)
+        monkeypatch.setattr(cover, "STEPS_FOR_ANY", 0)
+        assert fewest_tracks(left, 2, 40) == found
+        assert found.range_m < 40
+
+
+class TestSearch:
+    def test_what_surveys_leave_takes_few_steps_to_prove_and_is_always_covered_alike(self) -> None:
+        steps, offsets, ranges = [], [], []
+        for seed in range(200):
+            rng = random.Random(seed)
+            range_m = rng.randint(11, 29)
+            left = after_a_survey(rng, 303, 10, range_m)
+            cells = sum(cover._run(int(near_m), int(far_m)) for near_m, far_m in left)
+            search = cover._Search(cells, 10, range_m)
+            found, proven = search.fewest()
+            assert proven
+            steps.append(search._steps)
+            offsets += found
+            if seed < 60:
+                ranges.append(fewest_tracks(left, 10, range_m).range_m)
+        # As it is: what is a lower bound of what a part needs leaves more to be tried.
+        assert (sum(steps), len(offsets), sum(offsets), sum(ranges)) == (3590, 5370, 859_787, 1169)
 
 
 class TestWhatIsLeft:
@@ -248,6 +304,7 @@ class TestRefusals:
             ([(0, 10)], 40, float("inf"), "finite and 0 or more"),
             ([(0, 10)], float("nan"), 100, "finite and 0 or more"),
             ([(-5, 10)], 40, 100, "must lie at 0 or more"),
+            ([(20, 30), (-0.5, 10)], 40, 100, "must lie at 0 or more, not from -0.5 to 10 m"),
             ([(0, float("inf"))], 40, 100, "must lie at 0 or more"),
         ],
     )

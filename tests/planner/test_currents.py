@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.currents import Current, FlowGrid, Sailing, made_good_mps
+from planner.currents import Current, FlowGrid, Sailing, along_and_across_mps, made_good_mps
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import KeepOut
 from planner.sweep import pass_over
@@ -27,7 +27,18 @@ ZERO = np.array(0.0)
 @pytest.mark.parametrize(("course_rad", "mps"), [(EAST, 4.0), (WEST, 1.0), (NORTH, 2.0), (SOUTH, 2.0)])
 def test_a_leg_of_100_m(course_rad: float, mps: float) -> None:
     assert EASTWARD.straight_s(100, Pose(0, 0, course_rad)) == pytest.approx(100 / mps)
+    northward = Sailing(2.5, 1.5)
+    assert northward.straight_s(100, Pose(0, 0, course_rad - EAST)) == pytest.approx(100 / mps)
     assert made_good_mps(course_rad, 2.5, Current(1.5, EAST).flow_mps(0)) == pytest.approx(mps)
+
+
+def test_the_flow_is_told_to_the_east_and_to_the_north_and_along_a_heading_and_to_starboard_of_it() -> None:
+    assert Current(2.0, math.pi / 6).flow_mps(0) == pytest.approx((1.0, math.sqrt(3)))
+    assert Current(2.0, math.pi / 6, period_s=400.0).flow_mps(100) == pytest.approx((1.0, math.sqrt(3)))
+    for heading_rad, mps in ((NORTH, (1.5, 0.5)), (EAST, (0.5, -1.5)), (SOUTH, (-1.5, -0.5)), (WEST, (-0.5, 1.5))):
+        assert along_and_across_mps(heading_rad, (0.5, 1.5)) == pytest.approx(mps)
+    along_mps, across_mps = along_and_across_mps(math.pi / 6, (2.0, 0.0))
+    assert (along_mps, across_mps) == pytest.approx((1.0, math.sqrt(3)))
 
 
 def test_a_tide_is_reckoned_with_as_it_runs_against() -> None:
@@ -35,11 +46,46 @@ def test_a_tide_is_reckoned_with_as_it_runs_against() -> None:
     assert [tidal.straight_s(100, Pose(0, 0, course_rad)) for course_rad in (EAST, WEST)] == pytest.approx(
         [100.0, 100.0]
     )
+    # Across it as either way; at an angle against it: 60 degrees off 0.75 m/s are lost, and 1.3 m/s crabbed against.
+    assert tidal.straight_s(100, Pose(0, 0, NORTH)) == pytest.approx(50.0)
+    for course_rad in (math.pi / 6, math.pi * 5 / 6, -math.pi / 6):
+        mps = math.sqrt(2.5**2 - (1.5 * math.cos(math.pi / 6)) ** 2) - 0.75
+        assert tidal.straight_s(100, Pose(0, 0, course_rad)) == pytest.approx(100 / mps)
+
+
+def test_many_straights_and_turns_take_as_long_as_each_alone() -> None:
+    starts = np.array([[0.0, 10.0, 0.3], [200.0, 50.0, 2.0], [350.0, 90.0, 4.0]])
+    lengths_m, by_rad = np.array([10.0, 80.0, 130.0]), np.array([-0.5, 2.0, 3.0])
+    for sailing in (Sailing(2.5), Sailing(2.5, 1.5, 0.7), Sailing(2.5, 1.5, grid=SHEAR)):
+        straights_s = [
+            sailing.straight_s(*one) for one in zip(lengths_m.tolist(), [Pose(*p) for p in starts], strict=True)
+        ]
+        assert sailing.straights_s(lengths_m, starts) == pytest.approx(straights_s)
+        turns_s = [float(sailing.turns_s(12.0, *one)) for one in zip(starts, by_rad, strict=True)]
+        assert sailing.turns_s(12.0, starts, by_rad) == pytest.approx(turns_s)
+        paths = [
+            DubinsPath(Pose(*start), 12.0, (int(math.copysign(1, by)), 0, 0), (12.0 * abs(by), 0.0, 0.0))
+            for start, by in zip(starts.tolist(), by_rad.tolist(), strict=True)
+        ]
+        assert [sailing.path_s(path) for path in paths] == pytest.approx(turns_s, rel=1e-12)
+
+
+def test_a_turn_is_reckoned_by_sixteen_headings_and_a_straight_by_eight_places() -> None:
+    points, weights = np.polynomial.legendre.leggauss(16)
+    mps = EASTWARD.made_good_mps(math.pi * (points + 1), ZERO, ZERO)
+    circle_s = 10 * math.pi * float((weights / mps).sum())
+    assert EASTWARD.turns_s(10, np.array([0, 0, NORTH]), np.array(2 * math.pi)) == pytest.approx(circle_s, rel=1e-12)
+    points, weights = np.polynomial.legendre.leggauss(8)
+    mps = np.sqrt(2.5**2 - (1.5 * (points + 1) / 2) ** 2)
+    straight_s = Sailing(2.5, 1.5, grid=AT_FIRST).straight_s(100, Pose(10, 0, NORTH))
+    assert straight_s == pytest.approx(50 * float((weights / mps).sum()), rel=1e-12)
 
 
 def test_still_water_takes_the_length_over_the_speed() -> None:
     path = DubinsPath(Pose(0, 0, NORTH), 10, (1, 0, -1), (5, 20, 3))
+    assert (Sailing(2.0).is_in_still_water, EASTWARD.is_in_still_water) == (True, False)
     assert Sailing(2.0).path_s(path) == 14.0
+    assert Sailing(2.0).straight_s(28, Pose(0, 0, 1.0)) == 14.0
 
 
 def test_a_whole_circle_takes_as_long_as_its_steps() -> None:
@@ -102,6 +148,7 @@ def test_passes_past_a_zone_take_the_way_round_it() -> None:
     zone = KeepOut((((40, -40), (60, -40), (60, 40), (40, 40)),))
     passes = [pass_over((-100, 0), (0, 0), 0.0), pass_over((200, 0), (300, 0), 0.0)]
     assert EASTWARD.passes_s(passes, 10) == pytest.approx(400 / 4)
+    assert EASTWARD.passes_s(passes, 10, here=Pose(-140, 0, EAST)) == pytest.approx(440 / 4)
     way = shortest_way(passes[0].end, passes[1].begin, 10, zone)
     assert way is not None
     assert len(way) > 1
@@ -153,13 +200,32 @@ class TestFlowsFromPlaceToPlace:
     def test_between_places_and_times_it_is_linear_and_beyond_as_at_the_edge(
         self, time_s: float, place: tuple[float, float], east_mps: float
     ) -> None:
-        assert Current(1.5, 0.0, grid=SHEAR).flow_mps(time_s, place) == pytest.approx((east_mps, 0.0))
+        current = Current(1.5, 0.0, grid=SHEAR)
+        assert current.flow_mps(time_s, place) == pytest.approx((east_mps, 0.0))
+        assert current.flow_mps(time_s) == current.flow_mps(time_s, (0.0, 0.0))
 
     def test_on_a_square_it_is_bilinear(self) -> None:
         corners = np.array([[[1.0, 2.0], [3.0, 5.0]]])
         grid = FlowGrid(np.array([0.0, 10.0]), np.array([0.0, 10.0]), np.array([0.0]), corners, -corners)
         # A quarter east and half north: 1.25 in the south, 3.5 in the north.
         assert grid.flow_mps(0, (2.5, 5)) == pytest.approx((2.375, -2.375))
+        about = replace(grid, x_m=grid.x_m - 4.0, y_m=grid.y_m - 5.0)
+        assert Current(6.0, 0.0, grid=about).flow_mps(0) == about.flow_mps(0, (0.0, 0.0))  # where the frame begins
+
+    @pytest.mark.parametrize("heading_rad", [0.4, 2.1, 3.9, 5.6])
+    @pytest.mark.parametrize("turn", [-1, 0, 1])
+    def test_a_way_takes_as_long_as_its_steps_where_they_lead(self, heading_rad: float, turn: int) -> None:
+        east_mps, north_mps = np.array([[[0.1, 0.9], [-0.5, 0.3]]]), np.array([[[0.7, -0.2], [0.4, -0.9]]])
+        axes = np.array([-60.0, 80.0]), np.array([-90.0, 70.0])
+        sailing = Sailing(2.0, 1.1, grid=FlowGrid(*axes, np.array([0.0]), east_mps, north_mps))
+        path = DubinsPath(Pose(7.0, -4.0, heading_rad), 15.0, (turn, 0, 0), (40.0, 0.0, 0.0))
+        x_m, y_m, courses_rad = path.poses_at((np.arange(2000) + 0.5) * 40 / 2000).T
+        took_s = float((40 / 2000 / sailing.made_good_mps(courses_rad, x_m, y_m)).sum())
+        assert sailing.path_s(path) == pytest.approx(took_s, rel=1e-6)
+        for place in zip(x_m[::500], y_m[::500], courses_rad[::500], strict=True):
+            flow_mps = Current(1.1, 0.0, grid=sailing.grid).flow_mps(0, place[:2])
+            alone_mps = float(sailing.made_good_mps(*(np.array(one) for one in (place[2], place[0], place[1]))))
+            assert alone_mps == pytest.approx(made_good_mps(place[2], 2.0, flow_mps))
 
     def test_along_an_axis_of_one_place_it_is_the_same_everywhere(self) -> None:
         flows = np.array([[[1.0, 2.0]]])
@@ -212,6 +278,41 @@ class TestFlowsFromPlaceToPlace:
         path = DubinsPath(Pose(40, 0, EAST), 30, (-1, 0, 0), (30 * math.pi, 0, 0))
         assert Sailing(2.5, 1.5, grid=turned).path_s(path) == pytest.approx(took_s, rel=1e-4)
 
+    @pytest.mark.parametrize(
+        ("time_s", "until_s", "kept"),
+        [
+            ((-600, 0, 600, 1200, 1800), 0, (1, 2)),
+            ((-600, 0, 600, 1200, 1800), 600, (1, 3)),
+            ((-600, 0, 600, 1200, 1800), 601, (1, 4)),
+            ((-600, 0, 600, 1200, 1800), 9999, (1, 5)),
+            ((-600, -1, 600, 1200, 1800), 0, (1, 3)),
+            ((300, 900, 1000, 1100, 1200), 100, (0, 1)),
+            ((300, 900, 1000, 1100, 1200), 301, (0, 2)),
+            ((-900, -800, -700, -600, -300), 100, (4, 5)),
+        ],
+    )
+    def test_until_a_time_it_is_known_from_the_last_one_before_now_to_the_first_one_behind_that(
+        self, time_s: tuple[float, ...], until_s: float, kept: tuple[int, int]
+    ) -> None:
+        east_mps, north_mps = np.arange(30.0).reshape(5, 2, 3), -np.arange(60.0, 90.0).reshape(5, 2, 3)
+        grid = FlowGrid(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0]), np.array(time_s), east_mps, north_mps)
+        until = grid.until(until_s)
+        assert until.time_s.tolist() == list(time_s[slice(*kept)])
+        assert until.east_mps.tolist() == east_mps[slice(*kept)].tolist()
+        assert until.north_mps.tolist() == north_mps[slice(*kept)].tolist()
+        assert until.fastest_mps == pytest.approx(math.hypot(6 * kept[1] - 1, 59 + 6 * kept[1]))
+
+    @pytest.mark.parametrize(("length_m", "pieces"), [(49, 1), (50, 1), (51, 2), (100, 2), (101, 3), (390, 8)])
+    def test_a_straight_or_a_turn_is_reckoned_in_pieces_of_up_to_50_m(self, length_m: float, pieces: int) -> None:
+        sailing = Sailing(2.5, 1.5, grid=AT_FIRST)
+        for turn in (0, 1):
+            path = DubinsPath(Pose(0, 20, NORTH), 70, (0, turn, 0), (7, length_m, 0))
+            times_s, lengths_m = sailing.knots([path])
+            each_m = length_m / pieces
+            assert lengths_m == pytest.approx([0.0, *(7 + each_m * n for n in range(pieces + 1)), 7 + length_m])
+            assert times_s[-1] == pytest.approx(sailing.path_s(path))
+            assert EASTWARD.knots([path])[1].tolist() == [0, 7, 7 + length_m, 7 + length_m]
+
     def test_of_its_times_the_slowest_counts(self) -> None:
         sailing = Sailing(2.5, 1.5, grid=SHEAR)
         for heading_rad in (EAST, WEST):
@@ -241,22 +342,21 @@ class TestFlowsFromPlaceToPlace:
         assert homes[0] == pytest.approx(homes[1], rel=1e-6)
 
     @given(
-        st.lists(st.floats(-1, 1), min_size=36, max_size=36),
+        st.lists(st.floats(-1, 1), min_size=54, max_size=54),
         st.floats(-50, 150),
         st.floats(-50, 150),
-        st.floats(-10, 20),
+        st.floats(-10, 40),
         st.floats(0, 6.28),
     )
     def test_it_is_never_faster_than_at_some_place_and_one_by_one_is_as_many_at_once(
         self, flows: list[float], x_m: float, y_m: float, time_s: float, course_rad: float
     ) -> None:
-        east_mps, north_mps = np.array(flows).reshape(2, 2, 3, 3)
-        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 60.0, 100.0]), np.array([0.0, 10.0])
+        east_mps, north_mps = np.array(flows).reshape(2, 3, 3, 3)
+        axes = np.array([0.0, 30.0, 100.0]), np.array([0.0, 60.0, 100.0]), np.array([0.0, 10.0, 25.0])
         grid = FlowGrid(*axes, east_mps, north_mps)
         east, north = grid.flow_mps(time_s, (x_m, y_m))
         assert math.hypot(east, north) <= grid.fastest_mps + 1e-9
         many = grid.flows_mps(np.array([x_m]), np.array([y_m]))
-        share = min(max(time_s / 10, 0), 1)
-        assert (east, north) == pytest.approx(many[:, 0, 0] + share * (many[:, 1, 0] - many[:, 0, 0]))
+        assert (east, north) == pytest.approx([np.interp(time_s, axes[2], one) for one in many[:, :, 0]])
         made_good = Sailing(1.6, grid.fastest_mps, grid=grid).made_good_mps(*map(np.array, (course_rad, x_m, y_m)))
         assert float(made_good) <= made_good_mps(course_rad, 1.6, (east, north)) + 1e-9

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -102,6 +103,65 @@ class TestThePapersExperiments:
         assert (decision.offsets_m, decision.range_m) == (theirs.offsets_m, theirs.range_m)
         assert (decision.asks_after, theirs.asks_after) == (1, 2)
 
+    @pytest.mark.parametrize(
+        ("flown_m", "width_m", "terms", "offsets_m", "worst"),
+        [
+            ((), WIDTH_M, TERMS, (120, 190, 415, 490, 715, 785, 1010, 1084), "0.750"),
+            ((138.0,), WIDTH_M, TERMS, (80, 225, 445, 510, 730, 795, 1020, 1085), "0.717"),
+            ((150.0, 260.0), WIDTH_M, SpacingTerms(5.0, 0.4), (85, 325, 525, 589, 790, 854, 1056, 1120), "0.682"),
+            ((), 360.0, SpacingTerms(5.0, wanted_risk=0.5), (82, 130, 180, 225, 274), "0.495"),
+            ((100.0,), 500.0, SpacingTerms(3.0, 0.2, 0.7), (163, 355, 418), "0.676"),
+        ],
+    )
+    def test_the_same_survey_is_always_laid_so(
+        self,
+        flown_m: tuple[float, ...],
+        width_m: float,
+        terms: SpacingTerms,
+        offsets_m: tuple[float, ...],
+        worst: str,
+    ) -> None:
+        note = f"by P(y), worst 30 % expected at {worst}"
+        expected = SpacingDecision(130, offsets_m, replans=True, note=note, asks_after=1)
+        assert ProfileSpacing(40, 130).lay(part(*flown_m, width_m=width_m), terms) == expected
+
+    def test_what_algorithm_1_will_lay_goes_by_the_ranges_that_its_last_tracks_had(self) -> None:
+        planner, theirs = ProfileSpacing(40, 145), AdaptiveSpacing(40, 145)
+        ranges_m = (150, 138.7, 129.2, 126.9, 131.0)
+        looked = tuple(FlownTrack(50.0 * n, range_m, single=False) for n, range_m in enumerate(ranges_m))
+        expected: list[float] = []
+        covered_m, known_m = 0.0, 141
+        for then_m in (138, 126, 135, 135):
+            decision = theirs.decide(1300.0, covered_m, known_m)
+            expected += decision.offsets_m[:2]
+            covered_m = max(covered_m, max(decision.offsets_m[:2]) + min(decision.range_m, then_m))
+            known_m = then_m
+        assert covered_m >= 1300.0 - NARROWEST_M
+        assert planner._algorithm_1(PartSoFar(1300.0, 141, looked, (), CURVE, 135)) == expected
+
+    def test_moved_are_the_tracks_to_come_drawn_out_from_the_last_one_flown_and_those_planned_if_as_many(self) -> None:
+        planner = ProfileSpacing(40, 130)
+        assert planner._starts(part(), THEIRS) == [list(THEIRS)]
+        drawn = [1212 - (1212 - one) * (1212 - 260) / (1212 - 200) for one in THEIRS[2:]]
+        planned_m = tuple(float(one) for one in range(6))
+        starts = planner._starts(part(138.0, 260.0, planned_m=planned_m), THEIRS)
+        assert starts == [pytest.approx(drawn), planned_m]
+        assert planner._starts(part(138.0, 260.0, planned_m=planned_m[1:]), THEIRS) == [pytest.approx(drawn)]
+        # From a last one at the far end, or where Algorithm 1's lies there, nothing can be drawn.
+        assert planner._starts(part(1212.0), THEIRS) == [list(THEIRS[1:])]
+        assert planner._starts(part(300.0), (1212.0, 900.0)) == [[900.0]]
+        assert planner._starts(part(300.0, 400.0, 500.0), THEIRS[:2])[0] == []
+
+    def test_what_is_asked_for_and_not_seen_by_as_many_takes_one_more_and_then_no_other(self) -> None:
+        sees = curve(15, 117, 0.5)
+        looked = flown(12.0, 35.0, curve=sees)
+        so_far = PartSoFar(93.0, None, tuple(replace(one, range_m=117) for one in looked), (), sees, 117)
+        note = "by P(y), worst 30 % expected at 0.530"
+        assert ProfileSpacing(30, 90).lay(so_far, TERMS) == SpacingDecision(117, (78,), False, note, asks_after=1)
+        first, second = curve(15, 94, 0.5), FlownTrack(166.0, 94, single=False, curve=curve(15, 94, 0.5))
+        decision = laid(ProfileSpacing(30, 90), PartSoFar(208.9, None, (second,), (), first, 94))
+        assert (decision.offsets_m, decision.replans) == ((94, 208), True)
+
 
 class TestWantedRisk:
     def test_the_fewest_tracks_that_reach_it(self) -> None:
@@ -139,6 +199,11 @@ class TestJoint:
         joint, alone = (laid(one(40, 130), part(), terms).offsets_m for one in (JointSpacing, ProfileSpacing))
         assert len(joint) < len(THEIRS) < len(alone)
         assert worst30(*joint, helpers=self.HELPERS) <= 0.7
+
+    def test_the_same_survey_with_helpers_is_always_laid_so(self) -> None:
+        decision = laid(JointSpacing(40, 130), part(200.0), SpacingTerms(5.0, 0.3, 0.6, self.HELPERS))
+        assert decision.offsets_m == (130, 270, 529, 605, 775, 855, 1020, 1096)
+        assert decision.note == "by P(y), worst 30 % expected at 0.564"
 
     def test_without_helpers_it_is_profile(self) -> None:
         assert JointSpacing(40, 130).lay(part(), TERMS) == ProfileSpacing(40, 130).lay(part(), TERMS)

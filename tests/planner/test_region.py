@@ -119,10 +119,35 @@ def test_what_is_no_region_is_refused(outline: object, holes: object, message: s
         Region(outline, holes)  # type: ignore[arg-type]
 
 
+def test_zones_to_keep_out_of_are_looked_at_as_the_outline_is() -> None:
+    for zone, message in (
+        (((0.0, 0.0), (9.0, 0.0)), "at least 3 different corners"),
+        (((0.0, 0.0), (9.0, math.inf), (9.0, 0.0)), "finite"),
+        (((0.0, 0.0), (9.0, 9.0), (0.0, 9.0), (9.0, 0.0)), "the sides of a zone to keep out of must not cross"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            Region(SQUARE, (), (MIDDLE, zone))
+
+
+def test_an_area_has_an_inside_if_it_is_more_than_two_micrometres_wide() -> None:
+    def of_width(width_m: float) -> Region:
+        return Region(((0.0, 0.0), (100.0, 0.0), (100.0, width_m), (0.0, width_m)))
+
+    with pytest.raises(ValueError, match="must have an inside"):
+        of_width(1.9e-6)
+    assert of_width(2.1e-6).polygon.area == pytest.approx(2.1e-4)
+
+
 class TestShare:
     def test_the_second_of_three_of_a_square_by_hand(self) -> None:
         share = Region(SQUARE).share(0.25, 0.5, 0.0)
         assert np.array(sorted(share.outline)) == pytest.approx(np.array([(25, 0), (25, 100), (50, 0), (50, 100)]))
+
+    def test_from_the_beginning_to_the_end_it_is_all_of_it(self) -> None:
+        whole = Region(((0, 0), (100, 10), (130, 70), (60, 120), (-20, 60)), (((40, 40), (60, 40), (50, 60)),))
+        all_of_it = whole.share(0, 1, 0.4)
+        assert all_of_it.polygon.area == pytest.approx(whole.polygon.area)
+        assert len(all_of_it.holes) == 1
 
     def test_tracks_to_the_east_are_laid_from_north_to_south(self) -> None:
         first = Region(SQUARE).share(0, 0.3, math.pi / 2)

@@ -15,6 +15,7 @@ from planner.dubins import TIE_M, Pose, shortest_path
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import pass_over
 from planner.way_home import WayHome
+from planner.ways import shortest_way
 
 NORTH, EAST, SOUTH = 0.0, math.pi / 2, math.pi
 # Between them there is a gap of 40 m, and home lies in the bay to the north of it.
@@ -47,6 +48,39 @@ class TestByHand:
         elsewhere = replace(WAY, home=(30.0, -40.0))
         assert elsewhere.from_pose(Pose(30.01, -40, SOUTH))[0] == 0.0
         assert elsewhere.from_pose(Pose(30, 40, SOUTH))[0] == pytest.approx(40.0)
+        assert elsewhere.from_pose(Pose(30.03, -40.04, SOUTH))[0] == 0.0
+        assert elsewhere.from_pose(Pose(30.03, -40.05, NORTH))[0] > 0.0
+
+    def test_within_the_circle_that_it_would_turn_on_it_turns_to_the_other_side(self) -> None:
+        # Home lies 5 m to port. The circle to starboard has its centre 15 m off, the tangent is sqrt(15^2 - 10^2) long.
+        tangent_m = math.sqrt(125)
+        turn_rad = 3 * math.pi / 2 + math.atan(10 / tangent_m)
+        for x_m, sign in ((5.0, 1), (-5.0, -1)):
+            time_s, heading_rad = WAY.from_pose(Pose(x_m, 0, NORTH))
+            assert time_s == pytest.approx((10 * turn_rad + tangent_m) / 2)
+            assert heading_rad == pytest.approx((sign * turn_rad) % (2 * math.pi))
+
+    @pytest.mark.parametrize("sailing", [Sailing(2.0), Sailing(2.0, 0.9, 0.6), Sailing(2.0, 0.9, 4.0, tidal=True)])
+    def test_it_takes_as_long_as_the_path_that_is_sailed(self, sailing: Sailing) -> None:
+        home = WayHome((35.0, -20.0), sailing, 12.0)
+        for number in range(24):
+            pose = Pose(35 + 90 * math.sin(number * 2.4), -20 + 70 * math.cos(number * 2.4), number * 1.1)
+            time_s, arrival_rad = home.from_pose(pose)
+            path = shortest_path(pose, Pose(*home.home, arrival_rad), 12.0)
+            assert time_s == pytest.approx(sailing.path_s(path), rel=1e-6)
+            assert sum(map(sailing.path_s, home.way(pose))) == pytest.approx(time_s, rel=1e-6)
+            assert 0.0 <= arrival_rad < 2 * math.pi
+
+    def test_well_within_is_what_leaves_eight_turn_radii_or_past_zones_three_times_all_and_circles_beside(self) -> None:
+        sailing, pose = Sailing(2.0, 0.5, EAST), Pose(30, 40, 2.0)  # against the stream 1.5 m/s
+        in_open_water = replace(WAY, sailing=sailing)
+        assert not in_open_water.is_well_within(pose, (50 + 80) / 1.5 - 0.01)
+        assert in_open_water.is_well_within(pose, (50 + 80) / 1.5 + 0.01)
+        past_zones = WayHome((0.0, 100.0), sailing, 10.0, HEADLANDS)
+        about_s = float(past_zones.times_s(np.array([pose]))[0])
+        time_s = 3 * (about_s + 3 * 20 * math.pi / 1.5)
+        assert not past_zones.is_well_within(pose, time_s - 0.01)
+        assert past_zones.is_well_within(pose, time_s + 0.01)
 
     def test_many_at_once_are_as_one_by_one(self) -> None:
         poses = np.array([[40.0, 0.0, NORTH], [0.0, -100.0, SOUTH], [0.0, 0.0, EAST], [3.0, 4.0, EAST]])
@@ -123,6 +157,20 @@ class TestRoundAZone:
     def test_many_at_once_take_the_way_from_corner_to_corner(self) -> None:
         poses = np.array([[0.0, -200.0, NORTH], [0.0, -60.0, NORTH]])
         assert self.ROUND.times_s(poses) == pytest.approx([self.TAUT_M / 2, 30.0], abs=0.1)
+
+    def test_it_arrives_by_whichever_of_sixteen_headings_or_the_direct_one_takes_least(self) -> None:
+        sailing = Sailing(2.0, 0.7, 1.0)
+        home = WayHome((6.0, 3.0), sailing, 10.0, self.ZONE)
+        for pose in (Pose(4, -170, 0.3), Pose(-10, -140, 1.0), Pose(15, -190, 5.0)):
+            direct_rad = WayHome((6.0, 3.0), sailing, 10.0).from_pose(pose)[1]
+            took_s = {}
+            for heading_rad in (direct_rad, *(math.pi / 8 * number for number in range(16))):
+                way = shortest_way(pose, Pose(6.0, 3.0, heading_rad), 10.0, self.ZONE)
+                assert way is not None
+                took_s[heading_rad] = sailing.way_s(way)
+            time_s, heading_rad = home.from_pose(pose)
+            assert time_s == pytest.approx(min(took_s.values()))
+            assert took_s[heading_rad] == pytest.approx(time_s)
 
     def test_in_a_current_each_path_of_it_counts_by_its_own(self) -> None:
         northward = replace(self.ROUND, sailing=Sailing(2.0, 1.0, NORTH))

@@ -36,6 +36,16 @@ def test_the_mean_is_the_truth_for_any_noise(truth: float, noise_cell: float) ->
     )
 
 
+@pytest.mark.parametrize("noise", [(0.6, 0.25), (1.5, 0.0), (0.0, 0.3), (0.0, 0.0)])
+def test_the_mean_is_the_truth_by_summing_up_over_all_errors(noise: tuple[float, float]) -> None:
+    truths = np.array([0.001, 0.02, 0.11, 0.3, 0.5, 0.77, 0.95, 0.99])
+    told = PDetectEstimate(*noise).estimate(truths, 0.0, np.zeros(truths.shape))
+    errors = np.linspace(-8.0, 8.0, 4001)[:, None]
+    density = np.exp(-(errors**2) / 2)
+    spread = 1.0 / (1.0 + (1.0 - told) / told * np.exp(-np.hypot(*noise) * errors))
+    assert (spread * density).sum(axis=0) / density.sum() == pytest.approx(truths, rel=2e-5)
+
+
 def test_cells_differ_by_the_cell_noise_and_tracks_by_the_track_noise() -> None:
     generator = np.random.default_rng(3)
     noise = PDetectEstimate(0.23, 0.05)

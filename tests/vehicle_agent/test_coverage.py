@@ -55,6 +55,24 @@ def test_a_tile_is_told_when_it_has_changed() -> None:
     assert layer.told() == tally([3 + 4])
 
 
+def test_tiles_that_changed_at_once_are_told_row_by_row_and_stay_as_they_were_told() -> None:
+    layer = CoverageLayer("alpha", GRID)
+    for x_m, y_m in ((150, 120), (50, 120), (150, 0), (50, 0)):
+        seen(layer, x_m, y_m)
+    publications = layer.changed_tiles()
+    assert told(publications) == [("0-0", 1), ("0-1", 2), ("1-0", 3), ("1-1", 4)]
+    messages = [one.message for one in publications]
+    assert [(one.first_row, one.first_column) for one in messages if isinstance(one, CoverageTile)] == [
+        *((0, 0), (0, 20), (20, 0), (20, 20)),
+    ]
+    before = [one.sum_levels.tolist() for one in messages if isinstance(one, CoverageTile)]
+    seen(layer)
+    assert told(layer.changed_tiles()) == [("0-0", 5)]
+    assert [one.sum_levels.tolist() for one in messages if isinstance(one, CoverageTile)] == before
+    assert layer.told() == tally([5 + 2 + 3 + 4])
+    assert layer.told() != CoverageLayer("alpha", GRID).told() == tally([0])
+
+
 def test_it_holds_what_was_seen_and_what_is_settled() -> None:
     layer = two_tiles()
     settled = np.zeros(GRID.shape, dtype=np.bool_)

@@ -12,8 +12,10 @@ from hypothesis import strategies as st
 
 from comms.errors import RunawayError
 from comms.lockstep import clock as lockstep_clock
-from comms.lockstep.clock import Grant, LockstepClock, Round, Sent
-from comms.lockstep.events import Freeze, Join, Kill
+from comms.lockstep.clock import Grant, LockstepClock, Round, Sent, result_of
+from comms.lockstep.events import Change, Freeze, Join, Kill
+from comms.result import Ending, LastWord
+from comms.runner import fleet_digest
 from comms.said.routing import RosterNode, Routing
 
 RUN = Sent("run", 300)
@@ -229,17 +231,167 @@ def test_what_is_due_to_who_is_frozen_is_held_until_it_is_thawed() -> None:
 
 
 class TestRunaway:
+    def test_200_000_in_a_second_are_let_through_and_what_most_of_them_are_is_told(self) -> None:
+        said = {NAV: 6, LOOK: 5, Sent("world/truth/pose/alpha", 30): 4, Sent("veh/alpha/maneuver_status", 20): 3}
+        few = [one for one, count in said.items() for _ in range(count)]
+        one_each = [Sent("world/truth/targets", 7), Sent("world/truth/coverage/alpha", 7)]
+        for more in (0, 1):
+            clock = started()
+            clock._messages_in_second = 200_000 - len(few) - 1 + more
+            answer_all(clock, world=(1, few + one_each[:1]))
+            if not more:
+                assert clock.next_round() is not None
+        with pytest.raises(RunawayError, match=r"^more than 200000 messages within simulated second 0; "):
+            clock.next_round()
+
     def test_messages_are_counted_second_by_second(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(lockstep_clock, "MOST_MESSAGES_A_SECOND", 4)
         clock = started()
         wake_world(clock, [500, 999, 1000, 1999, 2000, 2001, 9000], 2, 2, 3, 1, 4, 0)
         assert clock.messages == {"nav": 12}
+        clock = LockstepClock(Routing(ROSTER), 60_000)
+        clock.publish("clock", [RUN])  # before the first second
+        clock.next_round()
+        answer_all(clock, world=(2, [NAV] * 4))
+        assert clock.next_round() is not None
+        clock = started()
+        wake_world(clock, [1998, 1999], 5)
+        with pytest.raises(RunawayError, match=r"within simulated second 1;"):
+            clock.next_round()
         clock = started()
         wake_world(clock, [999, 1000, 1001, 1002], 4, 3, 2)
         with pytest.raises(
             RunawayError, match=r"^more than 4 messages within simulated second 1; messages in it: nav 5$"
         ):
             clock.next_round()
+
+
+def granted(
+    clock: LockstepClock, node_id: str, wakes: dict[int, int], says: dict[int, list[Sent]] | None = None
+) -> list[tuple[int, bool, bool]]:
+    """When one node is granted anything to the end, whether it is woken and whether it is started; nobody else wants or
+    says anything. `wakes`, `says`: by time."""
+    found = []
+    while (turn := clock.next_round()) is not None:
+        for grant in turn.grants:
+            mine, said = grant.node_id == node_id, []
+            if mine:
+                found.append((turn.now_ms, grant.wake, grant.start))
+                said = (says or {}).get(turn.now_ms, [])
+            clock.answer(grant.node_id, wakes.get(turn.now_ms) if mine else None, said)
+    return found
+
+
+class TestEventsOfNodes:
+    def test_who_is_killed_is_not_woken_and_not_waited_for(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("alpha", 25),))
+        assert clock.present() == list(ACTING)
+        assert granted(clock, "alpha", {0: 20, 20: 30}) == [(0, True, True), (20, True, False)]
+        assert clock.present() == ["world", "beta", "coordinator"]
+        assert (clock.now_ms, clock.rounds) == (25, 3)  # the event is a round of its own
+        assert clock.lasting == set()
+
+    def test_who_joins_late_is_started_then_and_given_1_ms_later_what_was_kept(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Join("alpha", 40),))
+        assert clock.present() == ["world", "beta", "coordinator"]
+        assert granted(clock, "alpha", {40: 70}) == [(40, True, True), (41, False, False)]
+        assert clock.present() == list(ACTING)
+        assert clock.said_to_joiners == {"alpha": {}}
+
+    @pytest.mark.parametrize(("wanted_ms", "woken_ms"), [(60, 60), (51, 51), (30, 51)])
+    def test_who_comes_back_with_its_memory_is_woken_when_it_wanted_once_it_has_its_mail(
+        self, wanted_ms: int, woken_ms: int
+    ) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("alpha", 25), Join("alpha", 50, memory=True)))
+        assert clock.lasting == {"alpha"}
+        found = granted(clock, "alpha", {0: wanted_ms, 51: wanted_ms} if woken_ms > 51 else {0: wanted_ms})
+        rest = [(woken_ms, True, False)]
+        assert found == [(0, True, True), *(rest if woken_ms == 51 else [(51, False, False), *rest])]
+
+    def test_or_by_its_mail_alone_where_it_wanted_nothing(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("alpha", 25), Join("alpha", 50, memory=True)))
+        assert granted(clock, "alpha", {}) == [(0, True, True), (51, False, False)]
+
+    @pytest.mark.parametrize(("wanted_ms", "woken_ms"), [(30, 50), (50, 50), (60, 60), (24, 24)])
+    def test_who_is_frozen_is_woken_when_it_is_thawed_or_later(self, wanted_ms: int, woken_ms: int) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Freeze("alpha", 25, 50),))
+        assert granted(clock, "alpha", {0: wanted_ms}) == [(0, True, True), (woken_ms, True, False)]
+        assert clock.present() == list(ACTING)
+
+    def test_two_things_of_one_time_happen_before_its_grants(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("beta", 25), Kill("alpha", 25)))
+        clock.next_round()
+        answer_all(clock, world=(25, []))
+        turn = clock.next_round()
+        assert turn is not None
+        assert turn.now_ms == 25
+        assert [(one.change, one.node_id) for one in turn.happenings] == [(Change.KILL, "alpha"), (Change.KILL, "beta")]
+        assert turn.grants == (Grant("world", True, {}),)
+
+    def test_mail_to_who_was_killed_makes_no_round(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("coordinator", 21),))
+        granted(clock, "alpha", {0: 20, 20: 30}, {20: [STATE], 30: [STATE]})
+        assert (clock.now_ms, clock.rounds) == (30, 4)
+
+    def test_mail_to_who_was_killed_is_not_due_after_the_time_limit_either(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 500, (Kill("coordinator", 400),))
+        assert granted(clock, "alpha", {0: 500}, {500: [STATE]}) == [(0, True, True), (500, True, False)]
+        assert not clock.timed_out
+
+    def test_who_was_told_of_the_end_rests_also_where_another_was_killed(self) -> None:
+        clock = LockstepClock(Routing(ROSTER), 60_000, (Kill("beta", 25),))
+        assert granted(clock, "coordinator", {0: 30, 30: 500}, {30: [OVER]})[-1] == (30, True, False)
+        assert clock.over_ms == 30
+        assert not clock.timed_out
+
+
+class TestTheEnd:
+    def rest(self, clock: LockstepClock, *alpha: tuple[int, int | None]) -> LockstepClock:
+        """The mission is over at 2 s; alpha's wake-ups then."""
+        wakes = dict(alpha)
+        while (turn := clock.next_round()) is not None:
+            for grant in turn.grants:
+                if grant.node_id == "coordinator":
+                    over = turn.now_ms == 2000
+                    clock.answer("coordinator", 2000 if turn.now_ms == 0 else None, [OVER] if over else [])
+                elif grant.node_id == "world":
+                    clock.answer("world", turn.now_ms + (1 if turn.now_ms >= 1990 else 1990), [])
+                else:
+                    clock.answer(grant.node_id, wakes.get(turn.now_ms) if grant.node_id == "alpha" else None, [])
+        return clock
+
+    @pytest.mark.parametrize(
+        ("alpha", "last_ms"),
+        [
+            ([], 2100),  # since the moment of the end nobody wants anything
+            ([(0, 2010), (2001, 2010), (2010, 2030)], 2130),
+            ([(0, 2010), (2001, None)], 2101),  # since it was told of it
+            ([(2001, 2050)], 2150),  # it rests, is stirred by the word, and rests again
+        ],
+    )
+    def test_the_world_goes_on_for_100_ms_since_all_agents_rest(
+        self, alpha: list[tuple[int, int | None]], last_ms: int
+    ) -> None:
+        clock = self.rest(LockstepClock(Routing(ROSTER), 60_000), *alpha)
+        assert (clock.over_ms, clock.timed_out) == (2000, False)
+        assert clock.now_ms == last_ms
+
+    def test_how_it_has_ended_is_told_with_when_and_with_what_was_said(self) -> None:
+        words = [LastWord(dropped={"lost": 2}, latencies_ms={"a": [1.0]}), LastWord(dropped={"lost": 1})]
+        clock = self.rest(LockstepClock(Routing(ROSTER), 60_000))
+        found = result_of(clock, words)
+        assert (found.ending, found.mission_ms, found.rounds) == (Ending.OVER, 2000, clock.rounds)
+        assert (found.messages, found.dropped, found.latencies_ms) == ({"mission_over": 1}, {"lost": 3}, {"a": [1.0]})
+        assert found.digest == fleet_digest([])
+        found = result_of(self.rest(LockstepClock(Routing(ROSTER), 1995)), [])
+        assert (found.ending, found.mission_ms) == (Ending.TIME_LIMIT, 1995)
+        clock = started()
+        answer_all(clock, world=(700, []))
+        clock.next_round()
+        clock.answer("world", None, [])
+        assert clock.next_round() is None
+        found = result_of(clock, [])
+        assert (found.ending, found.mission_ms) == (Ending.IDLE, 700)
 
 
 WRITES = {

@@ -81,6 +81,12 @@ class TestBids:
         assert alpha.claims.bids == pytest.approx([score(700, 150), score(2100, 255)])
         assert CBBA.assign(told) == {"alpha": 1}
 
+    def test_also_before_two_that_follow_each_other(self) -> None:
+        jobs = [open_strip(strip(1)), open_strip(strip(2, y_m=310), 3000), open_strip(strip(3, y_m=520), 9000)]
+        (alpha,) = agreed(situation(jobs, [helper()]), jobs)
+        assert (alpha.bundle, alpha.path) == ([2, 1, 0], [0, 1, 2])
+        assert alpha.claims.bids == pytest.approx([score(700, 150), score(2100, 255), score(6300, 360)])
+
     def test_a_bid_is_less_what_the_strips_behind_it_lose(self) -> None:
         # Side by side, 12 m apart: 1 is left at y = 305 m after 152.5 s, half a circle of 6 m leads onto 2, on which it
         # is 5 m of run-in later. So 2 ends 9.42 + 2.5 + 100 s later than 1 is left.
@@ -112,7 +118,22 @@ class TestBids:
     def test_a_bundle_has_its_most(self) -> None:
         told = situation([open_strip(strip(number, x_m=60 * number)) for number in range(1, 9)], [helper()])
         (alpha,) = agreed(told, told.strips)
-        assert len(alpha.bundle) == len(alpha.path) == BUNDLE
+        assert len(alpha.bundle) == len(alpha.path) == BUNDLE == 5
+
+    @pytest.mark.parametrize(("others", "considered"), [(0, 12), (1, 17), (3, 27)])
+    def test_it_has_twelve_to_choose_from_when_the_others_have_their_bundles(
+        self, others: int, considered: int
+    ) -> None:
+        jobs = [open_strip(strip(number, x_m=60 * number)) for number in range(1, 31)]
+        told = situation(jobs, [helper(), *(helper(f"other-{number}") for number in range(others))])
+        gains, _ = Bidder(0, helper(), told, jobs)._routes.gains([])
+        assert all(alone(told, job, helper()) > 0 for job in jobs)
+        assert np.flatnonzero(gains).tolist() == list(range(considered))  # the nearer ones
+
+    def test_of_few_strips_those_that_bring_nothing_are_not_considered(self) -> None:
+        jobs = [open_strip(strip(1)), open_strip(strip(2), 0), open_strip(strip(3, y_m=9000))]
+        gains, _ = Bidder(0, helper(), situation(jobs, [helper()], 300), jobs)._routes.gains([])
+        assert np.flatnonzero(gains).tolist() == [0]
 
     @pytest.mark.parametrize(("waits_s", "path"), [({}, [0, 1]), ({1: math.inf}, [1, 0]), ({1: 60.0}, [0, 1])])
     def test_a_strip_to_which_a_helper_must_wait_long_comes_later(

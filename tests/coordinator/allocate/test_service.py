@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from situations import helper, open_strip, situations, strip
 
-from coordinator.allocate.service import StripTable, can_fly, expected_service, removed_m2
+from coordinator.allocate.service import Service, StripTable, can_fly, expected_service, removed_m2, tables_of
 from coordinator.allocate.situation import Situation
 from planner.currents import FlowGrid, Sailing
 from planner.dubins import Pose
@@ -100,11 +100,108 @@ def test_a_current_tells_from_when_to_when_the_sonar_is_on() -> None:
 @pytest.mark.parametrize(("x_m", "y_m", "heading_rad"), [(0, 100, 0.0), (100, 0, np.pi / 2)])
 def test_on_the_way_to_a_strip_the_flow_half_way_there_counts(x_m: float, y_m: float, heading_rad: float) -> None:
     # From astern, and rising to 0.9 m/s at 90 m; half-way over the 95 m to the run-in it is 0.475 m/s.
-    north, axis, flow = x_m == 0, np.array([0.0, 90.0]), np.array([0.0, 0.9])
+    # All of it 30 m east and 20 m south of the origin.
+    north, flow = x_m == 0, np.array([0.0, 0.9])
+    axis = np.array([-20.0, 70.0]) if north else np.array([30.0, 120.0])
     speeds = flow[np.newaxis, :, np.newaxis] if north else flow[np.newaxis, np.newaxis, :]
     still, nowhere = np.zeros_like(speeds), np.zeros(1)
     grid = FlowGrid(nowhere, axis, nowhere, still, speeds) if north else FlowGrid(axis, nowhere, nowhere, speeds, still)
     one = helper(way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.9, grid=grid), 6.0))
-    table = StripTable([open_strip(strip(1, x_m, y_m, heading_rad=heading_rad))], one)
-    to_begin_s = table.to_begin_s(np.array([[0, 0, heading_rad]]))
+    table = StripTable([open_strip(strip(1, 30 + x_m, -20 + y_m, heading_rad=heading_rad))], one)
+    to_begin_s = table.to_begin_s(np.array([[30, -20, heading_rad]]))
     assert to_begin_s[0, 0, 0] == pytest.approx(95 / 2.475 + 5 / 2.9)
+
+
+@pytest.mark.parametrize(("time_s", "share"), [(99, 0), (100, 0), (125, 0.25), (199, 0.99), (200, 1), (300, 1)])
+def test_a_sweep_is_flown_evenly(time_s: float, share: float) -> None:
+    assert Service(100, 200, Pose(0, 0, 0), 205).share_by(time_s) == pytest.approx(share)
+
+
+@pytest.mark.parametrize("way_home", [None, WayHome((0.0, 0.0), Sailing(2.0), 6.0)])
+def test_a_battery_that_just_lasts_to_the_end_and_home_lasts(way_home: WayHome | None) -> None:
+    one = helper(way_home=way_home)
+    job = open_strip(strip(1))
+    served = expected_service(job, one)
+    ends_s = served.ends_s + float(one.home_s(np.array([served.free_at], dtype=np.float64))[0])
+    assert removed_m2(job, replace(one, lasts_until_s=ends_s), served, np.inf) == 700
+    assert removed_m2(job, replace(one, lasts_until_s=ends_s - 1e-6), served, np.inf) == 0
+
+
+def test_a_strip_that_cannot_be_flown_is_served_as_where_nothing_is_in_the_way() -> None:
+    zone = KeepOut((((-30.0, 150.0), (30.0, 150.0), (30.0, 160.0), (-30.0, 160.0)),))
+    job = open_strip(strip(1))
+    assert expected_service(job, replace(helper(), keep_out=zone)) == expected_service(job, helper())
+
+
+def test_of_two_ways_that_are_the_same_length_the_first_is_taken() -> None:
+    # Midway beside the strip and headed across it: either end is as far.
+    one = helper(x_m=-300, y_m=200, heading_rad=np.pi / 2)
+    table = StripTable([open_strip(strip(1))], one)
+    to_begin_s = table.to_begin_s(np.array([one.pose]))
+    assert to_begin_s[0, 0, 0] == pytest.approx(to_begin_s[0, 0, 1])
+    _, ways = table.ways.shortest_from(np.array([one.pose]))
+    assert ways.tolist() == [[0]]
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        *({}, {"vehicle": "beta"}, {"p_detect": 0.4}, {"lasts_until_s": 100.0}, {"refused": frozenset({1})}),
+        *({"speed_mps": 1.5}, {"turn_radius_m": 7}, {"run_in_m": 6}, {"swath_m": 30}, {"beside_m": 5.0}),
+        *({"lead_m": 5.0}, {"keep_out": KeepOut((((900.0, 0.0), (950.0, 0.0), (950.0, 9.0)),))}),
+        {"way_home": WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0)},
+    ],
+)
+def test_only_the_ways_of_those_that_fly_alike_are_worked_out_in_common(other: dict[str, object]) -> None:
+    jobs = [open_strip(strip(1)), open_strip(strip(2, x_m=200))]
+    one, two = helper(), replace(helper(), **other)  # type: ignore[arg-type]
+    tables = tables_of(jobs, [one, two])
+    flies_alike = not other or next(iter(other)) in ("vehicle", "p_detect", "lasts_until_s", "refused")
+    assert (tables[0].ways is tables[1].ways) is flies_alike
+    for table, its in zip(tables, (one, two), strict=True):
+        lone = StripTable(jobs, its)
+        assert table.helper is its
+        assert (table.worth_m2 == lone.worth_m2).all()
+        assert (table.sonar_on_s == lone.sonar_on_s).all()
+        assert (table.leave == lone.leave).all()
+
+
+class TestHowLongRunInsAndWaysHomeTake:
+    POSES = np.array([[[0, 100, 0.0], [0, 100, np.pi], [3, 4, 0.0]], [[9, 9, 0.0], [0, 0, np.pi], [5, 5, 0.0]]])
+
+    def test_run_ins_in_still_water(self) -> None:
+        assert helper().run_in_s(self.POSES).tolist() == [[2.5] * 3] * 2
+
+    def test_run_ins_in_a_current_are_by_the_speed_over_the_ground(self) -> None:
+        one = replace(helper(), way_home=WayHome((0, 0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0))
+        against = 5 / 1.5
+        assert one.run_in_s(self.POSES) == pytest.approx(np.array([[2, against, 2], [2, against, 2]]))
+
+    def test_home_is_reached_behind_the_run_out(self) -> None:
+        poses = np.array([[0, 100, np.pi], [0, 40, np.pi]])
+        assert helper().home_s(poses).tolist() == [0, 0]
+        assert helper(way_home=WayHome((0.0, 0.0), Sailing(2.0), 6.0)).home_s(poses) == pytest.approx([52.5, 22.5])
+
+
+def test_of_the_ways_over_a_strip_that_with_the_current_is_taken() -> None:
+    # 0.5 m/s to the north: 200 m take 80 s with it and 133 s against it; from the side either end is as far.
+    one = helper(x_m=-300, y_m=200, heading_rad=np.pi / 2, way_home=WayHome((0, 0), Sailing(2.0, 0.5, 0.0), 6.0))
+    table = StripTable([open_strip(strip(1))], one)
+    assert sorted(set(table.sonar_on_s[0].round(6).tolist())) == pytest.approx([80, 200 / 1.5])
+    to_begin_s, ways = table.ways.shortest_from(np.array([one.pose]))
+    assert table.sonar_on_s[0, ways[0, 0]] == pytest.approx(80)
+    assert table.run_out_s[0, ways[0, 0]] == pytest.approx(2)
+    assert table.leave[0, ways[0, 0]] == pytest.approx([0, 305, 0])
+    removed, free_s, _ = table.best_from(one.pose, 10.0, np.inf)
+    assert (removed[0], free_s[0]) == pytest.approx((700, 10 + to_begin_s[0, 0] + 82))
+
+
+def test_the_battery_must_last_home_from_the_end_of_the_way_that_is_flown() -> None:
+    one = helper(way_home=WayHome((0.0, -50.0), Sailing(2.0), 6.0))
+    job = open_strip(strip(1))
+    served = expected_service(job, one)
+    home_s = float(one.home_s(np.array([served.free_at], dtype=np.float64))[0])
+    assert home_s > 355 / 2
+    for spare_s, removed in ((0.01, 700), (-0.01, 0)):
+        table = StripTable([job], replace(one, lasts_until_s=served.ends_s + home_s + spare_s))
+        assert table.best_from(one.pose, 0.0, np.inf)[0] == pytest.approx([removed])

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from coordinator.cut.ground import OBJECTIVES, Ground
-from coordinator.cut.strips import Cut, Cutting, CuttingRules, strip_of
+from coordinator.cut.strips import Cut, Cutting, CuttingRules, _pieces, cells_wide, strip_of
 from coordinator.cut.window import Window
 from planner.types import FloatArray, GridSpec, SweepFrame
 
@@ -152,25 +152,60 @@ class TestByHand:
         assert Cutting(grid, ground(np.ones(grid.shape), grid), RULES).cut(PRICE) == [Window(0, 60, 0, 6)]
 
 
-class TestOverlap:
+class TestLengthsAndWidths:
     @pytest.mark.parametrize(
-        ("other", "share"),
+        ("band", "pieces"),
         [
-            (Window(0, 10, 0, 10), 1),
-            (Window(0, 10, 5, 15), 50 / 150),
-            (Window(5, 15, 5, 15), 25 / 175),
-            (Window(10, 20, 0, 10), 0),
-            (Window(30, 40, 30, 40), 0),
+            ((7, 10), [(7, 10)]),
+            ((7, 12), [(7, 12)]),  # as long as a strip may be
+            ((7, 13), [(7, 10), (10, 13)]),
+            ((7, 18), [(7, 11), (11, 14), (14, 18)]),
+            ((7, 9), []),  # too short
+            ((0, 6), [(0, 3), (3, 6)]),
         ],
     )
-    def test_it_is_the_shared_part_of_both(self, other: Window, share: float) -> None:
-        window = Window(0, 10, 0, 10)
-        assert window.overlap(other) == other.overlap(window) == pytest.approx(share)
+    def test_a_band_is_cut_into_as_few_equal_pieces_of_3_to_5_rows_as_there_may_be(
+        self, band: tuple[int, int], pieces: list[tuple[int, int]]
+    ) -> None:
+        assert _pieces(*band, 3, 5) == pieces
 
-    @pytest.mark.parametrize(("first_column", "at_it"), [(0, True), (2, True), (3, False), (10, False)])
-    def test_it_is_at_another_one_if_three_quarters_of_it_are(self, first_column: int, at_it: bool) -> None:
-        window = Window(0, 10, first_column, first_column + 10)
-        assert window.is_at_one_of([Window(50, 60, 0, 10), Window(0, 10, 0, 10)]) == at_it
+    def test_where_equal_ones_would_be_too_short_into_the_longest(self) -> None:
+        assert _pieces(10, 25, 4, 5) == [(10, 15), (15, 20), (20, 25)]
+        assert _pieces(10, 21, 4, 5) == [(10, 15), (15, 20)]
+        assert _pieces(10, 26, 4, 5) == [(10, 14), (14, 18), (18, 22), (22, 26)]
+
+    @pytest.mark.parametrize(
+        ("cell_m", "swath_m", "wide"), [(5, 50, 10), (5, 54.9, 10), (5, 49.9, 9), (5, 4, 1), (0.1, 0.7, 7), (3, 2.9, 1)]
+    )
+    def test_a_swath_is_as_wide_as_the_whole_cells_in_it_but_for_rounding(
+        self, cell_m: float, swath_m: float, wide: int
+    ) -> None:
+        assert cells_wide(GridSpec(EAST, cell_m, 40, 60), swath_m) == wide
+
+    @pytest.mark.parametrize(("min_strip_m", "rows"), [(5, 1), (2, 1), (7, 1), (8, 2), (12, 2), (13, 3)])
+    def test_the_least_length_is_rounded_to_whole_cells_and_at_least_one(self, min_strip_m: float, rows: int) -> None:
+        rules = replace(RULES, overhead_m=1, min_strip_m=min_strip_m)
+        for hot_rows in range(1, 5):
+            found = cut(hot(np.s_[10 : 10 + hot_rows, 10:20]), rules)
+            assert found == ([Window(10, 10 + hot_rows, 10, 20)] if hot_rows >= rows else [])
+
+    def test_where_the_most_is_less_than_the_least_all_are_as_long_as_that(self) -> None:
+        assert cut(hot(np.s_[10:16, 10:20]), replace(RULES, overhead_m=1, max_strip_m=5)) == [Window(10, 16, 10, 20)]
+
+    def test_a_place_is_cut_six_times_at_most(self) -> None:
+        told = ground(hot(np.s_[10:40, 10:20]), look=0.1)
+        assert Cutting(GRID, told, RULES).cut(0.1) == [Window(10, 40, 10, 20)] * 6
+
+    def test_metres_are_flown_for_a_strip_and_the_way_to_it(self) -> None:
+        assert RULES.metres_flown(150) == 190
+
+    @pytest.mark.parametrize(("heading_deg", "across_deg"), [(0, 90), (30, 120), (269, 359), (271, 1), (359, 89)])
+    def test_across_the_tracks_it_is_headed_to_starboard_of_them(self, heading_deg: float, across_deg: float) -> None:
+        grid = replace(GRID, frame=SweepFrame(1000, -500, math.radians(heading_deg)))
+        assert math.degrees(strip_of(grid, Window(10, 40, 12, 22, across=True), 1).heading_rad) == pytest.approx(
+            across_deg
+        )
+        assert math.degrees(strip_of(grid, Window(10, 40, 12, 22), 1).heading_rad) == pytest.approx(heading_deg)
 
 
 SMALL = GridSpec(EAST, 5, 9, 8)

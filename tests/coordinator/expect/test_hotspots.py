@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from coordinator_by_hand import ELSEWHERE, GRID, HOT, HOT_CELLS, box
 
+from comms.said.announcement import Vertex
 from comms.said.messages import Hotspot, HotspotState
 from coordinator.expect.hotspots import Hotspots
 from planner.fleet_map import MOST_STARTS
@@ -99,3 +102,33 @@ def test_what_lies_outside_the_area_is_left_out() -> None:
 def test_one_that_holds_no_cell_is_heard_and_draws_nothing(hotspots: Hotspots, place: Box) -> None:
     assert hotspots.hear(("p", 1), FIRST, hotspot(place))
     assert not drawn(hotspots).any()
+
+
+def test_three_corners_make_one_and_two_do_not(hotspots: Hotspots) -> None:
+    # Half of a square of ten cells: of row 10 nine cells, of row 18 one.
+    corners = (Vertex(97.5, 50.0), Vertex(147.5, 50.0), Vertex(97.5, 100.0))
+    assert hotspots.hear(("p", 1), FIRST, replace(hotspot(), outline=corners[:2]))
+    assert not drawn(hotspots).any()
+    assert hotspots.hear(("p", 1), (0, 2), replace(hotspot(), outline=corners))
+    assert [int(np.count_nonzero(row)) for row in drawn(hotspots)[10:20]] in (
+        [10, 9, 8, 7, 6, 5, 4, 3, 2, 1],
+        list(range(9, -1, -1)),
+    )
+
+
+def test_one_that_is_withdrawn_holds_nothing_whatever_its_outline(hotspots: Hotspots) -> None:
+    assert hotspots.hear(("p", 1), FIRST, replace(hotspot(), state=HotspotState.WITHDRAWN))
+    assert not drawn(hotspots).any()
+
+
+def test_cells_centred_on_its_edges_are_in_its_window(hotspots: Hotspots) -> None:
+    # Columns 20 and 30 are centred at 100 and 150 m, rows 10 and 70 at 52.5 and 352.5 m.
+    window, _ = hotspots._cells_within([(100.0, 52.5), (150.0, 52.5), (150.0, 352.5), (100.0, 352.5)])
+    assert window == (slice(10, 71), slice(20, 31))
+
+
+def test_two_hotspots_of_one_start_are_two(hotspots: Hotspots) -> None:
+    for number, (place, risk) in enumerate(((HOT, 0.5), (ELSEWHERE, 0.7)), 1):
+        assert hotspots.hear(("p", number), FIRST, hotspot(place, risk))
+        assert not hotspots.hear(("p", number), FIRST, hotspot(place, risk))
+    assert (drawn(hotspots) == told((HOT_CELLS, 0.5), (ELSEWHERE_CELLS, 0.7))).all()

@@ -20,11 +20,13 @@ from coordinator.allocate.situation import OpenStrip
 from coordinator.keep_apart.courses import (
     STEP_S,
     Course,
+    _nearest_m,
     course,
     lying_still,
     run_out_left_m,
     straight,
     survey_course,
+    survey_run_out_left_m,
     sweep_course,
     too_close,
 )
@@ -57,9 +59,37 @@ class TestCourses:
     def test_it_is_laid_for_900_s_beyond_its_paths_and_where_it_lies_still(self) -> None:
         laid = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 100, 10)])
         assert (laid.first, laid.end) == (3, 3 + (50 + 900) / STEP_S)
+        longer = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 102, 10)])
+        assert longer.end == 3 + 476  # 951 s
         still = lying_still(Pose(7, 8, EAST), 5)
         assert (still.first, still.end) == (3, 3 + 900 / STEP_S)
         assert set(map(tuple, still.poses.tolist())) == {(7, 8, EAST)}
+
+    @pytest.mark.parametrize("sailing", [Sailing(2), Sailing(2, 0.7, 2.5)])
+    def test_between_its_steps_it_is_where_they_let_expect_and_after_the_last_as_then(self, sailing: Sailing) -> None:
+        start = Pose(3, -4, 0.4)
+        turn = DubinsPath(start, 10, (1, 0, -1), (13.0, 21.0, 9.0))
+        then = straight(turn.pose_at(turn.length_m), 77, 10)
+        laid = course(start, 7.3, sailing, 10, [turn, straight(turn.pose_at(turn.length_m), 0, 10), then])
+        assert laid.first == 4
+        for step in (0, 1, 5, 17, 30, 40, 60, len(laid.poses) - 1):
+            assert laid.at((laid.first + step) * STEP_S) == pytest.approx(laid.poses[step].tolist(), abs=1e-6)
+        assert laid.at(laid.arrives_s)[:2] == pytest.approx(then.pose_at(77)[:2], abs=1e-6)
+        end = laid.at((laid.end - 1) * STEP_S)
+        assert laid.at(laid.end * STEP_S) == laid.at(1e9) == end
+        assert len(laid._asked) == 1  # what was asked for last
+        # It circles at its speed, whatever the current.
+        circle_s = math.tau * 10 / 2
+        assert laid.at(laid.arrives_s + circle_s)[:2] == pytest.approx(laid.at(laid.arrives_s)[:2], abs=1e-6)
+
+    def test_one_that_waits_does_all_so_much_later(self) -> None:
+        laid = course(Pose(0, 0, EAST), 5, Sailing(2), 10, [straight(Pose(0, 0, EAST), 100, 10)])
+        later = laid.later(3)
+        assert (later.first, later.end, later.arrives_s) == (laid.first, laid.end + 3, laid.arrives_s + 6)
+        assert later.poses[:4].tolist() == [laid.poses[0].tolist()] * 4
+        assert (later.poses[3:] == laid.poses).all()
+        assert later.at(8) == laid.at(5) == (0, 0, EAST)
+        assert laid.at(31) == pytest.approx(later.at(37))
 
     def test_where_there_is_room_to_neither_side_it_is_expected_to_starboard_all_the_same(self) -> None:
         walls = KeepOut(
@@ -94,6 +124,18 @@ class TestCourses:
         assert at_once.at(10).y_m > 1
         assert later.arrives_s == pytest.approx(at_once.arrives_s, abs=2)
 
+    @pytest.mark.parametrize("swath_m", [50, 30])
+    def test_who_is_on_the_first_leg_goes_on_over_it_and_then_over_the_others(self, swath_m: float) -> None:
+        free = helper(swath_m=swath_m)
+        sweep, _ = shortest_sweep(sweeps(strip(1), free), free.pose, free.turn_radius_m)
+        begin = sweep.passes[0].begin
+        whole = sweep_course(begin, 0, Sailing(2), 6, sweep)
+        on_it = whole.at(40)
+        assert on_it.y_m == pytest.approx(begin.y_m + 80)
+        laid = sweep_course(on_it, 40, Sailing(2), 6, sweep, entered=True)
+        assert laid.arrives_s == pytest.approx(whole.arrives_s)
+        assert laid.at(90)[:2] == pytest.approx(whole.at(90)[:2])
+
     def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
         one, free = strip(1, 0, 0, length_m=4000), helper(x_m=0, y_m=-100)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
@@ -120,6 +162,62 @@ class TestCourses:
     )
     def test_what_is_left_of_a_run_out(self, pose: Pose, left_m: float) -> None:
         assert run_out_left_m(Pose(0, 100, NORTH), pose, 20) == pytest.approx(left_m)
+
+    @pytest.mark.parametrize(
+        ("ahead_m", "beside_m", "turned_rad", "left_m"),
+        [
+            *((22, 0, 0, 22), (22.1, 0, 0, 0), (1, 1.9, 0, 1), (1, -1.9, 0, 1), (1, 2.1, 0, 0), (1, -2.1, 0, 0)),
+            *((7, 0, 0.14, 7), (7, 0, -0.14, 7), (7, 0, 0.142, 0), (7, 0, -0.142, 0), (7, 0, math.pi, 0)),
+            *((0.5, 0, 0, 0.5), (-0.5, 0, 0, 0)),
+        ],
+    )
+    def test_up_to_2_m_before_it_and_to_either_side_it_is_on_a_run_out(
+        self, ahead_m: float, beside_m: float, turned_rad: float, left_m: float
+    ) -> None:
+        sin, cos = math.sin(0.7), math.cos(0.7)
+        x_m, y_m = 30 - ahead_m * sin + beside_m * cos, -40 - ahead_m * cos - beside_m * sin
+        # A nanometre nearer: 22 m is the most, and sums of sines are not exact.
+        found = run_out_left_m(Pose(30, -40, 0.7), Pose(x_m + 1e-9 * sin, y_m + 1e-9 * cos, 0.7 + turned_rad), 20)
+        assert found == pytest.approx(left_m)
+
+    @pytest.mark.parametrize(("beside_m", "left_m"), [(2.0, 5.0), (-2.0, 5.0)])
+    def test_just_2_m_beside_it_still_is(self, beside_m: float, left_m: float) -> None:
+        assert run_out_left_m(Pose(0, 100, NORTH), Pose(beside_m, 95, NORTH), 20) == left_m
+        assert run_out_left_m(Pose(0, 100, NORTH), Pose(beside_m, 78, NORTH), 20) == 22
+
+    def test_a_run_out_is_that_of_the_last_track_that_was_flown(self) -> None:
+        entry = vehicle("primary", Role.SURVEY)
+        tracks = (PlannedTrack(1, 0, 0, 0, 0, 300, True), PlannedTrack(2, 0, 80, 300, 80, 0, True))
+        plan = Plan(1, (*tracks, PlannedTrack(3, 0, 160, 0, 160, 300, False)), (), (), "")
+        assert survey_run_out_left_m(entry, plan, Pose(80, -8, SOUTH)) == pytest.approx(12)
+        assert survey_run_out_left_m(entry, plan, Pose(0, 308, NORTH)) == 0
+        assert survey_run_out_left_m(entry, replace(plan, tracks=plan.tracks[2:]), Pose(80, -8, SOUTH)) == 0
+        assert survey_run_out_left_m(entry, None, Pose(80, -8, SOUTH)) == 0
+
+    def test_where_no_plan_was_told_a_primary_circles_where_it_was_heard(self) -> None:
+        laid = survey_course(vehicle("primary", Role.SURVEY), AgentState(Mode.TRANSIT, 1, 1, 0, 5, 6, NORTH), None, 9)
+        assert (laid.start_s, laid.arrives_s) == (9, 9)
+        assert laid.at(9 + math.pi * 20 / 1.5) == pytest.approx((45, 6, SOUTH))
+
+    @pytest.mark.parametrize(
+        ("state", "begins", "arrives_s"),
+        [
+            # 20 m of run-in and of run-out; the track itself takes 200 s.
+            (AgentState(Mode.SURVEY, 1, 1, 100_000, 0, 7, 0), (0, 300 - 1.5 * 90, NORTH), 100 + 20 / 1.5),
+            (AgentState(Mode.SURVEY, 1, 1, 1, 0, 310, 0), (0, 300, NORTH), 10 + 20 / 1.5),  # that is past
+            (AgentState(Mode.SURVEY, 1, 1, 0, 0, -20, 0), (0, -20, NORTH), 10 + 340 / 1.5),
+            (AgentState(Mode.SURVEY, 2, 1, 100_000, 0, -20, 0), (0, -20, NORTH), 10 + 340 / 1.5),
+            (AgentState(Mode.TRANSIT, 1, 1, 100_000, 0, -20, 0), (0, -20, NORTH), 10 + 340 / 1.5),
+            (AgentState(Mode.FINISHED, 1, 1, 100_000, 0, -20, 0), (0, -20, NORTH), 10),
+        ],
+    )
+    def test_where_a_primary_is_on_its_track(
+        self, state: AgentState, begins: tuple[float, float, float], arrives_s: float
+    ) -> None:
+        plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 300, False),), (), (), "")
+        laid = survey_course(vehicle("primary", Role.SURVEY), state, plan, 10)
+        assert laid.at(10) == pytest.approx(begins)
+        assert laid.arrives_s == pytest.approx(arrives_s)
 
     def test_a_track_under_way_ends_when_the_primary_says(self) -> None:
         entry = vehicle("primary", Role.SURVEY)
@@ -184,6 +282,23 @@ class TestCourses:
 
 
 class TestTooClose:
+    def test_between_two_steps_both_go_straight(self) -> None:
+        apart = np.array([[3.0, 4.0], [3.0, 4.0], [6.0, 8.0], [3.0, 4.0], [-3.0, 4.0], [0.4, -0.3], [-0.4, -0.3]])
+        assert _nearest_m(apart) == pytest.approx([5, 5, 5, 4, 0.7 / math.hypot(3.4, 4.3), 0.3])
+
+    def test_in_less_than_a_step_too(self) -> None:
+        one, other = ahead(0, 0, NORTH, 2), ahead(3, 40, SOUTH, 2)
+        assert too_close(one, other, 20, 8.2, 8.4) == too_close(one, other, 20, 8.2, 10.1)
+        assert too_close(one, other, 20, 8.2, 8.4) is not None
+        assert too_close(one, other, 20, 5000, 5001) is None  # of then nothing is known
+
+    def test_to_the_first_step_behind_the_time_that_is_asked_for(self) -> None:
+        one, other = ahead(0, 0, NORTH, 2), ahead(3, 48, SOUTH, 2)  # 24 m apart at 6 s, 16 m at 8 s
+        assert too_close(one, other, 20, 4.5, 5.9) is None
+        found = too_close(one, other, 20, 4.5, 6.0)
+        assert found is not None
+        assert found.time_s == 6
+
     def test_two_that_meet_head_on(self) -> None:
         north, south = ahead(0, 0, NORTH, 2), ahead(5, 400, SOUTH, 2)
         found = too_close(north, south, 20, 0, 600)
@@ -206,6 +321,29 @@ class TestTooClose:
         assert found is not None
         assert found.distance_m == pytest.approx(5)
         assert found.time_s == 0.5
+
+    def test_two_that_were_told_at_different_times(self) -> None:
+        later = course(Pose(5, 384, SOUTH), 8, Sailing(2), 10, [straight(Pose(5, 384, SOUTH), 2000, 10)])
+        assert later.first == 4
+        for one, other in ((ahead(0, 0, NORTH, 2), later), (later, ahead(0, 0, NORTH, 2))):
+            found = too_close(one, other, 20, 0, 600)
+            assert found is not None
+            assert [found.distance_m, found.time_s] == pytest.approx([5, 94])  # as from 400 m at 0 s
+
+    def test_just_as_near_as_they_may_they_are_not_too_close(self) -> None:
+        assert too_close(ahead(0, 0, NORTH, 2), ahead(20, 0, NORTH, 2), 20, 0, 300) is None
+        # From 25 m to 24 m, after 3.5 s or 14 s.
+        still = lying_still(Pose(24, 7, NORTH), 0)
+        for speed_mps in (2.0, 0.5):
+            assert too_close(ahead(0, 0, NORTH, speed_mps), still, 30, 0, 30) is None
+
+    def test_two_that_begin_just_as_near_as_they_may_come_no_nearer(self) -> None:
+        found = too_close(ahead(0, 0, NORTH, 2), lying_still(Pose(19.2, 5.6, NORTH), 0), math.hypot(19.2, 5.6), 0, 30)
+        assert found is not None
+        assert found.distance_m == pytest.approx(19.2)
+
+    def test_two_that_begin_near_may_stay_so(self) -> None:
+        assert too_close(ahead(0, 0, NORTH, 2), ahead(10, 0, NORTH, 2), 20, 0, 300) is None
 
     def test_one_that_passes_later(self) -> None:
         assert too_close(ahead(0, -100, NORTH, 2), ahead(-400, 0, EAST, 2), 20, 0, 600) is None

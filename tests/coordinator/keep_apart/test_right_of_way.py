@@ -16,7 +16,7 @@ from coordinator.allocate.allocators import ASKED_LATER_S, offers_let_through
 from coordinator.allocate.simple import GreedyAllocator, NearestAllocator
 from coordinator.allocate.situation import Allocator, Helper, OpenStrip, Situation
 from coordinator.keep_apart.courses import too_close
-from coordinator.keep_apart.right_of_way import RightOfWay, Underway
+from coordinator.keep_apart.right_of_way import Instruction, RightOfWay, Underway
 from coordinator.vehicles import KnownVehicle
 from planner.dubins import Pose
 from planner.types import Strip
@@ -243,6 +243,8 @@ class TestCheck:
         departures.wait_s(helper("helper"), far)
         right.offered("helper", 1, departures)
         assert right.check_s == 0
+        # It is expected on the way that was found clear, though it has not answered yet.
+        assert right._traffic.course(one, far.strip, 3.0) is departures.ways["helper", 1][1]
 
     @pytest.mark.parametrize("now_s", [0.0, 10.0])
     def test_two_are_checked_when_they_may_be_near_enough(self, now_s: float) -> None:
@@ -303,3 +305,349 @@ class TestCheck:
             one.state = replace(one.state, mode=Mode.TRANSIT, works_on=to[name].number)
         all_told = right.check([Underway(one, to[one.entry.vehicle]) for one in (first, second)], 1.0)
         assert [told.name for told in all_told] == ["helper"]
+
+
+def busy_helper(x_m: float, y_m: float, name: str = "helper", number: int = 7) -> tuple[Underway, Strip]:
+    """At work, heading north at 2 m/s straight to a strip that begins 10 m before it."""
+    to = strip(number, x_m, y_m + 10, length_m=250)
+    return Underway(known(name, Role.REVISIT, Mode.TRANSIT, x_m, y_m, number), to), to
+
+
+def lying(x_m: float, y_m: float) -> Underway:
+    """One whose battery is empty."""
+    return Underway(known("empty", Role.REVISIT, Mode.EMPTY, x_m, y_m), None)
+
+
+class TestWhoGivesWay:
+    @pytest.mark.parametrize(
+        ("role", "mode", "finished_ms", "gives_way"),
+        [
+            (Role.REVISIT, Mode.IDLE, None, True),
+            (Role.REVISIT, None, None, True),
+            (Role.REVISIT, Mode.RETURNING, None, False),
+            (Role.SURVEY, Mode.FINISHED, 1000, False),
+            (Role.SURVEY_REVISIT, Mode.SURVEY, None, False),
+            (Role.SURVEY_REVISIT, Mode.FINISHED, 1000, True),
+            (Role.SURVEY_REVISIT, Mode.RETURNING, 1000, False),
+        ],
+    )
+    def test_who_can_be_told_to(self, role: Role, mode: Mode | None, finished_ms: int | None, gives_way: bool) -> None:
+        one = KnownVehicle(vehicle("one", role), 0, finished_ms=finished_ms)
+        one.state = None if mode is None else AgentState(mode, 0, 1, 0, 0, 0, NORTH)
+        assert Underway(one, None).gives_way is gives_way
+
+    def test_one_at_work_before_one_that_is_free_whatever_their_names(self) -> None:
+        at_work, _ = busy_helper(0, 0, "zeta")
+        free = Underway(known("alpha", Role.REVISIT, Mode.IDLE, 3, 100), None)
+        (told,) = right_of_way().check([free, at_work], 0.0)
+        assert (told.name, told.gives_back) == ("alpha", None)
+
+    def test_who_was_sent_before_anybody_here_knows_of_goes_first(self) -> None:
+        right = right_of_way()
+        first, _ = busy_helper(0, 0, "zeta")
+        to = strip(8, 50, 60, length_m=200, heading_rad=WEST)  # both are at (0, 60) after 30 s
+        second = known("alpha", Role.REVISIT, Mode.TRANSIT, 60, 60, 8)
+        assert second.state is not None
+        second.state = replace(second.state, heading_rad=WEST)
+        departures = right.departures([Underway(second, None)], 0.5)
+        departures.wait_s(helper("alpha"), open_strip(to))
+        right.offered("alpha", 8, departures)
+        assert right.check([Underway(second, to), first], 0.5) == [Instruction("alpha", to, None)]
+
+    def test_who_lies_at_home_is_in_nobody_s_way(self) -> None:
+        at_work, _ = busy_helper(0, 0)
+        assert right_of_way().check([at_work, Underway(known("home", Role.REVISIT, Mode.HOME, 0, 60), None)], 0.0) == []
+
+    def test_who_is_lost_is_in_nobody_s_way(self) -> None:
+        at_work, _ = busy_helper(0, 0)
+        empty = lying(0, 60)
+        empty.vehicle.lost = True
+        assert right_of_way().check([at_work, empty], 0.0) == []
+
+    @pytest.mark.parametrize("of", ["primary", "helper"])
+    def test_who_was_never_heard_is_nowhere(self, of: str) -> None:
+        one, me = primary(0), known("helper", Role.REVISIT, Mode.IDLE, 3, 60)
+        (one if of == "primary" else me).state = None
+        right = right_of_way()
+        assert right.check([Underway(one, None), Underway(me, None)], 7.0) == []
+        assert right.check_s == 97
+
+
+class TestMargins:
+    @pytest.mark.parametrize(("beside_m", "told"), [(25.9, True), (26.1, False)])
+    def test_a_helper_at_work_gives_way_to_whom_it_would_come_nearer_than_11_m_and_the_separation(
+        self, beside_m: float, told: bool
+    ) -> None:
+        at_work, to = busy_helper(0, 0)
+        right = right_of_way()
+        found = right.check([at_work, lying(beside_m, 60)], 0.0)
+        assert found == ([Instruction("helper", to, None)] if told else [])
+        assert right.check_s == 1  # what is near is looked at each second
+
+    @pytest.mark.parametrize(("beside_m", "too_near"), [(18.9, True), (19.1, False)])
+    def test_of_two_that_are_near_already_one_may_pass_4_m_farther_off_than_the_separation(
+        self, beside_m: float, too_near: bool
+    ) -> None:
+        at_work, to = busy_helper(0, 0)
+        empty = lying(beside_m, 12)  # passed after 6 s
+        assert [one.gives_back for one in right_of_way().check([at_work, empty], 0.0)] == ([to] if too_near else [])
+        me = Underway(known("helper", Role.REVISIT, Mode.IDLE, 0, 0), None)
+        departures = right_of_way().departures([me, empty], 0.0)
+        waits_s = departures.wait_s(helper("helper"), open_strip(strip(1, 0, 30, length_m=250)))
+        assert waits_s == (math.inf if too_near else 0)
+
+    @pytest.mark.parametrize(("now_s", "meets_s", "told"), [(0.0, 51.0, True), (1.0, 53.0, False)])
+    def test_a_helper_at_work_looks_50_s_ahead(self, now_s: float, meets_s: float, told: bool) -> None:
+        # To the first multiple of 2 s behind that.
+        at_work, _ = busy_helper(0, 0)
+        found = right_of_way().check([at_work, lying(0, 26 + 2 * meets_s)], now_s)
+        assert [one.name for one in found] == (["helper"] if told else [])
+
+    @pytest.mark.parametrize(("now_s", "meets_s", "told"), [(0.0, 91.0, True), (1.0, 93.0, False)])
+    def test_a_helper_that_is_free_looks_90_s_ahead(self, now_s: float, meets_s: float, told: bool) -> None:
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 26 + 1.5 * meets_s)
+        found = right_of_way().check([Underway(primary(0), None), Underway(me, None)], now_s)
+        assert [one.name for one in found] == (["helper"] if told else [])
+
+    @pytest.mark.parametrize(("now_s", "meets_s", "waits_s"), [(0.0, 61.0, 10), (1.0, 63.0, 0)])
+    def test_one_that_is_free_needs_60_s_to_stand_aside(self, now_s: float, meets_s: float, waits_s: float) -> None:
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        other = known("second", Role.REVISIT, Mode.IDLE, 0, 31 + 2 * (meets_s - now_s))
+        departures = right_of_way().departures([Underway(one, None) for one in (me, other)], now_s)
+        to = open_strip(strip(1, 0, 30, length_m=250))
+        assert departures.wait_s(helper("helper"), to) == waits_s
+
+
+class TestHowLongAnOfferWaits:
+    @pytest.mark.parametrize(
+        ("crosses_s", "waits_s"),
+        [
+            (133.9, 10),
+            (134.4, 20),
+            (143.9, 20),
+            (144.4, 30),
+            (153.9, 30),
+            (154.4, math.inf),
+            (175.7, math.inf),
+            (176, 0),
+        ],
+    )
+    def test_until_it_passes_25_8_s_behind_who_crosses_its_way(self, crosses_s: float, waits_s: float) -> None:
+        # Eastwards at 2 m/s it is at the crossing after 150 s; 31 m is 25.8 s of that beside the primary's 1.5 m/s.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=math.pi / 2)
+        east = open_strip(strip(1, 50, 0, heading_rad=math.pi / 2, length_m=400))
+        fleet = [Underway(me, None), Underway(primary(300, -1.5 * crosses_s), None)]
+        assert right_of_way().departures(fleet, 0.0).wait_s(helper("helper"), east) == waits_s
+
+    def test_what_it_meets_on_its_way_later_than_it_would_without_waiting_counts_too(self) -> None:
+        # The primary is at the crossing after 75 s, 5 s before it; a sweep that begins after 90 s is no matter yet.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=math.pi / 2)
+        departures = right_of_way().departures([Underway(me, None), Underway(primary(160, -112.5), None)], 0.0)
+        assert departures.wait_s(helper("helper"), open_strip(strip(1, 200, 0, 200, math.pi / 2))) == 30
+
+    def test_one_that_waits_is_in_nobody_s_way(self) -> None:
+        me, other = known("helper", Role.REVISIT, Mode.IDLE, 0, 0), known("second", Role.REVISIT, Mode.IDLE, 150, -150)
+        assert me.state is not None
+        me.state = replace(me.state, heading_rad=math.pi / 2)
+        fleet = [Underway(one, None) for one in (me, other, primary(300, -225))]
+        departures = right_of_way().departures(fleet, 0.0)
+        assert departures.wait_s(helper("helper"), open_strip(strip(1, 50, 0, 400, math.pi / 2))) == 30
+        assert departures.wait_s(helper("second"), open_strip(strip(2, 150, -100))) == 0
+
+    def test_one_that_sets_out_is_in_the_way_as_one_at_work_is(self) -> None:
+        # Both are at the crossing after 75 s: 31 m is 21.9 s of either's way.
+        one, other = known("helper", Role.REVISIT, Mode.IDLE, 0, 0), known("second", Role.REVISIT, Mode.IDLE, -150, 150)
+        assert other.state is not None
+        other.state = replace(other.state, heading_rad=math.pi / 2)
+        departures = right_of_way().departures([Underway(one, None), Underway(other, None)], 0.0)
+        assert departures.wait_s(helper("second"), open_strip(strip(2, -60, 150, 200, math.pi / 2))) == 0
+        assert departures.wait_s(helper("helper"), open_strip(strip(1, 0, 50, length_m=250))) == 30
+
+    def test_of_who_is_lost_nothing_is_known_but_of_those_behind_it(self) -> None:
+        lost, me = known("aaa", Role.REVISIT, Mode.IDLE, 0, 40), known("helper", Role.REVISIT, Mode.IDLE, 0, 140)
+        lost.lost = True
+        to = open_strip(strip(1, 0, 20, length_m=100))
+        for other, waits in ((primary(0), True), (primary(200), False)):
+            fleet = [Underway(one, None) for one in (lost, me, other)]
+            assert (right_of_way().departures(fleet, 0.0).wait_s(helper("helper"), to) > 0) is waits
+
+    @pytest.mark.parametrize(("begin_m", "meets_s", "clear"), [(46, 71.0, False), (48, 73.0, True)])
+    def test_a_way_is_clear_20_s_beyond_its_end(self, begin_m: float, meets_s: float, clear: bool) -> None:
+        # It has seen all after 50.5 or 51.5 s and then circles; 20 s later, at most to the next multiple of 2 s, it is
+        # as near as it may be to one that lies where it then is headed.
+        me = Underway(known("helper", Role.REVISIT, Mode.IDLE, 0, 0), None)
+        to = open_strip(strip(1, 0, begin_m, length_m=50))
+        alone = right_of_way().departures([me], 0.0)
+        assert alone.wait_s(helper("helper"), to) == 0
+        _, course, _ = alone.ways["helper", 1]
+        assert course.arrives_s == (begin_m + 55) / 2
+        there = course.at(meets_s)
+        survey = known("primary", Role.SURVEY, Mode.SURVEY, there.x_m, 0, 1, expected_end_ms=round(meets_s * 1000))
+        south = (there.x_m, there.y_m + 231.0, there.x_m, there.y_m + 31.0)
+        survey.plan = Plan(1, (PlannedTrack(1, 0, *south, False),), (), (), "")
+        departures = right_of_way().departures([me, Underway(survey, None)], 0.0)
+        assert (departures.wait_s(helper("helper"), to) == 0) is clear
+
+    def test_who_was_in_the_way_is_not_when_all_are_judged_anew(self) -> None:
+        places = {"helper": 0, "second": 60}
+        fleet = [Underway(known(name, Role.REVISIT, Mode.IDLE, 0, y_m), None) for name, y_m in places.items()]
+        right = right_of_way()
+        departures = right.departures(fleet, 0.0)
+        assert departures.wait_s(helper("helper"), open_strip(strip(1, 0, 50))) == 10
+        departures.begin()
+        assert right.make_room(departures, fleet) == []
+
+    def test_only_who_is_free_makes_room(self) -> None:
+        right, second = right_of_way(), known("second", Role.REVISIT, Mode.IDLE, 0, 60)
+        fleet = [Underway(known("helper", Role.REVISIT, Mode.IDLE, 0, 0), None), Underway(second, None)]
+        departures = right.departures(fleet, 0.0)
+        departures.wait_s(helper("helper"), open_strip(strip(1, 0, 50)))
+        second.state = AgentState(Mode.TRANSIT, 2, 1, 0, 0, 60, NORTH)
+        offered_since = [fleet[0], Underway(second, strip(2, 0, 300))]
+        assert right.make_room(departures, offered_since) == []
+
+
+class TestWhatIsTold:
+    def test_the_first_place_that_is_clear_for_three_minutes(self) -> None:
+        # 30 m aside a circle of 6 m leads back to within 31 m of the primary's track; 52.5 m to the north-east not.
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        (told,) = right_of_way().check(fleet, 0.0)
+        assert told.place == pytest.approx((3 + 52.5 * math.sqrt(0.5), 90 + 52.5 * math.sqrt(0.5)))
+
+    @pytest.mark.parametrize("number", [0, 1, 2, 3, 5, 6, 7])
+    def test_each_eighth_of_a_circle_but_astern_is_tried(self, number: int) -> None:
+        x_m = 20 if number < 4 else -20
+        there = (x_m + 75 * math.sin(number * math.pi / 4), 90 + 75 * math.cos(number * math.pi / 4))
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, x_m, 90), None)]
+        (told,) = RightOfWay(15, lambda place: math.dist(place, there) < 1).check(fleet, 0.0)
+        assert told.place == pytest.approx(there)
+
+    def test_a_place_that_is_clear_for_two_minutes_is_not_taken_if_one_is_for_three(self) -> None:
+        # 75 m ahead the primary is near after some 125 s.
+        fleet = [Underway(primary(0, -60), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        ahead, beside = (3.0, 165.0), (78.0, 90.0)
+        both = RightOfWay(15, lambda place: min(math.dist(place, ahead), math.dist(place, beside)) < 1)
+        one = RightOfWay(15, lambda place: math.dist(place, ahead) < 1)
+        assert both.check(fleet, 0.0)[0].place == pytest.approx(beside)
+        assert one.check(fleet, 0.0)[0].place == pytest.approx(ahead)
+
+    def test_one_that_is_clear_for_three_minutes_and_no_longer_is_taken(self) -> None:
+        # 150 m ahead the primary is near after some 183 s.
+        fleet = [Underway(primary(0, -86), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        places = ((3, 240), (153, 90))
+        right = RightOfWay(30, lambda place: min(math.dist(place, one) for one in places) < 1)
+        (told,) = right.check(fleet, 0.0)
+        assert told.place == pytest.approx((3, 240))
+
+    def test_or_else_for_one_minute(self) -> None:
+        # Ahead all lies on the primary's track: it comes to 30 m ahead after some 95 s, in three minutes beyond all.
+        fleet = [Underway(primary(0, -60), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        (told,) = RightOfWay(15, lambda place: abs(place[0] - 3) < 1).check(fleet, 0.0)
+        assert told.place == pytest.approx((3, 120))
+
+    def test_a_helper_at_work_stands_aside_where_it_cannot_stay(self) -> None:
+        # It circles where it is if that is clear for a minute; the primary is near after (y - 26) / 1.5 s.
+        for y_m, stays in ((70, False), (140, True)):
+            to = strip(7, 0, 20, length_m=100)
+            at_work = known("helper", Role.REVISIT, Mode.TRANSIT, 0, y_m, 7)
+            right, fleet = right_of_way(), [Underway(primary(0), None), Underway(at_work, to)]
+            (told,) = right.check(fleet, 0.0)
+            assert told.gives_back == to
+            assert (told.place is None) is stays
+            if told.place is not None:  # and is expected there
+                course = right._traffic.course(at_work, None, 0.0)
+                assert course is not None
+                assert course.at(course.arrives_s)[:2] == pytest.approx(told.place, abs=0.01)
+
+    def test_it_is_told_again_after_10_s(self) -> None:
+        at_work, _ = busy_helper(0, 90)
+        right = right_of_way()
+        for now_s, told in ((5.0, 1), (14.9, 0), (15.0, 1)):
+            right.changed("helper")
+            assert len(right.check([lying(0, 150), at_work], now_s)) == told
+
+    def test_who_stands_aside_is_sent_elsewhere_after_10_s(self) -> None:
+        fleet = [Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)]
+        right = right_of_way()
+        (told,) = right.check(fleet, 0.0)
+        assert told.place is not None
+        fleet.append(lying(told.place[0] + 20, told.place[1]))
+        for now_s, times in ((9.9, 0), (10.0, 1)):
+            right.changed("helper")
+            assert len(right.check(fleet, now_s)) == times
+
+    def test_where_it_has_nowhere_to_go_that_is_said_once_of_each_two(self, caplog: pytest.LogCaptureFixture) -> None:
+        caplog.set_level("DEBUG", "secondlook.coordinator")
+        right = RightOfWay(15, lambda place: False)
+        fleet = [
+            *(Underway(primary(0), None), Underway(known("helper", Role.REVISIT, Mode.IDLE, 3, 90), None)),
+            Underway(known("second", Role.REVISIT, Mode.IDLE, -3, 90), None),
+        ]
+        for now_s in (0.0, 1.0, 2.0):
+            assert right.check(fleet, now_s) == []
+        assert [one.getMessage() for one in caplog.records] == [
+            f"{name} will come within 3 m of primary at 42 s and has nowhere to go (said once)"
+            for name in ("helper", "second")
+        ]
+
+
+class TestWhenItIsChecked:
+    def test_first_at_once(self) -> None:
+        assert right_of_way().check_s == 0
+
+    def test_two_that_may_just_now_be_near_enough_are_looked_at_and_then_a_second_later(self) -> None:
+        # 135 m of the primary's way, a circle of 12 m, and 26 m.
+        me = known("helper", Role.REVISIT, Mode.IDLE, 173, 0)
+        right = right_of_way()
+        assert right.check([Underway(primary(0), None), Underway(me, None)], 0.0) == []
+        assert right.check_s == 1
+
+    def test_where_nobody_gives_way_a_minute_and_a_half_later(self) -> None:
+        right = right_of_way()
+        assert right.check([Underway(primary(0), None)], 30.0) == []
+        assert right.check_s == 120
+
+    def test_two_that_are_near_each_second_and_no_sooner(self) -> None:
+        at_work, _ = busy_helper(0, 0)
+        empty, right = lying(200, 60), right_of_way()
+        assert right.check([at_work, empty], 10.0) == []
+        assert right.check_s == 11
+        at_work, _ = busy_helper(180, 0)
+        assert right.check([at_work, empty], 10.9) == []
+        assert len(right.check([at_work, empty], 11.0)) == 1
+
+    def test_all_of_a_sweep_50_s_before_it_begins(self) -> None:
+        # It begins after 60 s and is at its end, where it then circles, after 215 s; 3 s before it is 26 m from who
+        # lies behind that, or not.
+        for x_m, told in ((0, ["helper"]), (60, [])):
+            me = known("helper", Role.REVISIT, Mode.IDLE, 0, 0)
+            to, right, empty = strip(7, 0, 125, length_m=300), right_of_way(), lying(x_m, 451)
+            departures = right.departures([Underway(me, None)], 0.0)
+            assert departures.wait_s(helper("helper"), open_strip(to)) == 0
+            assert departures.sweeps_s["helper", 7] == pytest.approx(60)
+            right.offered("helper", 7, departures)
+            me.state = AgentState(Mode.TRANSIT, 7, 1, 0, 0, 0, NORTH)
+            fleet = [Underway(me, to), empty]
+            assert right.check(fleet, 0.0) == []
+            assert right.check_s == pytest.approx(10)
+            assert right.check(fleet, 9.9) == []
+            assert [one.name for one in right.check(fleet, 10.0)] == told
+            assert right.check_s > 10.9  # once
+            right.changed("helper")
+            assert right.check(fleet, 21.0) == []
+
+    def test_what_is_said_of_one_concerns_no_other_two(self) -> None:
+        right = right_of_way()
+        at_work, _ = busy_helper(0, 0)
+        fleet = [at_work, lying(200, 60)]
+        right.check(fleet, 10.0)
+        right.changed("somebody")
+        assert right.check_s == 0
+        near = [busy_helper(180, 0)[0], fleet[1]]
+        assert right.check(near, 10.5) == []
+        right.changed("empty")
+        assert len(right.check(near, 10.5)) == 1

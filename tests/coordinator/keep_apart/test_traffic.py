@@ -129,6 +129,10 @@ def test_a_course_is_laid_anew_once_a_helper_says_that_it_is_on_its_way() -> Non
         course = traffic.course(at(one, mode, 100, strip_told), SERVED, 3.0)
         assert course is not None
         assert course.start_s == start_s
+    alone, course = Traffic().course(one, SERVED, 3.0), traffic.course(one, SERVED, 3.0)
+    assert alone is not None
+    assert course is not None
+    assert course.arrives_s == pytest.approx(alone.arrives_s)  # with its way to the strip
     one.heard_ms = 5000
     course = traffic.course(at(one, Mode.TRANSIT, 96, SERVED.number), SERVED, 5.0)
     assert course is not None
@@ -153,9 +157,9 @@ def test_a_helper_that_says_it_is_at_another_strip_is_expected_over_that() -> No
 
 @pytest.mark.parametrize(("x_m", "y_m", "bearing_deg"), [(0, 200, 0), (60, 120, 90), (-60, 180, 315), (-60, 120, 270)])
 def test_a_helper_comes_to_where_it_is_to_wait_the_way_that_it_lies(x_m: float, y_m: float, bearing_deg: float) -> None:
-    course = Traffic().aside(at(helper(), Mode.IDLE, 120), None, (x_m, y_m), 0.0)
+    course = Traffic().aside(at(helper(), Mode.IDLE, 120, x_m=15.0), None, (15 + x_m, y_m), 0.0)
     arrives = course.at(course.arrives_s)
-    assert arrives[:2] == pytest.approx((x_m, y_m), abs=0.01)
+    assert arrives[:2] == pytest.approx((15 + x_m, y_m), abs=0.01)
     assert math.degrees(arrives.heading_rad) == pytest.approx(bearing_deg, abs=0.01)
 
 
@@ -240,3 +244,189 @@ class TestGroundToKeepOutOf:
         assert traffic.has_room(one, None, (10.0, 120.0), 0.0)
         assert not traffic.has_room(one, None, (14.0, 120.0), 0.0)
         assert not traffic.has_room(one, None, (30.0, 120.0), 0.0)
+
+
+def surveyor(**state: object) -> KnownVehicle:
+    """A primary on a track northwards, 300 m at 1.5 m/s, which ends at 200 s."""
+    plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 300, False),), (), (), "")
+    heard = AgentState(Mode.SURVEY, 1, 1, 200_000, 0, 0, NORTH)
+    return KnownVehicle(vehicle("primary", Role.SURVEY), 0, replace(heard, **state), plan=plan)  # type: ignore[arg-type]
+
+
+class TestWhatIsKnown:
+    def test_nothing_of_who_is_lost_was_never_heard_or_lies_at_home(self) -> None:
+        lost = at(helper(), Mode.IDLE, 120)
+        lost.lost = True
+        for one in (lost, helper(), at(helper(), Mode.HOME, 0)):
+            assert Traffic().course(one, None, 0.0) is None
+
+    def test_one_whose_battery_is_empty_lies_where_it_is_all_the_time(self) -> None:
+        course = Traffic().course(at(helper(), Mode.EMPTY, 120), None, 0.0)
+        assert course is not None
+        assert set(map(tuple, course.poses.tolist())) == {(0, 120, NORTH)}
+
+    @pytest.mark.parametrize("was_sent", [False, True])
+    def test_a_helper_that_was_never_sent_anywhere_lies_still_and_another_circles(self, was_sent: bool) -> None:
+        traffic, one = Traffic(), at(replace(helper(), offers={}), Mode.IDLE, 120)
+        if was_sent:
+            traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+            one.heard_ms = 60_000
+        course = traffic.course(one, None, 60.0)
+        assert course is not None
+        assert (course.at(100.0) == (0, 120, NORTH)) is not was_sent
+
+    def test_one_that_surveys_and_revisits_circles_when_it_has_surveyed(self) -> None:
+        entry = replace(vehicle("primary", Role.SURVEY), role=Role.SURVEY_REVISIT)
+        one = KnownVehicle(entry, 0, finished_ms=0, plan=surveyor().plan)  # of which a track is left
+        course = Traffic().course(at(one, Mode.IDLE, 120), None, 0.0)
+        assert course is not None
+        assert course.at(math.pi * 20 / 1.5) == pytest.approx((40, 120, math.pi))  # half round
+
+    @pytest.mark.parametrize("mode", [Mode.IDLE, Mode.RETURNING, Mode.EMPTY])
+    def test_what_follows_from_one_word_is_worked_out_once(self, mode: Mode) -> None:
+        traffic, one = Traffic(), at(helper(), mode, 120)
+        course = traffic.course(one, None, 0.0)
+        assert traffic.course(at(one, mode, 130), None, 50.0) is course
+        one.heard_ms = 1
+        later = traffic.course(one, None, 50.0)
+        assert later is not None
+        assert later.at(0.001).y_m == pytest.approx(130)
+
+    def test_on_its_way_home_it_sails_the_run_out_first(self) -> None:
+        traffic, one = Traffic(), helper()
+        traffic.course(at(one, Mode.TRANSIT, 0, 7), SERVED, 0.0)
+        traffic.course(at(one, Mode.REVISIT, 20, 7), SERVED, 0.0)
+        course = traffic.course(at(one, Mode.RETURNING, 120), None, 0.0)
+        assert course is not None
+        assert course.at(2.5) == pytest.approx((0, 125, NORTH))
+        assert math.cos(course.at(4.0).heading_rad) < 0.99
+
+    def test_a_survey_is_laid_anew_by_what_is_said_otherwise_of_it(self) -> None:
+        traffic, first = Traffic(), surveyor()
+        course = traffic.course(first, None, 0.0)
+        assert course is not None
+        again = replace(surveyor(y_m=40.0), heard_ms=20_000)
+        assert traffic.course(again, None, 20.0) is course
+        assert first.plan is not None
+        for other in (
+            surveyor(expected_end_ms=201_000),
+            surveyor(works_on=2),
+            surveyor(mode=Mode.TRANSIT),
+            replace(first, plan=replace(first.plan, revision=2)),
+            replace(first, plan=None),
+            first,
+        ):
+            laid = traffic.course(other, None, 20.0)
+            assert laid is not course
+            assert traffic.course(other, None, 20.0) is laid
+            course = laid
+
+    def test_on_its_way_to_a_track_it_is_no_matter_when_it_expects_to_be_where(self) -> None:
+        traffic = Traffic()
+        course = traffic.course(surveyor(mode=Mode.TRANSIT), None, 0.0)
+        assert traffic.course(surveyor(mode=Mode.TRANSIT, expected_end_ms=0), None, 5.0) is course
+
+    def test_who_should_have_sailed_its_tracks_is_where_it_was_heard_last(self) -> None:
+        traffic, one = Traffic(), surveyor()
+        course = traffic.course(one, None, 0.0)
+        assert course is not None
+        assert course.arrives_s == pytest.approx(200 + 20 / 1.5)  # with the run-out
+        later = replace(one, heard_ms=210_000)
+        assert traffic.course(later, None, course.arrives_s - 0.1) is course
+        assert traffic.course(one, None, course.arrives_s) is course  # nothing was heard since
+        anew = traffic.course(later, None, course.arrives_s)
+        assert anew is not None
+        assert anew.start_s == 210
+
+    def test_a_way_to_the_next_strip_begins_at_once(self) -> None:
+        # A circle of 6 m at 2 m/s: a third of a radian a second, to the west and back over the strip beside.
+        to = strip(8, -30, 0, length_m=100)
+        course, sweep = Traffic().onward(at(helper(), Mode.IDLE, 0), Pose(0, 125, NORTH), 60.0, to)
+        assert course.at(61.0).heading_rad == pytest.approx(2 * math.pi - 1 / 3)
+        assert sweep.passes[0][0][:2] == pytest.approx((-30, 105))
+        later, _ = Traffic().onward(at(helper(), Mode.IDLE, 0), Pose(0, 125, NORTH), 60.0, to, 4.0)
+        assert later.at(62.0) == pytest.approx((0, 129, NORTH))
+
+
+class TestWhereItIs:
+    def test_who_is_told_something_is_where_its_course_has_led_it_since_it_was_heard(self) -> None:
+        one = at(helper(), Mode.TRANSIT, -40, SERVED.number)  # it is at -20 m after 10 s
+        assert Traffic().holding(one, SERVED, 10.0).at(10.0) == pytest.approx((0, -20, NORTH))
+        assert Traffic().aside(one, SERVED, (60.0, 0.0), 10.0).at(10.0) == pytest.approx((0, -20, NORTH))
+
+    def test_or_where_it_was_heard_if_nobody_knows_its_course(self) -> None:
+        assert Traffic().holding(at(helper(), Mode.HOME, 9), None, 10.0).at(10.0) == (0, 9, NORTH)
+
+    def test_who_was_only_on_its_way_to_a_strip_has_no_run_out_of_it(self) -> None:
+        traffic, one = Traffic(), helper()
+        traffic.course(at(one, Mode.TRANSIT, 0, 7), SERVED, 0.0)
+        assert traffic.holding(at(one, Mode.IDLE, 120), None, 0.0).at(1.0).heading_rad == pytest.approx(1 / 3)
+
+    def test_of_a_strip_that_it_has_begun_before_anybody_here_knew_all_is_expected(self) -> None:
+        course = Traffic().course(at(helper(), Mode.REVISIT, 70, SERVED.number), SERVED, 0.0)
+        assert course is not None
+        assert course.arrives_s > 55  # what is left of it would take 27.5 s
+
+
+class TestErrands:
+    @pytest.mark.parametrize(("heard_ms", "is_sent"), [(39_990, True), (40_000, False)])
+    def test_who_is_heard_when_it_should_be_there_rests_where_it_is(self, heard_ms: int, is_sent: bool) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+        sent = traffic.course(one, None, 0.0)
+        one.heard_ms = heard_ms
+        assert (traffic.course(at(one, Mode.IDLE, 200), None, 40.0) is sent) is is_sent
+
+    def test_who_is_heard_elsewhere_in_the_moment_in_which_it_is_sent_goes_there_from_there(self) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 12.0)
+        one.heard_ms = 12_000
+        course = traffic.course(at(one, Mode.IDLE, 120, x_m=-40.0), None, 12.0)
+        assert course is not None
+        assert course.at(12.0) == pytest.approx((-40, 120, NORTH))
+
+    @pytest.mark.parametrize(("aside_m", "is_on_course"), [(9.9, True), (10.0, True), (10.1, False)])
+    def test_who_is_heard_10_m_off_its_course_is_on_it(self, aside_m: float, is_on_course: bool) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+        sent = traffic.course(one, None, 0.0)
+        one.heard_ms = 10_000
+        found = traffic.course(at(one, Mode.IDLE, 140, x_m=aside_m), None, 10.0)
+        assert (found is sent) is is_on_course
+        assert traffic.course(one, None, 12.0) is found  # and the way from there stays as it is
+
+    def test_who_is_22_m_from_where_it_was_sent_is_there(self) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+        one.heard_ms = 10_000
+        course = traffic.course(at(one, Mode.IDLE, 200, x_m=22.0), None, 12.0)
+        assert course is not None
+        assert course.arrives_s == 10
+
+    def test_who_is_sent_to_a_strip_is_not_sent_aside_any_more(self) -> None:
+        traffic, one = Traffic(), at(helper(), Mode.IDLE, 120)
+        traffic.sent_aside(one, None, (0.0, 200.0), 0.0)
+        traffic.offered("helper", SERVED, *traffic.to_strip(one, None, SERVED, 0.0))
+        course = traffic.course(one, None, 1.0)  # it has refused it
+        assert course is not None
+        assert course.arrives_s == 0
+
+    def test_where_nothing_is_in_the_way_there_is_room_everywhere(self) -> None:
+        assert Traffic().has_room(at(helper(), Mode.IDLE, 120), None, (0.0, 121.0), 0.0)
+
+
+def test_a_strip_that_leads_through_ground_to_keep_out_of_is_expected_to_be_flown_all_the_same() -> None:
+    wall = KeepOut((((-20.0, 40.0), (20.0, 40.0), (20.0, 60.0), (-20.0, 60.0)),), 1.5)
+    course = Traffic(wall).course(at(helper(), Mode.TRANSIT, -30, SERVED.number), SERVED, 0.0)
+    assert course is not None
+    assert course.at(course.arrives_s)[:2] == pytest.approx((0, 125), abs=0.01)
+
+
+def test_a_strip_in_a_dead_end_is_expected_to_be_flown_into_that() -> None:
+    # Walls to both sides of it and right before it, where the helper is: the way leads round to its far end.
+    walls = ((-40, -20, 40, -10), (-40, -20, -30, 140), (30, -20, 40, 140))
+    outlines = tuple(((x0, y0), (x1, y0), (x1, y1), (x0, y1)) for x0, y0, x1, y1 in walls)
+    for keep_out, end_m in ((KeepOut(outlines, 1.5), (0, 15)), (KeepOut(()), (0, 125))):
+        course = Traffic(keep_out).course(at(helper(), Mode.TRANSIT, -60, SERVED.number), SERVED, 0.0)
+        assert course is not None
+        assert course.at(course.arrives_s)[:2] == pytest.approx(end_m, abs=0.01)
