@@ -52,7 +52,9 @@ CORE = (
 GOLDEN = "tests/secondlook/recorded/test_golden_replay.py"
 WIRED = ("test_zenoh_fleet", "test_host", "wall/")
 """Of the wider tests those that wait for a wire or a clock are left out."""
+PYTEST = ("-x", "-q", "-p", "no:cacheprovider", "--hypothesis-profile=mutants")
 LIBRARIES = ("hypothesis.strategies", "numpy", "pydantic", "shapely", "yaml")
+"""Which tests import: a process has them once for all mutants that it tries."""
 LIMITS_S = (120, 300, 900)
 """Longer than any of these tests take on a busy machine: who takes longer does not end."""
 
@@ -82,8 +84,6 @@ def tried_against(file: str, root: Path) -> tuple[list[str], list[str], list[str
     names = [[one.relative_to(root).as_posix() for one in some] for some in (first, nearby, others)]
     return names[0], names[1], [one for one in names[2] if one not in names[0]]
 
-
-PYTEST = ("-x", "-q", "-p", "no:cacheprovider", "--hypothesis-profile=mutants")
 
 # What follows runs in the processes, each with a copy of the folder of its own.
 

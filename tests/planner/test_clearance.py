@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from told_tile import whole_map
 
 from planner.clearance import (
     CAUTIOUS_MINES,
@@ -23,7 +24,7 @@ from planner.clearance import (
 )
 from planner.fleet_map import FleetMap
 from planner.risk import to_levels
-from planner.types import BoolArray, DetectionCurve, GridSpec, SweepFrame
+from planner.types import DetectionCurve, GridSpec, SweepFrame
 
 CELL_M2 = 25.0
 ALL = np.ones((8, 10), dtype=np.bool_)
@@ -171,25 +172,13 @@ def test_the_chance_of_at_most_so_many_is_that_of_scipy(risk: float, found: floa
     assert told.chance_of_at_most(told.at_most_with(1.0)) == pytest.approx(1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Tile:
-    """The one tile of a map of 8 by 10 cells."""
-
-    sum_levels: np.ndarray
-    largest_levels: np.ndarray
-    version: int = 1
-    first_row: int = 0
-    first_column: int = 0
-    settled: BoolArray = field(default_factory=lambda: ALL)
-
-
 @pytest.mark.parametrize("rho", [0.0, 0.5])
 @pytest.mark.parametrize("of_a_part", [False, True])
 def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None:
     fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=10, rows=8), rho)
     for number, vehicle in enumerate(("one", "other")):
         levels = np.random.default_rng(number).integers(0, 120, ALL.shape).astype(np.uint8)
-        fleet.join(vehicle, 0, Tile(levels, levels // 2))
+        fleet.join(vehicle, 0, whole_map(levels, levels // 2))
     inside = ALL.copy()
     inside[:3, :4] = False
     west = np.broadcast_to(np.arange(10) < 6, ALL.shape)
@@ -209,7 +198,7 @@ def test_of_a_map_it_is_what_its_cells_tell(rho: float, of_a_part: bool) -> None
 def test_of_a_place_so_much_of_each_cell_counts_as_lies_there() -> None:
     fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=10, rows=8))
     levels = to_levels(-np.log(np.where(np.arange(10) < 5, 0.25, 0.5) * np.ones(ALL.shape)))
-    fleet.join("one", 0, Tile(levels, levels))
+    fleet.join("one", 0, whole_map(levels, levels))
     place = np.zeros(ALL.shape)
     place[0, 0], place[0, 9], place[1, 9] = 0.1, 0.5, 1.0
     told = mines_left_by(fleet, ALL, 7.5, 0.0, place)
@@ -221,7 +210,7 @@ def test_of_a_place_so_much_of_each_cell_counts_as_lies_there() -> None:
     levels = np.zeros_like(levels)
     levels[:, 1:] = 100
     other = FleetMap(fleet.grid)
-    other.join("one", 0, Tile(levels, levels))
+    other.join("one", 0, whole_map(levels, levels))
     beside = np.zeros(ALL.shape)
     beside[:, 0] = 0.2
     told = mines_left_by(other, np.broadcast_to(np.arange(10) > 0, ALL.shape), 7.5, 0.0, beside)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from told_tile import whole_map
 
 from planner.contacts import LISTED_FROM, Objects, ObjectsOnMap, likelihood_ratio, surer_by
 from planner.fleet_map import FleetMap
 from planner.risk import NATS_PER_LEVEL
-from planner.types import BoolArray, GridSpec, SweepFrame
+from planner.types import GridSpec, SweepFrame
 
 
 def test_a_contact_near_another_is_of_the_same_object_and_one_farther_off_is_not() -> None:
@@ -251,18 +251,6 @@ def test_chances_are_those_under_which_what_was_heard_is_likeliest(heard: list[l
     assert told == pytest.approx(np.array(found), rel=1e-6, abs=1e-12)
 
 
-@dataclass(frozen=True, eq=False)
-class Tile:
-    """The one tile of a map of 2 by 3 cells."""
-
-    sum_levels: np.ndarray
-    largest_levels: np.ndarray
-    version: int = 1
-    first_row: int = 0
-    first_column: int = 0
-    settled: BoolArray = field(default_factory=lambda: np.ones((2, 3), dtype=np.bool_))
-
-
 def test_what_objects_are_goes_by_what_the_map_has_seen_at_their_places_so_far() -> None:
     fleet = FleetMap(GridSpec(SweepFrame(0.0, 0.0, 0.0), 10.0, columns=3, rows=2))
     objects = ObjectsOnMap()
@@ -277,7 +265,7 @@ def test_what_objects_are_goes_by_what_the_map_has_seen_at_their_places_so_far()
     assert objects.known()[1] is not unseen
     assert objects.known()[1].tolist() == unseen.tolist()
     levels = np.arange(10, 70, 10, dtype=np.uint8).reshape(2, 3)
-    fleet.join("primary", 0, Tile(levels, levels))
+    fleet.join("primary", 0, whole_map(levels, levels))
     seen, chances = objects.known()
     nats = fleet.nats_at(seen.x_m, seen.y_m)
     assert nats == pytest.approx(NATS_PER_LEVEL * np.array([40.0, 30.0]))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from told_tile import Tile
 
 from planner.fleet_map import MOST_STARTS, FleetMap
 from planner.risk import LevelArray
@@ -18,16 +19,6 @@ from planner.types import BoolArray, GridSpec, SweepFrame
 GRID = GridSpec(SweepFrame(0.0, 0.0, 0.0), 5.0, columns=23, rows=22)
 # Its four tiles: (first row, first column, rows, columns).
 PLACES = ((0, 0, 20, 20), (0, 20, 20, 3), (20, 0, 2, 20), (20, 20, 2, 3))
-
-
-@dataclass(frozen=True, eq=False)
-class Tile:
-    version: int
-    first_row: int
-    first_column: int
-    sum_levels: LevelArray
-    largest_levels: LevelArray
-    settled: BoolArray
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,3 +104,14 @@ def test_a_disk_that_is_full_at_the_end_is_told() -> None:
     file.write(b"one")
     with pytest.raises(CannotWriteError, match=r"^/dev/full: No space left on device"):
         file.close()
+
+
+@pytest.mark.parametrize(("lasts", "synced"), [(True, 1), (False, 0)])
+def test_only_what_has_to_outlast_a_loss_of_power_is_waited_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lasts: bool, synced: int
+) -> None:
+    calls = list[int]()
+    monkeypatch.setattr(os, "fsync", calls.append)
+    write_whole(tmp_path / "a.txt", "told", lasts=lasts)
+    assert (tmp_path / "a.txt").read_text() == "told"
+    assert len(calls) == synced
