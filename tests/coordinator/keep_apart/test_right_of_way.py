@@ -88,6 +88,16 @@ class TestOffers:
         asked = situation([better, soon], [helper()])
         assert offers_let_through(GreedyAllocator(), asked, Waits({2}, wait_s)) == (offers, again_s)
 
+    def test_what_must_wait_for_long_is_refused_an_allocator_that_takes_no_notice_of_waits(self) -> None:
+        class LowestFirst:
+            def assign(self, asked: Situation) -> dict[str, int]:
+                (alpha,) = asked.helpers
+                return {"alpha": min(one.strip.number for one in asked.strips if one.strip.number not in alpha.refused)}
+
+        asked = situation([open_strip(strip(number)) for number in (1, 2, 3)], [helper()])
+        assert offers_let_through(LowestFirst(), asked, Waits({3}, math.inf)) == ([("alpha", 3)], ASKED_LATER_S)
+        assert offers_let_through(LowestFirst(), asked, Waits({3}, 60)) == ([], ASKED_LATER_S)
+
     def test_an_allocator_that_insists_gets_nothing(self) -> None:
         class Insists:
             def assign(self, asked: object) -> dict[str, int]:
