@@ -148,6 +148,63 @@ class TestBids:
         (bidder,) = agreed(situation([near], [helper(waits_s={1: 60.0})]), [near])
         assert bidder.claims.bids[0] == pytest.approx(score(700, 210))
 
+    def test_behind_another_a_strip_counts_as_it_is_flown_from_there(self) -> None:
+        # 0.5 m/s from astern. 1 ends after 120 s and is left after 122, from where 2, 100 m east, is flown back against
+        # the current: a quarter turn, 88 m across it, a quarter turn and 5 m of run-in, then 200 m in 133 s. Put in
+        # between, 3 takes all of the half of it that there is time for.
+        across_s = (88 + np.pi * 6) / math.sqrt(2**2 - 0.5**2)
+        sweep_s = 200 / 1.5
+        begins_s = 122 + across_s + 5 / 1.5
+        alpha = helper(way_home=WayHome((0.0, 0.0), Sailing(2.0, drift_mps=0.5, set_rad=0.0), 6.0))
+        jobs = [open_strip(strip(1)), open_strip(strip(2, x_m=100)), open_strip(strip(3, y_m=310), 3000)]
+        told = situation(jobs, [alpha], begins_s + sweep_s / 2)
+        gains, places = Bidder(0, alpha, told, jobs)._routes.gains([0, 1])
+        assert gains[2] == pytest.approx(score(2100, 204) - score(350, begins_s + sweep_s))
+        assert places[2] == 1
+
+    def test_what_is_worth_little_is_claimed_too(self) -> None:
+        assert CBBA.assign(situation([open_strip(strip(1), 1)], [helper()])) == {"alpha": 1}
+
+    def test_a_bid_is_discounted_from_now_on(self) -> None:
+        told = situation([open_strip(strip(1))], [helper(free_s=90)], now_s=40)
+        (alpha,) = agreed(told, told.strips)
+        assert alpha.claims.bids == pytest.approx([score(700, 200)])
+
+    def test_what_is_considered_goes_by_what_is_removed_in_the_time_from_when_it_is_free(self) -> None:
+        # The near one is worth a third of the others, and is done in a quarter of the time.
+        jobs = [open_strip(strip(number, x_m=1000 + number), 3000) for number in range(1, 13)]
+        jobs.append(open_strip(strip(13)))
+        alpha = helper(free_s=1000)
+        gains, _ = Bidder(0, alpha, situation(jobs, [alpha]), jobs)._routes.gains([])
+        assert np.flatnonzero(gains).tolist() == [*range(11), 12]
+
+    @pytest.mark.parametrize(("deadline_s", "lasts_until_s"), [(300, 4000), (4000, 300)])
+    def test_what_comes_too_late_behind_another_is_lost_and_no_more(
+        self, deadline_s: float, lasts_until_s: float
+    ) -> None:
+        # 100 m ahead and 100 m astern: there is time for one of them.
+        jobs = [open_strip(strip(1)), open_strip(strip(2, y_m=-300), 3000)]
+        alpha = helper(lasts_until_s=lasts_until_s)
+        told = situation(jobs, [alpha], deadline_s)
+        gains, places = Bidder(0, alpha, told, jobs)._routes.gains([0])
+        assert gains == pytest.approx([0, alone(told, jobs[1], alpha) - score(700, 150)])
+        assert places[1] == 0
+
+    @pytest.mark.parametrize(("lasts_until_s", "path"), [(149.9, []), (150.0, [0])])
+    def test_a_battery_that_just_lasts_to_the_end_of_a_sweep_lasts(self, lasts_until_s: float, path: list[int]) -> None:
+        told = situation([open_strip(strip(1))], [helper(lasts_until_s=lasts_until_s)])
+        (alpha,) = agreed(told, told.strips)
+        assert alpha.path == path
+
+    def test_its_battery_must_last_home_from_either_end_of_a_strip(self) -> None:
+        # Home lies north of both: 1 ends after 150 s, and it is 52 s home from its north end, but some 175 s from the
+        # other one. 2 ends after 185 s, and it is some 40 s home from there.
+        alpha = helper(way_home=WayHome((0.0, 405.0), Sailing(2.0), 6.0), lasts_until_s=250)
+        jobs = [open_strip(strip(1)), open_strip(strip(2, y_m=350, length_m=20))]
+        assert alone(situation(jobs, [alpha]), jobs[0], alpha) > 0
+        (bidder,) = agreed(situation(jobs, [alpha]), jobs)
+        assert bidder.path == [1]
+
 
 class TestConflicts:
     def test_the_nearer_gets_it_and_the_other_what_is_left(self) -> None:
@@ -175,6 +232,14 @@ class TestConflicts:
         assert alpha.claims.winners.tolist() == [NOBODY, 1]
         assert alpha.hear([mine, Claims(np.array([0.0, 2.0]), np.array([NOBODY, 1]))])
         assert alpha.claims.bids.tolist() == [0, 2]
+
+    def test_what_is_given_up_is_claimed_by_who_has_bid_less_for_it(self) -> None:
+        # beta faces 1 and takes it; alpha, which bid more for 2, may sail there from 1 alone. It is a round later that
+        # beta hears of that, in which nobody claims anything.
+        jobs = [open_strip(strip(1), 2000), open_strip(strip(2, y_m=310))]
+        beta = helper("beta", y_m=305, heading_rad=np.pi)
+        alpha, beta_then = agreed(situation(jobs, [helper(waits_s={2: math.inf}), beta]), jobs)
+        assert (alpha.path, beta_then.path) == ([], [0, 1])
 
     def test_a_third_ones_claim_is_not_taken_from_hearsay(self) -> None:
         jobs = [open_strip(strip(1))]

@@ -60,6 +60,23 @@ def test_strips_of_one_leg_and_of_two_are_each_as_by_itself() -> None:
         assert leave[place] == pytest.approx(served.free_at)
 
 
+def test_a_strip_that_can_be_flown_in_one_way_alone_is_flown_so_beside_one_of_two() -> None:
+    # What is seen lies 30 m ahead. Southwards 1 would be begun at y = 335 m, within the zone; northwards it is left at
+    # 275 m.
+    zone = KeepOut((((-5.0, 330.0), (5.0, 330.0), (5.0, 340.0), (-5.0, 340.0)),))
+    one = helper(y_m=600, heading_rad=np.pi, lead_m=30.0, keep_out=zone)
+    jobs = [open_strip(strip(1)), open_strip(strip(2, x_m=200))]
+    table = StripTable(jobs, one)
+    assert table.leave[:, :, 1] == pytest.approx(np.array([[275, 275], [275, 125]]))
+    _, _, leave = table.best_from(one.pose, 0.0, np.inf)
+    assert leave[:, 1] == pytest.approx([275, 125])
+
+
+def test_where_there_is_no_strip_there_is_nothing_to_serve() -> None:
+    removed, free_s, leave = StripTable([], helper()).best_from(Pose(0, 0, 0), 0.0, np.inf)
+    assert (removed.shape, free_s.shape, leave.shape) == ((0,), (0,), (0, 3))
+
+
 @pytest.mark.parametrize(("from_x_m", "can"), [(-30.0, False), (10.0, False), (50.0, True)])
 def test_what_lies_on_its_legs_keeps_a_helper_from_flying_a_strip(from_x_m: float, can: bool) -> None:
     zone = KeepOut((tuple((from_x_m + x_m, y_m) for x_m, y_m in ((0, 150), (60, 150), (60, 160), (0, 160))),))
@@ -80,7 +97,7 @@ class TestByHand:
 
     @pytest.mark.parametrize(
         ("begins_s", "deadline_s", "removed"),
-        [(50, np.inf, 700), (50, 100, 350), (50, 50, 0), (100, 1000, 700), (101, 1000, 0)],
+        [(50, np.inf, 700), (50, 100, 350), (50, 50, 0), (50, 20, 0), (100, 1000, 700), (101, 1000, 0)],
     )
     def test_what_is_flown_by_the_deadline_counts_if_the_battery_lasts(
         self, begins_s: float, deadline_s: float, removed: float
@@ -88,6 +105,17 @@ class TestByHand:
         found = self.TABLE.removed_m2(np.full((1, *self.TABLE.sonar_on_s.shape), begins_s), deadline_s)
         assert found[0, 0] == pytest.approx(removed)
         assert (found[0, 1] == 0).all()  # it has refused that one
+
+
+def test_who_must_wait_before_it_sets_out_is_there_so_much_later() -> None:
+    served = expected_service(open_strip(strip(1)), helper(free_s=10, waits_s={1: 60.0, 2: 500.0}))
+    assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((120, 220, 222.5))
+
+
+@pytest.mark.parametrize(("deadline_s", "removed"), [(1000, 700), (100, 350), (75, 175), (20, 0)])
+def test_a_service_removes_what_is_flown_by_the_deadline(deadline_s: float, removed: float) -> None:
+    job = open_strip(strip(1))  # from 50 s to 150 s
+    assert removed_m2(job, helper(), expected_service(job, helper()), deadline_s) == pytest.approx(removed)
 
 
 def test_a_current_tells_from_when_to_when_the_sonar_is_on() -> None:
@@ -131,6 +159,12 @@ def test_a_strip_that_cannot_be_flown_is_served_as_where_nothing_is_in_the_way()
     zone = KeepOut((((-30.0, 150.0), (30.0, 150.0), (30.0, 160.0), (-30.0, 160.0)),))
     job = open_strip(strip(1))
     assert expected_service(job, replace(helper(), keep_out=zone)) == expected_service(job, helper())
+
+
+def test_who_lies_within_what_it_may_not_enter_is_expected_to_go_straight_out() -> None:
+    zone = KeepOut((((-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)),))
+    job = open_strip(strip(1))
+    assert expected_service(job, helper(keep_out=zone)) == expected_service(job, helper())
 
 
 def test_of_two_ways_that_are_the_same_length_the_first_is_taken() -> None:
