@@ -138,6 +138,25 @@ class TestTracks:
         assert [track.across_m for track in plan.tracks[0]] == track_offsets(1212, 40, 138)
         assert (len(plan.parts), plan.track_count, plan.turns, plan.length_m) == (1, 7, 6, 2800)
 
+    @pytest.mark.parametrize(
+        ("sonar", "ranges_m", "begins_m"),
+        [
+            ((40, 145), (120, 145), [(110, 0), (190, 600), (445, 0), (550, 300), (655, 0)]),
+            (
+                (30, 90),
+                (90, 90),
+                [(90, 0), (150, 600), (210, 0), (390, 300), (450, 0), (630, 300), (690, 0), (710, 300)],
+            ),
+        ],
+    )
+    def test_each_part_has_its_range_and_is_begun_where_the_one_before_it_ends(
+        self, sonar: tuple[int, int], ranges_m: tuple[int, ...], begins_m: list[Point]
+    ) -> None:
+        plan = first_plan(L_SHAPE, 0, *sonar)
+        assert plan.ranges_m == ranges_m
+        assert [track.start for track in plan.all_tracks] == begins_m
+        assert (len(plan.parts), plan.turns) == (2, len(begins_m))  # two from the one part to the other
+
 
 class TestParts:
     def test_a_convex_region_is_its_own_only_part(self) -> None:
@@ -181,6 +200,9 @@ class TestParts:
         region = Region(((800.0, 0.0), (700.0, 0.0), (500.0, 200.0), (0.0, 100.0), (200.0, 400.0), (300.0, 600.0)))
         assert first_plan(region, 0, 40, 120).track_count == 6
         assert first_plan(region, 0, 40, 120, thorough=False).track_count == 8
+        thorough = parts_in_order(region, 0, 40, 120, thorough=True)
+        assert parts_in_order(region, 0, 40, 120) == thorough
+        assert parts_in_order(region, 0, 40, 120, thorough=False) != thorough
 
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))
@@ -277,6 +299,24 @@ class TestOrder:
         for order in ([west, east], [east, west]):
             assert [part.vertices for part in in_order(order, (0, 0))] == [part.vertices for part in order]
 
+    def test_where_one_is_two_millimetres_nearer_that_decides(self) -> None:
+        west, east = (
+            Region(((x, -50.0), (x + 100, -50.0), (x + 100, 50.0), (x, 50.0))).about(0) for x in (-200.002, 100.0)
+        )
+        for order in ([west, east], [east, west]):
+            assert in_order(order, (0, 0))[0].vertices == east.vertices
+
+    @pytest.mark.parametrize(("count", "is_best"), [(5, True), (6, True), (7, False)])
+    def test_of_up_to_six_parts_the_best_order_is_found_and_of_more_the_nearest_is_next(
+        self, count: int, is_best: bool
+    ) -> None:
+        # The nearest lies to the east, 20 m off, with all the others behind it; but it is shorter to begin with the one
+        # 25 m to the west than to come back for it.
+        east_m, west_m = [20.0 + 40.0 * place for place in range(count - 1)], [-32.0]
+        parts = [Region(((x, -5.0), (x + 7, -5.0), (x + 7, 5.0), (x, 5.0))).about(0) for x in (*east_m, *west_m)]
+        ordered_m = [min(x for x, _ in part.vertices) for part in in_order(parts, (0, 0))]
+        assert ordered_m == (west_m + east_m if is_best else east_m + west_m)
+
     def test_many_parts_are_taken_one_after_the_other(self) -> None:
         row = [
             Region(((x, 0.0), (x + 90, 0.0), (x + 90, 100.0), (x, 100.0))).about(0)
@@ -322,6 +362,10 @@ class TestWhereItBegins:
         assert sorted(round(abs(track.start[0] - corner[0]), 6) for track in plan.all_tracks) == sorted(
             round(track.start[0], 6) for track in first_plan(RECTANGLE, 0, 40, 145).all_tracks
         )
+
+    @pytest.mark.parametrize(("begin_m", "start_m"), [(199, 0), (200, 0), (201, 400)])
+    def test_at_the_end_that_is_nearer(self, begin_m: float, start_m: float) -> None:
+        assert first_plan(RECTANGLE, 0, 40, 145, begin=(0, begin_m)).all_tracks[0].start == (138, start_m)
 
     def test_left_out_it_is_the_corner_from_which_tracks_are_laid(self) -> None:
         assert (

@@ -213,11 +213,11 @@ def test_many_starts_in_any_order_end_in_one_map_and_take_no_more_memory(order: 
     assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1))
     for incarnation in range(MOST_STARTS, 3 * MOST_STARTS):
         assert tile("alpha", (incarnation, 1), PLACES[0], 1).give(fleet)
-        assert len(layer.versions[0, 0]) == MOST_STARTS
+        assert len(layer.versions[0, 0]) == MOST_STARTS == 8
     assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1)) + 2 * MOST_STARTS
     # Nothing more is taken of what is held as one; of the others it is.
     for incarnation in range(2 * MOST_STARTS + 1):
-        assert not tile("alpha", (incarnation, 2), PLACES[0], 200).give(fleet)
+        assert not tile("alpha", (incarnation, 2**31 - 1), PLACES[0], 200).give(fleet)
     assert tile("alpha", (2 * MOST_STARTS + 1, 2), PLACES[0], 3).give(fleet)
     assert layer.sum_levels[0, 0] == sum(range(1, MOST_STARTS + 1)) + 2 * MOST_STARTS + 2
 
@@ -290,6 +290,13 @@ def test_what_is_no_tile_of_the_grid_is_refused(place: tuple[int, int, int, int]
 )
 def test_arrays_of_another_shape_are_refused(spoilt: dict[str, Any]) -> None:
     check_refused(replace(tile("alpha", (5, 1), PLACES[0], 50), **spoilt))
+
+
+def test_who_is_refused_is_told_where_and_by_how_much_it_does_not_fit() -> None:
+    misfit = replace(tile("alpha", (0, 1), PLACES[1], 50), settled=np.zeros((20, 4), dtype=np.bool_))
+    told = r"^the tile at 0, 20 has \(20, 3\) cells, not \(20, 3\), \(20, 3\) and \(20, 4\)$"
+    with pytest.raises(ValueError, match=told):
+        misfit.give(FleetMap(GRID))
 
 
 def check_refused(misfit: TileNews) -> None:

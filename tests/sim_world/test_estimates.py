@@ -46,6 +46,11 @@ def test_the_mean_is_the_truth_by_summing_up_over_all_errors(noise: tuple[float,
     assert (spread * density).sum(axis=0) / density.sum() == pytest.approx(truths, rel=2e-5)
 
 
+def test_what_is_told_without_an_error_is_the_same_in_every_version_of_the_program() -> None:
+    told = PDetectEstimate(2.0, 1.0).estimate(np.array([0.02, 0.3, 0.77]), 0.0, np.zeros(3))
+    assert told == pytest.approx([0.0025907121852964533, 0.18491373745786352, 0.8902382990447898], rel=1e-9)
+
+
 def test_cells_differ_by_the_cell_noise_and_tracks_by_the_track_noise() -> None:
     generator = np.random.default_rng(3)
     noise = PDetectEstimate(0.23, 0.05)
@@ -93,7 +98,7 @@ def test_the_draws_do_not_depend_on_what_was_seen() -> None:
     assert np.array_equal(one[0, 0, 3:], other[0, 0, 3:])
 
 
-CURVE = DetectionCurve(np.array([0.0, 100.0]), np.array([0.4, 0.4]))
+CURVE = DetectionCurve(np.array([0.0, 30.0, 60.0, 100.0]), np.full(4, 0.4))
 SHAPE = (2, 4, 11)
 
 

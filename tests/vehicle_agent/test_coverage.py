@@ -91,11 +91,18 @@ def test_it_holds_what_was_seen_and_what_is_settled() -> None:
     assert layer.changed_tiles() == []
 
 
-@pytest.mark.parametrize(("rho", "counts"), [(0.0, 0.2), (0.3, 0.3), (1.0, 0.3)])
-def test_where_the_best_look_counts_a_cell_has_the_mean_of_its_bins(rho: float, counts: float) -> None:
+@pytest.mark.parametrize(
+    ("layer", "counts"),
+    [
+        (CoverageLayer("alpha", GRID), 0.2),
+        (CoverageLayer("alpha", GRID, 0.0), 0.2),
+        (CoverageLayer("alpha", GRID, 0.3), 0.3),
+        (CoverageLayer("alpha", GRID, 1.0), 0.3),
+    ],
+)
+def test_where_the_best_look_counts_a_cell_has_the_mean_of_its_bins(layer: CoverageLayer, counts: float) -> None:
     """The bins at cells' centres tell 0.2, all bins on a cell 0.3 on average."""
     by_place = np.array([0.2, 0.4, 0.3, 0.3, 0.3])  # 0 m to 4 m beside a cell's centre
-    layer = CoverageLayer("alpha", GRID, rho)
     track = Maneuver(1, ManeuverKind.FOLLOW, 50, 0, 50, 100, 20)
     layer.add(look(track, 1, 0, 4, lambda range_m: by_place[range_m.astype(int) % 5]))
     cells = layer.layer.largest_nats[0, 12:36]  # from 10 m beside the track on
@@ -118,6 +125,14 @@ def test_who_asks_is_told_so_many_those_told_the_fewest_times_first(monkeypatch:
     layer.one_again()
     monkeypatch.setattr(coverage, "MOST_AGAIN", 1)
     assert told(layer.again()) == [(FIRST, 1)]
+
+
+def test_who_asks_is_told_no_more_than_200_tiles_at_a_time() -> None:
+    layer = CoverageLayer("alpha", GridSpec(SweepFrame(0, 0, 0), 5, 202 * 20, 1))
+    layer.settled = np.ones((1, 202 * 20), dtype=np.bool_)
+    assert len(layer.changed_tiles()) == 202
+    assert [version for _, version in told(layer.again())] == list(range(1, 201))
+    assert [version for _, version in told(layer.again())] == [201, 202, *range(1, 199)]
 
 
 def test_nothing_is_told_more_than_eight_times_unasked() -> None:
