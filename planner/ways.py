@@ -96,7 +96,6 @@ class _Graph:
         order = np.argsort(self._lines.start, kind="stable")
         self._from = np.searchsorted(self._lines.start[order], np.arange(2 * count + 1))
         self._order = order
-        self._arcs: dict[tuple[int, float, float], bool] = {}
 
     def way(self, start: Pose, end: Pose) -> Way | None:
         """The shortest way that begins with a turn at the start and ends with one at the end."""
@@ -196,17 +195,15 @@ class _Graph:
     def _joined(self, centres: FloatArray, starts: np.ndarray, ends: np.ndarray) -> _Lines:
         """All lines from some circles to others that stay out."""
         start, end = (places.ravel() for places in np.meshgrid(starts, ends, indexing="ij"))
-        other = start // 2 != end // 2
-        start, end = start[other], end[other]
         from_side, to_side = 2 * (start % 2) - 1, 2 * (end % 2) - 1
         x_m, y_m = (centres[end // 2] - centres[start // 2]).T
         apart_m, crossing = np.hypot(x_m, y_m), from_side != to_side
         may = np.where(crossing, apart_m >= 2 * self._radius_m, apart_m > _LEAST_M)
         start, end, x_m, y_m = start[may], end[may], x_m[may], y_m[may]
         apart_m, crossing, from_side, to_side = apart_m[may], crossing[may], from_side[may], to_side[may]
-        across = np.where(crossing, 2 * self._radius_m / np.maximum(apart_m, _LEAST_M), 0.0)
-        heading = np.arctan2(y_m, x_m) - from_side * np.arcsin(np.minimum(across, 1.0))
-        length_m = np.sqrt(np.maximum(apart_m**2 - np.where(crossing, 2 * self._radius_m, 0.0) ** 2, 0.0))
+        across_m = np.where(crossing, 2 * self._radius_m, 0.0)
+        heading = np.arctan2(y_m, x_m) - from_side * np.arcsin(across_m / apart_m)
+        length_m = np.sqrt(apart_m**2 - across_m**2)
         normal = np.column_stack([-np.sin(heading), np.cos(heading)]) * self._radius_m
         begin = centres[start // 2] + from_side[:, np.newaxis] * normal
         stop = centres[end // 2] + to_side[:, np.newaxis] * normal
@@ -308,9 +305,6 @@ def way_lengths_m(starts: FloatArray, ends: FloatArray, turn_radius_m: float, ke
     rows, columns = np.flatnonzero(blocked.any(axis=1)), np.flatnonzero(blocked.any(axis=0))
     corners, between_m = _between_corners(keep_out)
     to_m, from_m = _seen_from(starts[rows], corners, keep_out), _seen_from(ends[columns], corners, keep_out)
-    if not len(corners):
-        lengths_m[blocked] = np.inf
-        return lengths_m
     round_m = np.full((rows.size, columns.size), np.inf)
     by_corner_m = np.array([(one + between_m.T).min(axis=1) for one in to_m])
     for place, one in enumerate(from_m):
