@@ -10,16 +10,25 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.currents import Sailing
+from planner.currents import FlowGrid, Sailing
 from planner.dubins import TIE_M, Pose, shortest_path
 from planner.keep_out import NOWHERE, KeepOut
 from planner.sweep import pass_over
+from planner.types import Point
 from planner.way_home import WayHome
 from planner.ways import shortest_way
 
 NORTH, EAST, SOUTH = 0.0, math.pi / 2, math.pi
 # Between them there is a gap of 40 m, and home lies in the bay to the north of it.
 HEADLANDS = KeepOut((((-300, 20), (-20, 20), (-20, 60), (-300, 60)), ((20, 20), (300, 20), (300, 60), (20, 60))), 1.5)
+# How the water flows differs from corner to corner.
+EDDY = FlowGrid(
+    np.array([-150.0, 200.0]),
+    np.array([-150.0, 150.0]),
+    np.array([0.0]),
+    np.array([[[-0.7, 0.6], [0.3, 0.9]]]),
+    np.array([[[0.2, -0.8], [1.0, 0.5]]]),
+)
 WAY = WayHome((0.0, 0.0), Sailing(2.0), turn_radius_m=10.0)
 
 
@@ -43,8 +52,26 @@ class TestByHand:
             for x_m in (beside_m, -beside_m):
                 assert WAY.from_pose(Pose(x_m, 0, NORTH))[0] == pytest.approx(way_m / 2)
 
+    def test_of_two_ways_as_long_it_takes_the_one_to_starboard(self) -> None:
+        for stream in (Sailing(2.0), Sailing(2.0, 0.5, NORTH)):
+            _, heading_rad = replace(WAY, sailing=stream).from_pose(Pose(0, 100, NORTH))
+            assert heading_rad == pytest.approx(math.pi + 2 * math.atan(10 / 100))
+
+    def test_home_on_the_circle_that_it_turns_on_it_needs_no_more_than_the_turn(self) -> None:
+        for x_m in (20.0, -20.0):
+            time_s, heading_rad = WAY.from_pose(Pose(x_m, 0, NORTH))
+            assert time_s == pytest.approx(10 * math.pi / 2, abs=1e-3)
+            assert math.cos(heading_rad - SOUTH) == pytest.approx(1.0)
+        a_quarter_s, _ = WAY.from_pose(Pose(-10, -10, NORTH))
+        assert a_quarter_s == pytest.approx(10 * math.pi / 2 / 2, abs=1e-3)
+
     def test_who_is_there_has_no_way(self) -> None:
         assert WAY.from_pose(Pose(0.01, 0, SOUTH))[0] == 0.0
+        assert WAY.from_pose(Pose(0.05, 0, SOUTH))[0] == 0.0
+        assert WAY.from_pose(Pose(0.0501, 0, SOUTH))[0] > 0.0
+        # Nor where a wall is in the way of turning back.
+        wall = KeepOut((((5, -40), (9, -40), (9, 40), (5, 40)),))
+        assert replace(WAY, keep_out=wall).from_pose(Pose(0.03, 0, NORTH))[0] == 0.0
         elsewhere = replace(WAY, home=(30.0, -40.0))
         assert elsewhere.from_pose(Pose(30.01, -40, SOUTH))[0] == 0.0
         assert elsewhere.from_pose(Pose(30, 40, SOUTH))[0] == pytest.approx(40.0)
@@ -60,7 +87,10 @@ class TestByHand:
             assert time_s == pytest.approx((10 * turn_rad + tangent_m) / 2)
             assert heading_rad == pytest.approx((sign * turn_rad) % (2 * math.pi))
 
-    @pytest.mark.parametrize("sailing", [Sailing(2.0), Sailing(2.0, 0.9, 0.6), Sailing(2.0, 0.9, 4.0, tidal=True)])
+    @pytest.mark.parametrize(
+        "sailing",
+        [Sailing(2.0), Sailing(2.0, 0.9, 0.6), Sailing(2.0, 0.9, 4.0, tidal=True), Sailing(2.0, 1.5, grid=EDDY)],
+    )
     def test_it_takes_as_long_as_the_path_that_is_sailed(self, sailing: Sailing) -> None:
         home = WayHome((35.0, -20.0), sailing, 12.0)
         for number in range(24):
@@ -76,10 +106,12 @@ class TestByHand:
         in_open_water = replace(WAY, sailing=sailing)
         assert not in_open_water.is_well_within(pose, (50 + 80) / 1.5 - 0.01)
         assert in_open_water.is_well_within(pose, (50 + 80) / 1.5 + 0.01)
+        assert not WAY.is_well_within(pose, 65.0)
+        assert WAY.is_well_within(pose, 65.0001)
         past_zones = WayHome((0.0, 100.0), sailing, 10.0, HEADLANDS)
         about_s = float(past_zones.times_s(np.array([pose]))[0])
         time_s = 3 * (about_s + 3 * 20 * math.pi / 1.5)
-        assert not past_zones.is_well_within(pose, time_s - 0.01)
+        assert not past_zones.is_well_within(pose, time_s)
         assert past_zones.is_well_within(pose, time_s + 0.01)
 
     def test_many_at_once_are_as_one_by_one(self) -> None:
@@ -132,6 +164,11 @@ class TestPassesWithin:
         within = WAY.passes_within(Pose(0, 0, NORTH), self.PASSES, time_s - short_s)
         assert within == (count if short_s < 0 else count - 1)
 
+    def test_who_comes_home_right_in_time_comes_home_in_time(self) -> None:
+        time_s = WAY.sailing.passes_s(self.PASSES[:2], 10.0, Pose(3, -20, EAST)) + WAY.from_pose(self.PASSES[1].end)[0]
+        assert WAY.passes_within(Pose(3, -20, EAST), self.PASSES, time_s) == 2
+        assert WAY.passes_within(Pose(3, -20, EAST), self.PASSES, math.nextafter(time_s, 0.0)) == 1
+
     def test_of_none_none(self) -> None:
         assert WAY.passes_within(Pose(0, 0, NORTH), (), 0.0) == 0
 
@@ -158,19 +195,43 @@ class TestRoundAZone:
         poses = np.array([[0.0, -200.0, NORTH], [0.0, -60.0, NORTH]])
         assert self.ROUND.times_s(poses) == pytest.approx([self.TAUT_M / 2, 30.0], abs=0.1)
 
-    def test_it_arrives_by_whichever_of_sixteen_headings_or_the_direct_one_takes_least(self) -> None:
+    def test_of_no_poses_there_are_no_times(self) -> None:
+        assert self.ROUND.times_s(np.empty((0, 3))).shape == WAY.times_s(np.empty((0, 3))).shape == (0,)
+
+    def test_in_a_current_what_is_longer_about_it_counts_right_against_the_stream(self) -> None:
+        against = replace(self.ROUND, home=(7.0, 4.0), sailing=Sailing(2.0, 0.5, EAST))
+        poses = np.array([[3.0, -200.0, 1.0], [7.0, -60.0, NORTH], [-90.0, -30.0, 2.0]])
+        further_m = math.hypot(17, 80) + 40 + math.hypot(13, 84) - math.hypot(4, 204)
+        straight_s = replace(against, keep_out=NOWHERE).times_s(poses)
+        assert against.times_s(poses) == pytest.approx(straight_s + np.array([further_m / 1.5, 0.0, 0.0]), abs=1e-6)
+
+    @pytest.mark.parametrize("at", [(6.0, 3.0), (10.0, -70.0)])
+    def test_it_arrives_by_whichever_of_sixteen_headings_or_the_direct_one_takes_least(self, at: Point) -> None:
         sailing = Sailing(2.0, 0.7, 1.0)
-        home = WayHome((6.0, 3.0), sailing, 10.0, self.ZONE)
-        for pose in (Pose(4, -170, 0.3), Pose(-10, -140, 1.0), Pose(15, -190, 5.0)):
-            direct_rad = WayHome((6.0, 3.0), sailing, 10.0).from_pose(pose)[1]
+        home = WayHome(at, sailing, 10.0, self.ZONE)
+        for pose in (Pose(4, -170, 0.3), Pose(-40, -135, 2.0), Pose(15, -190, 5.0)):
+            direct_rad = WayHome(at, sailing, 10.0).from_pose(pose)[1]
             took_s = {}
             for heading_rad in (direct_rad, *(math.pi / 8 * number for number in range(16))):
-                way = shortest_way(pose, Pose(6.0, 3.0, heading_rad), 10.0, self.ZONE)
+                way = shortest_way(pose, Pose(*at, heading_rad), 10.0, self.ZONE)
                 assert way is not None
                 took_s[heading_rad] = sailing.way_s(way)
             time_s, heading_rad = home.from_pose(pose)
             assert time_s == pytest.approx(min(took_s.values()))
             assert took_s[heading_rad] == pytest.approx(time_s)
+
+    def test_it_leads_round_where_the_direct_path_to_its_own_arrival_is_not_clear(self) -> None:
+        home, direct = replace(self.ROUND, home=(10.0, -70.0)), replace(WAY, home=(10.0, -70.0))
+        clear = 0
+        for number in range(16):
+            pose = Pose(10 + 70 * math.sin(number), -75 + 90 * math.cos(number), number * 2.0)
+            time_s, heading_rad = direct.from_pose(pose)
+            if self.ZONE.is_clear([shortest_path(pose, Pose(10.0, -70.0, heading_rad), 10.0)]):
+                clear += 1
+                assert home.from_pose(pose) == (time_s, heading_rad)
+            else:
+                assert home.from_pose(pose)[0] > time_s + 0.1
+        assert 4 < clear < 12
 
     def test_in_a_current_each_path_of_it_counts_by_its_own(self) -> None:
         northward = replace(self.ROUND, sailing=Sailing(2.0, 1.0, NORTH))
