@@ -62,7 +62,7 @@ class WayHome:
         keep out of is in the way; there the way from corner to corner counts, as `planner.ways.way_lengths_m` tells
         it."""
         time_s = self._ways(poses)[0]
-        if not self.keep_out or not len(poses):
+        if not self.keep_out:
             return time_s
         home = np.array([[*self.home, 0.0]])
         round_m = way_lengths_m(poses, home, self.turn_radius_m, self.keep_out)[:, 0]
