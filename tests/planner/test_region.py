@@ -58,6 +58,13 @@ def test_of_each_cell_the_share_counts_that_lies_there() -> None:
     assert (with_hole[4, 4], with_hole[4, 5], with_hole[3, 5]) == (1, 0, 1)
 
 
+def test_of_cells_smaller_than_a_square_metre_too() -> None:
+    region = Region(((0, 0), (3, 0), (3, 2), (0, 2)))
+    shares = region.shares(shapely.box(-1, -1, 1.3, 0.8), region.about(0).grid(0.5))
+    # Columns reach from 0.75 to 1.25 m and from 1.25 to 1.75 m, rows from 0.5 to 1 m.
+    np.testing.assert_allclose(shares, np.outer([1, 0.6, 0, 0], [1, 1, 1, 0.1, 0, 0, 0]), atol=1e-6)
+
+
 def test_what_lies_nowhere_in_it_has_no_share() -> None:
     region = Region(SQUARE)
     grid = region.about(0).grid(10)
