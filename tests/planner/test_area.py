@@ -161,6 +161,16 @@ class TestRefusals:
         with pytest.raises(ValueError, match=message):
             SurveyArea(vertices, 0)
 
+    def test_of_what_is_narrower_or_dented_by_no_more_than_a_micrometre_along_its_sides(self) -> None:
+        # All sides together 200 m: two ten-thousandths of a square metre.
+        with pytest.raises(ValueError, match="on one line"):
+            SurveyArea(((0, 0), (100, 0), (100, 1.9e-6), (0, 1.9e-6)), 0)
+        assert SurveyArea(((0, 0), (100, 0), (100, 2.1e-6), (0, 2.1e-6)), 0).width_m == pytest.approx(100)
+        # All sides together 400 m: a dent of half of 100 m by 8 micrometres.
+        assert len(SurveyArea(((0, 0), (100, 0), (100 - 7.9e-6, 40), (100, 100), (0, 100)), 0).vertices) == 5
+        with pytest.raises(ValueError, match="convex"):
+            SurveyArea(((0, 0), (100, 0), (100 - 8.1e-6, 40), (100, 100), (0, 100)), 0)
+
     def test_of_headings_cells_and_legs(self) -> None:
         with pytest.raises(ValueError, match="heading"):
             rectangle(100, 100, math.nan)

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 
 from planner.dubins import Pose, shortest_path
 from planner.keep_out import KeepOut
-from planner.sweep import Sweep, distance_over, legs_over_strip, pass_over, shortest_sweep, sweeps_over
+from planner.sweep import NoSweepError, Sweep, distance_over, legs_over_strip, pass_over, shortest_sweep, sweeps_over
 from planner.types import Strip, Track
+from planner.ways import shortest_way, way_length_m
 
 NORTH, EAST, SOUTH, WEST = (k * math.pi / 2 for k in range(4))
 
@@ -206,3 +207,56 @@ class TestShortestSweep:
                 sweeps_over(self.STRIP, 20, 10, run_in_m)
         with pytest.raises(ValueError, match="turn radius"):
             sweeps_over(self.STRIP, 20, 0, 0)
+
+
+class TestPastZones:
+    STRIP = Strip(1, (30, 0), NORTH, 100, 60)
+    # It lies across the half circle from the first leg's north end to the second one's.
+    POST = KeepOut((((18, 108), (22, 108), (22, 112), (18, 112)),))
+
+    def length_m(self, one: Pose, other: Pose) -> float:
+        way = shortest_way(one, other, 10, self.POST)
+        assert way is not None
+        return way_length_m(way)
+
+    def test_turns_count_as_they_lead_round_a_zone(self) -> None:
+        ways = sweeps_over(self.STRIP, 20, 10, 0, keep_out=self.POST)
+        round_m = self.length_m(Pose(10, 100, NORTH), Pose(30, 100, SOUTH))
+        assert round_m > 10 * math.pi + 1
+        # From the first leg to the second to the north, from the third to the second, and both turned.
+        longer_m, usual_m = 300 + 10 * math.pi + round_m, 300 + 20 * math.pi
+        assert [way.length_m for way in ways] == pytest.approx([longer_m, usual_m, usual_m, longer_m])
+
+    def test_the_shortest_is_that_with_the_way_there_past_zones(self) -> None:
+        ways = sweeps_over(self.STRIP, 20, 10, 0, keep_out=self.POST)
+        for pose, best in ((Pose(22, -60, NORTH), 1), (Pose(20, 125, SOUTH), 2), (Pose(-20, 130, 3.0), 2)):
+            totals_m = [self.length_m(pose, way.entry) + way.length_m for way in ways]
+            sweep, way_m = shortest_sweep(ways, pose, 10, self.POST)
+            assert ways.index(sweep) == totals_m.index(min(totals_m)) == best
+            assert way_m + sweep.length_m == pytest.approx(min(totals_m))
+            assert distance_over(pose, sweep.passes, 10, self.POST) == pytest.approx(min(totals_m))
+
+    def test_where_no_way_there_stays_out_there_is_none(self) -> None:
+        ring = KeepOut(
+            tuple(
+                ((west, south), (east, south), (east, north), (west, north))
+                for west, south, east, north in (
+                    (-240, -40, -160, -35),
+                    (-240, 35, -160, 40),
+                    (-240, -40, -235, 40),
+                    (-165, -40, -160, 40),
+                )
+            )
+        )
+        ways = sweeps_over(self.STRIP, 20, 10, 0, keep_out=ring)
+        assert len(ways) == 4
+        with pytest.raises(NoSweepError, match="no sweep"):
+            shortest_sweep(ways, Pose(-200, 0, EAST), 10, ring)
+
+    def test_what_no_way_joins_is_no_sweep(self) -> None:
+        # A wall between the first two legs, and one round each half.
+        sides = ((-500, -500, -498, 500), (20, -500, 22, 500), (498, -500, 500, 500))
+        ends = ((-500, -500, 500, -498), (-500, 498, 500, 500))
+        walls = KeepOut(tuple(((w, s), (e, s), (e, n), (w, n)) for w, s, e, n in (*sides, *ends)))
+        assert sweeps_over(self.STRIP, 20, 8, 0, keep_out=walls) == ()
+        assert len(sweeps_over(Strip(1, (40, 0), NORTH, 100, 30), 20, 8, 0, keep_out=walls)) == 4
