@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from planner.dubins import TIE_M, Pose, compass_rad, path_lengths_m, shortest_path
+from planner.dubins import TIE_M, DubinsPath, Pose, compass_rad, path_lengths_m, shortest_path
 
 NORTH, EAST, SOUTH, WEST = 0.0, math.pi / 2, math.pi, 3 * math.pi / 2
 
@@ -208,6 +208,14 @@ class TestPlacesBeyondTheEnds:
         assert path.poses_at(np.array([-10.0, 12.0, 1000.0])) == pytest.approx(
             np.array([[0, 0, EAST], [12, 0, EAST], [30, 0, EAST]])
         )
+
+
+@pytest.mark.parametrize("heading_rad", [-1e-17, math.tau, math.nextafter(math.tau, 0.0)])
+def test_headings_along_a_path_that_are_short_of_a_full_turn_by_rounding_are_none(heading_rad: float) -> None:
+    path = DubinsPath(Pose(3, 4, heading_rad), 10.0, (1, 0, -1), (0.0, 5.0, 0.0))
+    assert path.pose_at(2.0) == pytest.approx((3, 6, 0.0), abs=1e-9)
+    assert path.pose_at(2.0).heading_rad == 0.0
+    assert path.poses_at(np.array([2.0, 9.0]))[:, :2] == pytest.approx(np.array([(3, 6), (3, 9)]))
 
 
 @pytest.mark.parametrize(

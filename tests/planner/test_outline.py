@@ -18,6 +18,7 @@ def cells_of(picture: str) -> BoolArray:
 
 
 corners = st.tuples(st.integers(0, 9), st.integers(0, 9))
+FAR = [(x, y) for x in range(6, 10) for y in range(10)]
 
 
 @given(st.tuples(corners, corners, corners), st.sets(corners, max_size=60))
@@ -26,6 +27,11 @@ corners = st.tuples(st.integers(0, 9), st.integers(0, 9))
 @example(((0, 0), (0, 4), (4, 4)), {(2, 4)})
 @example(((0, 0), (4, 4), (4, 0)), {(4, 2)})
 @example(((0, 0), (4, 4), (4, 0)), {(2, 0)})
+# The same among many that lie elsewhere.
+@example(((0, 0), (0, 4), (4, 4)), {(0, 2), *FAR})
+@example(((0, 0), (0, 4), (4, 4)), {(2, 4), *FAR})
+@example(((0, 0), (4, 4), (4, 0)), {(4, 2), *FAR})
+@example(((0, 0), (4, 4), (4, 0)), {(2, 0), *FAR})
 def test_whether_a_triangle_holds_any_vertex(triangle: tuple[Corner, Corner, Corner], vertices: set[Corner]) -> None:
     area = shapely.Polygon(triangle)
     assume(area.area > 0)
@@ -124,6 +130,15 @@ class TestByHand:
         assert polygon.is_valid
         assert polygon.equals(fill_one_by_one(cells, most_vertices))
         assert len(polygon.exterior.coords) - 1 <= most_vertices
+
+    @pytest.mark.parametrize("most_vertices", range(6, 18))
+    def test_nor_over_a_corner_that_lies_right_on_its_side(self, most_vertices: int) -> None:
+        # Once those beside it are filled there is a notch (3, 0), (4, 1), (7, 2), of one cell in all: without it the
+        # side would touch the finger's corner at (5, 1).
+        cells = cells_of("############ #######...## #######...## ####......## ###..#######")
+        polygon = shapely.Polygon(outline(cells, most_vertices))
+        assert polygon.is_valid
+        assert polygon.equals(fill_one_by_one(cells, most_vertices))
 
 
 class TestProperties:
