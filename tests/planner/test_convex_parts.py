@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 import pytest
 import shapely
 
+from planner import convex_parts as cutting
+from planner.area import SurveyArea
 from planner.convex_parts import _cuts, _deepest, _inward_corners, convex_parts, is_all_but_convex
 from planner.region import Region
+from planner.spacing import track_count
 from planner.types import Point
 
 SQUARE = ((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0))
+L_SHAPE = ((0.0, 0.0), (60.0, 0.0), (60.0, 60.0), (30.0, 60.0), (30.0, 90.0), (0.0, 90.0))
 # A block above an arm, with a notch between them that leads in to (80, 100) and back out from (100, 200).
 NOTCHED = shapely.Polygon(((0, 0), (500, 0), (500, 100), (80, 100), (100, 200), (700, 200), (700, 500), (0, 500)))
 
@@ -38,7 +43,7 @@ def test_of_cuts_that_take_as_many_tracks_that_is_made_by_which_they_are_shorter
     # Along x = 10 m 1 track of 90 m and 2 of 60 m; along y = 60 m 2 of 60 m and 1 of 30 m.
     assert sizes_m(Region(((0, 0), (60, 0), (60, 60), (10, 60), (10, 90), (0, 90)))) == [(10, 30), (60, 60)]
     # Along x = 30 m 1 of 90 m and 1 of 60 m; along y = 60 m 2 of 60 m and 1 of 30 m.
-    assert sizes_m(Region(((0, 0), (60, 0), (60, 60), (30, 60), (30, 90), (0, 90)))) == [(30, 60), (30, 90)]
+    assert sizes_m(Region(L_SHAPE)) == [(30, 60), (30, 90)]
 
 
 def test_a_region_that_is_convex_but_for_rounding_is_its_own_part_as_it_was_drawn() -> None:
@@ -52,6 +57,8 @@ def test_what_zones_leave_is_cut_part_by_part_but_for_what_is_smaller_than_a_squ
     for wide_m, parts in ((0.009, [(40, 100)]), (0.011, [(0.011, 100), (40, 100)])):
         lane = ((wide_m, -10.0), (60.0, -10.0), (60.0, 110.0), (wide_m, 110.0))
         assert sizes_m(Region(SQUARE, (), (lane,))) == parts
+    all_but_one_m2 = ((1, -1), (101, -1), (101, 101), (-1, 101), (-1, 1), (1, 1))
+    assert sizes_m(Region(SQUARE, (), (all_but_one_m2,))) == []
     # A zone beside it changes nothing.
     assert sizes_m(Region(SQUARE, (), (((200, 0), (210, 0), (210, 10)),))) == [(100, 100)]
     # Where there are none, all of it is surveyed, however small.
@@ -64,6 +71,21 @@ def test_a_hole_in_the_middle_is_cut_out_by_as_few_tracks_as_may_be() -> None:
     hole = ((50.0, 60.0), (80.0, 60.0), (80.0, 120.0), (50.0, 120.0))
     region = Region(((0, 0), (130, 0), (130, 200), (0, 200)), (hole,))
     assert sizes_m(region) == [(30, 60), (30, 80), (50, 200), (50, 200)]
+
+
+def test_unless_it_is_asked_for_less_the_search_is_thorough() -> None:
+    # Of the cut that promises most the best end takes more tracks than of the second one.
+    region = Region(((800.0, 0.0), (700.0, 0.0), (500.0, 200.0), (0.0, 100.0), (200.0, 400.0), (300.0, 600.0)))
+
+    def tracks(parts: list[SurveyArea]) -> int:
+        return sum(track_count(part.width_m, 40, 120) for part in parts)
+
+    def tracks_for(width_m: float) -> int:
+        return track_count(width_m, 40, 120)
+
+    usual, at_once = convex_parts(region, 0, tracks_for), convex_parts(region, 0, tracks_for, thorough=False)
+    assert tracks(usual) < tracks(at_once)
+    assert tracks(usual) == tracks(convex_parts(region, 0, tracks_for, thorough=True))
 
 
 class TestCuts:
@@ -116,6 +138,20 @@ class TestManyCorners:
         for most, kept in ((4, [90, 70, 60, 80]), (5, [50, 90, 70, 60, 80])):
             assert [500 - corner[1] for corner, _, _ in _deepest(corners, comb, most)] == kept
         assert len(list(_cuts(comb, 4))) >= 4 * 4
+
+    @pytest.mark.parametrize(("thorough", "most"), [(True, 12), (False, 4)])
+    def test_cuts_are_tried_through_twelve_or_of_a_search_that_is_not_thorough_through_four(
+        self, monkeypatch: pytest.MonkeyPatch, thorough: bool, most: int
+    ) -> None:
+        tried, cuts = [], cutting._cuts
+
+        def told(polygon: shapely.Polygon, most_corners: int) -> Iterator[shapely.LineString]:
+            tried.append(most_corners)
+            yield from cuts(polygon, most_corners)
+
+        monkeypatch.setattr(cutting, "_cuts", told)
+        convex_parts(Region(L_SHAPE), 0.0, tracks_of_30_m, thorough=thorough)
+        assert tried == [most]
 
     def test_up_to_twelve_are_all_kept(self) -> None:
         comb = self.comb([20.0, 50, 90, 30, 70, 10, 60, 25, 80, 40, 15, 35])
