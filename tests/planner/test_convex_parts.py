@@ -18,16 +18,16 @@ from planner.types import Point
 
 SQUARE = ((0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0))
 L_SHAPE = ((0.0, 0.0), (60.0, 0.0), (60.0, 60.0), (30.0, 60.0), (30.0, 90.0), (0.0, 90.0))
-# A block above an arm, with a notch between them that leads in to (80, 100) and back out from (100, 200).
-NOTCHED = shapely.Polygon(((0, 0), (500, 0), (500, 100), (80, 100), (100, 200), (700, 200), (700, 500), (0, 500)))
+# A block above an arm, with a notch between them that leads in to (100, 110) and back out from (120, 210).
+NOTCHED = shapely.Polygon(((20, 10), (520, 10), (520, 110), (100, 110), (120, 210), (720, 210), (720, 510), (20, 510)))
 
 
 def tracks_of_30_m(width_m: float) -> int:
     return math.ceil(width_m / 30)
 
 
-def sizes_m(region: Region, heading_rad: float = 0.0) -> list[tuple[float, float]]:
-    parts = convex_parts(region, heading_rad, tracks_of_30_m)
+def sizes_m(region: Region, *, thorough: bool = True) -> list[tuple[float, float]]:
+    parts = convex_parts(region, 0.0, tracks_of_30_m, thorough=thorough)
     return sorted((round(part.width_m, 3), round(part.length_m, 3)) for part in parts)
 
 
@@ -41,7 +41,8 @@ def test_a_dent_or_a_hole_counts_that_is_deeper_than_10_m(deep_m: float, counts:
 
 def test_of_cuts_that_take_as_many_tracks_that_is_made_by_which_they_are_shorter() -> None:
     # Along x = 10 m 1 track of 90 m and 2 of 60 m; along y = 60 m 2 of 60 m and 1 of 30 m.
-    assert sizes_m(Region(((0, 0), (60, 0), (60, 60), (10, 60), (10, 90), (0, 90)))) == [(10, 30), (60, 60)]
+    narrow = Region(((0, 0), (60, 0), (60, 60), (10, 60), (10, 90), (0, 90)))
+    assert sizes_m(narrow) == sizes_m(narrow, thorough=False) == [(10, 30), (60, 60)]
     # Along x = 30 m 1 of 90 m and 1 of 60 m; along y = 60 m 2 of 60 m and 1 of 30 m.
     assert sizes_m(Region(L_SHAPE)) == [(30, 60), (30, 90)]
 
@@ -96,15 +97,15 @@ class TestCuts:
         directions = ((0, 1), (1, 0), (-1, 0), slant, (0, 1), (1, 0), slant, (1, 0))
         expected = [
             (np.array(corner) - np.array(direction) * reach_m, np.array(corner) + np.array(direction) * reach_m)
-            for corner, direction in zip([(80, 100)] * 4 + [(100, 200)] * 4, directions, strict=True)
+            for corner, direction in zip([(100, 110)] * 4 + [(120, 210)] * 4, directions, strict=True)
         ]
         assert np.array(across) == pytest.approx(np.array(expected))
 
     def test_and_before_that_as_far_as_the_next_boundary_where_there_is_more_beyond(self) -> None:
-        # North of (100, 200) to the block's end; the arm to the south is left whole. By 1 mm it reaches beyond both.
-        along_100 = [line for line in map(shapely.get_coordinates, _cuts(NOTCHED, 12)) if np.ptp(line[:, 0]) < 1e-9]
-        assert [round(float(np.ptp(line[:, 1])), 3) for line in along_100] == [3440.93, 300.002, 3440.93]
-        assert along_100[1] == pytest.approx(np.array([(100, 199.999), (100, 500.001)]), abs=1e-6)
+        # North of (120, 210) to the block's end; the arm to the south is left whole. By 1 mm it reaches beyond both.
+        along_120 = [line for line in map(shapely.get_coordinates, _cuts(NOTCHED, 12)) if np.ptp(line[:, 0]) < 1e-9]
+        assert [round(float(np.ptp(line[:, 1])), 3) for line in along_120] == [3440.93, 300.002, 3440.93]
+        assert along_120[1] == pytest.approx(np.array([(120, 209.999), (120, 510.001)]), abs=1e-6)
 
     @pytest.mark.parametrize("turned", [False, True])
     def test_corners_that_point_inward_come_with_their_sides_also_those_of_holes(self, turned: bool) -> None:
