@@ -121,6 +121,12 @@ class TestCuts:
             [[30, 25], [10, 15], [0, -15]],
         ]
 
+    def test_however_little_it_points_inward_a_corner_does_and_no_other(self) -> None:
+        # At 20 and 60 m it points outward by as little, at 80 m to neither side.
+        south = ((0, 0), (20, 0), (40, 0.01), (60, 0), (80, 0), (100, 0))
+        corners = _inward_corners(shapely.Polygon((*south, (100, 50), (0, 50))))
+        assert [corner.tolist() for corner, _, _ in corners] == [[40, 0.01]]
+
 
 class TestManyCorners:
     def comb(self, depths_m: list[float]) -> shapely.Polygon:
