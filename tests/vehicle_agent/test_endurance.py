@@ -9,7 +9,7 @@ import pytest
 from by_hand import PRIMARY, nav, run_info
 from one_node import OneNode
 
-from comms.said.announcement import Role, Vertex, Zone
+from comms.said.announcement import Role, RunInfo, Vertex, Zone
 from comms.said.messages import (
     AgentState,
     Hotspot,
@@ -17,6 +17,7 @@ from comms.said.messages import (
     ManeuverKind,
     ManeuverState,
     ManeuverStatus,
+    MissionOver,
     Mode,
     Nav,
     Plan,
@@ -24,7 +25,7 @@ from comms.said.messages import (
 from planner.currents import Sailing
 from planner.dubins import Pose
 from planner.footprints.side import SideLooking
-from planner.spacing_planners import AdaptiveSpacing
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
 from planner.sweep import pass_over
 from planner.types import SonarShape
 from planner.way_home import WayHome
@@ -71,15 +72,22 @@ def test_who_waits_goes_home_while_it_may_circle_once_more() -> None:
     assert not FOR_EVER.is_low(here, 10**9, circles=True)
 
 
+ADAPTIVE, RUN = AdaptiveSpacing(40, 145), run_info(300, 200)
 HOME = Homing(WayHome((0, 0), Sailing(2.0), turn_radius_m=10.0), reserve_ms=0)
 
 
-def survey(endurance_ms: int, homing: Homing | None = HOME) -> OneNode:
+def survey(
+    endurance_ms: int,
+    homing: Homing | None = HOME,
+    *,
+    spacing: SpacingPlanner = ADAPTIVE,
+    run: RunInfo = RUN,
+) -> OneNode:
     """A primary of 2 m/s that is to come home to the origin, told of the run and of nothing else."""
     sonar = SideLooking(SonarShape("side", 40, 145))
-    config = SurveyConfig(PRIMARY, AdaptiveSpacing(40, 145), sonar, 40, 145, 0.05, 0.6, 20, endurance_ms, homing=homing)
+    config = SurveyConfig(PRIMARY, spacing, sonar, 40, 145, 0.05, 0.6, 20, endurance_ms, homing=homing)
     node = OneNode(SurveyAgent(config), Role.SURVEY)
-    node.hear("run", run_info(300, 200))
+    node.hear("run", run)
     return node
 
 
@@ -98,6 +106,58 @@ def test_a_track_that_takes_too_long_is_left_for_home_wherever_that_is_left_from
     assert not goes_home or (orders[-1].end_x_m, orders[-1].end_y_m) == (0, 0)
     # What is left is for helpers, at once: all of the area, 61 columns of 40 cells.
     assert [hotspot.cells for hotspot in node.all(Hotspot)] == [61 * 40] * goes_home
+    last_words = "the battery lasts for no further track and the way home: the survey ends, 100.00% of the area"
+    assert node.last(Plan).note.startswith(last_words) is goes_home
+
+
+def test_a_track_is_left_if_it_leaves_no_time_for_its_run_out_and_the_way_home_from_there() -> None:
+    # The first one, beside the pair's second, which runs the other way.
+    (first, second) = survey(1_000_000).last(Plan).tracks[:2]
+    assert (first.end_y_m, second.end_y_m) == (200, 0)
+    way_s, _ = HOME.way.from_pose(Pose(first.end_x_m, 220, NORTH))
+    latest_ms = 1_000_000 - round(way_s * 1000) - 10_000
+    for ends_ms, kind in ((latest_ms, ManeuverKind.FOLLOW), (latest_ms + 1, ManeuverKind.GOTO)):
+        node = survey(1_000_000)
+        node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.ACCEPTED, ends_ms, ""))
+        assert node.last(Maneuver).kind is kind
+
+
+def test_the_next_track_is_reckoned_from_the_end_of_the_last_one() -> None:
+    node = survey(720_000, spacing=FixedSpacing(40, 145), run=run_info(600, 200))
+    node.hear(f"veh/{PRIMARY}/nav", nav())
+    for number, at_ms in ((1, 120_000), (2, 240_000)):
+        node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(number, ManeuverState.DONE, 0, ""), at_ms=at_ms)
+    # At 250 s it is behind the second one, at (250, -20). The third begins at (350, -20) and ends at (350, 220), 206 m
+    # from home: some 55 s there, 120 s along it, some 220 s home. From the end of the first it would be 100 s more.
+    assert [(track.end_x_m, track.end_y_m, track.flown) for track in node.last(Plan).tracks] == [
+        (145, 200, True),
+        (250, 0, True),
+        (350, 200, False),
+    ]
+    assert node.last(Maneuver).number == 3
+    assert node.last(Plan).tentative == 0
+
+
+@pytest.mark.parametrize(("endurance_ms", "count", "tentative"), [(3_600_000, 7, 5), (900_000, 3, 1), (700_000, 2, 0)])
+def test_tracks_for_which_the_battery_does_not_last_are_not_among_those_that_may_be_laid_elsewhere(
+    endurance_ms: int, count: int, tentative: int
+) -> None:
+    # Each track takes 120 s, the ways to the second, at 236 m, and to the third, at 512 m, some 60 and 150 s. Home it
+    # is some 120 s from behind the second one and 280 s from behind the third.
+    node = survey(endurance_ms, run=run_info(1212, 200))
+    node.hear(f"veh/{PRIMARY}/nav", nav())
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.DONE, 0, ""), at_ms=120_000)
+    plan = node.last(Plan)
+    assert (len(plan.tracks), plan.tentative) == (count, tentative)
+
+
+def test_who_is_on_its_way_home_goes_on_when_the_mission_is_over() -> None:
+    node = survey(150_000)
+    node.hear(f"veh/{PRIMARY}/nav", Nav(0, 0, 0, 2, 15, 0))
+    node.hear(f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.REFUSED, 0, "no rudder"))
+    said = node.hear("coord/mission_over", MissionOver("enough"))
+    assert node.all(Maneuver, said) == []
+    assert node.last(AgentState).mode is Mode.RETURNING
 
 
 def test_no_track_is_begun_that_the_battery_does_not_last_for() -> None:

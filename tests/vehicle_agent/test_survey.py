@@ -48,8 +48,8 @@ from planner.fleet_map import FleetMap
 from planner.footprints.side import SideLooking
 from planner.profile_spacing import ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
-from planner.types import BoolArray, DetectionCurve, GridSpec, SonarShape
-from vehicle_agent.config import SurveyConfig
+from planner.types import BoolArray, DetectionCurve, GridSpec, Point, SonarShape
+from vehicle_agent.config import WHOLE, SurveyConfig
 from vehicle_agent.survey import SurveyAgent
 
 SEES_TO_130_M = flat(0.3, 25, 130)
@@ -61,7 +61,10 @@ def survey(
     *,
     nadir_gap_m: float = 40,
     range_m: float = 145,
+    hotspot_risk: float = 0.6,
     prior: DetectionCurve | None = None,
+    share: tuple[float, float] = WHOLE,
+    begin: Point | None = None,
 ) -> OneNode:
     """A survey agent that waits for the run."""
     config = SurveyConfig(
@@ -71,10 +74,12 @@ def survey(
         nadir_gap_m=nadir_gap_m,
         range_m=range_m,
         threshold=0.05,
-        hotspot_risk=0.6,
+        hotspot_risk=hotspot_risk,
         run_in_m=20,
         endurance_ms=36_000_000,
         prior=prior,
+        share=share,
+        begin=begin,
     )
     return OneNode(SurveyAgent(config), Role.SURVEY)
 
@@ -143,6 +148,42 @@ class TestThePapersExperiments:
         assert plans[0].note == "spacing for 138 m, 7 tracks"
         assert "r_eff 130 m after track 2, spacing 138 to 120 m" in [plan.note for plan in plans]
 
+    def test_the_last_track_of_a_pair_decides_what_follows_and_it_says_from_what_the_spacing_changes(self) -> None:
+        agent = on_its_way(survey(), run_info(1000, 200, cell_m=10))
+        for far_m in (135, 124, 128, 130, 130, 130):
+            fly(agent, PRIMARY, command(agent), flat(0.3, 25, far_m))
+        # By hand: three pairs of 125 m cover 1005 m. From the edge 210 + 124 on 666 m take a single track, too, and two
+        # pairs do with 120 m; from 534 + 120 on a pair of 129 m covers 347 m, and 346 m are left.
+        assert [plan.note for plan in agent.all(Plan)] == [
+            "spacing for 125 m, 6 tracks",
+            "",
+            "r_eff 124 m after track 2, spacing 125 to 120 m",
+            "",
+            "r_eff 130 m after track 4, spacing 120 to 129 m",
+            "",
+            "the survey ends, all of the area is seen",
+        ]
+        assert offsets(agent.last(Plan)) == [125, 210, 454, 534, 782, 871]
+
+    @pytest.mark.parametrize(("width_m", "words"), [(105, "145 m, 1 track"), (106, "120 m, 2 tracks")])
+    def test_how_many_tracks_there_are_is_said(self, width_m: float, words: str) -> None:
+        assert on_its_way(survey(), run_info(width_m, 200)).last(Plan).note == f"spacing for {words}"
+
+    @pytest.mark.parametrize(("begin", "start_y_m"), [((0, 99), 0), ((0, 100), 0), ((0, 101), 200)])
+    def test_the_first_track_is_begun_from_the_end_that_is_nearer(self, begin: Point, start_y_m: float) -> None:
+        agent = on_its_way(survey(begin=begin))
+        fly_all(agent, SEES_TO_130_M)
+        starts_m = [track.start_y_m for track in agent.last(Plan).tracks]
+        assert len(starts_m) > 1
+        assert starts_m == [start_y_m if place % 2 == 0 else 200 - start_y_m for place in range(len(starts_m))]
+
+    def test_of_a_share_of_the_area_nothing_beyond_is_surveyed(self) -> None:
+        agent = on_its_way(survey(share=(0.25, 0.5)))
+        tell_status(agent, PRIMARY, 1, ManeuverState.REFUSED)
+        assert to_follow(agent) is None
+        (hotspot,) = agent.all(Hotspot)  # of 37 columns those at 90 to 180 m
+        assert (hotspot.cells, hotspot.growing) == (10 * 20, False)
+
     def test_it_says_which_tracks_may_still_be_laid_elsewhere_and_the_others_stay(self, experiment_1: OneNode) -> None:
         plans = experiment_1.all(Plan)
         tentative = {sum(track.flown for track in plan.tracks): plan.tentative for plan in plans}
@@ -180,6 +221,8 @@ class TestThePapersExperiments:
         assert offsets(plan)[0] == 138  # as Algorithm 1 begins
         assert plan.r_adpt_m == (138,) + (130,) * 7
         assert [track.flown for track in plan.tracks] == [True] * 8
+        ends_m = [(track.start_y_m, track.end_y_m) for track in plan.tracks]
+        assert ends_m == [(0, 400), (400, 0)] * 4
         # Seen from 25 to 130 m: nothing is left but what the first track's range, told too long, leaves at the edge.
         seen = {place for across_m in offsets(plan) for place in range(1213) if 25 <= abs(place - across_m) <= 130}
         assert set(range(1213)) - seen == set(range(8))
@@ -211,6 +254,14 @@ class TestThePapersExperiments:
         assert agent.last(Curve).track == 1
         below_the_threshold = DetectionCurve(np.array([30.0, 70.0]), np.array([0.04, 0.04]))
         assert on_its_way(survey(prior=below_the_threshold)).last(Curve).r_eff_m == 0
+
+    def test_a_track_without_looks_counts_as_one_that_saw_nothing(self) -> None:
+        agent = on_its_way()
+        tell_status(agent, PRIMARY, command(agent).number, ManeuverState.DONE)
+        fly(agent, PRIMARY, command(agent), SEES_TO_130_M)
+        known = agent.node._known  # type: ignore[attr-defined]
+        assert known.r_eff_m == 130
+        assert known.curve.at(np.array([24, 100, 131])).tolist() == pytest.approx([0, 0.15, 0])
 
 
 class TestSpacingAtItsLimits:
@@ -257,6 +308,23 @@ class TestSpacingAtItsLimits:
         assert not node.coverage.settled[:, seen_next].any()
         fly_all(agent, flat(0.3, 25, 100))
         assert node.coverage.settled.all()
+
+    def test_cells_that_the_next_pair_may_see_are_not_settled_by_what_the_last_track_saw(self) -> None:
+        agent = on_its_way(survey(), run_info(800, 200, cell_m=10))
+        for far_m in (135, 135, 125):
+            fly(agent, PRIMARY, command(agent), flat(0.3, 25, far_m))
+        assert offsets(agent.last(Plan)) == [132, 224, 487, 578, 669]
+        fourth = command(agent)
+        tell_status(agent, PRIMARY, fourth.number, ManeuverState.ON_TRACK)
+        agent.hear(f"veh/{PRIMARY}/look", look(fourth, 1, 0, 20, SEES_TO_130_M))
+        agent.wait(40)
+        coverage = agent.node.coverage  # type: ignore[attr-defined]
+        # With 125 m the pair covers up to 578 + 125, and what is left takes another: at 600 and 680 m. It has seen to
+        # 135 m, and a cell is kept beside. The fourth track comes from the far end.
+        assert coverage.grid.across_m[coverage.settled[-1]].tolist() == list(range(0, 451, 10))
+        # Of its second half what it may see from 25 to 135 m, and a cell beside, is not settled, nor is that of the
+        # fifth, 91 m farther.
+        assert coverage.grid.across_m[coverage.settled[0]].tolist() == list(range(0, 431, 10))
 
     @pytest.mark.parametrize(
         ("nadir_gap_m", "p_detect", "second"),
@@ -476,6 +544,17 @@ class TestTracksThatGoWrong:
         fly(agent, PRIMARY, command(agent), flat(0.999, 0, 100), looks=5)  # their mean is 0.9990000000000001
         assert agent.last(Curve).p_detect[50] == 0.999
 
+    @pytest.mark.parametrize(("bins", "published"), [(4096, 4096), (4097, 2049)])
+    def test_a_curve_holds_no_more_points_than_the_wire(self, bins: int, published: int) -> None:
+        agent = on_its_way()
+        maneuver = command(agent)
+        fine = np.full((2, 1, bins), 0.3)
+        agent.hear(
+            f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 1, SEES_TO_130_M), range_bin_m=0.03, p_detect=fine)
+        )
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)
+        assert agent.last(Curve).p_detect.size == published
+
     def test_a_curve_of_very_many_bins_is_published_coarser(self) -> None:
         agent = on_its_way()
         maneuver = command(agent)
@@ -519,6 +598,7 @@ class TestHotspots:
                 if hotspot.state is HotspotState.ACTIVE:
                     cells = cells_within(fleet.grid, hotspot) & hot.astype(bool)
                     assert np.count_nonzero(cells) >= hotspot.cells > 0
+                    assert hotspot.merged_into == 0
                     assert 0.6 <= hotspot.mean_risk <= 1
                     held += 1
         assert held > 20
@@ -557,7 +637,27 @@ class TestHotspots:
         withdrawn = {one.number: one.message for one in said if isinstance(one.message, Hotspot)}
         assert withdrawn.keys() == numbers
         for hotspot in withdrawn.values():
-            assert (hotspot.state, hotspot.outline, hotspot.merged_into) == (HotspotState.WITHDRAWN, (), 0)
+            assert replace(hotspot, revision=0) == Hotspot(0, HotspotState.WITHDRAWN, (), 0, 0, False, 0)
+
+    def test_a_look_after_a_pause_is_followed_by_hotspots_with_the_next_report(self) -> None:
+        agent = on_its_way(survey(FixedSpacing(0, 60), nadir_gap_m=0, range_m=60), run_info(60, 400))
+        maneuver = command(agent)
+
+        def said_ms(number: int, at_ms: int, until_ms: int) -> list[int]:
+            agent.hear(f"veh/{PRIMARY}/look", look(maneuver, number, 50 * number, 10, flat(0.2, 0, 140)), at_ms=at_ms)
+            return [one.at_ms for one in agent.wait_until(until_ms) if isinstance(one.message, Hotspot)]
+
+        assert said_ms(0, 15_000, 21_000) == [20_001]
+        assert said_ms(1, 21_500, 60_000) == [50_001]  # 30 s later
+        assert said_ms(2, 95_000, 120_000) == [100_001]
+
+    def test_cells_lie_in_one_from_the_very_risk_on(self) -> None:
+        once = math.exp(-0.36)  # 18 levels, the risk of a cell that was seen once with 0.3
+        for hotspot_risk, found in ((once, True), (float(np.nextafter(once, 1)), False)):
+            lone = survey(FixedSpacing(0, 60), nadir_gap_m=0, range_m=60, hotspot_risk=hotspot_risk)
+            agent = on_its_way(lone, run_info(60, 200))
+            fly_all(agent, flat(0.3, 0, 140))
+            assert bool(agent.all(Hotspot)) is found
 
     def test_two_that_grow_together_become_one_and_the_other_names_it(self) -> None:
         # One track beside a narrow area: on its first half the sonar sees badly in two bands, then everywhere.
@@ -700,6 +800,11 @@ class TestContactsAndTheEnd:
         state = experiment_1.last(AgentState)
         assert (state.mode, state.works_on, state.expected_end_ms) == (Mode.FINISHED, 0, 0)
 
+    def test_one_that_holds_is_not_told_to_hold_again_when_the_mission_is_over(self) -> None:
+        agent = on_its_way()
+        fly_all(agent, SEES_TO_130_M)
+        assert agent.all(Maneuver, agent.hear("coord/mission_over", MissionOver("enough"))) == []
+
     def test_when_the_mission_is_over_it_stops_says_what_it_has_and_falls_silent(self) -> None:
         agent = on_its_way()
         maneuver = command(agent)
@@ -707,6 +812,7 @@ class TestContactsAndTheEnd:
         said = agent.hear("coord/mission_over", MissionOver("enough"))
         assert [one.kind for one in agent.all(Maneuver, said)] == [ManeuverKind.HOLD]
         assert agent.all(CoverageTile, said)
+        assert agent.all(Hotspot, said)  # where the looks have passed, and no later track sees
         assert agent.all(AgentState, said)[-1].mode is Mode.FINISHED
         assert agent.wake_ms is None
         tell_status(agent, PRIMARY, maneuver.number, ManeuverState.DONE)

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import shapely
-from by_hand import PRIMARY, P_Detect, flat, fly, nav, run_info, tell_status, to_follow
+from by_hand import PRIMARY, P_Detect, flat, fly, look, nav, run_info, tell_status, to_follow
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from one_node import OneNode
@@ -22,7 +22,7 @@ from planner.footprints.footprint import Footprint
 from planner.footprints.side import SideLooking
 from planner.footprints.wedge import ForwardLooking
 from planner.region import Region
-from planner.spacing_planners import AdaptiveSpacing
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner
 from planner.types import Point, SonarShape, Track
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.survey import SurveyAgent
@@ -38,6 +38,13 @@ STEPS = Region(
 WITH_ROCKS = Region(L_SHAPE.outline, (((100.0, 100.0), (160.0, 100.0), (160.0, 160.0), (100.0, 160.0)),))
 
 
+class NarrowOnesLaidOnce(FixedSpacing):
+    """As a user may write one: what is no wider than 400 m is laid once."""
+
+    def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
+        return replace(super().decide(width_m, covered_m, r_eff_m), replans=width_m > 400)
+
+
 def announced(region: Region, heading_rad: float = 0.0, cell_m: float = 10) -> RunInfo:
     """A run over a region."""
     grid = region.about(heading_rad).grid(cell_m)
@@ -51,12 +58,17 @@ def announced(region: Region, heading_rad: float = 0.0, cell_m: float = 10) -> R
 
 
 def surveyor(
-    run: RunInfo, *, nadir_gap_m: float = 40, range_m: float = 145, footprint: Footprint | None = None
+    run: RunInfo,
+    *,
+    nadir_gap_m: float = 40,
+    range_m: float = 145,
+    footprint: Footprint | None = None,
+    spacing: SpacingPlanner | None = None,
 ) -> OneNode:
     """A survey agent told of the run and of where its vehicle is."""
     config = SurveyConfig(
         vehicle=PRIMARY,
-        spacing=AdaptiveSpacing(nadir_gap_m, range_m),
+        spacing=spacing or AdaptiveSpacing(nadir_gap_m, range_m),
         footprint=footprint or SideLooking(SonarShape("side", nadir_gap_m, range_m)),
         nadir_gap_m=nadir_gap_m,
         range_m=range_m,
@@ -155,10 +167,31 @@ class TestPartByPart:
         fly_all(agent, p_detect)
         assert (node.coverage.settled == node._inside).all()
         outside = L_SHAPE.polygon.buffer(15)  # an outline covers its notches with little to spare
+        for one in {one.number: one.message for one in agent.said if isinstance(one.message, Hotspot)}.values():
+            assert not one.growing  # what lies beyond the area is not still to come
         for one in agent.all(Hotspot):
             if one.state is HotspotState.ACTIVE:
                 assert shapely.Polygon([(corner.x_m, corner.y_m) for corner in one.outline]).within(outside)
         assert agent.last(Plan).note.startswith("the survey ends, ")
+
+    def test_tracks_of_parts_to_come_may_be_laid_elsewhere_as_long_as_one_of_them_is_planned_anew(self) -> None:
+        # Three parts, of which the last one, 300 m wide, is laid once; it takes two tracks and the others three each.
+        third = ((900.0, 1000.0), (1200.0, 1000.0), (1200.0, 1600.0), (900.0, 1600.0))
+        region = Region((*STEPS.outline[:4], *third, *STEPS.outline[5:]))
+        agent = surveyor(announced(region), spacing=NarrowOnesLaidOnce(40, 133))
+        fly_all(agent, flat(0.3, 25, 140))
+        told = {sum(track.flown for track in plan.tracks): plan.tentative for plan in agent.all(Plan)}
+        assert told == {0: 1 + 3 + 2, 1: 6, 2: 5, 3: 1, 4: 1, 5: 0, 6: 0, 7: 0, 8: 0}
+
+    def test_the_parts_to_come_are_laid_by_what_the_last_track_saw(self) -> None:
+        agent = surveyor(announced(STEPS))
+        for far_m in (135, 100, 100, 130):
+            maneuver = to_follow(agent)
+            assert maneuver is not None
+            fly(agent, PRIMARY, maneuver, flat(0.3, 25, far_m))
+        # For 130 m two pairs of 120 m; 133 m or more would do with three tracks, 100 m would take single ones.
+        second_m = [track.across_m - 450 for track in agent.last(Plan).tracks if track.across_m > 450]
+        assert second_m == [120, 200, 250, 330]
 
     def test_a_part_of_which_every_track_is_refused_is_left_out(self) -> None:
         agent = surveyor(announced(L_SHAPE))
@@ -198,6 +231,22 @@ def test_what_a_sonar_that_looks_ahead_may_still_see_of_a_track() -> None:
     assert (north.start[1], south.start[1]) == (0, 400)
     assert astuple(node._still_ahead(north)) == pytest.approx((north.across_m, -30, 420))
     assert astuple(node._still_ahead(south)) == pytest.approx((south.across_m, -20, 430))
+
+
+def test_which_cells_tracks_of_a_part_may_see() -> None:
+    # The second part lies from 300 to 800 m and up to 300 m; a cell, a look's bin and what is seen ahead are kept
+    # beyond its ends, 10 + 8 + 50 m.
+    wedge = ForwardLooking(SonarShape("wedge", 3, 50, math.pi / 4, 10))
+    agent = surveyor(announced(L_SHAPE), footprint=wedge)
+    node, maneuver = node_of(agent), to_follow(agent)
+    assert maneuver is not None
+    agent.hear(f"veh/{PRIMARY}/look", replace(look(maneuver, 1, 0, 4, SEES_TO_130_M), along_bin_m=8))
+    cells = node._cells_within(node._parts[1], -45, 75)
+    expected = np.zeros_like(cells)
+    expected[:37, 26:] = True  # up to 365 m, from 260 m on
+    assert (cells == expected).all()
+    assert not node._cells_within(node._parts[1], 500, 0).any()
+    assert node._cells_within(node._parts[1], 490, 15)[0].nonzero()[0].tolist() == [80]
 
 
 class TestAnyArea:
@@ -266,6 +315,14 @@ class TestGroundToKeepOutOf:
         fly_all(free, SEES_TO_130_M)
         assert len(tracks) == len(free.last(Plan).tracks) + 1
         assert len(node.r_adpt_m) == len(node_of(free).r_adpt_m)
+
+    def test_who_is_not_announced_is_taken_to_turn_on_the_spot(self) -> None:
+        zone = Zone(tuple(Vertex(x_m - 80.0, y_m) for x_m, y_m in self.BUOY))
+        told = replace(announced(self.FIELD), keep_out=(zone,), keep_out_margin_m=1.5, vehicles=())
+        first, second = surveyor(told).last(Plan).tracks[:2]
+        # 5.5 m about the buoy's middle, at (120, 300), and 20 m before and behind; looked for metre by metre.
+        assert (first.across_m, first.start_y_m, first.end_y_m) == (120, 0, 274)
+        assert (second.across_m, second.start_y_m, second.end_y_m) == (120, 326, 600)
 
     def test_each_part_to_come_is_planned_from_where_the_one_before_it_ends(self) -> None:
         # Two tracks from the near side and back, one to the far side of a part 400 m long, and then from there.
