@@ -172,7 +172,6 @@ class SurveyAgent(Agent):
         track = self.ahead.pop(0)
         self.flown.append(track)
         self._run_out_ms = now_ms + self.endurance.run_out_ms(self._pass(track), self.config.run_in_m)
-        self._looked_to_m = None
         r_eff_m, curve = 0, UNSEEN
         if self._tally is not None:
             curve = self._tally.curve()
