@@ -428,6 +428,15 @@ class TestTracksThatGoWrong:
         # The nadir gap of the first track, at 138 m, which the second should have seen.
         assert any(inside(agent, one, 138, 200) for one in agent.all(Hotspot))
 
+    def test_of_the_track_after_one_that_is_left_half_way_all_is_still_to_be_seen(self) -> None:
+        agent = on_its_way(survey(FixedSpacing(40, 145)))
+        maneuver = command(agent)
+        agent.hear(f"veh/{PRIMARY}/look", look(maneuver, 1, 0, 20, SEES_TO_130_M))
+        tell_status(agent, PRIMARY, maneuver.number, ManeuverState.REFUSED)
+        coverage = agent.node.coverage  # type: ignore[attr-defined]
+        lateral_m = np.abs(coverage.grid.across_m - command(agent).start_x_m)
+        assert not coverage.settled[:, (lateral_m >= 25) & (lateral_m <= 130)].any()
+
     def test_when_every_track_is_refused_the_whole_area_is_a_hotspot(self) -> None:
         agent = on_its_way(survey(), run_info(360, 200))
         for _ in range(9):
