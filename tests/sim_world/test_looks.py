@@ -8,22 +8,28 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from comms.node import random_stream
 from comms.said.messages import Look, Maneuver, ManeuverKind, TruthLook
 from planner.currents import FlowGrid
 from planner.types import DetectionCurve, FloatArray, Point
 from sim_world.config import EstimateConfig, SensorConfig, TargetsConfig, VehicleConfig
+from sim_world.estimates import Estimates
 from sim_world.kinds import Mixture
 from sim_world.layouts import Given
 from sim_world.looks import Looks
+from sim_world.seabed import UniformSeabed
 from sim_world.sonar import Seabed
 from sim_world.steadiness import STILL_WATER, Stream
-from sim_world.targets import Recogniser, make_targets
+from sim_world.targets import NO_TARGETS, Recogniser, Targets, make_targets
 from sim_world.vehicle import Stretch
 
 AREA: tuple[Point, ...] = ((0.0, 0.0), (300.0, 0.0), (300.0, 400.0), (0.0, 400.0))
 SENSOR = SensorConfig(DetectionCurve(np.array([0.0, 100.0]), np.array([0.6, 0.6])))
 PLACES = tuple((120.0 + 0.05 * number, 0.01 + 0.03 * number) for number in range(600))
 """All within the first 20 m of a track northward from (100, 0), to its east."""
+
+
+SURE = replace(SENSOR, curve=DetectionCurve(np.array([0.0, 100.0]), np.array([0.998, 0.998])))
 
 
 class HalfTaken:
@@ -37,6 +43,20 @@ class HalfTaken:
 def northward(x_m: float) -> Stretch:
     """The first 20 m of a track to the north."""
     return Stretch(Maneuver(1, ManeuverKind.FOLLOW, x_m, 0.0, x_m, 400.0, 50.0), 0.0, 0.0, 4)
+
+
+def looks_of(
+    targets: TargetsConfig, sensor: SensorConfig, clutter: Targets = NO_TARGETS, false_alarms_per_km2: float = 0.0
+) -> Looks:
+    """Over an even seabed."""
+    return Looks(
+        VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, sensor),
+        sonar=sensor.sonar_over(UniformSeabed(), "a"),
+        targets=make_targets(targets, AREA, 1),
+        clutter=clutter,
+        recogniser=Recogniser(sensor.curve, false_alarms_per_km2=false_alarms_per_km2),
+        seed=1,
+    )
 
 
 def looked(
@@ -101,6 +121,75 @@ def test_a_look_suffers_from_the_current_where_the_vehicle_is_at_its_end() -> No
     sensor = replace(SENSOR, half_at_crab_rad=math.atan(0.5))
     ((look, _),) = looked([100.0], TARGETS, sensor, current=Stream(1.0, 0.0, grid=grid))
     assert look.p_detect == pytest.approx(0.3 / 2)
+
+
+@pytest.mark.parametrize(("first_along_m", "bins", "end_m"), [(0.0, 4, 20.0), (60.0, 4, 80.0), (60.0, 2, 70.0)])
+def test_that_is_the_end_of_its_stretch_along_the_tracks_heading(first_along_m: float, bins: int, end_m: float) -> None:
+    # 1 m/s across the track at the place that is half way south-east from (100, 0), none a metre off.
+    heading_rad, away_m = math.radians(150.0), np.array([-1.0, 0.0, 1.0])
+    x_m, y_m = 100.0 + end_m * math.sin(heading_rad), end_m * math.cos(heading_rad)
+    there = np.outer([0.0, 1.0, 0.0], [0.0, 1.0, 0.0])[np.newaxis]
+    flow = there * math.cos(heading_rad), there * -math.sin(heading_rad)
+    current = Stream(1.0, 0.0, grid=FlowGrid(x_m + away_m, y_m + away_m, np.array([0.0]), *flow))
+    sensor = replace(SENSOR, half_at_crab_rad=math.atan(0.5))
+    looks = Looks(
+        VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, sensor),
+        sonar=sensor.sonar_over(UniformSeabed(), "a"),
+        targets=NO_TARGETS,
+        recogniser=Recogniser(sensor.curve, false_alarms_per_km2=0.0),
+        seed=1,
+        current=current,
+    )
+    track = Maneuver(1, ManeuverKind.FOLLOW, 100.0, 0.0, 300.0, -200.0 * math.sqrt(3.0), 50.0)
+    look, truth = looks.look(Stretch(track, heading_rad, first_along_m, bins), 0.0, (0.0, 0.0), 0.0)
+    assert look.p_detect == pytest.approx(0.6 / 2)
+    assert truth is None
+
+
+def test_of_more_contacts_than_the_wire_takes_the_best_are_told() -> None:
+    few, _ = looks_of(TargetsConfig(150, Given(PLACES[:150])), SURE).look(northward(100.0), 0.0, (0.0, 0.0), 0.0)
+    assert 140 < len(few.contacts) <= 150
+    many, truth = looks_of(TARGETS, SURE).look(northward(100.0), 0.0, (0.0, 0.0), 0.0)
+    assert truth is not None
+    scores = [contact.score for contact in many.contacts]
+    assert (len(scores), len(truth.detected) > 580) == (200, True)
+    assert scores == sorted(scores, reverse=True)
+    assert scores[-1] > 0.75  # of scores of 0.5 to 1 the upper third
+
+
+def test_clutter_and_false_alarms_are_reported_with_low_scores_and_are_no_targets() -> None:
+    clutter = make_targets(TargetsConfig(150, Given(PLACES[:150])), AREA, 1)
+    looks = looks_of(TargetsConfig(0), SURE, clutter)
+    look, truth = looks.look(northward(100.0), 0.0, (0.0, 0.0), 0.0)
+    assert truth is None
+    assert 140 < len(look.contacts) <= 150
+    assert max(contact.score for contact in look.contacts) < 0.75
+    assert looks.look(northward(0.0), 0.0, (0.0, 0.0), 0.0)[0].contacts == ()  # 120 m off
+    both, truth = looks_of(TargetsConfig(1, Given(PLACES[:1])), SURE, clutter).look(
+        northward(100.0), 0.0, (0.0, 0.0), 0.0
+    )
+    assert truth is not None
+    assert len(both.contacts) == len(look.contacts) + 1
+    # A swath of 20 m by 200 m: 40 are expected.
+    false, truth = looks_of(TargetsConfig(0), SURE, false_alarms_per_km2=10_000).look(
+        northward(100.0), 0.0, (0.0, 0.0), 0.0
+    )
+    assert truth is None
+    assert len(false.contacts) == pytest.approx(40, abs=4 * math.sqrt(40))
+
+
+def test_what_is_drawn_goes_by_the_numbers_of_looks_and_tracks_from_1_on() -> None:
+    sensor = replace(SENSOR, noise_cell=0.2, noise_track=0.5, estimate=EstimateConfig(drift_per_km=2.0))
+    looks = looks_of(TargetsConfig(0), sensor)
+    ours = Estimates(sensor, lambda name, number: random_stream(1, "world", "a", name, str(number)))
+    seen = np.full((2, 4, 21), 0.6)
+    nothing = np.zeros(seen.shape)
+    for number, (track, first_along_m) in enumerate(((1, 0.0), (1, 20.0), (2, 0.0), (2, 20.0)), start=1):
+        if first_along_m == 0.0:
+            ours.begin_track(track)
+        look, _ = looks.look(replace(northward(100.0), first_along_m=first_along_m), 0.0, (0.0, 0.0), 0.0)
+        assert look.number == number
+        assert look.p_detect == pytest.approx(ours.of_look(number, seen, nothing, nothing, 20.0))
 
 
 def test_what_is_told_too_high_finds_no_more() -> None:

@@ -120,6 +120,14 @@ def test_who_asks_is_told_so_many_those_told_the_fewest_times_first(monkeypatch:
     assert told(layer.again()) == [(FIRST, 1)]
 
 
+def test_who_asks_is_told_no_more_than_200_tiles_at_a_time() -> None:
+    layer = CoverageLayer("alpha", GridSpec(SweepFrame(0, 0, 0), 5, 202 * 20, 1))
+    layer.settled = np.ones((1, 202 * 20), dtype=np.bool_)
+    assert len(layer.changed_tiles()) == 202
+    assert [version for _, version in told(layer.again())] == list(range(1, 201))
+    assert [version for _, version in told(layer.again())] == [201, 202, *range(1, 199)]
+
+
 def test_nothing_is_told_more_than_eight_times_unasked() -> None:
     layer = two_tiles()
     for _ in range(7):
