@@ -103,6 +103,25 @@ class TestBatteries:
         assert stream.metrics.primary_ms() == 10_000
         assert stream.metrics.summary()["vehicles"][PRIMARY]["survey_cut_short"] is False
 
+    def test_who_leaves_home_again_has_not_ended(self) -> None:
+        stream = begun()
+        tracks = (PlannedTrack(1, 0, 0, 0, 0, 200, False),)
+        stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (138,), (), ""))
+        self.state(stream, 20, PRIMARY, Mode.HOME, 0.5)
+        self.state(stream, 30, PRIMARY, Mode.SURVEY, 0.4)
+        assert self.told(stream, PRIMARY) == ("over", 30.0, 0.4)
+        self.state(stream, 40, PRIMARY, Mode.HOME, 0.3)
+        assert self.told(stream, PRIMARY) == ("home", 40.0, 0.3)
+        stream.say(50, f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.EMPTY, 50_000, ""))
+        assert self.told(stream, PRIMARY) == ("empty", 50.0, 0.0)
+
+    def test_of_one_that_has_told_nothing_there_is_nothing_to_tell(self) -> None:
+        vehicles = begun().metrics.summary()["vehicles"]
+        nothing = {"path_m": 0.0, "ended": "over", "ended_s": 0.0, "battery_left": 1.0}
+        ranges = {"tracks": 0, "r_adpt_m": [], "r_eff_m": []}
+        assert vehicles[PRIMARY] == {"role": "survey", **nothing, "survey_cut_short": False, **ranges}
+        assert vehicles[HELPER] == {"role": "revisit", **nothing}
+
     def test_whose_battery_is_empty_the_world_tells_whatever_the_agent_makes_of_it(self) -> None:
         stream = begun()
         self.state(stream, 10, HELPER, Mode.IDLE, 0.5)
@@ -132,10 +151,29 @@ class TestPaths:
                 stream.say(at_s, f"veh/{name}/nav", replace(nav(side * apart_m / 2), speed_mps=3))
         assert stream.metrics.summary()["closest"] == [{"vehicles": [HELPER, PRIMARY], "closest_m": 4, "t_s": 41}]
 
+    def test_how_near_two_came_is_told_in_centimetres_and_milliseconds_and_not_of_who_is_home(self) -> None:
+        stream = begun()
+        for at_s, x_m in ((1, 50), (2, 20), (3, 50), (4, 3), (5, 50)):
+            if at_s == 3:
+                stream.state(3, HELPER, Mode.HOME)
+            for name, place in ((PRIMARY, nav(x_m)), (HELPER, nav(0, 0.333))):
+                stream.say(at_s + 0.0126, f"veh/{name}/nav", replace(place, speed_mps=1))
+        # At 2.0126 s hypot(20, 0.33) = 20.003 m, as places travel in centimetres.
+        assert stream.metrics.summary()["closest"] == [{"vehicles": [HELPER, PRIMARY], "closest_m": 20.0, "t_s": 2.013}]
+
+    def test_the_share_flown_of_tracks_that_have_no_length_is_none(self) -> None:
+        stream = begun()
+        for end_y_m, share in ((200, 0.0), (200.5, 1.0)):
+            tracks = (PlannedTrack(1, 10, 10, 200, 10, end_y_m, True),)
+            stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (120,), (), ""))
+            track = Maneuver(1, ManeuverKind.FOLLOW, 10, 0, 10, 200, 20)
+            stream.say(2, f"veh/{PRIMARY}/look", look(track, 1, 0, 8, flat(0.5, 0, 50)))
+            assert stream.metrics.share_flown() == share
+
     def test_the_share_flown_counts_valid_looks_of_primaries_over_planned_tracks(self) -> None:
         stream = begun()
         assert stream.metrics.share_flown() == 0
-        tracks = tuple(PlannedTrack(n, 10.0 * n, 10.0 * n, 0, 10.0 * n, 200, n == 1) for n in (1, 2))
+        tracks = tuple(PlannedTrack(n, 10.0 * n, 10.0 * n, 50, 10.0 * n, 250, n == 1) for n in (1, 2))
         stream.say(1, f"agent/{PRIMARY}/plan", Plan(1, tracks, (120,), (), ""))
         track = Maneuver(1, ManeuverKind.FOLLOW, 10, 0, 10, 200, 20)
         stream.say(2, f"veh/{PRIMARY}/look", look(track, 1, 0, 8, flat(0.5, 0, 50)))
@@ -309,6 +347,12 @@ class TestRisk:
             stream.say(3, f"agent/{PRIMARY}/curve", one)
         assert stream.metrics.summary()["mines"]["left"] == pytest.approx(2.5 / (math.e - 1.0), rel=0.01)
 
+    def test_of_curves_those_of_tracks_are_kept_and_not_what_is_taken_for_granted_before(self) -> None:
+        stream = begun()
+        for number in (0, 1, 2):
+            stream.say(1, f"agent/{PRIMARY}/curve", curve(number, 0.1 * (number + 1)))
+        assert {track: one.p_detect[0] for track, one in stream.metrics.curves[PRIMARY].items()} == {1: 0.2, 2: 0.3}
+
 
 def curve(track: int, peak: float) -> Curve:
     return Curve(track, 1.0, np.full(40, peak), 30)
@@ -335,6 +379,22 @@ class TestTruth:
         expected = (3 * math.exp(-2) + math.exp(-1) + math.exp(-0.5) + 1) / 6
         assert truth["predicted_missed_share"] == pytest.approx(expected)
 
+    def test_a_target_at_the_edge_is_met_by_the_nearest_cell(self) -> None:
+        stream = begun()
+        assert stream.metrics.targets_met()[0].shape == stream.metrics.targets_met()[1].shape == (0,)
+        places = ((-5.01, 12.0), (45.0, 3.0), (20.0, -0.01), (10.0, 20.01))
+        stream.say(0, "world/truth/targets", TruthTargets(tuple(TruthTarget(*place) for place in places)))
+        stream.tile(1, PRIMARY, [[0, 0, 10, 0, 40], [20, 30, 0, 0, 0]])
+        risk, missed = stream.metrics.targets_met()
+        assert risk == pytest.approx(np.exp([-0.4, -0.8, -0.2, -0.6]))
+        assert missed.all()
+
+    def test_targets_of_which_is_told_before_the_run_are_met_by_nothing(self) -> None:
+        stream = Stream()
+        stream.say(0, "world/truth/targets", TruthTargets((TruthTarget(3.0, 4.0),)))
+        assert stream.metrics.truly_found() is None
+        assert stream.metrics.summary()["truth"]["targets"] == 0
+
     def test_what_is_listed_is_held_against_the_targets(self) -> None:
         stream = begun()
         targets = tuple(TruthTarget(x_m, y_m) for x_m, y_m in ((3.0, 4.0), (17.0, 4.0), (30.0, 15.0)))
@@ -345,8 +405,18 @@ class TestTruth:
         for number, (x_m, y_m) in enumerate(((3.5, 4.0), (23.0, 15.0))):
             stream.say(2, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, y_m, 0.2, 0.9, 1))
         truth = stream.metrics.summary()["truth"]
+        assert stream.metrics.truly_found() == pytest.approx(2 / 3)
         # Of the two that were detected the first one; and one that is none, on 10 cells of 100 m2.
         assert (truth["listed_share"], truth["false_listed_per_km2"]) == (0.5, pytest.approx(1000))
+
+    def test_where_nothing_was_detected_none_of_it_is_listed(self) -> None:
+        stream = begun()
+        stream.say(0, "world/truth/targets", TruthTargets((TruthTarget(3.0, 4.0),)))
+        stream.tile(1, PRIMARY, [[50] * 5] * 2)
+        for number, x_m in enumerate((13.0, 23.0, 33.0)):
+            stream.say(2, f"agent/{PRIMARY}/contact/{number}", Contact(x_m, 15.0, 0.2, 0.9, 1))
+        truth = stream.metrics.summary()["truth"]
+        assert (truth["listed_share"], truth["false_listed_per_km2"]) == (None, 3000.0)
 
     def test_found_are_those_that_somebody_has_detected_of_all_or_of_some_ground(self) -> None:
         stream = begun()
