@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import Counter
 
 import pytest
-from fleets import ROSTER, nav, state
+from fleets import ROSTER, RUN_INFO, nav, state, with_modems
 from hypothesis import given
 from hypothesis import strategies as st
 
 from comms.lockstep.faults import CutOff, Delivery, FaultKind, Faults, MessageFault
 from comms.runner import Intake
 from comms.said.codec import Header, encode
-from comms.said.messages import AgentState, Message, MissionOver, Nav
+from comms.said.messages import AgentState, Message, MissionOver, Nav, Packet
 from comms.said.routing import Routing
 
 ROUTING = Routing(ROSTER)
@@ -42,6 +42,40 @@ def test_without_faults_a_message_passes() -> None:
     faults = Faults(1)
     assert not faults
     assert deliver(faults, NAV) == [Delivery(payload_of(NAV, 0, 0))]
+
+
+def test_there_are_faults_where_messages_or_vehicles_are_struck() -> None:
+    assert Faults(1, [MessageFault(FaultKind.DROP)])
+    assert Faults(1, cut_offs=[CutOff("alpha", 0, 1)])
+
+
+def test_the_announcement_of_the_run_reaches_everyone() -> None:
+    payload = encode(Header("clock", 0, 0, 0), RUN_INFO)
+    received = Intake(ROUTING).open("run", payload)
+    assert received is not None
+    faults = Faults(1, [MessageFault(FaultKind.DROP)], [CutOff("alpha", 0, 1000)])
+    assert faults.deliveries("alpha", received, ROUTING) == [Delivery(payload)]
+
+
+def test_what_is_struck_is_the_same_in_every_version_of_the_program() -> None:
+    dropping = Faults(7, [MessageFault(FaultKind.DROP, probability=0.2)])
+    assert [number for number in range(40) if not deliver(dropping, NAV, number)] == [1, 3, 6, 11, 27, 28, 35, 37]
+    # Of what names the chance, 68 letters for this seed, 64 count.
+    for seed, key, later_ms in ((7, NAV, [154, 195, 270]), (2**110, STATE, [986, 128, 185])):
+        late = Faults(seed, [MessageFault(FaultKind.REORDER, delay_ms=1000)])
+        assert [one.later_ms for number in range(3) for one in deliver(late, key, number)] == later_ms
+    corrupting, struck = Faults(7, [MessageFault(FaultKind.CORRUPT)]), []
+    for number in range(4):
+        (one,) = deliver(corrupting, NAV, number)
+        pairs = enumerate(zip(payload_of(NAV, number, 0), one.payload, strict=True))
+        struck += [(place, before ^ after) for place, (before, after) in pairs if before != after]
+    assert struck == [(19, 237), (4, 116), (10, 214), (5, 222)]
+
+
+def test_a_fault_that_strikes_never_strikes_never_and_one_of_which_no_more_is_told_always_for_a_second() -> None:
+    assert all(deliver(Faults(1, [MessageFault(FaultKind.DROP, probability=0.0)]), NAV, n) for n in range(100))
+    assert [one.later_ms for one in deliver(Faults(1, [MessageFault(FaultKind.DELAY)]), NAV)] == [1000]
+    assert [one.later_ms for one in deliver(Faults(1, [MessageFault(FaultKind.REORDER, delay_ms=1)]), NAV)] == [1]
 
 
 @pytest.mark.parametrize(
@@ -140,12 +174,35 @@ def test_a_vehicle_cut_off_loses_what_crosses_water(vehicle: str, key: str, sent
     assert (deliver(faults, key, 0, sent_ms, receiver=receiver) == []) is lost
 
 
+def test_of_several_that_are_cut_off_each_is() -> None:
+    faults = Faults(1, cut_offs=[CutOff("beta", 0, 1000), CutOff("alpha", 0, 1000), CutOff("gamma", 0, 1000)])
+    assert deliver(faults, STATE) == []
+
+
+def test_what_the_world_reads_is_lost_only_if_it_is_the_packet_of_who_is_cut_off() -> None:
+    faults = Faults(1, cut_offs=[CutOff("alpha", 0, 1000)])
+    assert deliver(faults, "coord/mission_over", receiver="world")
+    routing = Routing(with_modems(ROSTER))
+    for name, lost in (("alpha", True), ("beta", False)):
+        payload = encode(Header(f"modem-{name}", 0, 0, 0), Packet((b"told",)))
+        received = Intake(routing).open(f"modem/{name}/tx", payload)
+        assert received is not None
+        assert (faults.deliveries("world", received, routing) == []) is lost
+
+
 def test_faults_apply_in_their_order() -> None:
+    later = [MessageFault(FaultKind.DELAY, delay_ms=50), MessageFault(FaultKind.REORDER, delay_ms=100)]
+    others = [MessageFault(FaultKind.CORRUPT), MessageFault(FaultKind.REPEAT, delay_ms=7)]
+    by_chance = deliver(Faults(7, later), NAV)[0].later_ms
+    assert 50 < by_chance <= 150
+    assert [one.later_ms for one in deliver(Faults(7, [*later, *others]), NAV)] == [by_chance, by_chance + 7]
     twice_late = [MessageFault(FaultKind.REPEAT, delay_ms=5), MessageFault(FaultKind.DELAY, delay_ms=100)]
     assert [one.later_ms for one in deliver(Faults(1, twice_late), NAV)] == [100, 105]
 
 
-@pytest.mark.parametrize("wrong", [{"probability": 1.1}, {"probability": float("nan")}, {"delay_ms": 0}])
+@pytest.mark.parametrize(
+    "wrong", [{"probability": 1.1}, {"probability": -0.1}, {"probability": float("nan")}, {"delay_ms": 0}]
+)
 def test_what_is_no_fault_is_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(ValueError, match=r"^a fault's (probability|delay) must be"):
         MessageFault(FaultKind.DROP, **wrong)  # type: ignore[arg-type]

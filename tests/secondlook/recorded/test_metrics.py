@@ -153,13 +153,14 @@ class TestPaths:
 
     def test_how_near_two_came_is_told_in_centimetres_and_milliseconds_and_not_of_who_is_home(self) -> None:
         stream = begun()
-        for at_s, x_m in ((1, 50), (2, 20), (3, 50), (4, 3), (5, 50)):
-            if at_s == 3:
-                stream.state(3, HELPER, Mode.HOME)
-            for name, place in ((PRIMARY, nav(x_m)), (HELPER, nav(0, 0.333))):
-                stream.say(at_s + 0.0126, f"veh/{name}/nav", replace(place, speed_mps=1))
-        # At 2.0126 s hypot(20, 0.33) = 20.003 m, as places travel in centimetres.
-        assert stream.metrics.summary()["closest"] == [{"vehicles": [HELPER, PRIMARY], "closest_m": 20.0, "t_s": 2.013}]
+        for at_s, x_m, helper_mps in ((1, 50, 1), (101, 20, 1), (201, 50, 0), (301, 3, 0), (401, 50, 0)):
+            stream.state(at_s, PRIMARY, Mode.SURVEY)
+            stream.state(at_s, HELPER, Mode.IDLE if helper_mps else Mode.HOME)
+            stream.say(at_s + 0.0126, f"veh/{HELPER}/nav", replace(nav(0, 1.234), speed_mps=helper_mps))
+            stream.say(at_s + 0.0126, f"veh/{PRIMARY}/nav", replace(nav(x_m), speed_mps=1))
+        # At 101.0126 s hypot(20, 1.23) m, as places travel in centimetres and times in milliseconds.
+        closest = {"vehicles": [HELPER, PRIMARY], "closest_m": 20.04, "t_s": 101.013}
+        assert stream.metrics.summary()["closest"] == [closest]
 
     def test_the_share_flown_of_tracks_that_have_no_length_is_none(self) -> None:
         stream = begun()
@@ -326,6 +327,7 @@ class TestRisk:
         metrics = Metrics()
         metrics.close()
         summary = metrics.summary()
+        assert (metrics.now_ms, metrics.misfits) == (0, 0)
         assert (summary["risk"], summary["risk_primary_alone"], summary["risk_at"]) == (None, None, [])
         assert summary["primary_s"] is None
         assert summary["truth"] == {"targets": 0, "missed_share": None, "predicted_missed_share": None}
