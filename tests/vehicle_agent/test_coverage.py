@@ -91,11 +91,18 @@ def test_it_holds_what_was_seen_and_what_is_settled() -> None:
     assert layer.changed_tiles() == []
 
 
-@pytest.mark.parametrize(("rho", "counts"), [(0.0, 0.2), (0.3, 0.3), (1.0, 0.3)])
-def test_where_the_best_look_counts_a_cell_has_the_mean_of_its_bins(rho: float, counts: float) -> None:
+@pytest.mark.parametrize(
+    ("layer", "counts"),
+    [
+        (CoverageLayer("alpha", GRID), 0.2),
+        (CoverageLayer("alpha", GRID, 0.0), 0.2),
+        (CoverageLayer("alpha", GRID, 0.3), 0.3),
+        (CoverageLayer("alpha", GRID, 1.0), 0.3),
+    ],
+)
+def test_where_the_best_look_counts_a_cell_has_the_mean_of_its_bins(layer: CoverageLayer, counts: float) -> None:
     """The bins at cells' centres tell 0.2, all bins on a cell 0.3 on average."""
     by_place = np.array([0.2, 0.4, 0.3, 0.3, 0.3])  # 0 m to 4 m beside a cell's centre
-    layer = CoverageLayer("alpha", GRID, rho)
     track = Maneuver(1, ManeuverKind.FOLLOW, 50, 0, 50, 100, 20)
     layer.add(look(track, 1, 0, 4, lambda range_m: by_place[range_m.astype(int) % 5]))
     cells = layer.layer.largest_nats[0, 12:36]  # from 10 m beside the track on

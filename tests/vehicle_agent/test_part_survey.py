@@ -12,7 +12,7 @@ from planner.area import SurveyArea
 from planner.footprints.footprint import Reach
 from planner.footprints.side import SideLooking
 from planner.profile_spacing import Known, ProfileSpacing, SpacingTerms
-from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingPlanner
+from planner.spacing_planners import AdaptiveSpacing, FixedSpacing, SpacingDecision, SpacingPlanner
 from planner.types import DetectionCurve, SonarShape, Track
 from vehicle_agent.config import SurveyConfig
 from vehicle_agent.part_survey import PartSurvey
@@ -68,6 +68,8 @@ def test_it_is_time_to_decide_after_a_pair_or_when_nothing_is_left_and_something
     assert not part.is_due(at(224, 488))  # another piece of the second
     assert part.tentative(at(224, 488)) == 1
     assert (part.is_due(laid[2:]), part.tentative(laid[2:])) == (True, 3)
+    part.flown(laid[2], 135, CURVE)
+    assert part.tentative(laid[3:]) == 2
     assert part.next(135, CURVE) is not None
     assert not part.is_due(at(487))
     once = part_of(spacing=FixedSpacing(40, 145))
@@ -91,11 +93,22 @@ def test_what_was_covered_stays_covered() -> None:
     assert after(part, (500, 580), 130) == ADAPTIVE.decide(800, 710, 130).offsets_m
     assert after(part, (132, 224), 130) == ADAPTIVE.decide(800, 710, 130).offsets_m
     assert after(part, (652,), 130) == ADAPTIVE.decide(800, 652 + 120, 130).offsets_m  # laid for 120 m
+    before = part_of()
+    before.first(None)
+    assert after(before, (-200,), 130) == ADAPTIVE.decide(800, 0, 130).offsets_m  # what lies before it does not count
+
+
+class Eager(AdaptiveSpacing):
+    """As a user may write one: lays a track in the middle, whatever is left."""
+
+    def decide(self, width_m: float, covered_m: float, r_eff_m: int | None) -> SpacingDecision:
+        return SpacingDecision(132, (width_m / 2,), replans=True)
 
 
 @pytest.mark.parametrize(("covered_m", "ends"), [(799.998, False), (799.9995, True), (800.0, True), (900.0, True)])
-def test_nothing_is_laid_for_less_than_a_millimetre(covered_m: float, ends: bool) -> None:
-    part = part_of()
+@pytest.mark.parametrize("spacing", [ADAPTIVE, Eager(40, 145)])
+def test_nothing_is_laid_for_less_than_a_millimetre(covered_m: float, ends: bool, spacing: SpacingPlanner) -> None:
+    part = part_of(spacing=spacing)
     part.first(None)
     assert (after(part, (covered_m - 132,), 140) is None) is ends
 
@@ -138,6 +151,8 @@ class TestWhatLaterTracksMaySee:
         # What 135 m leave, 91 m, takes a track at 800 - 131 m, and what 125 m leave, 97 m, two: at 600 and 680 m.
         for r_eff_m, next_m in ((135, 669), (None, 669), (125, 600)):
             assert part.frontier_m(at(578, 669), SEES, r_eff_m, 5) == next_m - 135.5 - 5
+        # Of a reach of 135.5 m the whole metres count: 95.5 m take two tracks, and with 136 m would take one.
+        assert part.frontier_m(at(573.5, 669), SEES, None, 5) == 600 - 135.5 - 5
         # Of a piece of the track that was flown last: the pair is that and the next.
         assert part.frontier_m(at(487, 578, 669), SEES, 125, 5) == 600 - 135.5 - 5
 
