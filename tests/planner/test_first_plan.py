@@ -277,6 +277,24 @@ class TestOrder:
         for order in ([west, east], [east, west]):
             assert [part.vertices for part in in_order(order, (0, 0))] == [part.vertices for part in order]
 
+    def test_where_one_is_two_millimetres_nearer_that_decides(self) -> None:
+        west, east = (
+            Region(((x, -50.0), (x + 100, -50.0), (x + 100, 50.0), (x, 50.0))).about(0) for x in (-200.002, 100.0)
+        )
+        for order in ([west, east], [east, west]):
+            assert in_order(order, (0, 0))[0].vertices == east.vertices
+
+    @pytest.mark.parametrize(("count", "is_best"), [(5, True), (6, True), (7, False)])
+    def test_of_up_to_six_parts_the_best_order_is_found_and_of_more_the_nearest_is_next(
+        self, count: int, is_best: bool
+    ) -> None:
+        # The nearest lies to the east, 20 m off, with all the others behind it; but it is shorter to begin with the one
+        # 25 m to the west than to come back for it.
+        east_m, west_m = [20.0 + 40.0 * place for place in range(count - 1)], [-32.0]
+        parts = [Region(((x, -5.0), (x + 7, -5.0), (x + 7, 5.0), (x, 5.0))).about(0) for x in (*east_m, *west_m)]
+        ordered_m = [min(x for x, _ in part.vertices) for part in in_order(parts, (0, 0))]
+        assert ordered_m == (west_m + east_m if is_best else east_m + west_m)
+
     def test_many_parts_are_taken_one_after_the_other(self) -> None:
         row = [
             Region(((x, 0.0), (x + 90, 0.0), (x + 90, 100.0), (x, 100.0))).about(0)

@@ -188,7 +188,7 @@ def test_what_is_drawn_goes_by_the_numbers_of_looks_and_tracks_from_1_on() -> No
         if first_along_m == 0.0:
             ours.begin_track(track)
         look, _ = looks.look(replace(northward(100.0), first_along_m=first_along_m), 0.0, (0.0, 0.0), 0.0)
-        assert look.number == number
+        assert (look.number, look.maneuver, look.valid) == (number, 1, True)
         assert look.p_detect == pytest.approx(ours.of_look(number, seen, nothing, nothing, 20.0))
 
 
