@@ -12,7 +12,7 @@ from comms.node import random_stream
 from comms.said.messages import Look, Maneuver, ManeuverKind, TruthLook
 from planner.currents import FlowGrid
 from planner.types import DetectionCurve, FloatArray, Point
-from sim_world.config import EstimateConfig, SensorConfig, TargetsConfig, VehicleConfig
+from sim_world.config import EstimateConfig, SensorConfig, SettlingConfig, TargetsConfig, VehicleConfig
 from sim_world.estimates import Estimates
 from sim_world.kinds import Mixture
 from sim_world.layouts import Given
@@ -46,16 +46,22 @@ def northward(x_m: float) -> Stretch:
 
 
 def looks_of(
-    targets: TargetsConfig, sensor: SensorConfig, clutter: Targets = NO_TARGETS, false_alarms_per_km2: float = 0.0
+    targets: TargetsConfig,
+    sensor: SensorConfig,
+    clutter: Targets = NO_TARGETS,
+    false_alarms_per_km2: float = 0.0,
+    settling: SettlingConfig | None = None,
+    current: Stream = STILL_WATER,
 ) -> Looks:
     """Over an even seabed."""
     return Looks(
-        VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, sensor),
+        VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, sensor, settling=settling),
         sonar=sensor.sonar_over(UniformSeabed(), "a"),
         targets=make_targets(targets, AREA, 1),
         clutter=clutter,
         recogniser=Recogniser(sensor.curve, false_alarms_per_km2=false_alarms_per_km2),
         seed=1,
+        current=current,
     )
 
 
@@ -132,18 +138,42 @@ def test_that_is_the_end_of_its_stretch_along_the_tracks_heading(first_along_m: 
     flow = there * math.cos(heading_rad), there * -math.sin(heading_rad)
     current = Stream(1.0, 0.0, grid=FlowGrid(x_m + away_m, y_m + away_m, np.array([0.0]), *flow))
     sensor = replace(SENSOR, half_at_crab_rad=math.atan(0.5))
-    looks = Looks(
-        VehicleConfig("a", 0.0, 0.0, 0.0, 2.0, 6.0, 5.0, sensor),
-        sonar=sensor.sonar_over(UniformSeabed(), "a"),
-        targets=NO_TARGETS,
-        recogniser=Recogniser(sensor.curve, false_alarms_per_km2=0.0),
-        seed=1,
-        current=current,
-    )
+    looks = looks_of(TargetsConfig(0), sensor, current=current)
     track = Maneuver(1, ManeuverKind.FOLLOW, 100.0, 0.0, 300.0, -200.0 * math.sqrt(3.0), 50.0)
     look, truth = looks.look(Stretch(track, heading_rad, first_along_m, bins), 0.0, (0.0, 0.0), 0.0)
     assert look.p_detect == pytest.approx(0.6 / 2)
     assert truth is None
+
+
+def test_a_look_across_a_current_is_askew_and_sees_what_lies_abeam_of_the_bow_on_the_track_alone() -> None:
+    # It swims 2 m/s in 1 m/s to the east, and so points 30 degrees to port of a track of 400 m to the north; of P_d a
+    # half is left. To starboard it sees ahead, to port behind, where its track has ended.
+    sensor = replace(SENSOR, half_at_crab_rad=math.radians(30.0))
+    looks = looks_of(TargetsConfig(0), sensor, current=Stream(1.0, math.pi / 2, over_ground=False))
+    track = Maneuver(1, ManeuverKind.FOLLOW, 100.0, 50.0, 100.0, 450.0, 50.0)
+    look, _ = looks.look(Stretch(track, 0.0, 380.0, 4), 0.0, (0.0, 0.0), 0.0)
+    along_m = 380.0 + np.array([2.5, 7.5, 12.5, 17.5])[:, np.newaxis]
+    lateral_m = 5.0 * np.arange(21.0)
+    behind_m = math.tan(math.radians(30.0)) * lateral_m
+    within = lateral_m / math.cos(math.radians(30.0)) <= 100.0
+    expected = [np.where(within & (along_m + side * behind_m <= 400.0), 0.3, 0.0) for side in (1.0, -1.0)]
+    assert look.p_detect == pytest.approx(np.array(expected))
+
+
+def test_how_far_it_has_gone_straight_counts_from_where_the_run_in_begins() -> None:
+    looks = looks_of(TargetsConfig(0), SENSOR, settling=SettlingConfig(0.4, 100.0))
+    look, _ = looks.look(northward(100.0), 0.0, (0.0, 0.0), 0.0)
+    # Behind 50 m of run-in, and 2.5 m, 7.5 m, ...
+    left = 1.0 - 0.4 * (1.0 - (50.0 + np.array([2.5, 7.5, 12.5, 17.5])) / 100.0)
+    assert look.p_detect[1, :, 3] == pytest.approx(0.6 * left)
+
+
+def test_targets_where_nothing_is_seen_are_not_told() -> None:
+    near = replace(SENSOR, curve=DetectionCurve(np.array([0.0, 50.0, 60.0, 100.0]), np.array([0.6, 0.6, 0.0, 0.0])))
+    for places, told in (((170.0, 120.0), (1,)), ((120.0, 130.0), (0, 1)), ((170.0, 180.0), None)):
+        looks = looks_of(TargetsConfig(2, Given(tuple((x_m, 10.0) for x_m in places))), near)
+        _, truth = looks.look(northward(100.0), 0.0, (0.0, 0.0), 0.0)
+        assert (None if truth is None else truth.targets) == told
 
 
 def test_of_more_contacts_than_the_wire_takes_the_best_are_told() -> None:
