@@ -46,6 +46,11 @@ def test_the_mean_is_the_truth_by_summing_up_over_all_errors(noise: tuple[float,
     assert (spread * density).sum(axis=0) / density.sum() == pytest.approx(truths, rel=2e-5)
 
 
+def test_what_is_told_without_an_error_is_the_same_in_every_version_of_the_program() -> None:
+    told = PDetectEstimate(2.0, 1.0).estimate(np.array([0.02, 0.3, 0.77]), 0.0, np.zeros(3))
+    assert told == pytest.approx([0.0025907121852964533, 0.18491373745786352, 0.8902382990447898], rel=1e-9)
+
+
 def test_cells_differ_by_the_cell_noise_and_tracks_by_the_track_noise() -> None:
     generator = np.random.default_rng(3)
     noise = PDetectEstimate(0.23, 0.05)
