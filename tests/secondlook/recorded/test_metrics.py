@@ -153,13 +153,15 @@ class TestPaths:
 
     def test_how_near_two_came_is_told_in_centimetres_and_milliseconds_and_not_of_who_is_home(self) -> None:
         stream = begun()
-        for at_s, x_m, helper_mps in ((1, 50, 1), (101, 20, 1), (201, 50, 0), (301, 3, 0), (401, 50, 0)):
+        ways = ((1, 10, 0, 1), (101, -20, 7, 1), (201, -20, 50, 0), (301, 0, 1, 0), (401, 50, 50, 0))
+        for at_s, x_m, y_m, helper_mps in ways:
             stream.state(at_s, PRIMARY, Mode.SURVEY)
             stream.state(at_s, HELPER, Mode.IDLE if helper_mps else Mode.HOME)
             stream.say(at_s + 0.0126, f"veh/{HELPER}/nav", replace(nav(0, 1.234), speed_mps=helper_mps))
-            stream.say(at_s + 0.0126, f"veh/{PRIMARY}/nav", replace(nav(x_m), speed_mps=1))
-        # At 101.0126 s hypot(20, 1.23) m, as places travel in centimetres and times in milliseconds.
-        closest = {"vehicles": [HELPER, PRIMARY], "closest_m": 20.04, "t_s": 101.013}
+            stream.say(at_s + 0.0126, f"veh/{PRIMARY}/nav", replace(nav(x_m, y_m), speed_mps=1))
+        # The first way, 30 m to the west and 7 m to the north, passes (0, 1.23), as places travel in centimetres, at
+        # 33.1 / hypot(30, 7) m, after 308.61 / 949 of its 100 s.
+        closest = {"vehicles": [HELPER, PRIMARY], "closest_m": 1.07, "t_s": 33.532}
         assert stream.metrics.summary()["closest"] == [closest]
 
     def test_the_share_flown_of_tracks_that_have_no_length_is_none(self) -> None:
