@@ -138,6 +138,25 @@ class TestTracks:
         assert [track.across_m for track in plan.tracks[0]] == track_offsets(1212, 40, 138)
         assert (len(plan.parts), plan.track_count, plan.turns, plan.length_m) == (1, 7, 6, 2800)
 
+    @pytest.mark.parametrize(
+        ("sonar", "ranges_m", "begins_m"),
+        [
+            ((40, 145), (120, 145), [(110, 0), (190, 600), (445, 0), (550, 300), (655, 0)]),
+            (
+                (30, 90),
+                (90, 90),
+                [(90, 0), (150, 600), (210, 0), (390, 300), (450, 0), (630, 300), (690, 0), (710, 300)],
+            ),
+        ],
+    )
+    def test_each_part_has_its_range_and_is_begun_where_the_one_before_it_ends(
+        self, sonar: tuple[int, int], ranges_m: tuple[int, ...], begins_m: list[Point]
+    ) -> None:
+        plan = first_plan(L_SHAPE, 0, *sonar)
+        assert plan.ranges_m == ranges_m
+        assert [track.start for track in plan.all_tracks] == begins_m
+        assert (len(plan.parts), plan.turns) == (2, len(begins_m))  # two from the one part to the other
+
 
 class TestParts:
     def test_a_convex_region_is_its_own_only_part(self) -> None:
@@ -340,6 +359,10 @@ class TestWhereItBegins:
         assert sorted(round(abs(track.start[0] - corner[0]), 6) for track in plan.all_tracks) == sorted(
             round(track.start[0], 6) for track in first_plan(RECTANGLE, 0, 40, 145).all_tracks
         )
+
+    @pytest.mark.parametrize(("begin_m", "start_m"), [(199, 0), (200, 0), (201, 400)])
+    def test_at_the_end_that_is_nearer(self, begin_m: float, start_m: float) -> None:
+        assert first_plan(RECTANGLE, 0, 40, 145, begin=(0, begin_m)).all_tracks[0].start == (138, start_m)
 
     def test_left_out_it_is_the_corner_from_which_tracks_are_laid(self) -> None:
         assert (
