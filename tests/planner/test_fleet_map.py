@@ -292,6 +292,13 @@ def test_arrays_of_another_shape_are_refused(spoilt: dict[str, Any]) -> None:
     check_refused(replace(tile("alpha", (5, 1), PLACES[0], 50), **spoilt))
 
 
+def test_who_is_refused_is_told_where_and_by_how_much_it_does_not_fit() -> None:
+    misfit = replace(tile("alpha", (0, 1), PLACES[1], 50), settled=np.zeros((20, 4), dtype=np.bool_))
+    told = r"^the tile at 0, 20 has \(20, 3\) cells, not \(20, 3\), \(20, 3\) and \(20, 4\)$"
+    with pytest.raises(ValueError, match=told):
+        misfit.give(FleetMap(GRID))
+
+
 def check_refused(misfit: TileNews) -> None:
     """It raises and changes nothing."""
     fleet, twin = FleetMap(GRID), FleetMap(GRID)
