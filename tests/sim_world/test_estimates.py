@@ -98,7 +98,7 @@ def test_the_draws_do_not_depend_on_what_was_seen() -> None:
     assert np.array_equal(one[0, 0, 3:], other[0, 0, 3:])
 
 
-CURVE = DetectionCurve(np.array([0.0, 100.0]), np.array([0.4, 0.4]))
+CURVE = DetectionCurve(np.array([0.0, 30.0, 60.0, 100.0]), np.full(4, 0.4))
 SHAPE = (2, 4, 11)
 
 
