@@ -200,6 +200,9 @@ class TestParts:
         region = Region(((800.0, 0.0), (700.0, 0.0), (500.0, 200.0), (0.0, 100.0), (200.0, 400.0), (300.0, 600.0)))
         assert first_plan(region, 0, 40, 120).track_count == 6
         assert first_plan(region, 0, 40, 120, thorough=False).track_count == 8
+        thorough = parts_in_order(region, 0, 40, 120, thorough=True)
+        assert parts_in_order(region, 0, 40, 120) == thorough
+        assert parts_in_order(region, 0, 40, 120, thorough=False) != thorough
 
     def test_a_hole_is_cut_out(self) -> None:
         parts = convex_parts(SQUARE_WITH_HOLE, 0, lambda width_m: track_count(width_m, 40, 120))
