@@ -260,6 +260,15 @@ class TestBeforehand:
         told.settle()
         assert told.strips() == {}
 
+    def test_nothing_is_planned_while_one_of_two_helpers_is_not_heard(self) -> None:
+        told = coordinator(TWO_HELPERS, strips="beforehand")
+        told.plan(60.0, 180.0)
+        told.settle()
+        assert told.strips() == {}
+        told.state(SECOND_HELPER, Mode.IDLE)
+        told.settle()
+        assert {name for name, _, _ in told.tasks()} == set(BOTH)
+
     def test_nothing_is_planned_before_the_primary_has_said_its_plan(self) -> None:
         told = coordinator(strips="beforehand")
         told.hotspot()

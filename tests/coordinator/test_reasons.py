@@ -14,7 +14,7 @@ from comms.said.announcement import Role
 from comms.said.messages import Plan, PlannedTrack
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
-from coordinator.reasons import Reasons, _apart, _best_m, _evenly, _listed
+from coordinator.reasons import Reasons, _apart, _best_m, _evenly, _listed, _named
 from coordinator.vehicles import KnownVehicle
 from planner.types import DetectionCurve, GridSpec, SweepFrame
 from secondlook.testing.checks.any_mail import any_message
@@ -154,6 +154,15 @@ def test_places_are_apart_from_a_track_and_beyond_its_ends() -> None:
     assert apart_m.shape == is_beyond.shape == (2, 3)
     short_m, _ = _apart(np.array([4.0]), np.array([7.25]), [PlannedTrack(2, 0, 7, 7, 7, 7.5, False)])
     assert short_m == pytest.approx(np.array([[3.0]]))
+
+
+def test_a_place_half_a_metre_behind_a_track_is_beyond_it() -> None:
+    _, is_beyond = _apart(np.array([3.0, 3.0]), np.array([10.0, 10.5]), [PlannedTrack(1, 0, 3, 4, 3, 10, False)])
+    assert is_beyond.tolist() == [[False, True]]
+
+
+def test_what_weighs_most_is_named_however_little_that_is() -> None:
+    assert _named(np.array([2, 0, 4, 1, 3]), np.array([1.0, 1.0, 1.0, 1.1, 1.0])) == [1]
 
 
 def test_at_most_twelve_cells_to_a_side_are_looked_at_evenly_with_both_ends() -> None:
