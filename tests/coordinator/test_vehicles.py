@@ -111,14 +111,19 @@ class TestWhenASurveyEnds:
         assert self.ends_ms(told, NORTHWARDS, BESIDE) == pytest.approx(10_000 + takes_s * 1000, abs=1.5)
 
     def test_in_a_current_run_out_and_turns_are_by_what_it_makes_good(self) -> None:
-        # 0.5 m/s to the north: 2 m/s over the run-out, and 1 m/s from the run-in on.
+        # 0.5 m/s to the north: 2 m/s over the run-out, and 1 m/s from the run-in on; with a third track 2 m/s again.
         entry = replace(self.ENTRY, drift_mps=0.5)
-        plan = Plan(1, (NORTHWARDS, replace(BESIDE, start_x_m=400.0, end_x_m=400.0)), (), (), "")
-        found = expected_end_ms(entry, state(Mode.SURVEY, 1, ends_ms=90_000), plan, 10_000)
-        passes = [pass_of(one, entry) for one in plan.tracks]
+        tracks = (
+            *(NORTHWARDS, replace(BESIDE, start_x_m=400.0, end_x_m=400.0)),
+            replace(NORTHWARDS, number=3, start_x_m=800.0, end_x_m=800.0),
+        )
         sailing = sailing_of(entry)
-        takes_s = 10 + sailing.passes_s(passes[1:], 20, passes[0].end) - 20
-        assert found == pytest.approx(90_000 + takes_s * 1000, abs=1.5)
+        for count, last_run_out_s in ((2, 20), (3, 10)):
+            plan = Plan(1, tracks[:count], (), (), "")
+            found = expected_end_ms(entry, state(Mode.SURVEY, 1, ends_ms=90_000), plan, 10_000)
+            passes = [pass_of(one, entry) for one in plan.tracks]
+            takes_s = 10 + sailing.passes_s(passes[1:], 20, passes[0].end) - last_run_out_s
+            assert found == pytest.approx(90_000 + takes_s * 1000, abs=1.5)
 
     def test_flows_count_only_where_there_is_a_current(self) -> None:
         axis = np.zeros(1)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.cut.ground import OBJECTIVES, Ground
+from coordinator.cut.ground import CELLS_AT_ONCE, OBJECTIVES, Ground
 from coordinator.cut.window import Window
 from planner.types import FloatArray
 
@@ -54,6 +54,11 @@ class TestWorth:
         one = ground(np.arange(12.0).reshape(3, 4) / 12, objective="both", threshold=0.4)
         cells = Window(1, 3, 1, 2).cells
         assert one.worth_of(cells) == pytest.approx(one.worth()[cells])
+
+    def test_of_a_map_wider_than_what_is_worked_on_at_once_it_is_told_row_by_row(self) -> None:
+        risk = np.zeros((2, CELLS_AT_ONCE + 1))
+        risk[0, 1], risk[1, -1] = 0.4, 0.8
+        assert ground(risk).worth() == pytest.approx(25 * 0.5 * risk)
 
 
 class TestLeft:
@@ -106,6 +111,8 @@ class TestTurned:
         one = ground(np.full((1, 2), 0.8), look=0.5)
         one.fly(Window(0, 1, 0, 1), 0.25)
         assert one.risk == pytest.approx(np.array([[0.7, 0.8]]))
+        one.fly(Window(0, 1, 0, 2), 0.0)
+        assert one.risk == pytest.approx(np.array([[0.7, 0.8]]))
 
 
 class TestFly:
@@ -156,6 +163,11 @@ def test_what_a_look_removes_of_a_block_is_what_it_removes_of_its_cells_also_at_
     assert blocks.look == pytest.approx(np.array([[0.16 / 0.26, 0.11 / 0.2], [0.06 / 0.15, 0.0]]))
     assert blocks.worth() == pytest.approx(np.array([[0.16, 0.11], [0.06, 0.0]]))
     assert blocks.left_m2() == pytest.approx(one.left_m2())
+
+
+def test_blocks_hold_what_there_is_of_them_in_a_map_longer_one_way_than_the_other() -> None:
+    for shape, cells in (((3, 5), [[4, 4, 2], [2, 2, 1]]), ((5, 3), [[4, 2], [4, 2], [2, 1]])):
+        assert ground(np.full(shape, 0.5)).in_blocks(2).weights.tolist() == (25 * np.array(cells)).tolist()
 
 
 def test_a_block_is_seen_where_more_than_half_of_what_counts_of_it_is() -> None:
