@@ -47,6 +47,8 @@ class TestByHand:
         assert side_by_side(worth, 5, 0.1, 0.1) == [Window(0, 3, 3, 8)]
         assert side_by_side(np.roll(worth, -5, axis=1), 5, 0.1, 0.1) == [Window(0, 3, 0, 5)]
         assert side_by_side(np.roll(worth, 6, axis=1), 5, 0.1, 0.1) == [Window(0, 3, 7, 12)]
+        worth[:, 6] = 1.0  # of three columns to spare there are two before it
+        assert side_by_side(worth, 5, 0.1, 0.1) == [Window(0, 3, 3, 8)]
 
     def test_nothing_gives_none(self) -> None:
         assert side_by_side(np.zeros((3, 8)), 2, 1.0, 0.0) == []
@@ -75,6 +77,31 @@ class TestByHand:
             worth = worth.copy()
             worth[changed.cells] *= 2 * rng.random()
             bands.change(worth, [changed])
+
+    @pytest.mark.parametrize("width", [7, MOST_ADDED, MOST_ADDED + 3])
+    def test_so_it_is_where_windows_are_worth_the_same_but_for_rounding(self, width: int) -> None:
+        for changed in np.random.default_rng(0).random(20):
+            worth = np.array([[0.2], [0.1]]).repeat(94, axis=1)
+            bands = Bands(worth, width)
+            bands.side_by_side(0.5, 0.1)
+            worth = worth.copy()
+            worth[:, 0] = changed
+            bands.change(worth, [Window(0, 2, 0, 1)])
+            assert bands.side_by_side(0.5, 0.1) == side_by_side(worth, width, 0.5, 0.1)
+
+    def test_what_is_found_of_a_copy_is_not_known_of_the_other(self) -> None:
+        bands = Bands(np.ones((2, 6)), 2)
+        bands.side_by_side(1.0, 0.5)
+        changed = np.zeros((2, 6))
+        changed[:, 4:] = 3.0
+        bands.change(changed, [Window(0, 2, 0, 6)])
+        found = bands.copy().side_by_side(1.0, 0.5)
+        assert found == bands.side_by_side(1.0, 0.5) == [Window(0, 2, 4, 6)]
+
+    def test_what_brings_more_than_it_costs_by_rounding_alone_is_left_out(self) -> None:
+        assert 0.1 + 0.2 > 0.3
+        assert side_by_side(np.array([[0.1], [0.2]]), 1, 0.0, 0.3) == []
+        assert side_by_side(np.array([[0.1], [0.2]]), 1, 0.0, 0.3 - 1e-8) == [Window(0, 2, 0, 1)]
 
 
 @given(
