@@ -47,6 +47,16 @@ def serve(teams: Teams, plans: Plans, place: int, turn: int) -> None:
     plans.serve(teams, plans.ahead(teams), every, every, np.full(plans.count, place), turn)
 
 
+def brings(team: Team, time_s: float, *without: int) -> float:
+    """What the strips that are left bring in some time, the best first, each in the time that it takes by itself."""
+    total_m2 = 0.0
+    for place in team.by_rate.tolist():
+        if place not in without:
+            share = min(1.0, time_s / team.alone_s[place])
+            total_m2, time_s = total_m2 + share * team.alone_m2[place], time_s - share * team.alone_s[place]
+    return total_m2 + time_s * team.later_m2ps
+
+
 class TestAhead:
     def test_who_is_free_first_may_serve_each_strip_from_where_it_is(self) -> None:
         teams, plans = begun(2)
@@ -171,22 +181,33 @@ class TestWhatPlansCount:
         team, ahead = teams.all[0], plans.ahead(teams)
         assert ahead.next.tolist() == [0, 1]
 
-        def brings(time_s: float, *without: int) -> float:
-            total_m2 = 0.0
-            for place in team.by_rate.tolist():
-                if place not in without:
-                    share = min(1.0, time_s / team.alone_s[place])
-                    total_m2, time_s = total_m2 + share * team.alone_m2[place], time_s - share * team.alone_s[place]
-            return total_m2 + time_s * team.later_m2ps
-
         alpha_s = min(deadline_s, 420) - 152.5
         still_m2 = plans._still_m2(teams, ahead)
         for place in (0, 2):
             mine_s = max(0.0, min(deadline_s, 420) - ahead.ends_s[0, place])
-            assert still_m2[0, place] == pytest.approx(brings(mine_s, 1, place))
+            assert still_m2[0, place] == pytest.approx(brings(team, mine_s, 1, place))
             mine_s = max(0.0, deadline_s - ahead.ends_s[1, place])
-            assert still_m2[1, place] == pytest.approx(brings(mine_s + alpha_s, 1, place))
-        assert still_m2[:, 3] == pytest.approx([0, brings(alpha_s, 1)])
+            assert still_m2[1, place] == pytest.approx(brings(team, mine_s + alpha_s, 1, place))
+        assert still_m2[:, 3] == pytest.approx([0, brings(team, alpha_s, 1)])
+
+    @pytest.mark.parametrize("deadline_s", [385.0, 3000.0])
+    def test_so_it_may_where_nothing_is_served_yet_and_who_has_no_time_brings_nothing(self, deadline_s: float) -> None:
+        teams = Teams([Team(JOBS, [replace(ALPHA, lasts_until_s=2000), BETA], deadline_s)])
+        plans = Plans.begun(teams).chosen(np.array([0, 0]))
+        plans.is_done[0, 1], plans.free_s[1, 1] = True, 5000.0
+        team, ahead = teams.all[0], plans.ahead(teams)
+        expected = [
+            brings(team, max(0.0, min(deadline_s, 2000) - ends_s), place)
+            for place, ends_s in enumerate(ahead.ends_s[0].tolist())
+        ]
+        assert plans._still_m2(teams, ahead) == pytest.approx(np.array([[*expected, 0.0]] * 2))
+
+    @pytest.mark.parametrize(("alike", "differ"), [(7, 2), (8, 1)])
+    def test_of_four_times_as_many_as_are_carried_on_those_that_differ_are(self, alike: int, differ: int) -> None:
+        teams, plans = begun(alike)
+        grown, rows, _ = plans.grown(teams, plans.ahead(teams), 2, 0)
+        assert grown.count == differ
+        assert rows.tolist() == [0] * differ
 
     def test_plans_in_which_another_is_done_or_elsewhere_or_that_serve_other_strips_are_others(self) -> None:
         teams, plans = begun(7)
@@ -208,6 +229,15 @@ class TestWhatPlansCount:
             one = Plans.begun(lone)
             found += one.grown(lone, one.ahead(lone), 2, 0)[0].places[:, 1:].tolist()
         assert grown.places[:, 1:].tolist() == found
+
+
+def test_who_is_free_as_the_mission_ends_has_nothing_to_go_on_with() -> None:
+    teams = Teams([Team(JOBS, [replace(ALPHA, free_s=DEADLINE_S), BETA], DEADLINE_S)])
+    plans = Plans.begun(teams)
+    plans.is_done[0, 1] = True
+    completion = Completion(teams)
+    completion.take(plans)
+    assert completion.ended().routes() == [[[], []]]
 
 
 def test_plans_are_gone_on_with_by_what_brings_most_a_second() -> None:
