@@ -37,6 +37,7 @@ from comms.said.messages import (
     TaskState,
     TaskStatus,
 )
+from coordinator.agenda import Item
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.config import CoordinatorConfig
 from coordinator.coordinator import Coordinator
@@ -129,6 +130,54 @@ class TestFromHotspotToTask:
         assert told.states() == {1: UNDER_WAY}
         told.keep_alive([PRIMARY, HELPER], 1)
         assert told.states() == {1: UNDER_WAY, 2: OPEN}
+
+    @pytest.mark.parametrize(("state", "within_ms"), [(TaskState.ACCEPTED, 10_000), (TaskState.UNDER_WAY, 120_000)])
+    def test_news_is_cut_by_soon_where_one_on_its_way_may_be_turned_round(
+        self, state: TaskState, within_ms: int
+    ) -> None:
+        told = with_a_helper(state)
+        told.hotspot(ELSEWHERE, number=2)
+        heard_ms = told.node.now_ms
+        told.keep_alive([PRIMARY, HELPER], within_ms / 1000 - 1)
+        told.node.wait_until(heard_ms + within_ms - 1)
+        assert 2 not in told.states()
+        told.node.wait_until(heard_ms + within_ms)
+        assert told.states()[2] is OPEN
+
+    def test_of_two_sectors_a_tile_or_news_is_cut_by_in_its_own_and_half_as_soon(self) -> None:
+        told = coordinator(TWO_HELPERS, idle=(HELPER,), helpers_a_team=1)
+        told.hotspot()
+        told.node.wait(1)
+        assert told.tasks() == [(HELPER, TaskAction.TAKE, 1)]
+        told.state(HELPER, Mode.TRANSIT, 1)
+        told.node.wait(1)
+        node = told.node.node
+        assert isinstance(node, Coordinator)
+        for place, sector in ((HOT, 0), (ELSEWHERE, 1)):
+            for name in (HELPER, SECOND_HELPER):
+                told.state(name, Mode.TRANSIT, 1)
+            told.node.wait(1)
+            assert node._agenda.sectors(Item.CUT) == []
+            tile = [one for one in tiles(GRID) if 5 * one.first_column < place[2]][-1]
+            levels = np.ones(GRID.shape, dtype=np.uint8)[tile.window]
+            message = CoverageTile(9, tile.first_row, tile.first_column, levels, levels, levels > 0)
+            told.node.hear(f"agent/{PRIMARY}/coverage/{tile.name}", message)
+            assert node._agenda.sectors(Item.CUT) == [sector]
+            assert node._agenda.deadline_ms(Item.CUT) == told.node.now_ms + 120_000
+            told.hotspot(place, number=3 + sector)
+            assert node._agenda.sectors(Item.CUT) == [sector]
+            assert node._agenda.deadline_ms(Item.CUT) == told.node.now_ms + 20_000
+            told.node.wait(20)
+
+    def test_strips_are_numbered_from_the_second_in_which_it_was_started(self) -> None:
+        first = coordinator()
+        config = first.node.node.config  # type: ignore[attr-defined]
+        told = Told(OneNode(Coordinator(config), Role.COORDINATOR, now_ms=5_999))
+        told.node.hear("run", run_info(400, 400))
+        told.state(PRIMARY, Mode.SURVEY, 1)
+        told.hotspot()
+        told.settle()
+        assert list(told.strips()) == [5_001]
 
     def test_where_another_is_free_it_is_cut_at_once(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)

@@ -106,6 +106,9 @@ class TestTime:
         cuts = cut(Cutter(GRID, RULES, 1e-3 * 25), told, strips * STRIP_M)
         assert windows(cuts) == [lane(number) for number in range(count)]
 
+    def test_where_there_is_hardly_any_time_there_is_all_the_same(self) -> None:
+        assert windows(cut(Cutter(GRID, RULES, LEAST), ground(TWELVE), 0.5))[0] == lane(0)
+
     def test_what_is_just_enough_is_enough(self) -> None:
         # There is time for two: of the six that are worth much four are to spare, and none of those worth less.
         rich_and_poor = ground(lanes(*[0.9] * 6, *[0.7] * 6))
@@ -170,6 +173,13 @@ class TestTime:
     def test_the_price_is_that_of_the_last_look_that_there_is_time_for(self) -> None:
         cutter = Cutter(GRID, RULES, 1e-3 * 25)
         cut(cutter, ground(lanes(0.9)), 2.5 * STRIP_M)
+        of_third, step = 0.225 * LOOK * 50 * 300 / STRIP_M, 1.2
+        assert of_third / step <= price(cutter) < of_third
+
+    @pytest.mark.parametrize("least", [1e-3, 1.2e-3])
+    def test_where_there_is_just_so_much_time_the_price_is_that_of_the_last_look_too(self, least: float) -> None:
+        cutter = Cutter(GRID, RULES, least * 25)
+        cut(cutter, ground(lanes(0.9)), 3 * STRIP_M)
         of_third, step = 0.225 * LOOK * 50 * 300 / STRIP_M, 1.2
         assert of_third / step <= price(cutter) < of_third
 
@@ -275,6 +285,21 @@ class TestHeading:
         for flown in (across, along):
             first = cutter.cut(told, 2 * STRIP_M, (), (), flown)[0]
             assert first.window.across == (flown is across)
+
+    def test_if_not_told_otherwise_none_lies_across_and_else_either_heading_is_tried_each_time(self) -> None:
+        along, across = best_in(2 * STRIP_M), best_in(2 * STRIP_M, across=True)
+        cuts = Cutter(GRID, RULES, LEAST).cut(self.ALL_HOT, 2 * STRIP_M, (), (), across)
+        assert {one.window.across for one in cuts} == {False}
+        cutter = Cutter(GRID, RULES, LEAST, across=True)
+        opened = windows(cutter.cut(self.ALL_HOT, 2 * STRIP_M, (), (), along))
+        assert cutter.cut(self.ALL_HOT, 2 * STRIP_M, (), opened, across)[0].window.across
+
+    def test_every_other_cut_may_try_it(self) -> None:
+        cutter = Cutter(GRID, RULES, LEAST, across=True, turns_each=2)
+        opened = windows(cutter.cut(self.ALL_HOT, 2 * STRIP_M, (), (), best_in(2 * STRIP_M)))
+        for tried in (False, True):
+            cuts = cutter.cut(self.ALL_HOT, 2 * STRIP_M, (), opened, best_in(2 * STRIP_M, across=True))
+            assert {one.window.across for one in cuts} == {tried}
 
 
 class TestClaimed:
