@@ -40,7 +40,8 @@ from comms.said.messages import (
 from coordinator.agenda import Item
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.config import CoordinatorConfig
-from coordinator.coordinator import Coordinator
+from coordinator.coordinator import Coordinator, _tile
+from coordinator.cut.window import Window
 from planner.tiles import tiles
 
 
@@ -169,15 +170,41 @@ class TestFromHotspotToTask:
             assert node._agenda.deadline_ms(Item.CUT) == told.node.now_ms + 20_000
             told.node.wait(20)
 
-    def test_strips_are_numbered_from_the_second_in_which_it_was_started(self) -> None:
-        first = coordinator()
-        config = first.node.node.config  # type: ignore[attr-defined]
-        told = Told(OneNode(Coordinator(config), Role.COORDINATOR, now_ms=5_999))
+    @pytest.mark.parametrize(("start_ms", "first"), [(999, 1), (5_999, 5_001), (6_000, 6_001)])
+    def test_strips_are_numbered_from_the_second_in_which_it_was_started(self, start_ms: int, first: int) -> None:
+        config = coordinator().node.node.config  # type: ignore[attr-defined]
+        told = Told(OneNode(Coordinator(config), Role.COORDINATOR, now_ms=start_ms))
         told.node.hear("run", run_info(400, 400))
         told.state(PRIMARY, Mode.SURVEY, 1)
         told.hotspot()
         told.settle()
-        assert list(told.strips()) == [5_001]
+        assert list(told.strips()) == [first]
+
+    @pytest.mark.parametrize(
+        ("ends_ms", "cut_ms"), [(0, None), (1, 20_000), (80_000, 20_000), (80_001, 20_001), (500_000, 440_000)]
+    )
+    def test_a_helper_at_a_strip_has_its_next_cut_a_minute_before_its_end_if_that_is_known(
+        self, ends_ms: int, cut_ms: int | None
+    ) -> None:
+        told = coordinator(ahead_ms=60_000)
+        told.hotspot()
+        told.settle()
+        told.state(HELPER, Mode.TRANSIT, 1)
+        told.node.wait_until(19_999)
+        told.state(HELPER, Mode.REVISIT, 1, at_ms=20_000, ends_ms=ends_ms)
+        assert told.node.node._agenda.deadline_ms(Item.CUT) == cut_ms  # type: ignore[attr-defined]
+
+    def test_a_tile_s_window_is_that_of_its_cells(self) -> None:
+        levels = np.ones((7, 5), dtype=np.uint8)
+        assert _tile(CoverageTile(1, 40, 60, levels, levels, levels > 0)) == Window(40, 47, 60, 65)
+
+    def test_who_was_lost_is_said_to_be_heard_again_once(self, caplog: pytest.LogCaptureFixture) -> None:
+        caplog.set_level("INFO", "secondlook.coordinator")
+        told = coordinator()
+        told.keep_alive([PRIMARY], 40)
+        for _ in range(2):
+            told.state(HELPER, Mode.IDLE)
+        assert [one.message for one in caplog.records if "again" in one.message] == [f"{HELPER} is heard again"]
 
     def test_where_another_is_free_it_is_cut_at_once(self) -> None:
         told = with_a_helper(TaskState.UNDER_WAY, TWO_HELPERS)

@@ -242,7 +242,7 @@ def test_who_is_free_as_the_mission_ends_has_nothing_to_go_on_with() -> None:
 
 def test_plans_are_gone_on_with_by_what_brings_most_a_second() -> None:
     # The far one brings more, in 402 s; the near one in 152 s. Behind the near one the far one takes 250 s.
-    teams = Teams([Team([replace(FAR, risk_m2=1500), NEAR], [helper()], 1000.0)])
+    teams = Teams([Team([replace(FAR, risk_m2=1500), NEAR], [helper(free_s=1000)], 2000.0)])
     completion = Completion(teams)
     completion.take(Plans.begun(teams))
     ended = completion.ended()
