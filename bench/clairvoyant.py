@@ -343,6 +343,8 @@ def main() -> None:
     failure = ""
     try:
         if arguments.run:
+            if arguments.told or arguments.allocators or arguments.set:
+                raise UserError("--run: is not allowed with --told, --allocators or --set; a run is as it was flown")
             rows.append(one_run(arguments.run, arguments.seconds, arguments.objective))
         else:
             _solve_all(arguments, rows)

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from bench import clairvoyant
 from bench.clairvoyant_bound import most_looks, upper_bound
 from bench.clairvoyant_schedule import best_schedule, lanes
 from bench.legs import Leg, Simulator
@@ -327,3 +328,10 @@ class TestTheSearch:
     def test_lanes_cover_the_area_once(self, across: bool) -> None:
         made = mission(np.ones((ROWS, COLUMNS)), ends_s=1e6, helpers=2)
         assert Simulator(made).removed_m2(lanes(made, across=across)) == pytest.approx(made.total_m2 / 2)
+
+
+@pytest.mark.parametrize("other", [["--told"], ["--allocators", "greedy"], ["--set", "mission.rho=1"]])
+def test_a_recorded_run_is_judged_as_it_was_flown(other: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.argv", ["clairvoyant", "--run", "runs/nowhere", *other])
+    with pytest.raises(SystemExit, match=r"^--run: is not allowed with --told"):
+        clairvoyant.main()
