@@ -27,6 +27,8 @@ Way = tuple[DubinsPath, ...]
 STRAIGHT_FIRST = (0.0, 1.0, 2.0, 4.0)
 """Turn radii that a way may go straight on before its first turn, and before its end, where there is no other."""
 _LEAST_M = 1e-9
+_MOST_RAD = 1.5 * math.pi
+"""By less than that a shortest way turns at a corner: it comes back at most where it came from, past a narrow spit."""
 _FULL_RAD = math.tau
 
 
@@ -151,8 +153,7 @@ class _Graph:
             for other in self._leaving(arrives, into_by):
                 its = kinds[other[0]]
                 turned_rad = _turned(heading, float(its.heading[other[1]]), arrives)
-                # A shortest way turns at a corner by less than half a turn.
-                if other not in came and turned_rad < math.pi:
+                if other not in came and turned_rad < _MOST_RAD:
                     push(other, line, turned_rad, done_m)
         return None
 

@@ -188,6 +188,15 @@ def test_round_many_corners_it_turns_a_little_at_each() -> None:
     assert way[-1].pose_at(way[-1].length_m) == pytest.approx((12, -3, SOUTH))
 
 
+@pytest.mark.parametrize(("beside_m", "more_m"), [(10.001, 0), (10, 0), (9, 0.5), (3.5, 0.5)])
+def test_past_a_spit_it_comes_back_by_half_a_turn_and_more_where_it_came_from_nearer(
+    beside_m: float, more_m: float
+) -> None:
+    spit = KeepOut((((-3.0, -300.0), (3.0, -300.0), (0.0, 10.0)),))
+    way = found(Pose(-beside_m, -100, NORTH), Pose(beside_m, -100, SOUTH), spit)
+    assert way_length_m(way) == pytest.approx(200 + 10 * math.pi + more_m / 2, abs=0.01 + more_m / 2)
+
+
 def test_it_may_end_right_before_a_wall() -> None:
     there, back = (
         found(Pose(100, -20, NORTH), Pose(-50.5, -20, EAST)),
