@@ -62,7 +62,8 @@ def test_a_file_is_tried_against_the_tests_of_its_name_then_those_nearby_then_th
     assert "tests/coordinator/test_coordinator.py" in others
     assert len({*first, *nearby, *others}) == len(first) + len(nearby) + len(others)
     # It has no test of its name.
-    assert tried_against("coordinator/allocate/team.py", ROOT)[0] == ["tests/coordinator/allocate/test_routes.py"]
+    theirs = [f"tests/coordinator/allocate/test_{name}.py" for name in ("plans", "routes")]
+    assert tried_against("coordinator/allocate/team.py", ROOT)[0] == theirs
 
 
 DIFF = """--- mutation diff ---
