@@ -5,15 +5,16 @@ python -m bench.figures [--fly NAME ...]
 
 Without a name it writes each table anew into its page, from what is kept in docs/figures/: behind the line
 `<!-- figures: NAME -->`. With `--fly` it flies the missions of these tables before that, or of `all`, and keeps what
-they left; that is an hour and more for all. A test holds the pages to what is kept, and flies one mission of each table
-again: where that leaves something else, the table is stale.
+they left; that is two hours and more for all. Broken off, the same command goes on with the sweeps in `runs/figures/`;
+these refuse to with other code, and are to be removed then. A test holds the pages to what is kept, and flies one
+mission of each table again: where that leaves something else, the table is stale.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import tempfile
+import shutil
 from collections.abc import Sequence
 from dataclasses import asdict
 from itertools import takewhile
@@ -37,7 +38,7 @@ from bench.flown import (
 from bench.rows import MISSION, head, line, values_of
 from secondlook.scenario import load_scenario
 
-KEPT = ROOT / "docs" / "figures"
+KEPT, UNDER_WAY = ROOT / "docs" / "figures", ROOT / "runs" / "figures"
 
 CONTENDERS = ("plan", "lawnmower", "across", "beforehand", "second_survey", "greedy", "nearest", "cbba")
 COMPARED = ("tellaro", "two-helpers", "patchy", "clear")
@@ -374,10 +375,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     named = list(TABLES) if "all" in options.fly else options.fly
     for name in named:
-        with tempfile.TemporaryDirectory() as folder:
-            document = TABLES[name].fly(Path(folder))
+        folder = UNDER_WAY / name
+        folder.mkdir(parents=True, exist_ok=True)
+        document = TABLES[name].fly(folder)
         KEPT.mkdir(exist_ok=True)
         keep(name, document)
+        shutil.rmtree(folder)
     for name, table in TABLES.items():
         if table.draw is not None and (options.draw or name in named):
             table.draw(kept(name))

@@ -98,6 +98,29 @@ def test_a_table_is_put_in_the_place_of_the_old_one(tmp_path: Path, monkeypatch:
         written("toy")
 
 
+def test_broken_off_it_goes_on_with_what_was_flown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, folder in (("ROOT", tmp_path), ("KEPT", tmp_path / "kept"), ("UNDER_WAY", tmp_path / "under way")):
+        monkeypatch.setattr(figures, name, folder)
+    found = []
+
+    def fly(folder: Path) -> dict[str, int]:
+        found.append([one.name for one in folder.iterdir()])
+        (folder / "a sweep").mkdir(exist_ok=True)
+        if len(found) == 1:
+            raise KeyboardInterrupt
+        return {"a": 2}
+
+    table = Table("page.md", fly, lambda document: ["| a |", f"| {document['a']} |"], lambda _: Mission("", (), 1, {}))
+    monkeypatch.setattr(figures, "TABLES", {"toy": table})
+    (tmp_path / "page.md").write_text("<!-- figures: toy -->\n\n| a |\n| 1 |\n")
+    with pytest.raises(KeyboardInterrupt):
+        figures.main(["--fly", "toy"])
+    figures.main(["--fly", "toy"])
+    assert found == [[], ["a sweep"]]
+    assert "| 2 |" in (tmp_path / "page.md").read_text()
+    assert list((tmp_path / "under way").iterdir()) == []
+
+
 def test_what_is_kept_is_rounded_and_no_more_than_tables_need() -> None:
     pair = {"both": {"difference": 0.123456789, "better": 1}}
     contender: dict[str, Any] = {"name": "plan", "mean_end": {"mean": 1 / 3}, "worst30_mean_end": {"mean": 2 / 3}}
