@@ -127,6 +127,7 @@ def _fly_compared(folder: Path) -> Document:
     kept = []
     for scenario in COMPARED:
         out = folder / scenario
+        shutil.rmtree(out, ignore_errors=True)  # unlike a sweep a comparison does not go on
         seeds = ("--first-seed", "1001", "--seeds", "50")
         call_secondlook("compare", scenario, "--allocators", ",".join(CONTENDERS), *seeds, "--out", str(out))
         kept.append(compared_kept(json.loads((out / "compare.json").read_text())))

@@ -28,7 +28,7 @@ STRAIGHT_FIRST = (0.0, 1.0, 2.0, 4.0)
 """Turn radii that a way may go straight on before its first turn, and before its end, where there is no other."""
 _LEAST_M = 1e-9
 _MOST_RAD = 1.5 * math.pi
-"""By less than that a shortest way turns at a corner: it comes back at most where it came from, past a narrow spit."""
+"""By less than that a shortest way turns at a corner, even where it comes back past a spit narrower than a turn."""
 _FULL_RAD = math.tau
 
 

@@ -144,7 +144,7 @@ class Metrics:
             if message.mode is Mode.HOME:
                 self.approaches.rest(received.vehicle)
             ends = message.mode is Mode.FINISHED or message.mode.is_out_of_work
-            if ends and vehicle.finished_ms is None and vehicle.has_surveyed_all:
+            if ends and vehicle.role.surveys and vehicle.finished_ms is None and vehicle.has_surveyed_all:
                 vehicle.finished_ms = received.header.sent_ms
                 if vehicle.role is Role.SURVEY_REVISIT and self.map is not None:
                     vehicle.surveyed = copy.deepcopy(self.map.layers.get(received.vehicle))

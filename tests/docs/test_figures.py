@@ -3,6 +3,7 @@ that."""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from pathlib import Path
 from statistics import fmean
@@ -119,6 +120,20 @@ def test_broken_off_it_goes_on_with_what_was_flown(tmp_path: Path, monkeypatch: 
     assert found == [[], ["a sweep"]]
     assert "| 2 |" in (tmp_path / "page.md").read_text()
     assert list((tmp_path / "under way").iterdir()) == []
+
+
+def test_a_comparison_that_was_broken_off_is_flown_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mission = {"contender": "plan", "seed": 1001, "at_end": {"mean": 0.5, "worst30_mean": 0.5}}
+    told = {"scenario": "toy", "objective": "both", "contenders": [], "missions": [mission]}
+
+    def compare(*words: str) -> None:
+        out = Path(words[-1])
+        out.mkdir()  # the command takes a new folder alone, or an empty one
+        (out / "compare.json").write_text(json.dumps(told))
+
+    monkeypatch.setattr(figures, "COMPARED", ("toy",))
+    monkeypatch.setattr(figures, "call_secondlook", compare)
+    assert [figures._fly_compared(tmp_path) for _ in range(2)] == [{"comparisons": [compared_kept(told)]}] * 2
 
 
 def test_what_is_kept_is_rounded_and_no_more_than_tables_need() -> None:

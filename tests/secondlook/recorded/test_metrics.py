@@ -115,6 +115,12 @@ class TestBatteries:
         stream.say(50, f"veh/{PRIMARY}/maneuver_status", ManeuverStatus(1, ManeuverState.EMPTY, 50_000, ""))
         assert self.told(stream, PRIMARY) == ("empty", 50.0, 0.0)
 
+    def test_a_helper_that_is_home_and_is_started_anew_has_not_ended(self) -> None:
+        stream = begun()
+        for at_s, mode in ((20, Mode.HOME), (30, Mode.IDLE), (40, Mode.RETURNING), (50, Mode.RETURNING)):
+            self.state(stream, at_s, HELPER, mode, 0.5)
+            assert self.told(stream, HELPER) == ("over" if mode is Mode.IDLE else mode.value, at_s, 0.5)
+
     def test_of_one_that_has_told_nothing_there_is_nothing_to_tell(self) -> None:
         vehicles = begun().metrics.summary()["vehicles"]
         nothing = {"path_m": 0.0, "ended": "over", "ended_s": 0.0, "battery_left": 1.0}
