@@ -27,8 +27,7 @@ from planner.types import BoolArray
 
 @dataclass
 class FixedRoutes:
-    """An `Allocator`: each helper flies its own strips in turn, and what it must wait for long later. `routes`: their
-    numbers, by vehicle."""
+    """An `Allocator`: each helper flies its own strips in turn. `routes`: their numbers, by vehicle."""
 
     routes: dict[str, list[int]] = field(default_factory=dict)
 
@@ -37,8 +36,8 @@ class FixedRoutes:
         there = {one.strip.number for one in situation.strips}
         offers = {}
         for helper in situation.free:
-            left = there - helper.refused - {number for number, wait_s in helper.waits_s.items() if math.isinf(wait_s)}
-            number = next((one for one in self.routes.get(helper.vehicle, ()) if one in left), None)
+            numbers = (one for one in self.routes.get(helper.vehicle, ()) if one in there and one not in helper.refused)
+            number = next(numbers, None)
             if number is not None:
                 offers[helper.vehicle] = number
         return offers

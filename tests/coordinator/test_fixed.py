@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from dataclasses import replace
 from typing import Literal
@@ -230,12 +229,6 @@ class TestWhatLanesAre:
         lanes = [(one.start_x_m, one.start_y_m, one.length_m) for _, one in sorted(told.strips().items())]
         assert lanes[4:] == [(x_m, 0, 400) for x_m in (122.5, 172.5, 222.5, 272.5, 322.5, 372.5, 377.5)]
         assert lanes[:4] == [(x_m, y_m, long_m) for x_m in (22.5, 72.5) for y_m, long_m in ((0, 185), (235, 165))]
-
-
-def test_what_a_helper_must_wait_for_long_it_is_offered_later_and_for_what_is_soon_clear_it_waits() -> None:
-    routes, jobs = FixedRoutes({"alpha": [2, 3, 1]}), [open_strip(strip(number)) for number in (1, 2, 3)]
-    assert routes.assign(situation(jobs, [helper("alpha", waits_s={2: math.inf, 3: 60.0})])) == {"alpha": 3}
-    assert routes.assign(situation(jobs, [helper("alpha", waits_s=dict.fromkeys((1, 2, 3), math.inf))])) == {}
 
 
 def test_each_is_offered_the_next_of_its_own_that_is_there_and_that_it_has_not_refused() -> None:

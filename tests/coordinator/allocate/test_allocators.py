@@ -102,15 +102,15 @@ class TestTheOthers:
         assert offers("none", situation([open_strip(strip(1))], [HELPER])) == {}
 
 
+@pytest.mark.parametrize("number", [1, 2])
+@pytest.mark.parametrize("name", ["auction", "cbba", "greedy", "nearest", "plan"])
+def test_a_helper_does_not_wait_for_a_strip_for_longer_than_another_takes(name: str, number: int) -> None:
+    told = situation([open_strip(strip(1)), open_strip(strip(2, y_m=600))], [helper(waits_s={number: 3000.0})])
+    assert offers(name, told) == {"alpha": 3 - number}
+
+
 @pytest.mark.parametrize("name", [name for name in ALLOCATORS if name != "none"])
 class TestEveryAllocator:
-    @pytest.mark.parametrize("number", [1, 2])
-    def test_a_strip_to_which_a_helper_may_not_set_out_for_long_is_not_what_it_begins_with(
-        self, name: str, number: int
-    ) -> None:
-        told = situation([open_strip(strip(1)), open_strip(strip(2, y_m=600))], [helper(waits_s={number: math.inf})])
-        assert offers(name, told) == {"alpha": 3 - number}
-
     def test_one_helper_and_one_strip(self, name: str) -> None:
         assert offers(name, situation([open_strip(strip(1))], [HELPER])) == {"alpha": 1}
 

@@ -135,7 +135,7 @@ class TestBids:
         gains, _ = Bidder(0, helper(), situation(jobs, [helper()], 300), jobs)._routes.gains([])
         assert np.flatnonzero(gains).tolist() == [0]
 
-    @pytest.mark.parametrize(("waits_s", "path"), [({}, [0, 1]), ({1: math.inf}, [1, 0]), ({1: 60.0}, [0, 1])])
+    @pytest.mark.parametrize(("waits_s", "path"), [({}, [0, 1]), ({1: 600.0}, [1, 0]), ({1: 60.0}, [0, 1])])
     def test_a_strip_to_which_a_helper_must_wait_long_comes_later(
         self, waits_s: dict[int, float], path: list[int]
     ) -> None:
@@ -238,7 +238,7 @@ class TestConflicts:
         # beta hears of that, in which nobody claims anything.
         jobs = [open_strip(strip(1), 2000), open_strip(strip(2, y_m=310))]
         beta = helper("beta", y_m=305, heading_rad=np.pi)
-        alpha, beta_then = agreed(situation(jobs, [helper(waits_s={2: math.inf}), beta]), jobs)
+        alpha, beta_then = agreed(situation(jobs, [helper(waits_s={2: 600.0}), beta]), jobs)
         assert (alpha.path, beta_then.path) == ([], [0, 1])
 
     def test_a_third_ones_claim_is_not_taken_from_hearsay(self) -> None:

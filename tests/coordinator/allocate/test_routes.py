@@ -146,8 +146,8 @@ class TestOneHelper:
         [
             (100, 500, (2, 1), 1400),
             (150, 500, (2, 1), 1050),
-            (math.inf, 500, (1,), 700),
-            (math.inf, 3600, (1, 2), 1400),
+            (600, 500, (1,), 700),
+            (600, 3600, (1, 2), 1400),
         ],
     )
     def test_what_a_helper_must_wait_for_is_begun_later_or_comes_later(
@@ -160,7 +160,7 @@ class TestOneHelper:
 
     def test_a_helper_at_work_goes_on_without_a_wait(self) -> None:
         # That is for one that were turned round.
-        busy = at_work(helper(waits_s={1: math.inf}), NEAR)
+        busy = at_work(helper(waits_s={1: 600.0}), NEAR)
         assert routes([FAR], [busy]).strips == {"alpha": (1,)}
 
 

@@ -88,7 +88,7 @@ class TestOffers:
         asked = situation([better, soon], [helper()])
         assert offers_let_through(GreedyAllocator(), asked, Waits({2}, wait_s)) == (offers, again_s)
 
-    def test_what_must_wait_for_long_is_refused_an_allocator_that_takes_no_notice_of_waits(self) -> None:
+    def test_an_allocator_that_takes_no_notice_of_waits_waits_but_not_for_long(self) -> None:
         class LowestFirst:
             def assign(self, asked: Situation) -> dict[str, int]:
                 (alpha,) = asked.helpers
