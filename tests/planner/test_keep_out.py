@@ -56,6 +56,43 @@ class TestGrown:
         assert with_one_more.ground.bounds[0] < -10
 
 
+class TestStayingOut:
+    # Its grown side lies at x = 98 m.
+    ZONE = KeepOut((((100.0, -50.0), (200.0, -50.0), (200.0, 50.0), (100.0, 50.0)),), 2.0)
+
+    def test_who_is_told_a_way_may_come_a_quarter_of_a_metre_nearer(self) -> None:
+        assert self.ZONE.nearer() == KeepOut(self.ZONE.zones, 1.75)
+        assert KeepOut(self.ZONE.zones, 0.1).nearer() == KeepOut(self.ZONE.zones)
+        assert KeepOut((), 2.0).nearer() == KeepOut((), 2.0)
+
+    def test_its_side_may_be_touched(self) -> None:
+        places = [97.0, 98.04, 98.06, 150.0]
+        assert self.ZONE.are_clear(shapely.points([(x_m, 0.0) for x_m in places])).tolist() == [
+            True,
+            True,
+            False,
+            False,
+        ]
+        north = [shapely.LineString([(x_m, -80.0), (x_m, 80.0)]) for x_m in places]
+        assert self.ZONE.are_clear(north).tolist() == [True, True, False, False]
+        assert KeepOut(self.ZONE.zones).are_clear(shapely.points([(100.04, 0), (100.06, 0)])).tolist() == [True, False]
+
+    def test_paths_are_clear_if_all_are(self) -> None:
+        beside, across = (DubinsPath(Pose(x_m, -80, 0), 6.0, (0, 0, 0), (160, 0, 0)) for x_m in (97.0, 99.0))
+        assert self.ZONE.is_clear([beside])
+        assert not self.ZONE.is_clear([beside, across])
+        assert NOWHERE.is_clear([across])
+
+    def test_a_lagoon_is_parted_from_the_sea_and_from_another_one(self) -> None:
+        bars = [((0.0, y_m), (200.0, y_m), (200.0, y_m + 10), (0.0, y_m + 10)) for y_m in (0.0, 90.0)]
+        piers = [((x_m, 0.0), (x_m + 10, 0.0), (x_m + 10, 100.0), (x_m, 100.0)) for x_m in (0.0, 90.0, 190.0)]
+        atoll = KeepOut((*bars, *piers))
+        sea, far, west, east = (-20.0, 50.0), (300.0, 50.0), (50.0, 50.0), (150.0, 50.0)
+        parted = [atoll.are_parted(*two) for two in ((sea, west), (west, east), (east, far))]
+        assert parted == [True, True, True]
+        assert [atoll.are_parted(*two) for two in ((sea, far), (west, (20.0, 20.0)))] == [False, False]
+
+
 class TestRoom:
     # Passed to the north along its west side, with turns of 6 m: there is room to starboard before it and behind it.
     BLOCK = KeepOut((((1.0, -30.0), (20.0, -30.0), (20.0, 30.0), (1.0, 30.0)),))
@@ -70,6 +107,40 @@ class TestRoom:
         wall = ((-20.0, -30.0), (-1.0, -30.0), (-1.0, 30.0), (-20.0, 30.0))
         gap = KeepOut((*self.BLOCK.zones, wall))
         assert [gap.circling(Pose(*place, 0.0), 6.0) for place in places] == [1, None, 1]
+
+    @pytest.mark.parametrize("heading_rad", [0.4, 2.0, 3.7, 5.5])
+    @pytest.mark.parametrize(("from_m", "side"), [(9.96, -1), (9.98, 1)])
+    def test_a_turn_may_come_within_a_few_centimetres_of_a_zone(
+        self, heading_rad: float, from_m: float, side: int
+    ) -> None:
+        # A coast that is as far from the middle of a turn to starboard as its radius, a little more or less: to the
+        # north or south, or to the east or west, on the side that is farther from the middle of one to port.
+        middle = 10 * math.cos(heading_rad), -10 * math.sin(heading_rad)
+        away = [math.copysign(1.0, part_m) for part_m in middle]
+        near, far = ([part_m + way * off_m for part_m, way in zip(middle, away, strict=True)] for off_m in (from_m, 90))
+        coasts = [
+            ((near[0], -90.0), (far[0], -90.0), (far[0], 90.0), (near[0], 90.0)),
+            ((-90.0, near[1]), (-90.0, far[1]), (90.0, far[1]), (90.0, near[1])),
+        ]
+        assert [KeepOut((coast,)).circling(Pose(0, 0, heading_rad), 10.0) for coast in coasts] == [side, side]
+
+    @pytest.mark.parametrize(
+        ("at_m", "half_m", "side"), [(10, 2, 1), (10, 6.9, 1), (10, 7.2, -1), (17, 2, 1), (18, 2, -1)]
+    )
+    def test_one_circles_about_what_is_small_enough(self, at_m: float, half_m: float, side: int) -> None:
+        # The corners of a rock lie half_m to either side; the circle to starboard is about (10, 0).
+        west_m, east_m = at_m - half_m, at_m + half_m
+        rock = KeepOut((((west_m, -half_m), (east_m, -half_m), (east_m, half_m), (west_m, half_m)),))
+        assert rock.circling(Pose(0, 0, 0), 10.0) == side
+        assert rock.circling(Pose(20, 0, math.pi), 10.0) == side
+
+    def test_about_a_rock_or_not_one_does_not_circle_over_another(self) -> None:
+        rocks = [((x_m, -1.0), (x_m + 2, -1.0), (x_m + 2, 1.0), (x_m, 1.0)) for x_m in (9.0, 19.0, -11.0, -21.0)]
+        assert KeepOut(tuple(rocks[:1])).circling(Pose(0, 0, 0), 10.0) == 1
+        coast = ((90.0, -90.0), (190.0, -90.0), (190.0, 90.0), (90.0, 90.0))
+        assert KeepOut((rocks[0], coast)).circling(Pose(0, 0, 0), 10.0) == 1
+        assert KeepOut(tuple(rocks[:3])).circling(Pose(0, 0, 0), 10.0) == -1
+        assert KeepOut(tuple(rocks)).circling(Pose(0, 0, 0), 10.0) is None
 
     def test_for_a_pass_there_must_be_room_on_the_way_and_to_turn_before_and_behind(self) -> None:
         wall = ((-20.0, -30.0), (-1.0, -30.0), (-1.0, 30.0), (-20.0, 30.0))
