@@ -56,10 +56,6 @@ class TestServiceTime:
     def test_it_begins_where_and_when_the_helper_is_free(self) -> None:
         assert expected_service(open_strip(strip(1)), replace(HELPER, free_s=100)).ends_s == pytest.approx(250)
 
-    def test_it_begins_so_much_later_as_the_helper_must_wait(self) -> None:
-        served = expected_service(open_strip(strip(1)), helper(waits_s={1: 30.0, 2: 7.0}))
-        assert (served.begins_s, served.ends_s, served.free_s) == pytest.approx((80, 180, 182.5))
-
     @pytest.mark.parametrize(("deadline_s", "share"), [(50, 0), (100, 0.5), (150, 1), (math.inf, 1)])
     def test_what_is_flown_by_the_deadline_counts(self, deadline_s: float, share: float) -> None:
         served = expected_service(open_strip(strip(1)), HELPER)
