@@ -1,8 +1,8 @@
 """How near an allocator comes to who knows everything beforehand.
 
-python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--first-seed N] [--seconds S] [--jobs J]
+python -m bench.clairvoyant [SCENARIO] [--allocators A,B] [--seeds N] [--first-seed N] [--steps S] [--jobs J]
                             [--set KEY=VALUE] [--objective mean|worst30|both] [--told]
-python -m bench.clairvoyant --run RUN [--seconds S]      a recorded run; --json for programs, with either
+python -m bench.clairvoyant --run RUN [--steps S]        a recorded run; --json for programs, with either
 
 For each seed: the bound on the residual risk (times m2) that a schedule can remove (`clairvoyant_bound` says why none
 removes more), the most that was removed by the best schedule found (`clairvoyant_schedule`, which begins with what the
@@ -10,8 +10,8 @@ contenders flew) or by a contender, and what each contender removed; then what m
 ratios: to the best by the objective, to the bound by the mean. All are counted alike, by the true P_d of the helpers,
 contenders look by look as they were flown; what the mission's map told, from what the vehicles made of their P_d, is
 compared with that at the end. The schedule is searched by the mean, or by another of the coordinator's objectives; what
-it and each contender leave of the worst 30 % stands in a table of its own. S is the processor time of the search for
-the schedule, which a busy machine makes longer but not worse. With `--told` the first contender flies once more, its
+it and each contender leave of the worst 30 % stands in a table of its own. S is the number of steps in which a schedule
+is searched, some 3,000 a second; the same steps find the same. With `--told` the first contender flies once more, its
 coordinator told beforehand what the survey leaves: what is lacking then is not knowledge.
 """
 
@@ -71,7 +71,7 @@ class Row:
     same as the mission's map told. `there_m2`: all the risk that the survey alone left on `area_m2`. `found_m2`: what
     the best schedule found removes, of so many `legs`; `started_m2`: by how much the schedule that the search began
     with made the objective less. `worst30`: the residual risk of the worst 30 % that the survey, that schedule and
-    each contender leave. `search_s`: processor time of the search, by the `objective`.
+    each contender leave. `steps`: of the search, by the `objective`.
 
     Raises ValueError where one of these contradicts another.
     """
@@ -86,7 +86,7 @@ class Row:
     removed_m2: dict[str, float | None]
     measured_m2: dict[str, float | None]
     worst30: dict[str, float | None]
-    search_s: float
+    steps: int
     objective: str = "mean"
 
     def __post_init__(self) -> None:
@@ -144,11 +144,11 @@ class Row:
             )
 
 
-def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seconds: float, objective: str) -> Row:
+def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], steps: int, objective: str) -> Row:
     """Bound and best schedule of one mission; the search knows what was flown, by contender, None for a failure."""
     bound = upper_bound(mission)
     known = [one.schedule for one in flown.values() if one]
-    best = best_schedule(mission, bound, seconds, seed, known, OBJECTIVES[objective])
+    best = best_schedule(mission, bound, steps, seed, known, OBJECTIVES[objective])
     left = Simulator(mission).left(best.schedule)
     return Row(
         seed=seed,
@@ -165,7 +165,7 @@ def solve(mission: Removable, seed: int, flown: Mapping[str, Flown | None], seco
             "schedule": mission.left(left).worst30_mean,
             **{name: one.worst30 if one else None for name, one in flown.items()},
         },
-        search_s=seconds,
+        steps=steps,
         objective=objective,
     )
 
@@ -192,7 +192,7 @@ class Heard:
 
 
 def one_seed(
-    scenario: Scenario, names: Sequence[str], seconds: float, objective: str = "mean", *, told: bool = False
+    scenario: Scenario, names: Sequence[str], steps: int, objective: str = "mean", *, told: bool = False
 ) -> Row:
     """Flies the seed with each contender, with the first one `told` as well, and solves it."""
     alone = Heard(contenders(scenario, ["none"])[0].scenario)
@@ -212,10 +212,10 @@ def one_seed(
         if not np.array_equal(heard.clairvoyance.removable().risk, mission.risk):
             raise ValueError(f"seed {scenario.seed}: with {name} the survey is another than without helpers")
         flown[name] = heard.flown(result.removed_m2)
-    return solve(mission, scenario.seed, flown, seconds, objective)
+    return solve(mission, scenario.seed, flown, steps, objective)
 
 
-def one_run(folder: Path, seconds: float, objective: str) -> Row:
+def one_run(folder: Path, steps: int, objective: str) -> Row:
     """Solves a recorded run."""
     scenario = load_scenario(str(folder / "scenario.yaml"))
     heard = Heard(scenario)
@@ -227,7 +227,7 @@ def one_run(folder: Path, seconds: float, objective: str) -> Row:
         raise UserError(f"{folder}: the run ended before the mission began")
     flown = heard.flown((alone.mean - fleet.mean) * alone.cells * scenario.area.cell_m**2)
     removable = heard.clairvoyance.removable()
-    return solve(removable, scenario.seed, {scenario.coordinator.allocator: flown}, seconds, objective)
+    return solve(removable, scenario.seed, {scenario.coordinator.allocator: flown}, steps, objective)
 
 
 def summary(rows: list[Row]) -> dict[str, Any]:
@@ -264,7 +264,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--allocators", default="", help="as for secondlook compare; the scenario's own if left out")
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--first-seed", type=int, default=1)
-    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--steps", type=int, default=200_000)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--objective", choices=["mean", "worst30", "both"], default="mean")
@@ -275,10 +275,6 @@ def _arguments() -> argparse.Namespace:
 
 
 def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
-    for name, least in (("seeds", 1), ("first_seed", 0), ("jobs", 1)):
-        if getattr(arguments, name) < least:
-            key = name.replace("_", "-")
-            raise UserError(f"--{key}: {getattr(arguments, name)} is not allowed; must be at least {least}")
     scenario = load_scenario(arguments.scenario, arguments.set)
     if not scenario.revisit_vehicles:
         raise UserError(f"{arguments.scenario}: has no helper whose schedule could be compared")
@@ -298,7 +294,7 @@ def _solve_all(arguments: argparse.Namespace, rows: list[Row]) -> None:
         seeds = range(arguments.first_seed, arguments.first_seed + arguments.seeds)
         missions = (scenario.model_copy(update={"seed": seed}) for seed in seeds)
         objective, told = arguments.objective, arguments.told
-        solve = partial(one_seed, names=allocators, seconds=arguments.seconds, objective=objective, told=told)
+        solve = partial(one_seed, names=allocators, steps=arguments.steps, objective=objective, told=told)
         for mission, row in do_all(solve, missions, engine, count=arguments.seeds):
             if isinstance(row, Lost):
                 raise RunFailedError(f"seed {mission.seed}: {row.why}")
@@ -333,7 +329,7 @@ def _print(rows: list[Row]) -> None:
                 f"of the bound mean {bound['mean']:.3f}, least {bound['least']:.3f}; "
                 f"its map told {measured['least']:.3f} to {measured['most']:.3f} times as much"
             )
-    print(f"{rows[0].search_s:g} s of search a seed")
+    print(f"{rows[0].steps:,} steps of search a seed")
 
 
 def main() -> None:
@@ -342,10 +338,14 @@ def main() -> None:
     rows: list[Row] = []
     failure = ""
     try:
+        for name, least in (("seeds", 1), ("first_seed", 0), ("jobs", 1), ("steps", 0)):
+            if getattr(arguments, name) < least:
+                key = name.replace("_", "-")
+                raise UserError(f"--{key}: {getattr(arguments, name)} is not allowed; must be at least {least}")
         if arguments.run:
             if arguments.told or arguments.allocators or arguments.set:
                 raise UserError("--run: is not allowed with --told, --allocators or --set; a run is as it was flown")
-            rows.append(one_run(arguments.run, arguments.seconds, arguments.objective))
+            rows.append(one_run(arguments.run, arguments.steps, arguments.objective))
         else:
             _solve_all(arguments, rows)
     except UserError as error:

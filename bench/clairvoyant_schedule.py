@@ -11,7 +11,6 @@ last one.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -47,14 +46,13 @@ class Solution:
 def best_schedule(
     mission: Removable,
     bound: Bound,
-    seconds: float,
+    steps: int,
     seed: int,
     known: Sequence[Schedule] = (),
     objective: Objective = OBJECTIVES["mean"],
 ) -> Solution:
-    """Searches for about so many seconds of processor time. `known`: schedules to begin with; the result is at least as
-    good as each of them."""
-    began_s = time.process_time()
+    """Searches in so many steps of annealing. `known`: schedules to begin with; the result is at least as good as each
+    of them."""
     simulator = Simulator(mission, objective)
     starts = [*known, lanes(mission, across=False), lanes(mission, across=True)]
     prices_m2 = [bound.price_m2 * share for share in PRICES]
@@ -64,11 +62,10 @@ def best_schedule(
     found = [(simulator.gain_m2(start), simulator.in_time(start)) for start in starts]
     started_m2 = max(gain_m2 for gain_m2, _ in found)
     counts = _rounds(len(found))
-    left_s = seconds - (time.process_time() - began_s)
     for number, count in enumerate(counts):
         found = sorted(found, key=lambda one: -one[0])[:count]
-        each_s, hottest = left_s / len(counts) / count, HOTTEST[number > 0]
-        found = [_annealed(simulator, start, candidates, each_s, hottest, chance) for _, start in found]
+        each, hottest = steps // len(counts) // count, HOTTEST[number > 0]
+        found = [_annealed(simulator, start, candidates, each, hottest, chance) for _, start in found]
     return Solution(*max(found, key=lambda one: one[0]), started_m2)
 
 
@@ -120,18 +117,17 @@ def _annealed(
     simulator: Simulator,
     start: Schedule,
     candidates: Sequence[Leg],
-    seconds: float,
+    steps: int,
     hottest: float,
     chance: np.random.Generator,
 ) -> tuple[float, Schedule]:
     """The best schedule on a walk through schedules that begins at `start`, and at the temperature `hottest`."""
-    began_s = time.process_time()
     now, now_m2 = start, simulator.gain_m2(start)
     best, best_m2 = now, now_m2
-    while (share := (time.process_time() - began_s) / max(seconds, 1e-9)) < 1:
+    for step in range(steps):
         changed = _changed(now, candidates, simulator.mission, chance)
         changed_m2 = simulator.gain_m2(changed)
-        temperature = max(best_m2, 1.0) * hottest * (COLDEST / hottest) ** share
+        temperature = max(best_m2, 1.0) * hottest * (COLDEST / hottest) ** (step / steps)
         if changed_m2 >= now_m2 or chance.random() < math.exp((changed_m2 - now_m2) / temperature):
             now, now_m2 = simulator.in_time(changed), changed_m2
             if now_m2 > best_m2:

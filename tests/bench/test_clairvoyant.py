@@ -272,7 +272,7 @@ class TestTheSearch:
         risk[:, 9:] = chance.uniform(0.8, 1, (ROWS, 3))
         made = replace(mission(risk, ends_s=60 + 5 * seed), helpers=(helper(run_in_m=0.0),))
         bound = upper_bound(made)
-        best = best_schedule(made, bound, 0.8, seed)
+        best = best_schedule(made, bound, 4_000, seed)
         assert 0.55 * bound.removed_m2 <= best.gain_m2 <= bound.removed_m2 + 1e-6
         assert best.gain_m2 == pytest.approx(Simulator(made).removed_m2(best.schedule))
         for leg in best.schedule[0]:
@@ -286,7 +286,7 @@ class TestTheSearch:
         risk = np.zeros((ROWS, COLUMNS))
         risk[2:5] = 1.0
         made = mission(risk, ends_s=50.0)
-        best = best_schedule(made, upper_bound(made), 1.0, 1)
+        best = best_schedule(made, upper_bound(made), 5_000, 1)
         assert [leg[:3] for leg in best.schedule[0] if leg.across] == [(3, 0, COLUMNS)]
         assert best.gain_m2 >= 3 * COLUMNS * 25 * 0.5
 
@@ -300,7 +300,7 @@ class TestTheSearch:
             sensor.p_detect[columns] = 0.2
         left = {
             name: made.left(
-                Simulator(made).left(best_schedule(made, upper_bound(made), 1.0, 1, (), OBJECTIVES[name]).schedule)
+                Simulator(made).left(best_schedule(made, upper_bound(made), 5_000, 1, (), OBJECTIVES[name]).schedule)
             )
             for name in ("mean", "worst30")
         }
@@ -317,11 +317,17 @@ class TestTheSearch:
         both = (0.7 * 0.25 + 0.3 * worst / 2) * 72 * 25
         assert made.gain_m2(risk / 2, OBJECTIVES["both"]) == pytest.approx(both)
 
+    def test_the_same_steps_find_the_same_and_more_of_them_more(self) -> None:
+        made = mission(np.random.default_rng(1).uniform(0, 1, (ROWS, COLUMNS)), ends_s=60, helpers=2)
+        found = [best_schedule(made, upper_bound(made), steps, 1) for steps in (300, 300, 3_000)]
+        assert found[0] == found[1]
+        assert found[2].gain_m2 > found[0].gain_m2 > found[0].started_m2
+
     def test_it_is_no_worse_than_what_it_knows(self) -> None:
         risk = np.random.default_rng(1).uniform(0, 1, (ROWS, COLUMNS))
         made = mission(risk, ends_s=60, helpers=2)
         known = ((Leg(3, 1, 5), Leg(6, 0, 4, up=False)), (Leg(4, 2, 9, across=True),))
-        best = best_schedule(made, upper_bound(made), 0.05, 1, [known])
+        best = best_schedule(made, upper_bound(made), 100, 1, [known])
         assert best.gain_m2 >= best.started_m2 >= Simulator(made).removed_m2(known) > 0
 
     @pytest.mark.parametrize("across", [False, True])

@@ -180,7 +180,7 @@ class TestAFlownMission:
         assert removed_m2(flown, made) == pytest.approx(measured * made.inside.sum() * 25, rel=0.03)
 
     def test_a_seed_is_flown_and_solved(self) -> None:
-        row = one_seed(load_scenario(BRIEF, (), 1), ["greedy", "across", "none"], 1.0)
+        row = one_seed(load_scenario(BRIEF, (), 1), ["greedy", "across", "none"], 3_000)
         greedy, across, none = (row.removed_m2[name] for name in ("greedy", "across", "none"))
         assert greedy is not None
         assert across is not None
@@ -210,13 +210,13 @@ class TestAFlownMission:
             assert across_m >= grid.across_m[grid.columns // 2] - 5
 
     def test_a_seed_is_flown_once_more_by_who_is_told(self) -> None:
-        row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 0.3, "both", told=True)
+        row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 1_000, "both", told=True)
         assert [*row.removed_m2] == ["plan", "told"]
         assert row.removed_m2["told"] not in (row.removed_m2["plan"], None, 0.0)
         assert set(summary([row])) == {"best_to_bound", "plan", "told"}
 
     def test_a_search_that_knows_it_begins_with_it(self) -> None:
-        row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 0.3)
+        row = one_seed(load_scenario(BRIEF, (), 1), ["plan"], 1_000)
         plan_m2 = row.removed_m2["plan"]
         assert plan_m2 is not None
         # Its legs on whole rows, where each look ended between two of them or not.
@@ -261,7 +261,7 @@ class TestARow:
         removed_m2={"plan": 50.0, "none": None},
         measured_m2={"plan": 51.0, "none": None},
         worst30={"survey": 0.9, "schedule": 0.5, "plan": 0.6, "none": None},
-        search_s=1.0,
+        steps=100,
     )
 
     def test_the_best_is_the_most_that_anybody_removed(self) -> None:
@@ -316,5 +316,5 @@ class TestARow:
 def test_what_it_cannot_count_truly_is_refused(setting: str, told: str) -> None:
     with pytest.raises(UserError, match=told):
         one_seed(
-            load_scenario(BRIEF, ["current={drift_mps: 0.5, set_deg: 0, keeps: ground}", setting]), ["nearest"], 1.0
+            load_scenario(BRIEF, ["current={drift_mps: 0.5, set_deg: 0, keeps: ground}", setting]), ["nearest"], 100
         )
