@@ -39,6 +39,7 @@ from bench.flown import (
     Document,
     Mission,
     Table,
+    all_rounded,
     call_secondlook,
     fly_overridden,
     risk_and_truth,
@@ -149,7 +150,7 @@ def compared_kept(told: Document) -> Document:
     contenders = [{name: one[name] for name in names} for one in told["contenders"]]
     first = {name: told["missions"][0][name] for name in ("contender", "seed", "at_end")}
     document = {"scenario": told["scenario"], "objective": told["objective"], "contenders": contenders, "first": first}
-    return dict(json.loads(json.dumps(document), parse_float=lambda text: round(float(text), DIGITS)))
+    return dict(all_rounded(document))
 
 
 def _first_compared(document: Document) -> Mission:

@@ -6,6 +6,7 @@ flown with, and some of its figures.
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -77,6 +78,11 @@ def fly_overridden(folder: Path, flown: Iterable[Case], seeds: str, figures: Ite
         told = {"scenario": scenario, "overrides": list(overrides)}
         rows += [{**told, **some(row, figures)} for row in swept]
     return {"rows": rows}
+
+
+def all_rounded(document: Any) -> Any:
+    """The same with all figures rounded, however deep they lie."""
+    return json.loads(json.dumps(document), parse_float=lambda text: round(float(text), DIGITS))
 
 
 def some(row: Document, names: Iterable[str]) -> Document:

@@ -13,8 +13,8 @@ from statistics import fmean
 from typing import Any
 
 from bench.clairvoyant import TOLD, Row, summary
-from bench.flown import DIGITS, ROOT, Case, Document, Table, fly_overridden
-from bench.rows import MISSION
+from bench.flown import ROOT, Case, Document, Table, all_rounded, fly_overridden
+from bench.rows import MISSION, head, line
 
 PAGE = "docs/comparing.md"
 SCENARIOS = ("tellaro", "two-helpers", "patchy", "clear")
@@ -38,44 +38,35 @@ def _fly(folder: Path, asked: Sequence[str], again: Case) -> Document:
 def kept_of(told: Document) -> list[Document]:
     """What is kept of what the clairvoyant prints for programs: its rows, rounded, the first seed first."""
     rows = [{name: row[name] for name in Row.__dataclass_fields__} for row in told["seeds"]]
-    rows = json.loads(json.dumps(rows), parse_float=lambda text: round(float(text), DIGITS))
-    return sorted(rows, key=lambda row: int(row["seed"]))
+    return sorted(all_rounded(rows), key=lambda row: int(row["seed"]))
 
 
 def left_lines(found: Rows) -> list[str]:
     """Two lines for each scenario: the mean residual risk left, and the share of what the best removes."""
     columns = ("survey", "bound", "best", *RIVALS)
-    lines = _head(["survey alone", "bound", "best", *(f"`{name}`" for name in RIVALS)])
+    lines = head((), ["scenario", "survey alone", "bound", "best", *(f"`{name}`" for name in RIVALS)])
     for scenario, rows in found.items():
-        lines.append(_line(f"`{scenario}`", (f"{_mean(row.left[name] for row in rows):.3f}" for name in columns)))
-        lines.append(_line("of the best", ["", "", "", *_shares(rows, RIVALS)]))
+        lines.append(line((scenario,), [f"{_mean(row.left[name] for row in rows):.3f}" for name in columns]))
+        lines.append(line((), ["of the best", "", "", "", *_shares(rows, RIVALS)]))
     return lines
 
 
 def both_lines(found: Rows) -> list[str]:
     """A line for each scenario: mean and worst 30 % that each leaves."""
-    lines = _head(["the schedule", *(f"`{name}`" for name in BY_BOTH)])
+    lines = head((), ["scenario", "the schedule", *(f"`{name}`" for name in BY_BOTH)])
     for scenario, rows in found.items():
-        told = (
-            ", ".join(f"{_mean(of(row)[name] for row in rows):.3f}" for of in (_left, _worst))
-            for name in ("schedule", *BY_BOTH)
-        )
-        lines.append(_line(f"`{scenario}`", told))
+        told = []
+        for name in ("schedule", *BY_BOTH):
+            mean, worst30 = _mean(row.left[name] for row in rows), _mean(row.worst30[name] for row in rows)
+            told.append(f"{mean:.3f}, {worst30:.3f}")
+        lines.append(line((scenario,), told))
     return lines
 
 
 def told_lines(found: Rows) -> list[str]:
     """A line for each scenario: the share of what the best gains, not told and told."""
-    lines = _head(["`plan`", "`plan`, told"])
-    return [*lines, *(_line(f"`{scenario}`", _shares(rows, ("plan", TOLD))) for scenario, rows in found.items())]
-
-
-def _left(row: Row) -> dict[str, float | None]:
-    return row.left
-
-
-def _worst(row: Row) -> dict[str, float | None]:
-    return row.worst30
+    lines = head((), ["scenario", "`plan`", "`plan`, told"])
+    return [*lines, *(line((scenario,), _shares(rows, ("plan", TOLD))) for scenario, rows in found.items())]
 
 
 def _shares(rows: list[Row], names: Sequence[str]) -> list[str]:
@@ -86,14 +77,6 @@ def _shares(rows: list[Row], names: Sequence[str]) -> list[str]:
 
 def _mean(values: Iterable[float | None]) -> float:
     return fmean(value for value in values if value is not None)
-
-
-def _head(titles: Sequence[str]) -> list[str]:
-    return [_line("scenario", titles), f"|{'---|' * (1 + len(titles))}"]
-
-
-def _line(first: str, cells: Iterable[str]) -> str:
-    return " | ".join([f"| {first}", *cells]) + " |"
 
 
 def _table(asked: str, again: Case, lines: Callable[[Rows], list[str]]) -> Table:
