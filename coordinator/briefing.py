@@ -43,6 +43,7 @@ class Briefing:
             strips=tuple(self.open_strip(record) for record in records),
             helpers=tuple(helper for helper in found if helper is not None),
             switch_margin=self._config.switch_margin,
+            price=sector.price / self._p_detect,
         )
 
     def expected_deadline_s(self) -> float:

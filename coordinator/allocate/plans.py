@@ -113,8 +113,12 @@ class Plans:
         home_s += ends_s
         may = home_s <= teams.lasts_s.take(one)[:, np.newaxis]
         may &= self.turn < 0
-        gained_m2 *= may
         ends_s += teams.run_out_s.take(one)[:, np.newaxis]
+        spent_s = np.minimum(ends_s, teams.deadline_s)
+        spent_s -= self.free_s[rows, one][:, np.newaxis]
+        spent_s *= teams.time_m2ps.take(one)[:, np.newaxis]
+        gained_m2 -= spent_s
+        gained_m2 *= may
         ahead = Ahead(one, at, ends_s, gained_m2, gained_m2 > 0)
         self._drop_out(teams, ahead)
         return ahead

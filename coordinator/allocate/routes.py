@@ -32,10 +32,11 @@ TOLERANCE_M2 = 1e-6
 
 @dataclass(frozen=True)
 class Routes:
-    """What helpers are to serve: by vehicle the numbers of strips in order, what all that removes by the deadline, and
-    of each of these strips the share that is flown by then."""
+    """What helpers are to serve: by vehicle the numbers of strips in order, what all that removes by the deadline,
+    what it counts with the time that is left then, and of each of these strips the share that is flown by then."""
 
     removed_m2: float
+    counts_m2: float
     strips: Mapping[str, tuple[int, ...]]
     shares: Mapping[int, float]
 
@@ -65,13 +66,14 @@ class RoutesAllocator:
             ((*situation.strips, task), [free if one.vehicle == free.vehicle else one for one in helpers])
             for task, free in freed
         ]
-        routes, *others = plan_each([(situation.strips, helpers), *turned_round], deadline_s, self.beam)
+        choices = [(situation.strips, helpers), *turned_round]
+        routes, *others = plan_each(choices, deadline_s, self.beam, situation.price)
         offers = {one.vehicle: routes.strips[one.vehicle][0] for one in situation.free if routes.strips[one.vehicle]}
         offers |= _to_idle(situation, offers)
         for (task, free), its_routes in zip(freed, others, strict=True):
             worth_m2 = removed_m2(task, free, expected_service(task, free), deadline_s)
             route = its_routes.strips[free.vehicle]
-            better_m2 = its_routes.removed_m2 - routes.removed_m2 - worth_m2
+            better_m2 = its_routes.counts_m2 - routes.counts_m2 - worth_m2
             is_better = route and better_m2 > situation.switch_margin * worth_m2
             if is_better and route[0] != task.strip.number and route[0] not in offers.values():
                 offers[free.vehicle] = route[0]
@@ -96,13 +98,13 @@ def plan_routes(strips: Sequence[OpenStrip], helpers: Sequence[Helper], deadline
     return routes
 
 
-def plan_each(choices: Sequence[Choice], deadline_s: float, beam: int) -> list[Routes]:
+def plan_each(choices: Sequence[Choice], deadline_s: float, beam: int, price: float = 0.0) -> list[Routes]:
     """The same for each of several choices, all for the same helpers but for where and when they are free. They are
     planned side by side, which hardly takes longer than one by itself, as there are few plans in a beam."""
     teams = [Team(strips, helpers, deadline_s) for strips, helpers in choices if strips and helpers]
-    found = iter(_planned(Teams(teams), beam) if teams else ())
+    found = iter(_planned(Teams(teams, price), beam) if teams else ())
     return [
-        next(found) if strips and helpers else Routes(0.0, {one.vehicle: () for one in helpers}, {})
+        next(found) if strips and helpers else Routes(0.0, 0.0, {one.vehicle: () for one in helpers}, {})
         for strips, helpers in choices
     ]
 
@@ -118,14 +120,15 @@ def _planned(teams: Teams, beam: int) -> list[Routes]:
     if len(teams.helpers) > 1:  # who had left the rest to others takes what those leave
         plans.is_done[:] = False
         plans = _to_deadline(plans, teams, len(sizes))
-    return [_told(team, route) for team, route in zip(teams.all, plans.routes(), strict=True)]
+    return [_told(team, route, teams.time_m2ps) for team, route in zip(teams.all, plans.routes(), strict=True)]
 
 
-def _told(team: Team, routes: Sequence[Sequence[int]]) -> Routes:
+def _told(team: Team, routes: Sequence[Sequence[int]], time_m2ps: FloatArray) -> Routes:
     """A team's routes by the numbers of its strips; `routes`: of each helper, by their places."""
     numbers = (tuple(team.strips[place].strip.number for place in route) for route in routes)
-    removed_m2, shares = team.flown(routes)
-    return Routes(removed_m2, dict(zip((one.vehicle for one in team.helpers), numbers, strict=True)), shares)
+    removed_m2, left_s, shares = team.flown(routes)
+    counts_m2 = removed_m2 + float(time_m2ps @ np.array(left_s))
+    return Routes(removed_m2, counts_m2, dict(zip((one.vehicle for one in team.helpers), numbers, strict=True)), shares)
 
 
 def _completed(teams: Teams, beam: int) -> tuple[Plans, list[list[int]]]:

@@ -93,7 +93,8 @@ class Situation:
 
     `deadline_s`: when the mission is expected to be over, infinite while nobody can tell. `strips`: the open ones.
     `helpers`: those that are there. `switch_margin`: share of a task's worth by which turning a helper round must be
-    better.
+    better. `price`: what a metre flown brings where strips are cut, as what they count per metre; 0 while nothing is
+    known of it.
     """
 
     now_s: float
@@ -101,6 +102,7 @@ class Situation:
     strips: tuple[OpenStrip, ...]
     helpers: tuple[Helper, ...]
     switch_margin: float = 0.2
+    price: float = 0.0
 
     @property
     def free(self) -> tuple[Helper, ...]:

@@ -62,16 +62,25 @@ class Team:
         self.alone_m2 = self.table[:, self.start, 3].max(axis=0)
         sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
         self.alone_s = sweeps_s + self._usual_way_s(self.table[:, :, 0])
+        self._takes_s = float(self.alone_s.mean()) * len(strips)
         rates = self.alone_m2 / self.alone_s
         self.later_m2ps = LATER_SHARE * float(rates.min())
         self.by_rate = np.argsort(-rates, kind="stable")
         self.rank = np.empty_like(self.by_rate)
         self.rank[self.by_rate] = places
 
-    def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, dict[int, float]]:
-        """What is removed by the deadline, and by number the share of each strip that is flown by then; `routes`: of
-        each helper, the strips' places."""
-        total_m2, shares = 0.0, {}
+    def time_m2ps(self, price: float) -> FloatArray:
+        """What a second is worth that a helper keeps, shape (helpers,). Where helpers have more time than strips take
+        each place is looked at again later. What such looks bring is told by the price, see `Situation`; it counts by
+        the share of the helpers' time that is left over."""
+        left_s = float(np.maximum(self.until_s - [one.free_s for one in self.helpers], 0.0).sum())
+        left_over = 1.0 - self._takes_s / left_s if self._takes_s < left_s else 0.0
+        return price * left_over * np.array([one.p_detect * one.speed_mps for one in self.helpers])
+
+    def flown(self, routes: Sequence[Sequence[int]]) -> tuple[float, list[float], dict[int, float]]:
+        """What is removed by the deadline, how much time is left to each helper then, and by number the share of each
+        strip that is flown by then; `routes`: of each helper, the strips' places."""
+        total_m2, left_s, shares = 0.0, list[float](), {}
         for one, route in enumerate(routes):
             at, now_s = self.start, self.helpers[one].free_s
             for place in route:
@@ -81,7 +90,8 @@ class Team:
                 shares[self.strips[place].strip.number] = share
                 total_m2 += worth_m2 * share
                 now_s = begins_s + sweep_s + self.run_out_s[one]
-        return total_m2, shares
+            left_s.append(max(0.0, float(self.until_s[one]) - now_s))
+        return total_m2, left_s, shares
 
     def _usual_way_s(self, to_begin_s: FloatArray) -> float:
         """The way to the strip that is nearest, as it mostly is; by the time from each helper's nodes to strips."""
@@ -99,19 +109,22 @@ class Teams:
     bring nothing.
 
     `table`, shape (teams * helpers * nodes, 4, strips), `way`, (teams * helpers * nodes, strips), `by_rate` and `rank`,
-    (teams, strips), `start` and `later_m2ps`, (teams,): see `Team`. `free_s`: shape (teams, helpers). `alone`:
+    (teams, strips), `start` and `later_m2ps`, (teams,): see `Team`. `free_s`: shape (teams, helpers). `time_m2ps`: see
+    `Team.time_m2ps`; what strips bring, and what time does behind all of them, is told beyond that. `alone`:
     `alone_s` and `alone_m2`, shape (teams, 2, strips), and in order of `by_rate` `alone_by_rate`; `later`: what comes
     behind all strips, shape (teams, 2).
     """
 
-    def __init__(self, teams: Sequence[Team]) -> None:
+    def __init__(self, teams: Sequence[Team], price: float = 0.0) -> None:
         self.all, self.helpers, self.deadline_s = teams, teams[0].helpers, teams[0].deadline_s
         self.strips, self.nodes = max(len(one.strips) for one in teams), max(one.nodes for one in teams)
         self.run_out_s, self.lasts_s, self.until_s = teams[0].run_out_s, teams[0].lasts_s, teams[0].until_s
         self.start = np.array([one.start for one in teams])
         self.free_s = np.array([[helper.free_s for helper in one.helpers] for one in teams], dtype=np.float64)
-        self.later_m2ps = np.array([one.later_m2ps for one in teams])
-        self.later = np.array([(HORIZON_S, HORIZON_S * one.later_m2ps) for one in teams])
+        self.time_m2ps = teams[0].time_m2ps(price)
+        usual_m2ps = float(self.time_m2ps.mean())
+        self.later_m2ps = np.array([max(0.0, one.later_m2ps - usual_m2ps) for one in teams])
+        self.later = np.array([(HORIZON_S, HORIZON_S * later_m2ps) for later_m2ps in self.later_m2ps.tolist()])
         table, way = _empty((len(teams), len(self.helpers), self.nodes), self.strips)
         self.by_rate = np.tile(np.arange(self.strips), (len(teams), 1))
         self.rank = self.by_rate.copy()
@@ -120,7 +133,8 @@ class Teams:
             own, nodes = len(one.strips), one.nodes
             table[number, :, :nodes, :, :own], way[number, :, :nodes, :own] = one.table, one.way
             self.by_rate[number, :own], self.rank[number, :own] = one.by_rate, one.rank
-            self.alone[number, :, :own] = one.alone_s, one.alone_m2
+            self.alone[number, 0, :own] = one.alone_s
+            self.alone[number, 1, :own] = np.maximum(one.alone_m2 - one.alone_s * usual_m2ps, 0.0)
             self.alone_by_rate[number, :, :own] = self.alone[number].take(one.by_rate, axis=1)
         self.table, self.way = table.reshape(-1, 4, self.strips), way.reshape(-1, self.strips)
 
