@@ -24,8 +24,8 @@ LEAST_S = 1e-9
 @dataclass(frozen=True, eq=False)
 class Ahead:
     """Who goes on in every plan, `next`, and from where, its row of the teams' table, `at`, both of shape (plans,); and
-    by every strip, shape (plans, strips): when the helper is free again, what is gained by the deadline, and whether
-    that is anything."""
+    by every strip, shape (plans, strips): when the helper is free again, what is gained by the deadline beyond what the
+    time is worth that it takes, and whether that is anything."""
 
     next: np.ndarray
     at: np.ndarray
@@ -51,14 +51,15 @@ class Plans:
     """Some plans, held in two arrays, `places` and `sums`, of which what follows are columns. `team`: shape (plans,),
     whose each is. `nodes`, `is_done`, `free_s`: shape (plans, helpers), where each helper is, whether it finds nothing
     any more or leaves the rest to others, when it is free; `turn`: shape (plans, strips), as the how manieth a strip is
-    served, from 0, times the number of helpers, and by which helper, -1 where by none; `removed_m2`: shape (plans,)."""
+    served, from 0, times the number of helpers, and by which helper, -1 where by none; `gained_m2`: what
+    all that gains, shape (plans,)."""
 
     def __init__(self, places: np.ndarray, sums: FloatArray) -> None:
         self.places, self.sums = places, sums
         helpers = sums.shape[1] - 1
         self.team, self.nodes = places[:, 0], places[:, 1 : helpers + 1]
         self.is_done, self.turn = places[:, helpers + 1 : 2 * helpers + 1], places[:, 2 * helpers + 1 :]
-        self.free_s, self.removed_m2 = sums[:, :-1], sums[:, -1]
+        self.free_s, self.gained_m2 = sums[:, :-1], sums[:, -1]
 
     @classmethod
     def begun(cls, teams: Teams) -> Plans:
@@ -137,9 +138,9 @@ class Plans:
             self.is_done[idle] = others.is_done
 
     def counts_m2(self, teams: Teams) -> FloatArray:
-        """What is removed, and what may be later in the time that is left to those who are done; shape (plans,)."""
+        """What is gained, and what may be later in the time that is left to those who are done; shape (plans,)."""
         spare_s = np.where(self.is_done, np.maximum(teams.until_s - self.free_s, 0.0), 0.0)
-        counts_m2: FloatArray = self.removed_m2 + teams.later_m2ps.take(self.team) * spare_s.sum(axis=1)
+        counts_m2: FloatArray = self.gained_m2 + teams.later_m2ps.take(self.team) * spare_s.sum(axis=1)
         return counts_m2
 
     def grown(self, teams: Teams, ahead: Ahead, beam: int, turn: int) -> tuple[Plans, np.ndarray, np.ndarray]:
@@ -202,7 +203,7 @@ class Plans:
         self.nodes[own, one] = teams.way.take(ahead.at.take(rows) * teams.strips + strips)
         self.free_s[own, one] = ahead.ends_s.take(places)
         self.turn[own, strips] = turn * len(teams.helpers) + one
-        self.removed_m2[own] += ahead.gained_m2.take(places)
+        self.gained_m2[own] += ahead.gained_m2.take(places)
 
     def _still_m2(self, teams: Teams, ahead: Ahead) -> FloatArray:
         """What the strips that are left may bring in the time that is left, shape (plans, strips + 1), if a plan goes

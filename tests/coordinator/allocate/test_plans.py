@@ -77,7 +77,7 @@ class TestAhead:
         teams, plans = begun()
         serve(teams, plans, 1, 0)
         assert plans.free_s.tolist() == [[pytest.approx(152.5), 10]]
-        assert plans.removed_m2 == pytest.approx([700])
+        assert plans.gained_m2 == pytest.approx([700])
         assert plans.turn.tolist() == [[-1, 0, -1]]
         assert plans.routes() == [[[1], []]]
         ahead = plans.ahead(teams)
@@ -85,7 +85,7 @@ class TestAhead:
         assert ahead.gained_m2[0] == pytest.approx(gains(BETA, FAR, BESIDE))
         serve(teams, plans, 2, 1)
         assert plans.turn.tolist() == [[-1, 0, 3]]
-        assert plans.removed_m2 == pytest.approx([700 + 800])
+        assert plans.gained_m2 == pytest.approx([700 + 800])
         assert plans.free_s.tolist() == [[pytest.approx(152.5), pytest.approx(365)]]
         ahead = plans.ahead(teams)
         assert ahead.next.tolist() == [0]
@@ -93,6 +93,15 @@ class TestAhead:
         assert ahead.gained_m2[0] == pytest.approx(gains(served(NEAR, ALPHA), FAR))
         serve(teams, plans, 0, 2)
         assert plans.routes() == [[[1, 0], [2]]]
+
+    def test_what_time_is_worth_is_taken_off_until_the_helper_is_free_again_or_the_mission_over(self) -> None:
+        # Of an hour a strip takes about 150 s, so that nearly all is left over.
+        teams = Teams([Team([NEAR], [ALPHA], 3600.0)], price=3.0)
+        (second_m2,) = teams.time_m2ps
+        assert Plans.begun(teams).ahead(teams).gained_m2[0] == pytest.approx([700 - 152.5 * second_m2])
+        late = Teams([Team([NEAR], [replace(ALPHA, free_s=40)], 150.0)], price=3.0)
+        late.time_m2ps[:] = 2.0
+        assert Plans.begun(late).ahead(late).gained_m2[0] == pytest.approx([700 * 0.6 - (150 - 40) * 2])
 
     @pytest.mark.parametrize(
         ("home", "lasts_until_s", "can"),
@@ -140,7 +149,7 @@ class TestAhead:
 class TestWhatPlansCount:
     def test_it_is_what_is_removed_and_what_the_time_of_those_who_are_done_may_bring(self) -> None:
         teams, plans = begun(4)
-        plans.removed_m2[:] = [100, 200, 300, 400]
+        plans.gained_m2[:] = [100, 200, 300, 400]
         plans.is_done[:] = [[0, 0], [1, 0], [0, 1], [1, 1]]
         plans.free_s[:] = [[5, 10], [85, 10], [5, 365], [400, 375]]  # nobody has time from 385 s on
         later_m2ps = float(teams.later_m2ps[0])
@@ -151,7 +160,7 @@ class TestWhatPlansCount:
 
     def test_the_most_promising_go_on_by_one_strip_or_leave_the_rest_to_others(self) -> None:
         teams, plans = begun(2)
-        plans.removed_m2[1], plans.nodes[1, 1] = 5000.0, 0  # it is ahead by all that the first may bring
+        plans.gained_m2[1], plans.nodes[1, 1] = 5000.0, 0  # it is ahead by all that the first may bring
         ahead = plans.ahead(teams)
         ranks = plans._still_m2(teams, ahead) + plans.counts_m2(teams)[:, np.newaxis]
         ranks[:, :-1] += ahead.gained_m2
@@ -166,7 +175,7 @@ class TestWhatPlansCount:
             assert every.is_done[place].tolist() == [int(left), 0]
             assert every.turn[place].tolist() == [4 * 2 if one == by else -1 for one in range(len(JOBS))]
             gained_m2, free_s = (0, 0) if left else (ahead.gained_m2[row, by], ahead.ends_s[row, by])
-            assert every.removed_m2[place] == pytest.approx(plans.removed_m2[row] + gained_m2)
+            assert every.gained_m2[place] == pytest.approx(plans.gained_m2[row] + gained_m2)
             assert every.free_s[place] == pytest.approx([free_s, 10])
         plans.is_done[:, 0] = True  # who is left leaves nothing to anybody
         ahead = plans.ahead(teams)
@@ -247,7 +256,7 @@ def test_plans_are_gone_on_with_by_what_brings_most_a_second() -> None:
     completion.take(Plans.begun(teams))
     ended = completion.ended()
     assert ended.routes() == [[[1, 0]]]
-    assert ended.removed_m2 == pytest.approx([1050 + 700])
+    assert ended.gained_m2 == pytest.approx([1050 + 700])
 
 
 @pytest.mark.parametrize("beam", [1, 3, 12])

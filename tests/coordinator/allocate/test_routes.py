@@ -138,8 +138,8 @@ class TestOneHelper:
         assert set(route) == {job.strip.number for job in jobs} - poor
 
     def test_without_strips_or_helpers_there_are_no_routes(self) -> None:
-        assert routes([], [helper()]) == Routes(0.0, {"alpha": ()}, {})
-        assert routes([NEAR], []) == Routes(0.0, {}, {})
+        assert routes([], [helper()]) == Routes(0.0, 0.0, {"alpha": ()}, {})
+        assert routes([NEAR], []) == Routes(0.0, 0.0, {}, {})
 
     @pytest.mark.parametrize(
         ("wait_s", "deadline_s", "order", "removed_m2"),
@@ -202,8 +202,10 @@ class TestWhatIsPromising:
         assert still_m2[0] == pytest.approx([*expected, 0.0])
 
     def test_what_is_begun_after_the_deadline_brings_nothing(self) -> None:
-        removed, shares = Team([NEAR, FAR], [helper()], 250).flown([[1, 0]])  # by number the far one is the first
+        # By number the far one is the first. Behind it nothing is left of the time.
+        removed, left_s, shares = Team([NEAR, FAR], [helper(), helper("beta")], 250).flown([[1, 0], []])
         assert removed == pytest.approx(700)
+        assert left_s == [0, 250]
         assert shares == {2: 1.0, 1: 0.0}
 
     def test_a_strip_takes_its_sweep_and_the_way_that_is_usual_where_helpers_have_unlike_many_ways_to_fly_it(
@@ -329,6 +331,62 @@ class TestSeveralHelpers:
         offers = PLAN.assign(asked)
         assert len(set(offers.values())) == len(offers)
         assert {one.vehicle for one in asked.free} <= set(offers) <= {one.vehicle for one in asked.helpers}
+
+
+class TestTimeToSpare:
+    """Where helpers have more time than strips take, it is worth what a metre brings."""
+
+    POOR = open_strip(strip(2, y_m=100), 200)
+    """On the way to the far one: 140 m2 for 100 s of a look and 52.5 s beside."""
+
+    @pytest.mark.parametrize(("deadline_s", "left_over"), [(400.0, 1 - 150 / 400), (150.0, 0.0), (100.0, 0.0)])
+    def test_a_second_is_worth_a_metres_price_by_speed_and_sensor_and_the_share_that_strips_leave(
+        self, deadline_s: float, left_over: float
+    ) -> None:
+        team = Team([NEAR], [helper()], deadline_s)  # 50 s to get there, 100 s on it
+        assert team.time_m2ps(3.0) == pytest.approx([3.0 * 2 * 0.7 * left_over])
+
+    def test_it_is_the_share_of_the_time_that_all_have_to_the_deadline_or_as_far_as_a_battery_lasts(self) -> None:
+        short = helper("beta", speed_mps=1.0, p_detect=0.4, lasts_until_s=300, free_s=100)
+        gone = helper("gamma", free_s=5000)
+        team = Team([NEAR, replace(NEAR, strip=strip(3))], [helper(), short, gone], 1000.0)
+        left_over = 1 - 2 * team.alone_s[0] / (1000 + 200)
+        assert team.time_m2ps(3.0) == pytest.approx([3 * 2 * 0.7 * left_over, 3 * 0.4 * left_over, 3 * 1.4 * left_over])
+
+    def test_strips_count_that_are_not_planned_with(self) -> None:
+        team = Team([open_strip(strip(number)) for number in range(1, 2 * MOST_STRIPS + 1)], [helper()], 10_000.0)
+        assert team.time_m2ps(1.0) == pytest.approx([1.4 * (1 - 2 * MOST_STRIPS * team.alone_s[0] / 10_000)])
+
+    def test_what_takes_more_than_it_brings_is_left_for_later(self) -> None:
+        # 152.5 s on the poor one; but it lies on the way, so that the far one is reached 52.5 s later than without.
+        choice: list[tuple[list[OpenStrip], list[Helper]]] = [([self.POOR, FAR], [helper()])]
+        (plain,) = plan_each(choice, 3600.0, BEAM)
+        (priced,) = plan_each(choice, 3600.0, BEAM, price=1.0)
+        assert plain.strips["alpha"] == (2, 1)
+        assert priced.strips["alpha"] == (1,)
+        second_m2 = Team(*choice[0], 3600.0).time_m2ps(1.0)[0]
+        assert priced.counts_m2 == pytest.approx(700 + (3600 - 402.5) * second_m2)
+        assert plain.counts_m2 == plain.removed_m2 == pytest.approx(840)
+
+    def test_a_free_helper_is_sent_to_the_best_and_if_there_is_nothing_else_to_what_is_not_worth_its_time(self) -> None:
+        asked = replace(situation([self.POOR, FAR], [helper()]), price=1.0)
+        assert PLAN.assign(replace(asked, price=0.0)) == {"alpha": 2}
+        assert PLAN.assign(asked) == {"alpha": 1}
+        assert PLAN.assign(replace(asked, strips=(self.POOR,))) == {"alpha": 2}
+
+    def test_a_helper_is_turned_round_for_what_saves_time(self) -> None:
+        # Its task lies 1500 m ahead; a strip at hand is worth as much, and leaves 1400 m for other looks.
+        busy = at_work(helper(), open_strip(strip(9, y_m=1500)))
+        asked = situation([NEAR], [replace(busy, refused=frozenset({9}))])
+        assert PLAN.assign(asked) == {}
+        assert PLAN.assign(replace(asked, price=1.0)) == {"alpha": 2}
+
+    def test_what_may_still_come_is_told_beyond_what_time_is_worth(self) -> None:
+        team = Team([NEAR, self.POOR], [helper(), helper("beta")], 3600.0)
+        teams = Teams([team], price=0.5)
+        second_m2 = teams.time_m2ps[0]
+        assert teams.alone[0, 1] == pytest.approx(np.maximum(team.alone_m2 - team.alone_s * second_m2, 0.0))
+        assert teams.later_m2ps == pytest.approx([max(0.0, team.later_m2ps - second_m2)])
 
 
 class TestTurningRound:
