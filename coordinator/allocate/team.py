@@ -62,7 +62,7 @@ class Team:
         self.alone_m2 = self.table[:, self.start, 3].max(axis=0)
         sweeps_s = np.array([one.sonar_on_s.min(axis=1) for one in tables]).min(axis=0)
         self.alone_s = sweeps_s + self._usual_way_s(self.table[:, :, 0])
-        self._takes_s = float(self.alone_s.mean()) * len(strips)
+        self._takes_s = float(self.alone_s[self.alone_m2 > 0].sum()) * len(strips) / count
         rates = self.alone_m2 / self.alone_s
         self.later_m2ps = LATER_SHARE * float(rates.min())
         self.by_rate = np.argsort(-rates, kind="stable")

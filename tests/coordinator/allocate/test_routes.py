@@ -357,6 +357,11 @@ class TestTimeToSpare:
         team = Team([open_strip(strip(number)) for number in range(1, 2 * MOST_STRIPS + 1)], [helper()], 10_000.0)
         assert team.time_m2ps(1.0) == pytest.approx([1.4 * (1 - 2 * MOST_STRIPS * team.alone_s[0] / 10_000)])
 
+    def test_strips_take_nothing_that_no_helper_is_offered(self) -> None:
+        refuses = [helper(refused=frozenset({1})), helper("beta", refused=frozenset({1, 2}))]
+        team = Team([NEAR, FAR], refuses, 1000.0)
+        assert team.time_m2ps(1.0) == pytest.approx([1.4 * (1 - team.alone_s[1] / 2000)] * 2)
+
     def test_what_takes_more_than_it_brings_is_left_for_later(self) -> None:
         # 152.5 s on the poor one; but it lies on the way, so that the far one is reached 52.5 s later than without.
         choice: list[tuple[list[OpenStrip], list[Helper]]] = [([self.POOR, FAR], [helper()])]
