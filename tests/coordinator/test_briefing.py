@@ -104,6 +104,13 @@ def test_a_strip_is_told_with_the_risk_that_counts_on_it() -> None:
     assert known.situation(60_000).helpers[0].refused == {1}
 
 
+def test_what_a_metre_brings_is_told_as_strips_are() -> None:
+    known = Known()
+    assert known.situation(60_000).price == 0
+    known.sector.price = 3.5
+    assert known.situation(60_000).price == pytest.approx(3.5 / 0.7)
+
+
 def test_what_a_helper_cannot_fly_it_is_not_to_be_offered_beside_what_it_has_refused() -> None:
     # The first strip runs north along 122.5 m, over the zone, the second along 222.5 m.
     corners = ((115.0, 150.0), (130.0, 150.0), (130.0, 160.0), (115.0, 160.0))
