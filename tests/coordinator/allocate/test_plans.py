@@ -99,8 +99,8 @@ class TestAhead:
         teams = Teams([Team([NEAR], [ALPHA], 3600.0)], price=3.0)
         (second_m2,) = teams.time_m2ps
         assert Plans.begun(teams).ahead(teams).gained_m2[0] == pytest.approx([700 - 152.5 * second_m2])
-        late = Teams([Team([NEAR], [replace(ALPHA, free_s=40)], 150.0)], price=3.0)
-        late.time_m2ps[:] = 2.0
+        late = Teams([Team([NEAR], [replace(ALPHA, free_s=400), replace(ALPHA, free_s=40)], 150.0)])
+        late.time_m2ps[:] = 5.0, 2.0
         assert Plans.begun(late).ahead(late).gained_m2[0] == pytest.approx([700 * 0.6 - (150 - 40) * 2])
 
     @pytest.mark.parametrize(
