@@ -19,7 +19,7 @@ from typing import Any
 import typer
 from pydantic import BaseModel
 
-from secondlook import installed_command
+from secondlook import rooms
 from secondlook.cli import app_for
 from secondlook.scenario import (
     Area,
@@ -285,7 +285,7 @@ def _option(shown: str, told: str) -> tuple[str, str, str]:
 
 # The map
 
-ROOMS = tuple(sorted((*installed_command.ROOMS, "secondlook")))
+ROOMS = tuple(sorted((*rooms.ROOMS, "secondlook")))
 BESIDE = {
     "bench": "Programs that measure, each by itself: `python -m bench.NAME`.",
     "docs": "These pages; the files are what makes some of them, and the site.",

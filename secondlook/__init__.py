@@ -24,7 +24,7 @@ def load(run: str | os.PathLike[str]) -> RecordedMission:
     where a file of the caller's is called like one of our packages and hides it.
     """
     # The command checks where the other rooms come from before it imports one; this package must not be ahead of it.
-    from secondlook.installed_command import check_rooms  # noqa: PLC0415
+    from secondlook.rooms import check_rooms  # noqa: PLC0415
 
     check_rooms()
     from secondlook.recorded import load_run  # noqa: PLC0415
@@ -50,7 +50,7 @@ def fly_sweep(
     many as there are cores if left out. Missions that fail are rows that say why. Raises
     `secondlook.errors.UserError`, in one sentence, for what cannot be flown so.
     """
-    from secondlook.installed_command import check_rooms  # noqa: PLC0415
+    from secondlook.rooms import check_rooms  # noqa: PLC0415
 
     check_rooms()
     from secondlook.sweeps.fly import fly_sweep as fly_it  # noqa: PLC0415
@@ -63,7 +63,7 @@ def load_sweep(folder: str | os.PathLike[str]) -> Sweep:
 
     Raises `secondlook.errors.UserError` for what is not the folder of a sweep, and as `load` does.
     """
-    from secondlook.installed_command import check_rooms  # noqa: PLC0415
+    from secondlook.rooms import check_rooms  # noqa: PLC0415
 
     check_rooms()
     from secondlook.sweeps.standings import load_sweep as load_it  # noqa: PLC0415
@@ -78,7 +78,7 @@ def check_mission(scenario: str | os.PathLike[str] | Scenario, settings: Sequenc
     `scenario`: a bundled scenario's name, a YAML file, or a scenario that is loaded. `settings`: KEY=VALUE each, for
     one that is not. Raises `secondlook.errors.UserError` for what is no valid scenario, and as `load` does.
     """
-    from secondlook.installed_command import check_rooms  # noqa: PLC0415
+    from secondlook.rooms import check_rooms  # noqa: PLC0415
 
     check_rooms()
     from secondlook.preflight import expected_mission  # noqa: PLC0415

@@ -12,8 +12,7 @@ import typer
 
 from secondlook.commands.left_out import REAL_TIME, is_number, with_value
 from secondlook.commands.many_missions import DASK, HERE, is_like_address
-from secondlook.errors import UserError
-from secondlook.installed_command import WRONG_USE
+from secondlook.errors import WRONG_USE, UserError
 
 COMMANDS = {
     "run": "run:run",

@@ -13,12 +13,12 @@ import typer
 from rich.console import Console
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.commands.many_missions import FAILED, Dask, Jobs, Tell, engine, fly_watched
+from secondlook.commands.many_missions import Dask, Jobs, Tell, engine, fly_watched
 from secondlook.compare.flights import Flown, contenders, fly_all
 from secondlook.compare.paired import OBJECTIVES, objective_of, verdict
 from secondlook.compare.standings import as_json as comparison_as_json
 from secondlook.compare.standings import failures, standings, table
-from secondlook.errors import UserError
+from secondlook.errors import FAILED, UserError
 from secondlook.files import CannotWriteError, write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.run_folder import make_new_folder

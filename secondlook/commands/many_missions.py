@@ -20,8 +20,6 @@ from secondlook.files import CannotWriteError
 from secondlook.launch.signals import signals_interrupt
 from secondlook.progress import shown_progress
 
-FAILED = 1
-"""The exit code where missions were flown, and something was wrong with one of them or with all."""
 Tell = Callable[[int, str], None]
 """Takes how many have been flown, and a remark about them or nothing."""
 

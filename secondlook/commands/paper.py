@@ -12,8 +12,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from secondlook.commands.many_missions import FAILED, Dask, Tell, engine, fly_watched, make_folder
-from secondlook.errors import UserError
+from secondlook.commands.many_missions import Dask, Tell, engine, fly_watched, make_folder
+from secondlook.errors import FAILED, UserError
 from secondlook.launch.processes import RunFailedError
 from secondlook.paper.measured import MeasuredMission, measure_all
 from secondlook.paper.published import PublishedMission, published_missions

@@ -22,7 +22,7 @@ from comms.wall.words import LARGEST_FACTOR
 from secondlook.commands.left_out import REAL_TIME
 from secondlook.commands.reading import REPORT, reading
 from secondlook.commands.scenarios import names_beginning_with
-from secondlook.errors import UserError
+from secondlook.errors import FAILED, UserError
 from secondlook.fleet.survey_area import SpacingFailedError
 from secondlook.launch.mission import LOGS, RunOptions, check_bodies, run_mission
 from secondlook.launch.processes import RunFailedError
@@ -69,9 +69,6 @@ def live_view(make_folder: Callable[[], Path], *, live: bool, web: bool) -> Iter
             with contextlib.suppress(KeyboardInterrupt):
                 sys.stderr.write(f"Still shown, until Ctrl-C, at\n{server.page}\n")
                 server.wait()
-
-
-MISSION_FAILED = 1
 
 
 class BusName(StrEnum):
@@ -177,7 +174,7 @@ def run(
         unreported = "" if no_record or no_report else _report(folder, quiet=bool(failure), shown=not as_json)
         is_well = _tell_end(folder, summary, failure, unreported, as_json=as_json)
     if not is_well:
-        raise typer.Exit(MISSION_FAILED)
+        raise typer.Exit(FAILED)
 
 
 def _tell_end(folder: Path, summary: dict[str, Any], failure: str, unreported: str, *, as_json: bool) -> bool:

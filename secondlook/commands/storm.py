@@ -14,9 +14,9 @@ from typing import Annotated
 import typer
 
 from comms.said.announcement import LARGEST_SEED
-from secondlook.commands.many_missions import FAILED, Jobs, Tell, fly_watched, make_folder
+from secondlook.commands.many_missions import Jobs, Tell, fly_watched, make_folder
 from secondlook.engine.work_process import Lost, WorkProcess
-from secondlook.errors import UserError
+from secondlook.errors import FAILED, UserError
 from secondlook.files import write_whole
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import Bus

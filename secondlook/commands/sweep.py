@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from secondlook.commands.many_missions import FAILED, Dask, Jobs, Tell, engine, fly_watched
-from secondlook.errors import UserError
+from secondlook.commands.many_missions import Dask, Jobs, Tell, engine, fly_watched
+from secondlook.errors import FAILED, UserError
 from secondlook.sweeps.fly import LIMIT_S, fly_missing
 from secondlook.sweeps.page import write_page
 from secondlook.sweeps.plan import SweepPlan, load_sweep_plan, seeds_of, varied

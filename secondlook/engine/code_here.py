@@ -8,7 +8,7 @@ import platform
 from importlib.metadata import version
 from pathlib import Path
 
-from secondlook.installed_command import HOME, ROOMS
+from secondlook.rooms import HOME, ROOMS
 
 Code = dict[str, str]
 """By what it is, such as a room or `numpy`, its version; of ours a hash of what the files say."""

@@ -23,7 +23,7 @@ from comms.wall.access import access_rules
 from comms.wall.host import WallHost
 from comms.wall.hub import WallHub
 from comms.wall.seats import ListenerSeat, NodeSeat, Seat
-from secondlook.errors import UserError
+from secondlook.errors import FAILED, UserError
 from secondlook.files import room_kept, write_whole
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.link import deck_ms_of
@@ -45,8 +45,6 @@ from secondlook.recorded.summary import summarise
 from secondlook.report import write_report
 from secondlook.scenario import Scenario
 from secondlook.scenario.vehicle import ROUTER
-
-FAILED = 1
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,12 @@ import threading
 import time
 from collections.abc import Sequence
 
+from secondlook.errors import FAILED, WRONG_USE
 from secondlook.launch.restarts import Restarts
 from secondlook.launch.signals import signals_ask
 
 SUPERVISOR_FD, STARTS = "SECONDLOOK_SUPERVISOR_FD", "SECONDLOOK_STARTS"  # environment variables of the process
 OVER, AGAIN = b"over\n", b"again\n"  # what it says
-FAILED, WRONG_USE = 1, 2
 
 
 class Supervisor:

@@ -15,10 +15,10 @@ from types import FrameType
 from comms.awake_clock import AwakeClock
 from comms.errors import Stop
 from comms.node import Node, Received, Step
+from secondlook.errors import FAILED
 
 GRACE_S = 5.0  # for a call to heed its interruption, before the process is ended
 _LOOKS = 20  # within the patience
-_FAILED = 1  # exit code
 
 
 class NoReturn(Stop):
@@ -75,7 +75,7 @@ class Watchdog:
             elif now_s - since_s >= self._patience_s + GRACE_S:
                 sys.stderr.write(f"{self._sentence(what)}, and cannot be interrupted\n")
                 sys.stderr.flush()
-                os._exit(_FAILED)
+                os._exit(FAILED)
             elif now_s - since_s >= self._patience_s:
                 self._overdue = seen
                 signal.pthread_kill(self._main, signal.SIGALRM)

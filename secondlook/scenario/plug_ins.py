@@ -18,7 +18,7 @@ from coordinator.allocate.allocators import ALLOCATORS
 from planner.profile_spacing import JointSpacing, ProfileSpacing
 from planner.spacing_planners import AdaptiveSpacing, FixedSpacing
 from secondlook.errors import UserError
-from secondlook.installed_command import ROOMS, hidden_in
+from secondlook.rooms import ROOMS, hidden_in
 
 _OWN = re.compile(r"([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*):([A-Za-z_]\w*)")
 

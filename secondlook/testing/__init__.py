@@ -4,7 +4,7 @@ The fixtures come with the pytest plugin, `secondlook.pytest_plugin`.
 """
 # ruff: noqa: E402 - a file of the user's may lie in a room's way: that is told before anything of a room is imported
 
-from secondlook.installed_command import check_rooms
+from secondlook.rooms import check_rooms
 
 check_rooms()
 

@@ -11,7 +11,7 @@ from called import Call
 
 import secondlook
 from comms import errors
-from secondlook.installed_command import ROOMS
+from secondlook.rooms import ROOMS
 
 # As where the project is installed plainly: the finder of an editable installation would put our rooms first.
 PLAIN = """

@@ -15,7 +15,7 @@ from secondlook.engine.dask_cluster import dask_cluster
 from secondlook.engine.engine import Engine, EngineError, OtherCodeError, do_all
 from secondlook.engine.work_process import Lost
 from secondlook.errors import UserError
-from secondlook.installed_command import HOME, ROOMS
+from secondlook.rooms import HOME, ROOMS
 
 PIECES = 60
 TAKES_MS = 100
@@ -83,7 +83,7 @@ class TestChanges:
 
 
 def test_a_scheduler_that_stays_away_is_told(processes: DaskProcesses, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cluster_module, "PATIENCE_S", 3.0)
+    monkeypatch.setattr(cluster_module, "PATIENCE_S", 8.0)
     processes.start_worker()
     with dask_cluster(processes.address, 1) as engine:
         done = Done(engine)
