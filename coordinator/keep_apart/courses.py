@@ -4,7 +4,7 @@ vehicles on their courses come too close to each other."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -29,16 +29,47 @@ ON_TRACK_M = 2.0
 
 
 @dataclass(frozen=True, eq=False)
+class Sails:
+    """How a vehicle sails paths that follow each other from `start_s` on, for `sails_s`, and then in a circle. `still_mps`:
+    what it makes through the water. `knots`: in a current, how far it has come when, both of shape (n,), else None."""
+
+    start_s: float
+    still_mps: float
+    paths: tuple[DubinsPath, ...]
+    circle: DubinsPath
+    sails_s: float
+    knots: tuple[FloatArray, FloatArray] | None
+
+    def way_m(self, sails_for_s: FloatArray) -> FloatArray:
+        """How far it has come after some times; shape as theirs."""
+        still_m: FloatArray = self.still_mps * sails_for_s
+        if self.knots is None:
+            return still_m
+        return np.interp(sails_for_s, *self.knots) + np.maximum(still_m - self.still_mps * self.sails_s, 0.0)
+
+    def pose_at(self, time_s: float) -> Pose:
+        """Where it is."""
+        left_m = float(self.way_m(np.array(time_s - self.start_s)))
+        for path in self.paths:
+            if left_m < path.length_m:
+                return path.pose_at(left_m)
+            left_m -= path.length_m
+        return self.circle.pose_at(left_m)
+
+
+@dataclass(frozen=True, eq=False)
 class Course:
     """`poses[k]`, shape (n, 3), is where the vehicle is `first + k` steps after the mission's start: x_m, y_m,
-    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle. `pose_at`: the same at
-    any time in s, between the steps exactly; before `start_s` as then."""
+    heading_rad, mission frame. `arrives_s`: when it has sailed its paths, and begins to circle. `sails`: tells the pose
+    at any time in s, between the steps exactly; before `start_s` as then."""
 
     start_s: float
     first: int
     poses: FloatArray
     arrives_s: float
-    pose_at: Callable[[float], Pose]
+    sails: Sails
+    late_s: float = 0.0
+    """By so much it is later than `sails` tells."""
     _asked: dict[float, Pose] = field(default_factory=dict)
     """What was asked for last, as many courses are laid against one at one time."""
 
@@ -51,7 +82,7 @@ class Course:
         """Where the vehicle is; before its start and after its last step as then."""
         if time_s not in self._asked:
             self._asked.clear()
-            self._asked[time_s] = self.pose_at(min(time_s, (self.end - 1) * STEP_S))
+            self._asked[time_s] = self.sails.pose_at(min(time_s, (self.end - 1) * STEP_S) - self.late_s)
         return self._asked[time_s]
 
     def later(self, steps: int) -> Course:
@@ -61,7 +92,7 @@ class Course:
             self,
             poses=np.concatenate([waiting, self.poses]),
             arrives_s=self.arrives_s + late_s,
-            pose_at=lambda time_s: self.pose_at(time_s - late_s),
+            late_s=self.late_s + late_s,
             _asked={},
         )
 
@@ -77,43 +108,32 @@ def course(
     """The course from a pose at a time, along paths that follow each other, and then in a circle to starboard, or to
     port where there is only room for that; of paths that take longer than LONGEST_S no more than that."""
     first = math.ceil(start_s / STEP_S)
-    speed_mps, still = sailing.speed_mps, sailing.is_in_still_water
-    knots_s, knots_m = sailing.knots(() if still else paths)
-    sails_s = sum(path.length_m for path in paths) / speed_mps if still else float(knots_s[-1])
+    speed_mps, knots = sailing.speed_mps, None
+    sails_s = sum(path.length_m for path in paths) / speed_mps
+    if not sailing.is_in_still_water:
+        knots = sailing.knots(paths)
+        sails_s = float(knots[0][-1])
     lasts_s = min(sails_s + AHEAD_S, LONGEST_S)
     end = paths[-1].pose_at(paths[-1].length_m) if paths else start
     side = keep_out.circling(end, turn_radius_m) or 1
     circle = DubinsPath(end, turn_radius_m, (side, 0, 0), (speed_mps * (AHEAD_S + STEP_S), 0.0, 0.0))
-
-    def way_m(sails_for_s: FloatArray) -> FloatArray:
-        still_m: FloatArray = speed_mps * sails_for_s
-        if still:
-            return still_m
-        return np.interp(sails_for_s, knots_s, knots_m) + np.maximum(still_m - speed_mps * sails_s, 0.0)
-
-    def pose_at(time_s: float) -> Pose:
-        left_m = float(way_m(np.array(time_s - start_s)))
-        for path in paths:
-            if left_m < path.length_m:
-                return path.pose_at(left_m)
-            left_m -= path.length_m
-        return circle.pose_at(left_m)
-
+    sails = Sails(start_s, speed_mps, tuple(paths), circle, sails_s, knots)
     times_s = STEP_S * np.arange(first, first + math.ceil(lasts_s / STEP_S), dtype=np.float64)
-    ways_m, parts, done, done_m = way_m(times_s - start_s), [], 0, 0.0
+    ways_m, parts, done, done_m = sails.way_m(times_s - start_s), [], 0, 0.0
     for path in paths:
         to = int(np.searchsorted(ways_m, done_m + path.length_m))
         if to > done:
             parts.append(path.poses_at(ways_m[done:to] - done_m))
         done, done_m = to, done_m + path.length_m
     poses = np.concatenate([*parts, circle.poses_at(ways_m[done:] - done_m)])
-    return Course(start_s, first, poses, start_s + sails_s, pose_at)
+    return Course(start_s, first, poses, start_s + sails_s, sails)
 
 
 def lying_still(pose: Pose, from_s: float) -> Course:
     """The course of a vehicle that has not been under way yet."""
     poses = np.tile(np.array(pose, dtype=np.float64), (math.ceil(AHEAD_S / STEP_S), 1))
-    return Course(from_s, math.ceil(from_s / STEP_S), poses, from_s, lambda _: pose)
+    lies = DubinsPath(pose, 1.0, (0, 0, 0), (0.0, 0.0, 0.0))
+    return Course(from_s, math.ceil(from_s / STEP_S), poses, from_s, Sails(from_s, 0.0, (), lies, 0.0, None))
 
 
 def survey_course(

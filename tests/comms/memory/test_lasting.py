@@ -105,6 +105,7 @@ def test_killed_after_any_steps_it_says_what_it_would_have_said(node_id: str, da
                 assert node.is_taken_up == (place > 0)
                 for step in steps[place:until]:
                     said += take(node, step)
+                assert node._can_be_pickled is not False
                 shutil.copytree(Path(top) / str(life), Path(top) / str(life + 1))  # what a kill now leaves behind
             place = until
     assert said == [one for step in steps for one in step.said]
