@@ -20,6 +20,8 @@ from planner.types import Strip
 from planner.way_home import MARGIN_S
 
 AT_WORK = (StripState.ACCEPTED, StripState.UNDER_WAY)
+STAYS_MS = 10_000
+"""So long who was sent to a strip is not turned round: two might else be sent and called back in turns, without end."""
 
 
 class Briefing:
@@ -111,7 +113,12 @@ class Briefing:
             p_detect=entry.p_detect,
             lasts_until_s=(vehicle.heard_ms + state.battery * entry.endurance_ms - entry.reserve_ms) / 1000 - MARGIN_S,
             sweeping=record is not None
-            and (vehicle.silent or record is following or record.state is StripState.UNDER_WAY),
+            and (
+                vehicle.silent
+                or record is following
+                or record.state is StripState.UNDER_WAY
+                or now_ms - vehicle.offers[record.strip.number].offered_ms < STAYS_MS
+            ),
             refused=frozenset(one.strip.number for one in open_strips if vehicle.is_not_for_it(one)),
             keep_out=vehicle.keep_out,
             heard_s=vehicle.heard_ms / 1000,

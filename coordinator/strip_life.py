@@ -91,7 +91,7 @@ class StripLife:
         ends_ms = round(expected.ends_s * 1000)
         due_ms = ends_ms + round(LATE_SHARE * (ends_ms - now_ms)) + self._late_ms
         levels = self._fleet.levels(name, record.window)
-        vehicle.offers[number] = Offer(record.strip, record.cut, expected, due_ms, levels)
+        vehicle.offers[number] = Offer(record.strip, record.cut, expected, due_ms, levels, now_ms)
         if as_next:
             vehicle.agreed_next = 0
             self._move(record, StripState.NEXT, now_ms, f"offered to {name} as its next", name)

@@ -99,13 +99,14 @@ MOST_UNANSWERED = 10  # offers in a row, of which under bad water some are lost
 @dataclass(frozen=True)
 class Offer:
     """A strip as a vehicle was offered it: what it was cut from, how the service is expected to go, until when it is
-    waited for, and what the vehicle's own layer told then of the cells that the strip was cut from."""
+    waited for, what the vehicle's own layer told then of the cells that the strip was cut from, and when that was."""
 
     strip: Strip
     cut: Cut
     service: Service
     due_ms: int
     levels_before: LevelArray
+    offered_ms: int
 
 
 @dataclass

@@ -132,7 +132,7 @@ def at_work(known: Known) -> StripRecord:
     )
     for record, ends_s in ((present, 200.0), (then, 400.0)):
         service = Service(ends_s - 150, ends_s, Pose(record.strip.start[0], 350, 0), ends_s + 5)
-        offer = Offer(record.strip, record.cut, service, 999_000, LEVELS)
+        offer = Offer(record.strip, record.cut, service, 999_000, LEVELS, 50_000)
         known.fleet.vehicles[HELPER].offers[record.strip.number] = offer
     known.ledger.move(present, StripState.OFFERED, 0, "", HELPER)
     known.ledger.move(present, StripState.ACCEPTED, 0, "", HELPER)

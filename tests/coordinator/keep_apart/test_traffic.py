@@ -47,7 +47,7 @@ def at(one: KnownVehicle, mode: Mode, y_m: float, works_on: int = 0, x_m: float 
 def helper() -> KnownVehicle:
     """One that was offered a strip: else it has not been under way, and lies still."""
     service, nothing = Service(30, 80, Pose(0, 125, NORTH), 82), np.zeros((20, 10), dtype=np.uint8)
-    offer = Offer(SERVED, Cut(Window(0, 20, 0, 10), 1000, 1000), service, 200_000, nothing)
+    offer = Offer(SERVED, Cut(Window(0, 20, 0, 10), 1000, 1000), service, 200_000, nothing, 0)
     return KnownVehicle(vehicle("helper", Role.REVISIT), 0, offers={SERVED.number: offer})
 
 
