@@ -30,8 +30,9 @@ ON_TRACK_M = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Sails:
-    """How a vehicle sails paths that follow each other from `start_s` on, for `sails_s`, and then in a circle. `still_mps`:
-    what it makes through the water. `knots`: in a current, how far it has come when, both of shape (n,), else None."""
+    """How a vehicle sails paths that follow each other from `start_s` on, for `sails_s`, and then in a circle.
+    `still_mps`: what it makes through the water. `knots`: in a current, how far it has come when, both of shape (n,),
+    else None."""
 
     start_s: float
     still_mps: float

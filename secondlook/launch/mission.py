@@ -27,7 +27,7 @@ from secondlook.files import CannotWriteError, passing_folder, room_kept, write_
 from secondlook.fleet.build import Fleet, build_fleet
 from secondlook.fleet.link import deck_ms_of, modem_configs
 from secondlook.fleet.nodes import OBSERVER, RECORDER, NodeSpec, make_node, node_spec
-from secondlook.launch.processes import Processes, RunFailedError
+from secondlook.launch.processes import Processes, RunFailedError, RunInterruptedError
 from secondlook.launch.run_display import ending_of
 from secondlook.launch.run_folder import log_to_file
 from secondlook.launch.signals import Interruption, WholeMessages, signals_interrupt
@@ -134,7 +134,7 @@ def run_mission(scenario: Scenario, options: RunOptions) -> dict[str, Any]:
     except CannotWriteError as error:
         failure = failure or str(error)
     if failure is not None:
-        raise RunFailedError(failure)
+        raise RunInterruptedError(failure) if ending == "interrupted" else RunFailedError(failure)
     return summary
 
 

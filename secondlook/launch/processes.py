@@ -38,6 +38,10 @@ class RunFailedError(Exception):
     """The mission has failed; the text is one sentence."""
 
 
+class RunInterruptedError(RunFailedError):
+    """The same, as somebody wanted it to end."""
+
+
 class Processes:
     """The processes of one run over Zenoh. Use as a context: on leaving it, none of them is left.
 

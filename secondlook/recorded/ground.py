@@ -65,12 +65,12 @@ class RiskMap:
         return risk_statistics(self.risk, self.seen, self.inside)
 
     def at(self, x_m: FloatArray | float, y_m: FloatArray | float) -> FloatArray:
-        """The risk of the cells that hold these places (mission frame); NaN outside the grid."""
+        """The risk of the cells that hold these places (mission frame); NaN outside the grid, and for no place."""
         across_m, along_m = self.grid.frame.to_sweep(np.asarray(x_m), np.asarray(y_m))
-        columns = np.floor(across_m / self.grid.cell_m + 0.5).astype(int)
-        rows = np.floor(along_m / self.grid.cell_m).astype(int)
+        columns, rows = np.floor(across_m / self.grid.cell_m + 0.5), np.floor(along_m / self.grid.cell_m)
         on_grid = (columns >= 0) & (columns < self.grid.columns) & (rows >= 0) & (rows < self.grid.rows)
-        return np.where(on_grid, self.risk[np.where(on_grid, rows, 0), np.where(on_grid, columns, 0)], np.nan)
+        row, column = (np.where(on_grid, places, 0).astype(int) for places in (rows, columns))
+        return np.where(on_grid, self.risk[row, column], np.nan)
 
     def mean_within(self, geometry: BaseGeometry) -> float:
         """Mean risk of the cells inside the area whose centres lie within a geometry (mission frame) and not on its

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from comms.said.announcement import RunInfo
-from comms.said.messages import CoverageTile, Mode
+from comms.said.messages import AgentState, CoverageTile, Mode, Plan
 from planner.types import FloatArray
 from secondlook.recorded import Activity, RecordedMission, RiskMap
 from secondlook.recorded.metrics import Metrics
@@ -33,7 +33,7 @@ class RiskSample:
 @dataclass(frozen=True)
 class RiskSeries:
     """`samples`: from the start to the end, evenly spaced; fewer of a map with very many cells. `before`, `after`: the
-    map at the end by the primaries alone and by all."""
+    map at the end without second looks and with all."""
 
     samples: list[RiskSample]
     before: RiskMap
@@ -48,13 +48,14 @@ def risk_series(mission: RecordedMission) -> RiskSeries:
     metrics = Metrics()
     samples: list[RiskSample] = []
     # In the order of sending: a recorder that came late has heard of the run after other things.
-    for received in sorted(mission.received(RunInfo, CoverageTile), key=lambda one: one.header.order):
+    for received in sorted(mission.received(RunInfo, Plan, AgentState, CoverageTile), key=lambda one: one.header.order):
         while received.header.sent_ms / 1000 > times_s[len(samples)]:
             samples.append(_sample(metrics, times_s[len(samples)]))
         metrics.hear(received)
     samples += [_sample(metrics, t_s) for t_s in times_s[len(samples) :]]
-    before, after = (RiskMap.of(mission.end_s, metrics, vehicles) for vehicles in (mission.primaries, None))
-    return RiskSeries(samples, before, after)
+    after = RiskMap.of(mission.end_s, metrics)
+    risk, seen = metrics.map_primary_alone()
+    return RiskSeries(samples, replace(after, risk=risk, seen=seen), after)
 
 
 def _sample(metrics: Metrics, t_s: float) -> RiskSample:

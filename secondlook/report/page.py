@@ -20,6 +20,7 @@ import numpy as np
 from markupsafe import Markup
 
 from comms.said.messages import StripState
+from planner.contacts import LISTED_FROM
 from planner.footprints import footprint_of
 from secondlook.files import write_whole
 from secondlook.recorded import RecordedMission, RiskMap, StripRecord, load_run
@@ -149,6 +150,7 @@ def _flown(mission: RecordedMission) -> dict[str, Any]:
         "mines": mission.summary.get("mines"),
         "goal": mission.summary.get("goal"),
         "targets": _targets(mission, after),
+        "listed_from": LISTED_FROM,
         "at_odds": mission.summary.get("at_odds"),
         "log": log,
     }

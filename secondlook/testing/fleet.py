@@ -18,6 +18,7 @@ from comms.session import PATIENCE_S
 from secondlook.errors import UserError
 from secondlook.fleet.build import build_fleet
 from secondlook.launch.mission import Bus, Made, RunOptions, run_mission
+from secondlook.launch.processes import RunInterruptedError
 from secondlook.recorded.mission_files import NOT_FOR_PEOPLE
 from secondlook.recorded.observer import RunStopped
 from secondlook.scenario import Scenario, load_scenario, make_scenario
@@ -225,7 +226,10 @@ class Fleet(Trouble):
                 outages=self.outages,
                 lasts=False,
             )
-            summary = run_mission(self.scenario, options)
+            try:
+                summary = run_mission(self.scenario, options)
+            except RunInterruptedError as error:  # that is for who flies it, not one more failed mission
+                raise KeyboardInterrupt(str(error)) from None
         if watch.error is not None:
             raise watch.error
         watch.check_all_repeated()

@@ -16,7 +16,7 @@ from comms.said.messages import AgentState, Mode, Plan, PlannedTrack, StripState
 from coordinator.allocate.service import Service
 from coordinator.allocate.simple import GreedyAllocator
 from coordinator.allocate.situation import Situation
-from coordinator.briefing import Briefing
+from coordinator.briefing import STAYS_MS, Briefing
 from coordinator.config import CoordinatorConfig
 from coordinator.cut.strips import Cut
 from coordinator.cut.window import Window
@@ -138,6 +138,13 @@ def at_work(known: Known) -> StripRecord:
     known.ledger.move(present, StripState.ACCEPTED, 0, "", HELPER)
     known.heard(HELPER, Mode.REVISIT, works_on=1, end_ms=200_000)
     return then
+
+
+def test_who_was_sent_to_a_strip_is_not_turned_round_at_once() -> None:
+    known = Known()
+    at_work(known)  # since 50 s
+    for now_ms, stays in ((50_000, True), (50_000 + STAYS_MS - 1, True), (50_000 + STAYS_MS, False)):
+        assert known.situation(now_ms).helpers[0].sweeping == stays
 
 
 def test_a_helper_that_is_free_soon_is_told_as_free_from_there_and_then_and_with_a_next_strip_after_that() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from comms.said.messages import AgentState, CoverageTile, Hotspot, Mode, Plan, S
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.scenario.vehicle import Start
+from secondlook.testing import Fleet
 
 LONGER = ("area.polygon_m=[[0, 0], [300, 0], [300, 400], [0, 400]]", "coordinator.worth_risk=0.1")
 BRIEF = Path(__file__).parents[2] / "support" / "brief.yaml"
@@ -55,6 +57,54 @@ def alone() -> Flown:
 @pytest.fixture(scope="module")
 def parts() -> Flown:
     return fly_scenario(on_parts(3))
+
+
+AGAIN_AND_AGAIN = {
+    "name": "again-and-again",
+    "area": {
+        "polygon_m": [[0, 0], [700, 0], [700, 400], [0, 400]],
+        "keep_out_m": [[[300, 150], [360, 150], [360, 230], [300, 230]]],
+        "priorities": [{"polygon_m": [[500, 0], [700, 0], [700, 400]], "weight": 4}],
+    },
+    "current": {"set_deg": 45, "drift_mps": 0.4, "period_s": 900},
+    "mission": {"deadline_factor": 1.3},
+    "vehicles": {
+        name: {
+            "role": "survey",
+            "part": f"{part} of 2",
+            "revisits": True,
+            "start": {"x_m": x_m, "y_m": -40},
+            "speed_mps": 1.5,
+            "turn_radius_m": 20,
+            "endurance_s": 36_000,
+            "nadir_gap_m": 20,
+            "range_m": 80,
+            "sensor": {"curve": "muscle"},
+        }
+        for part, (name, x_m) in enumerate((("a", -40), ("b", 740)), 1)
+    }
+    | {
+        name: {
+            "role": "revisit",
+            "start": {"x_m": x_m, "y_m": -60},
+            "speed_mps": 2,
+            "turn_radius_m": 6,
+            "endurance_s": 14_400,
+            "sensor": {"p_detect": 0.7, "range_m": 25},
+        }
+        for name, x_m in (("h", -20), ("g", 720))
+    },
+}
+
+
+def test_two_vehicles_are_not_sent_and_called_back_in_turns(tmp_path: Path) -> None:
+    """What once kept a mission at 1933 s: each was called back for what the other had just been sent to."""
+    fleet = Fleet(AGAIN_AND_AGAIN, folder=tmp_path)
+    fleet.kill("coordinator", at_s=500)
+    fleet.join("coordinator", at_s=700, memory=True)
+    flight = fleet.run()
+    sent = Counter(one.header.sent_ms // 10_000 for one in flight.heard if isinstance(one.message, Task))
+    assert max(sent.values()) <= 2 * len(flight.scenario.vehicles)
 
 
 class TestAPrimaryThatRevisits:

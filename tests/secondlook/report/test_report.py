@@ -24,6 +24,7 @@ from hypothesis import strategies as st
 import secondlook
 from comms.said.codec import Header, encode
 from comms.said.messages import Mode, StripState
+from planner.contacts import LISTED_FROM
 from planner.types import GridSpec, Strip, SweepFrame
 from secondlook import cli
 from secondlook.errors import UserError
@@ -86,6 +87,8 @@ def test_what_it_says_is_what_the_summary_says(page: Page, mission: RecordedMiss
     assert f"{summary['truth']['predicted_missed_share']:.0%}".replace("%", " % were to be expected") in page.told
     mines = summary["mines"]
     assert f"{mines['left']:.0f} may be left: {mines['left_low']} to {mines['left_high']} with 90 %" in page.told
+    assert f"none with {mines['none_left']:.1%}".replace("%", " %") in page.told
+    assert f"a chance of {LISTED_FROM:g} or more to be one" in page.told
     assert summary["digest"] in page.told
     assert f"secondlook {summary['version']}" in page.told
     assert f"seed 3, SHA-256 {mission.run.scenario_sha256}" in page.told
@@ -135,11 +138,14 @@ def test_a_run_that_was_cut_off_is_told_as_far_as_it_came(brief_run: Path, share
 
 def test_a_failure_comes_first(brief_copy: Path) -> None:
     summary = json.loads((brief_copy / "summary.json").read_text())
-    for ending, told in (("failed", "This run failed."), ("interrupted", "This run was interrupted.")):
-        said = {"ending": ending, "failure": "helper has died", "digest": None}
+    for ending, failure, told in (
+        ("failed", "helper has died", "This run failed. helper has died."),
+        ("interrupted", "interrupted at 12 s of the mission", "This run was interrupted at 12 s of the mission."),
+    ):
+        said = {"ending": ending, "failure": failure, "digest": None}
         (brief_copy / "summary.json").write_text(json.dumps(summary | said))
         page = Page(report_page(secondlook.load(brief_copy)))
-        assert f"{told} helper has died. What follows is what had happened until then." in page.told
+        assert f"{told} What follows is what had happened until then." in page.told
         assert "The digest is a hash" not in page.told
 
 
@@ -224,6 +230,16 @@ def test_a_mission_by_the_wall_clock_is_flown_again_by_it() -> None:
     by_wall = announced("tellaro", 7)
     by_wall.summary = {"factor": 20.0}
     assert command_to_reproduce(by_wall) == "secondlook run tellaro --real-time 20"
+
+
+def test_what_a_primary_sees_again_is_not_of_the_survey(tmp_path: Path) -> None:
+    longer = ("vehicles.primary.revisits=true", "mission.deadline_factor=2", "coordinator.worth_risk=0.1")
+    summary = run_mission(load_scenario(str(BRIEF), longer), RunOptions(tmp_path, bus="local"))
+    mission = secondlook.load(tmp_path)
+    survey, series = summary["risk_primary_alone"], risk_series(mission)
+    assert mission.risk(vehicles=mission.primaries).statistics.mean < survey["mean"] - 1e-4, "it has seen some again"
+    assert series.before.statistics.mean == pytest.approx(survey["mean"], abs=1e-6)
+    assert f"from {survey['mean']:.2f} down to" in Page(report_page(mission)).told
 
 
 def test_the_series_is_the_risk_at_each_time(mission: RecordedMission) -> None:

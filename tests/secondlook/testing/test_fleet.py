@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -129,6 +130,15 @@ class TestRunUntil:
             fleet.run()
         assert "the mission does not repeat: after " in str(caught.value)
         assert "coord/task/helper/1 from coordinator at 0.003" in str(caught.value)
+
+    def test_ctrl_c_is_for_who_flies_it(self, brief: MakeFleet) -> None:
+        def interrupts(heard: Heard) -> bool:
+            if heard.now_s > 5:
+                signal.raise_signal(signal.SIGINT)
+            return False
+
+        with pytest.raises(KeyboardInterrupt):
+            brief().run_until(interrupts, timeout_s=100)
 
     def test_when_the_time_is_over_it_says_what_was_heard_last(self, brief: MakeFleet) -> None:
         fleet = brief()
