@@ -177,8 +177,9 @@ class Mission(ABC):
         """How many mines may be left in the area at the end, or in what of it lies within a geometry (mission frame),
         as a lane: `shapely.LineString(way).buffer(width_m / 2)`. None where nothing was seen.
 
-        Each cell of the map counts by the share of it that lies there. All that was found, wherever, tells how dense
-        mines lie. Raises UserError where nothing of the area lies there, and where the geometry is not valid.
+        Each cell of the map counts by the share of it that lies there; so the whole area counts for a little more than
+        without `within`, where cells count whose middle lies in it. All that was found, wherever, tells how dense mines
+        lie. Raises UserError where nothing of the area lies there, and where the geometry is not valid.
         """
         if within is None:
             return self._figures.mines_left()
