@@ -69,7 +69,7 @@ class SurveyArea:
         if not (math.isfinite(cell_m) and cell_m > 0):
             raise ValueError(f"a cell's side must be finite and above 0, not {cell_m} m")
         columns = math.floor((self.width_m + _TOLERANCE_M) / cell_m) + 1
-        rows = max(1, math.ceil((self.length_m - _TOLERANCE_M) / cell_m))
+        rows = math.ceil((self.length_m - _TOLERANCE_M) / cell_m)
         return GridSpec(self.frame, cell_m, columns, rows)
 
     def inside(self, grid: GridSpec) -> BoolArray:

@@ -286,6 +286,6 @@ def _outline(grid: GridSpec, rows: IndexArray, columns: IndexArray) -> tuple[Poi
 
 def _heir(numbers: NumberArray) -> int | None:
     """The number that most of some cells have, of equals the lowest; None where none has any."""
-    counts = np.bincount(numbers, minlength=1)
+    counts = np.bincount(numbers)
     counts[0] = 0
     return int(np.argmax(counts)) if counts.any() else None

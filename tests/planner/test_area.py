@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from planner.area import SurveyArea
+from planner.types import GridSpec, SweepFrame
 
 headings = st.floats(-7, 7) | st.integers(-4, 4).map(lambda n: n * math.pi / 2)
 
@@ -77,6 +78,22 @@ class TestRectangle:
         grid = rectangle(width_m, length_m, 0).grid(5)
         assert (grid.columns, grid.rows) == (columns, rows)
 
+    def test_the_narrowest_area_there_may_be_has_a_row(self) -> None:
+        assert rectangle(1000, 2.1e-6, 0).grid(0.5).shape == (1, 2001)
+
+    @pytest.mark.parametrize(("beyond_m", "inside"), [(0.9e-6, True), (1.1e-6, False)])
+    def test_a_cell_is_on_the_boundary_as_far_as_a_micrometre_beyond_it(self, beyond_m: float, inside: bool) -> None:
+        area = rectangle(10, 10, 0, (1000, 2000))
+        to_the_west = GridSpec(SweepFrame(1000 - beyond_m, 2000, 0), 5, columns=3, rows=2)
+        to_the_south = GridSpec(SweepFrame(1000, 1997.5 - beyond_m, 0), 5, columns=3, rows=2)
+        assert area.inside(to_the_west).tolist() == [[inside, True, True]] * 2
+        assert area.inside(to_the_south).tolist() == [[inside] * 3, [True] * 3]
+
+    def test_a_swath_a_micrometre_wide_along_its_side_is_long_as_that(self) -> None:
+        track = rectangle(1212, 400, 0).track(1, 0.0, False, 1e-6)
+        assert track is not None
+        assert track.length_m == 400
+
     def test_a_cell_beyond_the_far_side_is_outside(self) -> None:
         area = rectangle(12, 11, 0)
         assert area.inside(area.grid(5)).tolist() == [[True] * 3, [True] * 3, [False] * 3]
@@ -107,6 +124,12 @@ class TestTriangle:
         assert track is not None
         assert track.start == pytest.approx((310, 30), abs=1e-5)
         assert track.end == pytest.approx((310, 0), abs=1e-5)
+
+    def test_a_leg_past_less_than_a_metre_of_the_area_is_as_long_as_that(self) -> None:
+        # Half a metre of a triangle that is a metre wide lies within the swath, as long as 50 m.
+        track = SurveyArea(((0, 0), (1, 0), (1, 100)), 0).track(1, 0, False, 0.5)
+        assert track is not None
+        assert (*track.start, *track.end) == pytest.approx((0, 0, 0, 50), abs=1e-3)
 
 
 class TestConvexAreas:
@@ -145,6 +168,7 @@ class TestRefusals:
         ("vertices", "message"),
         [
             ((), "at least 3 different vertices, not 0"),
+            (((0, 0),), "at least 3 different vertices, not 1"),
             (((0, 0), (1, 0)), "at least 3 different vertices, not 2"),
             (((0, 0), (1, 0), (0, 0)), "at least 3 different vertices, not 2"),
             (((0, 0), (1, 0), (1, 0), (0, 0)), "at least 3 different vertices, not 2"),

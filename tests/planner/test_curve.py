@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from planner.curve import RangeTally, effective_range_m, reach_m
+from planner.curve import RangeTally, effective_range_m, mean_curve, reach_m
 from planner.types import DetectionCurve
 
 
@@ -79,6 +79,13 @@ class TestRangeTally:
             RangeTally(range_bin_m)
 
 
+def test_the_mean_of_curves_is_told_at_the_points_of_the_one_that_has_most() -> None:
+    # At 15 and 25 m the first one is halfway between its points, at 40 m beyond its end.
+    mean = mean_curve([curve_of((10, 0.2), (20, 0.4), (30, 0.6)), curve_of((10, 0.0), (15, 0.1), (25, 0.5), (40, 0.8))])
+    assert mean.range_m.tolist() == [10, 15, 25, 40]
+    assert mean.p_detect == pytest.approx([0.1, 0.2, 0.5, 0.4])
+
+
 class TestEffectiveRange:
     def test_is_where_the_curve_falls_to_the_threshold(self) -> None:
         # Falls from 0.1 at 120 m to 0 at 140 m: 0.05 at 130 m.
@@ -92,7 +99,8 @@ class TestEffectiveRange:
 
     def test_the_last_bits_of_a_mean_do_not_count(self) -> None:
         assert effective_range_m(curve_of((70, 0.5), (100, np.nextafter(0.05, 0)), (130, 0.05), (131, 0)), 0.05) == 130
-        assert effective_range_m(curve_of((70, 0.5), (100, 0.05 - 5e-10), (130, 0.05 - 2e-9)), 0.05) == 100
+        for short_by in (5e-10, 1e-9):
+            assert effective_range_m(curve_of((70, 0.5), (100, 0.05 - short_by), (130, 0.05 - 2e-9)), 0.05) == 100
 
     def test_nor_do_those_of_the_place_where_the_threshold_is_crossed(self) -> None:
         assert effective_range_m(curve_of((2, 0.06), (12, 0.04)), 0.05) == 7
@@ -139,7 +147,7 @@ class TestEffectiveRange:
 
 class TestReach:
     def test_is_the_first_and_last_point_with_detection(self) -> None:
-        assert reach_m(curve_of((0, 0), (25, 0.01), (30, 0), (130, 0.02), (131, 0))) == (25, 130)
+        assert reach_m(curve_of((0, 0), (25, 0.01), (30, 0), (70, 0.5), (130, 0.02), (131, 0))) == (25, 130)
 
     def test_of_a_curve_without_gaps_is_its_extent(self) -> None:
         assert reach_m(curve_of((0, 0.3), (60, 0.3))) == (0, 60)

@@ -114,6 +114,12 @@ class TestFinding:
         expected = shapely.box(105, 200 - 17.5, 115, 200 - 7.5)
         assert shapely.Polygon(found.changed[0].outline).symmetric_difference(expected).area < 1e-6
 
+    def test_an_outline_has_as_many_as_forty_vertices(self) -> None:
+        grid = GridSpec(SweepFrame(0, 0, 0), 5, columns=30, rows=30)
+        stairs = np.tri(30, dtype=bool)  # which have 60 corners
+        found = update_hotspots(grid, stairs, ~stairs, np.ones(grid.shape), HotspotMap.empty(grid))
+        assert len(found.changed[0].outline) == 40
+
     def test_one_that_is_new_lies_where_it_is_also_far_from_where_nothing_has_changed(self) -> None:
         def hot_from(first_column: int) -> BoolArray:
             hot = NONE.copy()

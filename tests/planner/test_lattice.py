@@ -36,5 +36,6 @@ def test_a_rectangle_with_its_sides_on_the_lattice_holds_what_is_between_them() 
     assert (inside == expected).all()
 
 
-def test_nothing_lies_in_what_is_beside_the_lattice() -> None:
+def test_nothing_lies_in_what_is_beside_the_lattice_or_begins_at_its_last_column() -> None:
     assert not points_inside(np.array([20.0, 30, 25]), np.array([1.0, 1, 5]), COLUMNS, ROWS).any()
+    assert not points_inside(np.array([11.0, 14, 14, 11]), np.array([1.0, 1, 5, 5]), COLUMNS, ROWS).any()

@@ -19,6 +19,7 @@ from planner.profile_spacing import (
     ProfilePlanner,
     ProfileSpacing,
     SpacingTerms,
+    _fewest,
     first_decision,
     known_before,
 )
@@ -78,6 +79,10 @@ class TestThePapersExperiments:
         so_far = PartSoFar(700.0, before_m, (), (), CURVE, 100)
         assert laid(ProfileSpacing(40, 145), so_far).singles is singles
 
+    def test_where_nothing_else_is_said_risk_is_judged_metre_by_metre(self) -> None:
+        by_metres = laid(ProfileSpacing(40, 130), part(), SpacingTerms(1.0))
+        assert laid(ProfileSpacing(40, 130), part(), SpacingTerms()) == by_metres
+
     def test_what_was_planned_is_as_good_a_start(self) -> None:
         first = laid(ProfileSpacing(40, 130), part()).offsets_m
         then = laid(ProfileSpacing(40, 130), part(first[0], planned_m=first[1:])).offsets_m
@@ -86,11 +91,29 @@ class TestThePapersExperiments:
         # Where more were planned than are still needed, no more are laid.
         assert len(laid(ProfileSpacing(40, 130), part(planned_m=(*first, 300.0, 900.0))).offsets_m) == len(THEIRS)
 
-    def test_of_a_wide_part_the_tracks_flown_first_are_moved(self) -> None:
-        theirs = algorithm_1(ProfileSpacing(40, 130), 4000.0, 130)
-        ours = laid(ProfileSpacing(40, 130), part(width_m=4000.0)).offsets_m
+    def test_a_plan_from_before_that_is_worse_than_algorithm_1s_tracks_is_not_gone_on_with(self) -> None:
+        assert laid(ProfileSpacing(40, 130), part(planned_m=(0.0,) * 8)) == laid(ProfileSpacing(40, 130), part())
+
+    def test_tracks_flown_count_by_their_own_curves_where_they_have_one(self) -> None:
+        poor = DetectionCurve(CURVE.range_m, CURVE.p_detect / 2)
+        decision = laid(ProfileSpacing(40, 130), PartSoFar(WIDTH_M, None, flown(138.0, curve=poor), (), CURVE, 130))
+        seen = [Measured(138.0, poor, 130), *(Measured(one, CURVE, 130) for one in decision.offsets_m)]
+        assert decision.note.endswith(f"{Across(WIDTH_M, seen, CURVE, 130, 5.0).worst30([]):.3f}")
+        without = FlownTrack(138.0, 130, single=False)
+        so_far = PartSoFar(WIDTH_M, None, (without,), (), CURVE, 130)
+        assert laid(ProfileSpacing(40, 130), so_far) == laid(ProfileSpacing(40, 130), part(138.0))
+
+    def test_where_tracks_on_whole_metres_would_have_to_be_more_they_lie_as_algorithm_1_has_them(self) -> None:
+        # From -10.5 m it sees 0 to 38.5 m, from -10 m nothing nearer than 0.5 m.
+        so_far = PartSoFar(38.5, None, (), (), curve(10.5, 49.0, 0.3), 49)
+        assert ProfileSpacing(10, 60).lay(so_far, TERMS) == SpacingDecision(49, (-10.5,), replans=True, asks_after=1)
+
+    @pytest.mark.parametrize(("width_m", "bin_m"), [(4000.0, 1), (6000.0, 2)])
+    def test_of_a_wide_part_the_tracks_flown_first_are_moved(self, width_m: float, bin_m: int) -> None:
+        theirs = algorithm_1(ProfileSpacing(40, 130), width_m, 130)
+        ours = laid(ProfileSpacing(40, 130), part(width_m=width_m)).offsets_m
         assert len(ours) == len(theirs)
-        assert ours[MOST_MOVED:] == pytest.approx(theirs[MOST_MOVED:], abs=0.5)
+        assert ours[MOST_MOVED:] == pytest.approx(theirs[MOST_MOVED:], abs=bin_m / 2)
         assert ours[:MOST_MOVED] != pytest.approx(theirs[:MOST_MOVED], abs=2)
 
     def test_it_ends_when_algorithm_1_would(self) -> None:
@@ -125,19 +148,25 @@ class TestThePapersExperiments:
         expected = SpacingDecision(130, offsets_m, replans=True, note=note, asks_after=1)
         assert ProfileSpacing(40, 130).lay(part(*flown_m, width_m=width_m), terms) == expected
 
-    def test_what_algorithm_1_will_lay_goes_by_the_ranges_that_its_last_tracks_had(self) -> None:
+    @pytest.mark.parametrize("width_m", [1250.0, 1375.0])  # a metre more of the first or second pair makes other tracks
+    def test_what_algorithm_1_will_lay_goes_by_the_whole_metres_that_its_last_tracks_saw(self, width_m: float) -> None:
         planner, theirs = ProfileSpacing(40, 145), AdaptiveSpacing(40, 145)
         ranges_m = (150, 138.7, 129.2, 126.9, 131.0)
         looked = tuple(FlownTrack(50.0 * n, range_m, single=False) for n, range_m in enumerate(ranges_m))
         expected: list[float] = []
-        covered_m, known_m = 0.0, 141
-        for then_m in (138, 126, 135, 135):
-            decision = theirs.decide(1300.0, covered_m, known_m)
+        covered_m, known_m, to_come_m = 0.0, 141, [138, 126, 135, 135, 135]
+        while covered_m < width_m - NARROWEST_M:
+            decision = theirs.decide(width_m, covered_m, known_m)
             expected += decision.offsets_m[:2]
-            covered_m = max(covered_m, max(decision.offsets_m[:2]) + min(decision.range_m, then_m))
-            known_m = then_m
-        assert covered_m >= 1300.0 - NARROWEST_M
-        assert planner._algorithm_1(PartSoFar(1300.0, 141, looked, (), CURVE, 135)) == expected
+            known_m = to_come_m.pop(0)
+            covered_m = max(covered_m, max(decision.offsets_m[:2]) + min(decision.range_m, known_m))
+        for count in (4, 5):
+            so_far = PartSoFar(width_m, 141, looked[:count], (), CURVE, 135)
+            assert planner._algorithm_1(so_far) == expected
+
+    def test_a_part_a_millimetre_wider_than_a_pair_sees_is_left_so(self) -> None:
+        so_far = PartSoFar(320.0 + NARROWEST_M, 120, (), (), CURVE, 120)
+        assert ProfileSpacing(40, 120)._algorithm_1(so_far) == [120, 200]
 
     def test_moved_are_the_tracks_to_come_drawn_out_from_the_last_one_flown_and_those_planned_if_as_many(self) -> None:
         planner = ProfileSpacing(40, 130)
@@ -179,9 +208,17 @@ class TestWantedRisk:
             decision = laid(ProfileSpacing(40, 130), part(width_m=360.0), SpacingTerms(5.0, wanted_risk=wanted_risk))
             assert decision.offsets_m == offsets_m
 
-    def test_no_more_than_three_times_as_many(self) -> None:
-        found = laid(ProfileSpacing(40, 130), part(), SpacingTerms(5.0, wanted_risk=0.01))
-        assert len(found.offsets_m) == 3 * len(THEIRS)
+    def test_what_is_left_is_allowed_to_be_just_what_is_wanted(self) -> None:
+        ground = Across(WIDTH_M, [], CURVE, 130, 5.0)
+        nine = ground.refined(ground.with_one_more([round(one) for one in THEIRS]))
+        eight = ground.refined(ground.with_one_less(nine))
+        for bins, wanted_risk in ((nine, ground.worst30(nine)), (eight, ground.worst30(eight))):
+            assert _fewest(ground, nine, wanted_risk, 20, may_lose=False) == bins
+
+    @pytest.mark.parametrize("flown_m", [(), (138.0, 260.0)])
+    def test_no_more_than_three_times_as_many(self, flown_m: tuple[float, ...]) -> None:
+        found = laid(ProfileSpacing(40, 130), part(*flown_m), SpacingTerms(5.0, wanted_risk=0.01))
+        assert len(flown_m) + len(found.offsets_m) == 3 * len(THEIRS)
 
 
 class TestJoint:
@@ -221,6 +258,13 @@ class TestOtherSonars:
         first = FlownTrack(120.0, 0, single=False, curve=blind)
         decision = laid(ProfileSpacing(40, 130), PartSoFar(WIDTH_M, None, (first,), (), blind, 0))
         assert len(decision.offsets_m) == len(THEIRS) - 1
+        # No track to come sees what the first one would have seen at 120 m, and so none is laid for that.
+        decision = laid(ProfileSpacing(40, 130), PartSoFar(WIDTH_M, None, flown(300.0), (), blind, 0))
+        assert len(decision.offsets_m) == len(THEIRS) - 1
+
+    def test_one_that_sees_nothing_and_has_no_nadir_gap_is_planned_with_in_whole_metres(self) -> None:
+        blind = DetectionCurve(np.array([0.0, 1.0]), np.zeros(2))
+        assert laid(ProfileSpacing(0, 90.5), PartSoFar(300.0, None, (), (), blind, 0)).range_m == 90
 
     def test_others_that_plan_by_range_are_asked_as_before(self) -> None:
         known = Known(CURVE, 130, measured=True)
@@ -318,3 +362,19 @@ def test_every_second_track_is_pushed_where_no_small_move_is_better() -> None:
     pushed = laid(ProfileSpacing(10, 50), PartSoFar(width_m, None, (), (), sees, 170)).offsets_m
     # From Algorithm 1's tracks moves of up to 32 m lead to these; with the second and the fourth pushed they lead on.
     assert left(*pushed) < left(8, 112, 385, 477) - 0.015
+
+
+@pytest.mark.parametrize(
+    ("nadir_gap_m", "told_m", "far_m", "peak", "width_m", "offsets_m"),
+    [
+        (20, 80, 160, 0.7, 500.0, (86, 167, 330, 410)),
+        (40, 140, 180, 0.9, 600.0, (104, 211, 384, 491)),
+        (40, 140, 180, 0.5, 600.0, (112, 222, 378, 488)),
+        (10, 50, 90, 0.7, 400.0, (61, 105, 242, 286, 332)),
+    ],
+)
+def test_from_where_tracks_are_pushed_they_always_come_to_the_same_places(
+    nadir_gap_m: int, told_m: int, far_m: int, peak: float, width_m: float, offsets_m: tuple[float, ...]
+) -> None:
+    so_far = PartSoFar(width_m, None, (), (), curve(nadir_gap_m, far_m, peak), far_m)
+    assert laid(ProfileSpacing(nadir_gap_m, told_m), so_far).offsets_m == offsets_m

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from regions import regions
 
@@ -58,6 +58,23 @@ def test_of_each_cell_the_share_counts_that_lies_there() -> None:
     assert (with_hole[4, 4], with_hole[4, 5], with_hole[3, 5]) == (1, 0, 1)
 
 
+@settings(max_examples=20)
+@given(st.floats(0, math.pi), st.integers(-20, 80), st.integers(-20, 80), st.sampled_from([10.0, 17.0]))
+def test_the_share_is_that_of_the_cells_ground_in_the_region(
+    heading_rad: float, west_m: int, south_m: int, cell_m: float
+) -> None:
+    region, there = Region(SQUARE, (MIDDLE,)), shapely.box(west_m, south_m, west_m + 40, south_m + 40)
+    grid = region.about(heading_rad).grid(cell_m)
+    shares, inside = region.shares(there, grid), region.inside(grid)
+    for row, column in np.ndindex(grid.shape):
+        left_m, right_m = (column - 0.5) * cell_m, (column + (0.5 if column < grid.columns - 1 else 1.0)) * cell_m
+        sides = (left_m, row), (right_m, row), (right_m, row + 1), (left_m, row + 1)
+        cell = shapely.Polygon([grid.frame.to_mission(across_m, one * cell_m) for across_m, one in sides])
+        ground = region.polygon.intersection(cell)
+        held_m2 = ground.area if inside[row, column] else cell_m**2
+        assert shares[row, column] == pytest.approx(ground.intersection(there).area / held_m2, abs=1e-5)
+
+
 def test_of_cells_smaller_than_a_square_metre_too() -> None:
     region = Region(((0, 0), (3, 0), (3, 2), (0, 2)))
     shares = region.shares(shapely.box(-1, -1, 1.3, 0.8), region.about(0).grid(0.5))
@@ -103,6 +120,9 @@ def test_what_it_is_to_keep_out_of_is_no_part_of_it_also_where_that_divides_it()
     # Columns are centred at 0, 10 and so on: at 50 is the lane's middle, at 40 and 60 its edges, which are inside.
     assert inside.all(axis=0).tolist() == [True] * 5 + [False] + [True] * 5
     assert not inside[:, 5].any()
+    one_part = Region(SQUARE, (), (MIDDLE,)).polygon
+    assert isinstance(one_part, shapely.Polygon)
+    assert one_part.area == 9600
     share = divided.share(0, 0.3, 0)
     assert (share.polygon.area, share.keep_out) == (3000, (lane,))
     with pytest.raises(ValueError, match="leave nothing of the area"):

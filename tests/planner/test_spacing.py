@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planner.spacing import TOLERANCE_M, RangeChoice, adapt_range, track_count, track_offsets
+from planner.spacing import NARROWEST_M, TOLERANCE_M, RangeChoice, adapt_range, track_count, track_offsets
 
 WIDTH_M = 1212
 NADIR_GAP_M = 40
@@ -71,9 +71,11 @@ class TestTrackCount:
             (-5, 0),
             (0, 0),
             (1e-6, 0),
+            (NARROWEST_M, 0),
             (0.1, 1),
             (80, 1),  # r - r_min
             (80 + 5e-7, 1),
+            (80 + NARROWEST_M, 1),
             (80.01, 2),
             (320, 2),  # 3 r - r_min
             (320 + 5e-7, 2),
@@ -90,8 +92,11 @@ class TestTrackCount:
 
     def test_a_range_may_be_a_micrometre_short_of_three_nadir_gaps(self) -> None:
         assert track_count(100, 40, 120 - TOLERANCE_M) == 2
-        with pytest.raises(ValueError, match="at least three nadir gaps"):
+        with pytest.raises(ValueError, match=r"at least three nadir gaps \(120 m\)"):
             track_count(100, 40, 120 - 2 * TOLERANCE_M)
+
+    def test_a_range_may_be_less_than_two_metres(self) -> None:
+        assert track_count(6.5, 0, 1) == 5  # two pairs of 3 m, and half a metre
 
     @pytest.mark.parametrize(
         ("width_m", "nadir_gap_m", "range_m"),
@@ -125,6 +130,11 @@ class TestAdaptRange:
         with pytest.raises(ValueError, match="no whole metre"):
             adapt_range(1212, 40, 120, 95)
 
+    def test_the_lower_limit_may_be_a_micrometre_short_of_three_nadir_gaps(self) -> None:
+        assert adapt_range(1212, 40, 120 - TOLERANCE_M, 145) == RangeChoice(138, 7)
+        with pytest.raises(ValueError, match="only from 120 m on"):
+            adapt_range(1212, 40, 120 - 2 * TOLERANCE_M, 145)
+
     def test_refuses_a_range_below_three_nadir_gaps(self) -> None:
         with pytest.raises(ValueError, match="only from 120 m on"):
             adapt_range(1212, 40, 119, 130)
@@ -142,6 +152,8 @@ class TestTrackOffsets:
 
     def test_an_only_pair_is_centred(self) -> None:
         assert track_offsets(200, 40, 120) == [60, 140]
+        assert track_offsets(200, 40, 120, covered_m=TOLERANCE_M) == [60, 140]
+        assert track_offsets(200, 40, 120, covered_m=2 * TOLERANCE_M) == [0, 80]
 
     def test_a_last_pair_beyond_a_covered_edge_is_pulled_in_even_if_no_other_is_left(self) -> None:
         assert track_offsets(520, 40, 120, covered_m=320) == [320, 400]

@@ -52,7 +52,7 @@ class TestLegsOverStrip:
         assert np.array([leg.end for leg in legs]) == pytest.approx(np.array([(100, 10), (0, -10)]))
 
     @pytest.mark.parametrize(
-        ("width_m", "count"), [(1, 1), (20, 1), (20 + 1e-9, 1), (20.1, 2), (60, 3), (60 - 1e-9, 3), (61, 4)]
+        ("width_m", "count"), [(5e-7, 1), (1, 1), (20, 1), (20 + 1e-9, 1), (20.1, 2), (60, 3), (60 - 1e-9, 3), (61, 4)]
     )
     def test_no_more_than_needed(self, width_m: float, count: int) -> None:
         assert len(legs_over_strip(Strip(1, (0, 0), 1.0, 50, width_m), 20)) == count
@@ -189,6 +189,11 @@ class TestShortestSweep:
         assert ways(1000, 0) == 8
         assert ways(30, 50) == 4  # on the leg in the middle
         assert ways(85, 50) == 6  # on the leg to the right
+
+    @pytest.mark.parametrize("heading_rad", [NORTH, EAST, SOUTH, WEST])
+    def test_a_pass_is_flown_by_its_compass_heading(self, heading_rad: float) -> None:
+        passed = pass_over((0, 0), (100 * math.sin(heading_rad), 100 * math.cos(heading_rad)), 30)
+        assert (passed.begin.heading_rad, passed.end.heading_rad) == pytest.approx((heading_rad, heading_rad))
 
     def test_a_sonar_that_looks_ahead_flies_its_pass_earlier(self) -> None:
         begun, ended = pass_over((0, 0), (0, 100), 10, lead_m=30)
