@@ -174,7 +174,7 @@ def warn_of_batteries(summary: Mapping[str, Any]) -> None:
     """One warning in the log for each vehicle that had to end its survey early, or has not come home."""
     for name, vehicle in summary["vehicles"].items():
         ending = ending_of(name, vehicle)
-        if ending.cut_short or ending.how == "empty":
+        if (ending.cut_short and ending.how != "over") or ending.how == "empty":
             log.warning("%s: %s", name, ending.words)
 
 

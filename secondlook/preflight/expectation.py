@@ -89,7 +89,7 @@ class MissionExpectation:
         """What is expected, for people."""
         left = _batteries(self.battery_left)
         over = (
-            f", the mission is over after {in_seconds(self.latest_s)} at the latest"
+            f", the mission is over after about {in_seconds(self.latest_s)} at the latest"
             if self.latest_s > self.survey_s
             else ", and with it the mission"
         )

@@ -78,7 +78,7 @@ class VehicleFigures:
         if ended_ms is None:
             ended_ms = self.ended_ms if self.finished_ms is None else self.finished_ms
         how = self.mode.value if self.mode is not None and self.mode.is_out_of_work else "over"
-        cut_short = self.role.surveys and how != "over" and not self.has_finished
+        cut_short = self.role.surveys and not self.has_finished
         return Ending(name, how, ended_ms / 1000, self.battery, cut_short=cut_short)
 
 

@@ -56,7 +56,7 @@ class Ending:
 
     `how`: `home`, as its battery lasted for no more; `returning`, on its way there when the mission was over; `empty`,
     wherever that was; else `over`, where the mission ended with it. `ended_s`: when it was home, or its battery empty;
-    else when its survey or the mission ended. `cut_short`: whether its survey ended early by that.
+    else when its survey or the mission ended. `cut_short`: whether it has not ended its survey.
     """
 
     vehicle: str
@@ -67,14 +67,14 @@ class Ending:
 
     @property
     def words(self) -> str:
-        """The same for people; nothing where the mission ended with it."""
+        """The same for people; nothing where the mission ended with it and its survey was done."""
         left = f"with {self.battery_left:.0%} of its battery"
         told = {
             "home": f"home at {self.ended_s:.0f} s {left}",
             "returning": f"on its way home at the end {left}",
             "empty": f"its battery was empty at {self.ended_s:.0f} s, not home",
         }.get(self.how, "")
-        return f"{told}, its survey is not finished" if self.cut_short else told
+        return ", ".join(filter(None, (told, "its survey is not finished" if self.cut_short else "")))
 
 
 @dataclass(frozen=True)

@@ -103,6 +103,14 @@ class TestBatteries:
         assert stream.metrics.primary_ms() == 10_000
         assert stream.metrics.summary()["vehicles"][PRIMARY]["survey_cut_short"] is False
 
+    @pytest.mark.parametrize(("last", "words"), [(Mode.SURVEY, "its survey is not finished"), (Mode.FINISHED, "")])
+    def test_of_one_that_is_never_heard_again_its_survey_is_told_as_it_was(self, last: Mode, words: str) -> None:
+        stream = begun()
+        self.state(stream, 10, PRIMARY, last, 0.5)
+        stream.say(900, f"agent/{HELPER}/state", AgentState(Mode.IDLE, 0, 0.5, 0, 0, 0, 0))
+        ending = stream.metrics.vehicles[PRIMARY].ended_as(PRIMARY)
+        assert (ending.how, ending.ended_s, ending.words) == ("over", 10.0, words)
+
     def test_who_leaves_home_again_has_not_ended(self) -> None:
         stream = begun()
         tracks = (PlannedTrack(1, 0, 0, 0, 0, 200, False),)
@@ -121,11 +129,11 @@ class TestBatteries:
             self.state(stream, at_s, HELPER, mode, 0.5)
             assert self.told(stream, HELPER) == ("over" if mode is Mode.IDLE else mode.value, at_s, 0.5)
 
-    def test_of_one_that_has_told_nothing_there_is_nothing_to_tell(self) -> None:
+    def test_of_one_that_has_told_nothing_all_is_told_that_there_is(self) -> None:
         vehicles = begun().metrics.summary()["vehicles"]
         nothing = {"path_m": 0.0, "ended": "over", "ended_s": 0.0, "battery_left": 1.0}
         ranges = {"tracks": 0, "r_adpt_m": [], "r_eff_m": []}
-        assert vehicles[PRIMARY] == {"role": "survey", **nothing, "survey_cut_short": False, **ranges}
+        assert vehicles[PRIMARY] == {"role": "survey", **nothing, "survey_cut_short": True, **ranges}
         assert vehicles[HELPER] == {"role": "revisit", **nothing}
 
     def test_whose_battery_is_empty_the_world_tells_whatever_the_agent_makes_of_it(self) -> None:
