@@ -11,7 +11,16 @@ from pathlib import Path
 import numpy as np
 
 from comms.node import Received
-from comms.said.messages import AgentState, CoverageTile, MissionOver, Mode, StripState, StripStatus
+from comms.said.messages import (
+    AgentState,
+    CoverageTile,
+    MissionOver,
+    Mode,
+    StripState,
+    StripStatus,
+    Task,
+    TaskAction,
+)
 from coordinator.fleet import GIVEN_UP_AFTER
 from planner.fleet_map import CLOSED
 from planner.risk import LevelArray
@@ -31,6 +40,7 @@ from secondlook.testing.strip_assertions import (
 
 AGREE_WITHIN_S = 60.0  # after the core is healed: what is late by half a minute, the next report, and its answer
 END_WITHIN_S = 30.0  # of the deadline
+MOST_CALLED_BACK = 12  # times in a minute, and so often at most is a vehicle told to give a strip back
 HEARD_CYCLES = SILENT_CYCLES + ANSWER_CYCLES  # of a link: a word has come by then, and its answer, as far as any does
 
 
@@ -38,7 +48,7 @@ def check_flight(flight: Flight, plan: TroublePlan, witness: Witness) -> list[Vi
     """All that does not hold of a flight, what the witness saw first."""
     found = list(witness.violations)
     checks = [_ends_in_time, _books_are_kept, _books_agree_with_agents, _map_is_what_came, _layers_are_what_was_seen]
-    checks += [_full_disk_is_told]
+    checks += [_full_disk_is_told, _who_is_sent_may_go]
     if any(one.t_s > plan.heals_s for one in flight.said(MissionOver)):  # else it was over before the core was healed
         checks += [_core_has_finished, _core_is_all_on_the_map]
     for check in checks:
@@ -99,6 +109,18 @@ def _asserted(invariant: str, holds: Callable[[Flight], None], flight: Flight) -
     except AssertionError as error:
         first = str(error).splitlines()[1].strip()
         yield Violation(invariant, flight.end_s, COORDINATOR, first)
+
+
+def _who_is_sent_may_go(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
+    """No vehicle is sent and called back again and again."""
+    for name in plan.scenario.vehicles:
+        told = flight.said(Task, f"coord/task/{name}/*")
+        back_s = [one.t_s for one in told if one.message.action is TaskAction.GIVE_BACK]
+        for first_s, last_s in zip(back_s, back_s[MOST_CALLED_BACK:], strict=False):
+            if last_s - first_s < 60.0:
+                what = f"called back {MOST_CALLED_BACK + 1} times from {first_s:.3f} s on"
+                yield Violation("who is sent may go", last_s, name, what)
+                break
 
 
 _AT_WORK = (StripState.ACCEPTED, StripState.UNDER_WAY)

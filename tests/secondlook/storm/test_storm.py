@@ -6,11 +6,14 @@ import json
 import resource
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 from typer.testing import CliRunner
 
 import secondlook
+from comms.said.messages import TaskAction
 from coordinator.fleet import GIVEN_UP_AFTER
 from secondlook.cli import app_for
 from secondlook.fleet.link import silent_after_ms_of
@@ -20,9 +23,11 @@ from secondlook.storm import campaign
 from secondlook.storm.campaign import agreement, flown_again, storm_of, times_reached
 from secondlook.storm.canaries import CANARIES, Find, find_canary
 from secondlook.storm.fly import Outcome, Truth, fly_storm
+from secondlook.storm.invariants import _who_is_sent_may_go
 from secondlook.storm.sometimes import DISK_FULL, SOMETIMES
-from secondlook.storm.witness import Violation
+from secondlook.storm.witness import Violation, Witness
 from secondlook.testing import Fleet
+from secondlook.testing.flight import Flight
 from secondlook.testing.plan import KINDS, DiskFull, TroublePlan, load_plan
 
 QUICK = 5
@@ -137,6 +142,19 @@ def test_a_full_disk_is_told_and_what_is_on_it_is_read_back(tmp_path: Path) -> N
 def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(resource, "setrlimit", lambda *_: None)  # as if all writes went well
     assert [one.invariant for one in fly_storm(full_disk(80.0)).violations] == ["a full disk is told"]
+
+
+BACK = SimpleNamespace(action=TaskAction.GIVE_BACK)
+
+
+@pytest.mark.parametrize(("every_s", "found"), [(5.1, []), (5.0, []), (4.9, [62.8])])
+def test_who_is_sent_and_called_back_again_and_again_is_found(every_s: float, found: list[float]) -> None:
+    plan = storm_of(None, QUICK)
+    (name, *_) = plan.scenario.vehicles
+    asked = [SimpleNamespace(t_s=4 + round(every_s * n, 1), message=BACK) for n in range(30)]
+    flight = SimpleNamespace(said=lambda _, key: asked if key == f"coord/task/{name}/*" else [])
+    told = _who_is_sent_may_go(cast(Flight, flight), plan, Witness())
+    assert [(one.t_s, one.who) for one in told] == [(t_s, name) for t_s in found]
 
 
 @pytest.mark.parametrize(
