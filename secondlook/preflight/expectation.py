@@ -140,7 +140,7 @@ def expected_mission(scenario: Scenario) -> MissionExpectation:
     # Where somebody may revisit strips are cut, and left open until then by those who can do nothing.
     latest_s = until_s if may_revisit else min(survey_s, until_s)
     refused, remarks = _flown_too_far(scenario, surveys, able, latest_s)
-    remarks += filter(None, [at_odds(scenario)])
+    remarks += [*_surveyed_twice(scenario), *filter(None, [at_odds(scenario)])]
     limit_s = mission.time_limit_s
     if survey_s <= limit_s < latest_s:
         remarks.append(
@@ -242,6 +242,17 @@ def _flown_too_far(
         f"{OR_ANYWAY}"
         for sentence, one in zip(told, short, strict=True)
     ], []
+
+
+def _surveyed_twice(scenario: Scenario) -> Iterator[str]:
+    """Which primaries survey the same ground."""
+    by_share: dict[tuple[int, int], list[str]] = {}
+    for name, vehicle in scenario.survey_vehicles.items():
+        by_share.setdefault(vehicle.share_of, []).append(name)
+    for (share, shares), names in by_share.items():
+        if len(names) > 1:
+            ground = "the whole area" if shares == 1 else f"share {share} of {shares}"
+            yield f"{', '.join(names)}: each surveys {ground}; vehicles.ID.part gives each a share of its own"
 
 
 def _tracks(count: int) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -273,6 +274,26 @@ def test_of_helpers_that_may_do_something_nothing_is_said() -> None:
 def test_a_primary_that_revisits_needs_time_after_its_survey() -> None:
     expected = two_tracks(**{"vehicles.primary.revisits": "true", "mission.deadline_factor": 1})
     assert expected.idle == {"primary": "it revisits, but the mission is over when its survey is"}
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        (("1 of 2", "2 of 2"), []),
+        ((None, None), ["one, two: each surveys the whole area; vehicles.ID.part gives each a share of its own"]),
+        (
+            ("1 of 2", "2 of 2", "2 of 2"),
+            ["two, three: each surveys share 2 of 2; vehicles.ID.part gives each a share of its own"],
+        ),
+    ],
+)
+def test_primaries_that_survey_the_same_ground_are_remarked_on(parts: Sequence[str | None], told: list[str]) -> None:
+    scenario = load_scenario(BRIEF)
+    primary, helper = scenario.survey_vehicles["primary"], scenario.revisit_vehicles["helper"]
+    names = ("one", "two", "three")[: len(parts)]
+    shares = {name: primary.model_copy(update={"part": part}) for name, part in zip(names, parts, strict=True)}
+    fleet = scenario.model_copy(update={"vehicles": {**shares, "helper": helper}})
+    assert expected_mission(fleet).warnings == told
 
 
 def test_a_time_limit_between_the_surveys_end_and_the_deadline_is_remarked_on(tmp_path: Path) -> None:
