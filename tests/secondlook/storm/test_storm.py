@@ -144,17 +144,23 @@ def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch)
     assert [one.invariant for one in fly_storm(full_disk(80.0)).violations] == ["a full disk is told"]
 
 
-BACK = SimpleNamespace(action=TaskAction.GIVE_BACK)
-
-
-@pytest.mark.parametrize(("every_s", "found"), [(5.1, []), (5.0, []), (4.9, [62.8])])
-def test_who_is_sent_and_called_back_again_and_again_is_found(every_s: float, found: list[float]) -> None:
+@pytest.mark.parametrize(
+    ("every_s", "are_sent", "found"), [(5.1, True, []), (5.0, True, []), (4.9, True, [62.8]), (4.9, False, [])]
+)
+def test_who_is_sent_and_called_back_again_and_again_is_found(
+    every_s: float, are_sent: bool, found: list[float]
+) -> None:
     plan = storm_of(None, QUICK)
     (name, *_) = plan.scenario.vehicles
-    asked = [SimpleNamespace(t_s=4 + round(every_s * n, 1), message=BACK) for n in range(30)]
-    flight = SimpleNamespace(said=lambda _, key: asked if key == f"coord/task/{name}/*" else [])
-    told = _who_is_sent_may_go(cast(Flight, flight), plan, Witness())
-    assert [(one.t_s, one.who) for one in told] == [(t_s, name) for t_s in found]
+    told = [
+        SimpleNamespace(t_s=4 + round(every_s * n, 1), message=SimpleNamespace(action=action, strip=n % 2))
+        for n in range(30)
+        for action in (TaskAction.TAKE, TaskAction.GIVE_BACK)
+        if are_sent or action is TaskAction.GIVE_BACK
+    ]
+    flight = SimpleNamespace(said=lambda _, key: told if key == f"coord/task/{name}/*" else [])
+    violations = _who_is_sent_may_go(cast(Flight, flight), plan, Witness())
+    assert [(one.t_s, one.who) for one in violations] == [(t_s, name) for t_s in found]
 
 
 @pytest.mark.parametrize(
