@@ -24,18 +24,19 @@ LEAST_S = 1e-9
 @dataclass(frozen=True, eq=False)
 class Ahead:
     """Who goes on in every plan, `next`, and from where, its row of the teams' table, `at`, both of shape (plans,); and
-    by every strip, shape (plans, strips): when the helper is free again, what is gained by the deadline beyond what the
-    time is worth that it takes, and whether that is anything."""
+    by every strip, shape (plans, strips): when the helper is free again, how much of its time before the deadline that
+    takes, what is gained by then beyond what that time is worth, and whether that is anything."""
 
     next: np.ndarray
     at: np.ndarray
     ends_s: FloatArray
+    spent_s: FloatArray
     gained_m2: FloatArray
     gains: BoolArray
 
     @property
     def _arrays(self) -> tuple[np.ndarray, ...]:
-        return self.next, self.at, self.ends_s, self.gained_m2, self.gains
+        return self.next, self.at, self.ends_s, self.spent_s, self.gained_m2, self.gains
 
     def last(self, count: int) -> Ahead:
         """The last plans of these."""
@@ -51,8 +52,8 @@ class Plans:
     """Some plans, held in two arrays, `places` and `sums`, of which what follows are columns. `team`: shape (plans,),
     whose each is. `nodes`, `is_done`, `free_s`: shape (plans, helpers), where each helper is, whether it finds nothing
     any more or leaves the rest to others, when it is free; `turn`: shape (plans, strips), as the how manieth a strip is
-    served, from 0, times the number of helpers, and by which helper, -1 where by none; `gained_m2`: what
-    all that gains, shape (plans,)."""
+    served, from 0, times the number of helpers, and by which helper, -1 where by none; `gained_m2`: what all that
+    gains, shape (plans,)."""
 
     def __init__(self, places: np.ndarray, sums: FloatArray) -> None:
         self.places, self.sums = places, sums
@@ -117,10 +118,9 @@ class Plans:
         ends_s += teams.run_out_s.take(one)[:, np.newaxis]
         spent_s = np.minimum(ends_s, teams.deadline_s)
         spent_s -= self.free_s[rows, one][:, np.newaxis]
-        spent_s *= teams.time_m2ps.take(one)[:, np.newaxis]
-        gained_m2 -= spent_s
+        gained_m2 -= spent_s * teams.time_m2ps.take(one)[:, np.newaxis]
         gained_m2 *= may
-        ahead = Ahead(one, at, ends_s, gained_m2, gained_m2 > 0)
+        ahead = Ahead(one, at, ends_s, spent_s, gained_m2, gained_m2 > 0)
         self._drop_out(teams, ahead)
         return ahead
 
@@ -283,10 +283,7 @@ class Completion:
 
     def _best_by_time(self, ahead: Ahead) -> tuple[np.ndarray, BoolArray]:
         """Which strip brings most a second in each plan, and whether any brings anything."""
-        now_s = self._plans.free_s[np.arange(self._plans.count), ahead.next][:, np.newaxis]
-        spent_s = np.minimum(ahead.ends_s, self._teams.deadline_s)
-        spent_s -= now_s
-        np.maximum(spent_s, LEAST_S, out=spent_s)  # where something is gained it is more
+        spent_s = np.maximum(ahead.spent_s, LEAST_S)  # where something is gained it is more
         return (ahead.gained_m2 / spent_s).argmax(axis=1), np.logical_or.reduce(ahead.gains, axis=1)
 
     def _go_on(self, ahead: Ahead, strips: np.ndarray, gains: BoolArray, goes_on: BoolArray) -> None:

@@ -40,7 +40,7 @@ from secondlook.testing.strip_assertions import (
 
 AGREE_WITHIN_S = 60.0  # after the core is healed: what is late by half a minute, the next report, and its answer
 END_WITHIN_S = 30.0  # of the deadline
-MOST_CALLED_BACK = 12  # times in a minute, and so often at most is a vehicle told to give a strip back
+MOST_CALLED_BACK, WITHIN_S = 12, 60.0  # no more often in that time is a vehicle called back from where it was sent
 HEARD_CYCLES = SILENT_CYCLES + ANSWER_CYCLES  # of a link: a word has come by then, and its answer, as far as any does
 
 
@@ -123,7 +123,7 @@ def _who_is_sent_may_go(flight: Flight, plan: TroublePlan, witness: Witness) -> 
                 sent_to.remove(strip)  # a coordinator that was started anew calls back from strips of before, too
                 back_s.append(one.t_s)
         for first_s, last_s in zip(back_s, back_s[MOST_CALLED_BACK:], strict=False):
-            if last_s - first_s < 60.0:
+            if last_s - first_s < WITHIN_S:
                 what = f"called back {MOST_CALLED_BACK + 1} times from {first_s:.3f} s on"
                 yield Violation("who is sent may go", last_s, name, what)
                 break

@@ -166,9 +166,9 @@ class Fleet(Trouble):
     def run(self, *, bus: Bus | None = None) -> Flight:
         """Flies the mission to its end, on another bus than the fleet's if one is given.
 
-        Raises RunFailedError, in one sentence, if it fails, and AssertionError if it was over before trouble that was
-        to strike in it: a test of that would test nothing. Of what goes on for a while the beginning counts; trouble of
-        a plan may lie after the end.
+        Raises RunFailedError, in one sentence, if it fails, KeyboardInterrupt if it is interrupted, and AssertionError
+        if it was over before trouble that was to strike in it: a test of that would test nothing. Of what goes on for a
+        while the beginning counts; trouble of a plan may lie after the end.
         """
         __tracebackhide__ = True
         flight, _ = self._fly(_Watch(self._new_heard(), self._until_now), self.bus if bus is None else _checked(bus))

@@ -102,7 +102,9 @@ def test_a_mission_ends_well_and_leaves_no_process(landed: Landed) -> None:
 
 def test_what_is_expected_of_it_is_told_first(landed: Landed) -> None:
     assert [line.partition(" tracks ")[0] for line in landed.expected[:-1]] == ["primary: about 4"]
-    assert landed.expected[-1].startswith("the survey ends after about 106 s, the mission is over after about 111 s")
+    assert landed.expected[-1].startswith(
+        "the survey ends after about 106 s, the mission is over after about 111 s at the"
+    )
 
 
 def test_all_files_of_a_run_are_there_and_no_other(landed: Landed) -> None:
