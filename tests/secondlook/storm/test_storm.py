@@ -145,18 +145,16 @@ def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(
-    ("every_s", "are_sent", "found"), [(5.1, True, []), (5.0, True, []), (4.9, True, [62.8]), (4.9, False, [])]
+    ("every_s", "offers", "found"), [(5.1, 30, []), (5.0, 30, []), (4.9, 30, [62.8]), (4.9, 2, []), (4.9, 0, [])]
 )
-def test_who_is_sent_and_called_back_again_and_again_is_found(
-    every_s: float, are_sent: bool, found: list[float]
-) -> None:
+def test_who_is_sent_and_called_back_again_and_again_is_found(every_s: float, offers: int, found: list[float]) -> None:
     plan = storm_of(None, QUICK)
     (name, *_) = plan.scenario.vehicles
     told = [
         SimpleNamespace(t_s=4 + round(every_s * n, 1), message=SimpleNamespace(action=action, strip=n % 2))
         for n in range(30)
         for action in (TaskAction.TAKE, TaskAction.GIVE_BACK)
-        if are_sent or action is TaskAction.GIVE_BACK
+        if n < offers or action is TaskAction.GIVE_BACK
     ]
     flight = SimpleNamespace(said=lambda _, key: told if key == f"coord/task/{name}/*" else [])
     violations = _who_is_sent_may_go(cast(Flight, flight), plan, Witness())
