@@ -36,7 +36,7 @@ class ToldHere:
         self._tiles = 0  # that were told
         self._state_headers: dict[str, Header] = {}  # of the last states told
         self._state_told_ms: dict[str, int] = {}  # and when that was
-        self._newest: dict[str, tuple[int, int]] = {}  # of states and words on tasks
+        self._newest: dict[str, tuple[int, int]] = {}  # of states and words on tasks that told
 
     def take(self) -> list[Publication]:
         """What is to be said here since it was asked last."""
@@ -52,15 +52,17 @@ class ToldHere:
         """What a platform has said. `topic`: None for a piece of a map."""
         header, message = said.header, said.message
         if isinstance(message, AgentState):
-            if not self._config.is_small and not self._is_newest(platform, header):
+            if self._is_overtaken(platform, header):
                 return  # another has overtaken it, or its word on a task, which tells what it does since
+            self._newest[platform] = _order(header)
             header = self._in_order(platform, header, now_ms)
             self._presences[platform].hear_state(message, header.incarnation, said.header.sent_ms)
         elif isinstance(message, TaskStatus):
-            tells = self._presences[platform].hear_status(message, now_ms)
+            is_old = self._is_overtaken(platform, header)  # where it had to be said again
+            tells = not is_old and self._presences[platform].hear_status(message, now_ms)
             strip = self._presences[platform].strips.get(message.strip) if message.state is TaskState.DONE else None
             if tells:
-                self._is_newest(platform, header)
+                self._newest[platform] = _order(header)
             # The map is told before the word.
             self._say_tiles(platform, header, self._layers.hear_done(platform, header.incarnation, strip))
         if topic is not None:
@@ -85,11 +87,10 @@ class ToldHere:
             self._tiles += 1
             self.say(COVERAGE.key(vehicle=platform, tile=name), header._replace(sequence=self._tiles), tile)
 
-    def _is_newest(self, platform: str, header: Header) -> bool:
-        """Whether a vehicle has told nothing newer of itself or its work; from now on that counts."""
-        order = header.incarnation, header.sequence
-        newest = self._newest[platform] = max(order, self._newest.get(platform, order))
-        return newest == order
+    def _is_overtaken(self, platform: str, header: Header) -> bool:
+        """Whether a vehicle has told newer things of itself or its work, which have come. Small frames keep the
+        order."""
+        return not self._config.is_small and _order(header) < self._newest.get(platform, _order(header))
 
     def _in_order(self, platform: str, header: Header, now_ms: int) -> Header:
         """A state's header as it is told here: one that was reckoned before does not make it an old one."""
@@ -100,6 +101,10 @@ class ToldHere:
         if header.incarnation >= before.incarnation:
             self._state_headers[platform], self._state_told_ms[platform] = header, now_ms
         return header
+
+
+def _order(header: Header) -> tuple[int, int]:
+    return header.incarnation, header.sequence
 
 
 def layer_start(incarnation: int, start: int) -> int:

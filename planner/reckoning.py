@@ -104,9 +104,11 @@ class Trace:
         return places
 
     def end(self, now_ms: int) -> list[tuple[int, Pose]]:
-        """The places up to now, that included unless the vehicle lies, as no more is told."""
+        """The places up to now, that included unless the vehicle lies. There it stays until another course is told."""
         places, course = self.until(now_ms), self._course
         if course is None or course.speed_mps == 0.0 or now_ms <= course.begun_ms:
             return places
         end_ms = min(now_ms, course.begun_ms + BELIEVED_MS)
-        return places if places and places[-1][0] == end_ms else [*places, (end_ms, course.pose_at(end_ms))]
+        last = course.pose_at(end_ms)
+        self._course = Course(now_ms, last, speed_mps=0.0)
+        return places if places and places[-1][0] == end_ms else [*places, (end_ms, last)]

@@ -16,6 +16,7 @@ from comms.said.messages import (
     Curve,
     Hotspot,
     Message,
+    MissionOver,
     Nav,
     Plan,
     TaskStatus,
@@ -103,6 +104,7 @@ class _Mission:
             TruthTargets: (truth.on_targets,),
             TruthLook: (truth.on_look,),
             TruthPose: (truth.on_pose,),
+            MissionOver: (self._on_over,),
         }
         self._draw |= dict.fromkeys(StripBooks.telling, (self._on_strips,))
         self._link = None if config.link is None else Link(canvas, run, config.link())
@@ -117,6 +119,11 @@ class _Mission:
             self._advance(received.header.sent_ms)
         for draw in self._draw.get(type(received.message), ()):
             draw(received, received.message)
+
+    def _on_over(self, received: Received, over: MissionOver) -> None:
+        """Vehicles are drawn no farther, unless they tell of courses after it."""
+        self._fleet.finish(received.header.sent_ms)
+        self._truth.finish(received.header.sent_ms)
 
     def _advance(self, time_ms: int) -> None:
         self._time_ms = time_ms

@@ -23,6 +23,7 @@ from comms.said.messages import (
     Look,
     ManeuverState,
     ManeuverStatus,
+    MissionOver,
     Mode,
     Plan,
     StripState,
@@ -152,6 +153,8 @@ class Metrics:
             if message.state is ManeuverState.EMPTY:
                 self._rest(vehicle, Mode.EMPTY, received.header.sent_ms)
         elif isinstance(message, StripBooks.telling):
+            if isinstance(message, MissionOver):  # the simulated world stands still, and tells no more courses
+                self._hear_places(self.whereabouts.end(received.header.sent_ms))
             for one in self.books.hear(received):
                 self._hear_strip(one, one.message)
         elif isinstance(message, TruthTargets):

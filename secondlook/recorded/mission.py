@@ -28,6 +28,7 @@ from comms.said.messages import (
     CoverageTile,
     Hotspot,
     Message,
+    MissionOver,
     Nav,
     Plan,
     TruthLook,
@@ -226,7 +227,7 @@ class Mission(ABC):
     @cached_property
     def paths(self) -> dict[str, PathRecord]:
         """Where each vehicle has been."""
-        return paths(self.said(Nav), self.end_s)
+        return paths(self.received(Nav, MissionOver), self.end_s)
 
     @cached_property
     def strips(self) -> list[StripRecord]:

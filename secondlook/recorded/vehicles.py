@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from comms.node import Received
-from comms.said.messages import AgentState, Mode, Nav, Plan
+from comms.said.messages import AgentState, Message, MissionOver, Mode, Nav, Plan
 from planner.dubins import Pose
 from planner.reckoning import Course, Trace
 from planner.types import FloatArray
@@ -154,16 +154,24 @@ class PathRecord:
         return float(self.line.length)
 
 
-def paths(courses: Iterable[Received[Nav]], end_s: float) -> dict[str, PathRecord]:
-    """The path of each vehicle that told its course, until `end_s`: where it told that, and each second of such a
-    course."""
+def paths(said: Iterable[Received[Message]], end_s: float) -> dict[str, PathRecord]:
+    """The path of each vehicle that told its course: where it told that, and each second of such a course, until the
+    mission is over or ends at `end_s`, or courses end that were told after it was over. `said`: courses and that it is
+    over, in order."""
     rows: dict[str, list[tuple[int, Pose]]] = {}
     traces: dict[str, Trace] = {}
-    for one in courses:
-        trace = traces.setdefault(one.vehicle, Trace(all_along=True))
-        rows.setdefault(one.vehicle, []).extend(trace.hear(Course.of(one.message, one.header.sent_ms)))
-    for vehicle, trace in traces.items():
-        rows[vehicle] += trace.end(round(end_s * 1000))
+
+    def end(at_ms: int) -> None:
+        for vehicle, trace in traces.items():
+            rows[vehicle] += trace.end(at_ms)
+
+    for one in said:
+        if isinstance(one.message, MissionOver):
+            end(one.header.sent_ms)
+        elif isinstance(one.message, Nav):
+            trace = traces.setdefault(one.vehicle, Trace(all_along=True))
+            rows.setdefault(one.vehicle, []).extend(trace.hear(Course.of(one.message, one.header.sent_ms)))
+    end(round(end_s * 1000))
     return {
         vehicle: PathRecord(vehicle, *np.array([(at_ms / 1000, *pose) for at_ms, pose in found]).T)
         for vehicle, found in rows.items()

@@ -48,7 +48,7 @@ class Whereabouts:
         return self._places(name, found, is_true, moves=not is_true and message.speed_mps > 0)
 
     def end(self, now_ms: int) -> list[Place]:
-        """The places up to now, as no more is told; vehicle by vehicle."""
+        """The places up to now, vehicle by vehicle: as a mission is over, or no more is told."""
         return [
             place
             for is_true, traces in ((False, self._believed), (True, self._true))

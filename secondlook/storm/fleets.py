@@ -20,15 +20,17 @@ SLOW_LINKS = ("micromodem-0", "micromodem-1", "unet-control")
 MOST_BY_SLOW_LINK = 3  # vehicles, as with more a cycle takes as long as a survey
 JANUS, JANUS_SHARE = "janus", 0.25  # of fleets that a slow link may have
 UNCORRECTED = (JANUS, "unet-control")  # a correction does not cross in their frames, or takes several
+ZONES_SHARE = 0.2  # of fleets whose area has no hole
+AGAIN_SHARE = 0.3  # of fleets of several primaries, beside those of which some happen to: all take second looks
 SPREAD = 0.6  # of the range that a primary is told: half of a track's share of the width, about
 
 
 def draw_fleet(number: int) -> Scenario:
     """The mission of this number, 0 or more; the same one each time.
 
-    Areas of some 100 to 400 m, convex or not, with and without holes; 1 to 4 primaries with shares of it, which may
-    take second looks themselves; 0 to 6 helpers of any kind; every allocator and spacing of ours. One fleet in five
-    talks by modems.
+    Areas of some 100 to 400 m, convex or not, with and without holes and zones to keep out of; 1 to 4 primaries with
+    shares of it, which may take second looks themselves; 0 to 6 helpers of any kind; every allocator and spacing of
+    ours. One fleet in five talks by modems.
     """
     rng = Random(f"fleet {number}")
     primaries = rng.choices((1, 2, 3, 4), (12, 5, 2, 1))[0]
@@ -52,6 +54,9 @@ def draw_fleet(number: int) -> Scenario:
         "coordinator": _coordinator(rng),
         **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
     }
+    if primaries > 1 and Random(f"again {number}").random() < AGAIN_SHARE:
+        for name in list(vehicles)[:primaries]:
+            vehicles[name]["revisits"] = True
     drawn |= _link(number, drawn)
     if number % 4 == 1:
         drawn["targets"]["clutter_per_km2"] = 500
@@ -62,11 +67,17 @@ def draw_fleet(number: int) -> Scenario:
     _move_apart(vehicles, drawn["mission"].get("separation_m", 0.0))
     if rng.random() < 0.15:  # for less than its survey, perhaps
         vehicles[rng.choice(list(vehicles)[:primaries])]["endurance_s"] = _m(rng.uniform(0.2, 1) * _LONGEST_S)
-    scenario = make_scenario(drawn)
+    drawn["area"] |= _zones(number, drawn["area"], width_m, height_m)
     try:
-        build_fleet(scenario, record=False)
-    except UserError:  # a hole, seldom, cuts a primary's share in two
-        scenario = make_scenario(drawn | {"area": drawn["area"] | {"holes_m": []}})
+        return _built(drawn)
+    except UserError:  # a hole or a zone, seldom, cuts a primary's share in two, or lies where somebody starts
+        return _built(drawn | {"area": drawn["area"] | {"holes_m": [], "keep_out_m": []}})
+
+
+def _built(drawn: dict[str, Any]) -> Scenario:
+    """Raises UserError if there can be no such fleet."""
+    scenario = make_scenario(drawn)
+    build_fleet(scenario, record=False)
     return scenario
 
 
@@ -90,6 +101,21 @@ def _area(rng: Random, width_m: float, height_m: float, cells_m: tuple[int, ...]
         "cell_m": rng.choice(cells_m),
         "priorities": [priority] if rng.random() < 0.1 else [],
     }
+
+
+def _zones(number: int, area: dict[str, Any], width_m: float, height_m: float) -> dict[str, Any]:
+    """One or two zones to keep out of, each of three or four corners, in the area or across its edge. Like a link's
+    they have a generator of their own."""
+    rng = Random(f"zones {number}")
+    if area["holes_m"] or rng.random() >= ZONES_SHARE:
+        return {}
+    zones: list[Corners] = []
+    for _ in range(rng.randint(1, 2)):
+        x_m, y_m = rng.uniform(-0.1, 0.9) * width_m, rng.uniform(-0.1, 0.9) * height_m
+        east_m, north_m = rng.uniform(15, 60), rng.uniform(15, 60)
+        box = [[x_m, y_m], [x_m + east_m, y_m], [x_m + east_m, y_m + north_m], [x_m, y_m + north_m]]
+        zones.append(_rounded(box[: rng.randint(3, 4)]))
+    return {"keep_out_m": zones}
 
 
 def _rounded(corners: Corners) -> Corners:

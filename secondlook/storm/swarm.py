@@ -23,6 +23,8 @@ from secondlook.testing.plan import TroublePlan, make_plan
 
 CALM_SHARE = 0.1
 """Of all storms: nothing goes wrong in these, and more must hold."""
+COORDINATOR_AGAIN_SHARE = 0.15
+"""Of those in which something goes wrong: beside all else the coordinator goes on by its memory once more."""
 FULL_DISK_SHARE = 0.02
 """Of those in which something goes wrong: the disk is full from some moment on."""
 _SHORTEST_S = 20.0  # until the core is healed
@@ -38,7 +40,7 @@ def draw_storm(scenario: Scenario, number: int) -> TroublePlan:
     heals_s = max(_SHORTEST_S, _s(rng.choice((rng.uniform(0.1, 1.2), rng.uniform(0.1, 2))) * survey_s(scenario)))
     heals_s = min(heals_s, latest_heals_s(scenario))
     core = (COORDINATOR, *_core_vehicles(rng, scenario))
-    trouble = _Swarm(rng, scenario, core, heals_s).drawn() + _full_disk(scenario, number)
+    trouble = _Swarm(rng, scenario, core, heals_s).drawn(number) + _full_disk(scenario, number)
     return _plan(scenario, number, core, heals_s, trouble)
 
 
@@ -102,8 +104,8 @@ class _Swarm:
         self._free_s = dict.fromkeys(self._nodes, 0.0)  # from when on something else may happen to the node
         self._gone: set[str] = set()
 
-    def drawn(self) -> list[_Entry]:
-        """All that goes wrong, in no order."""
+    def drawn(self, number: int) -> list[_Entry]:
+        """All that goes wrong in the storm of this number, in no order."""
         kinds: tuple[Callable[[], list[_Entry]], ...] = (
             self._late_joins,
             self._restarts,
@@ -123,6 +125,7 @@ class _Swarm:
         for kind in kinds:
             if self._rng.random() < 0.4:
                 trouble += kind()
+        trouble += self._coordinator_again(Random(f"coordinator again {number}"))
         for_good = self._for_good()
         return trouble + self._second_surveys() + for_good  # what befalls a node in the order of time
 
@@ -139,6 +142,16 @@ class _Swarm:
                 memory = {"memory": True} if self._rng.random() < 0.4 else {}
                 found.append({"what": "join", "node": node, "at_s": self._later(node), **memory})
         return found
+
+    def _coordinator_again(self, rng: Random) -> list[_Entry]:
+        """The coordinator alone is started anew, and goes on by its memory after a while in which much has changed."""
+        from_s = self._free_s[COORDINATOR]
+        if rng.random() >= COORDINATOR_AGAIN_SHARE or from_s + 20 > self._heals_s:
+            return []
+        at_s, until_s = sorted(_s(rng.uniform(from_s + 1, self._heals_s - 1)) for _ in range(2))
+        self._free_s[COORDINATOR] = until_s
+        killed = {"what": "kill", "node": COORDINATOR, "at_s": at_s}
+        return [killed, {"what": "join", "node": COORDINATOR, "at_s": _s(until_s + 0.01), "memory": True}]
 
     def _unheard_restarts(self) -> list[_Entry]:
         """Late a vehicle is started anew, and at first nobody hears it: it counts as what it was."""

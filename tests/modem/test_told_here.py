@@ -2,7 +2,17 @@
 
 from __future__ import annotations
 
-from modem.told_here import MOST_BESIDE, MOST_STARTS, layer_start
+import math
+
+from modems import RUN_INFO, config_of
+
+from comms.said.codec import Header
+from comms.said.messages import AgentState, Mode, TaskState, TaskStatus
+from comms.said.topics import STATE, TASK_STATUS
+from modem.layers import Layers
+from modem.letters import Said
+from modem.presence import Presence
+from modem.told_here import MOST_BESIDE, MOST_STARTS, ToldHere, layer_start
 
 
 def test_the_layers_of_each_start_of_the_coordinators_modem_count_beside_those_before() -> None:
@@ -11,3 +21,28 @@ def test_the_layers_of_each_start_of_the_coordinators_modem_count_beside_those_b
     assert len(set(beside)) == len(beside)
     assert min(beside) > MOST_BESIDE  # none is one of the vehicle's own
     assert layer_start(1, 2) > layer_start(1, 1) > layer_start(0, 7)
+
+
+def test_a_word_on_a_task_that_newer_ones_have_overtaken_tells_nothing_of_what_a_vehicle_does() -> None:
+    config, beta = config_of("ship"), RUN_INFO.vehicles[1]
+    presence = Presence(beta)
+    told = ToldHere(config, Layers(config, RUN_INFO), RUN_INFO.grid.spec, 0, {beta.vehicle: presence})
+
+    def hear(sequence: int, strip: int, state: TaskState) -> None:
+        header = Header(beta.vehicle, 0, sequence, 1_000)
+        key = TASK_STATUS.key(vehicle=beta.vehicle, number=sequence)
+        told.hear(beta.vehicle, TASK_STATUS, Said(key, header, TaskStatus(strip, state, 0.5, 0, "")), 2_000)
+
+    state = AgentState(Mode.IDLE, 0, 0.9, 0, 100.0, 0.0, math.pi)
+    told.hear(beta.vehicle, STATE, Said(STATE.key(vehicle=beta.vehicle), Header(beta.vehicle, 0, 1, 0), state), 0)
+    hear(5, 7, TaskState.ACCEPTED)
+    hear(3, 6, TaskState.UNDER_WAY)
+    hear(4, 6, TaskState.DONE)
+    now = presence.at(2_000)
+    assert now is not None
+    assert (now.mode, now.works_on) == (Mode.TRANSIT, 7)
+    assert len(told.take()) == 4  # all of it is told on, the books have use of it
+    hear(6, 7, TaskState.DONE)
+    done = presence.at(2_000)
+    assert done is not None
+    assert (done.mode, done.works_on) == (Mode.IDLE, 0)

@@ -82,6 +82,15 @@ class TestATrace:
         trace.hear(Course(0, NORTH, speed_mps))
         assert trace.end(5_000) == told
 
+    def test_there_it_stays_until_another_course_is_told(self) -> None:
+        trace = Trace()
+        trace.hear(Course(0, NORTH, 2.0))
+        assert trace.end(5_000) == [(5_000, (10.0, 5.0, 0.0))]
+        assert trace.end(9_000) == trace.until(9_000) == []
+        assert trace.hear(Course(4_000, NORTH, 2.0)) == []  # it comes late
+        assert trace.hear(Course(10_000, NORTH, 1.0)) == [(10_000, NORTH)]
+        assert trace.end(11_000) == [(11_000, (10.0, -4.0, 0.0))]
+
     def test_what_comes_about_a_second_later_is_waited_for(self) -> None:
         trace = Trace()
         trace.hear(Course(0, NORTH, 2.0, TURN))
@@ -115,7 +124,7 @@ class TestATrace:
         trace.hear(Course(0, NORTH, 2.0))
         assert [at_ms for at_ms, _ in trace.until(BELIEVED_MS * 9)] == list(range(1_000, BELIEVED_MS + 1, 1_000))
         assert trace.end(BELIEVED_MS * 9)[-1] == (BELIEVED_MS, (10.0, -5.0 + 2.0 * BELIEVED_MS / 1000, 0.0))
-        assert trace.hear(Course(90_000, NORTH, 2.0)) == [(90_000, NORTH)]
+        assert trace.hear(Course(BELIEVED_MS * 9, NORTH, 2.0)) == [(BELIEVED_MS * 9, NORTH)]
 
     def test_before_anything_is_told_there_is_nothing(self) -> None:
         assert Trace().until(10_000) == Trace().end(10_000) == []

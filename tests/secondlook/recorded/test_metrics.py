@@ -27,6 +27,7 @@ from comms.said.messages import (
     Message,
     MissionOver,
     Mode,
+    Nav,
     Plan,
     PlannedTrack,
     StripState,
@@ -38,6 +39,7 @@ from comms.said.messages import (
 from planner.footprints import footprint_of
 from planner.types import SonarShape
 from secondlook.recorded.metrics import Metrics
+from secondlook.recorded.vehicles import paths
 
 RUN = run_info(40, 20, cell_m=10)  # 5 columns at 0, 10, ... 40 m; 2 rows at 5 and 15 m
 LEVELS_OF_HALF = 35  # exp(-35 * 0.02) is 0.4966
@@ -208,6 +210,23 @@ class TestPaths:
             stream.say(at_s, f"veh/{PRIMARY}/nav", nav(x_m, 10))
             stream.say(at_s, f"veh/{HELPER}/nav", nav(x_m, 4))
         assert stream.metrics.summary()["entered"] == [{"vehicle": PRIMARY, "zone": 1, "t_s": 3}]
+
+    def test_when_the_mission_is_over_nobody_goes_on_who_tells_no_more(self) -> None:
+        """Over a link a helper may hear for half a minute later that it is over, in a world that stands still."""
+        zone = Zone(tuple(Vertex(x_m, y_m) for x_m, y_m in ((10, 5), (20, 5), (20, 15), (10, 15))))
+        stream = begun(replace(RUN, keep_out=(zone,)))
+        eastward = Nav(0, 10, math.pi / 2, 2.0, 5, 0)
+        stream.say(1, f"veh/{HELPER}/nav", eastward)
+        stream.say(4, "coord/mission_over", MissionOver(""))
+        stream.state(20, HELPER, Mode.FINISHED)
+        stream.metrics.close()
+        told = stream.metrics.summary()
+        assert told["entered"] == []
+        assert told["vehicles"][HELPER]["path_m"] == pytest.approx(6.0)  # 3 s at 2 m/s
+        said = [received(f"veh/{HELPER}/nav", eastward, sent_ms=1_000)]
+        assert paths(said, 20.0)[HELPER].x_m[-1] == pytest.approx(38.0)
+        said.append(received("coord/mission_over", MissionOver(""), sent_ms=4_000))
+        assert paths(said, 20.0)[HELPER].x_m[-1] == pytest.approx(6.0)
 
     def test_a_primary_tells_its_tracks_and_ranges(self) -> None:
         stream = begun()
