@@ -15,7 +15,7 @@ from coordinator.vehicles import pass_of, sailing_of
 from planner.currents import FlowGrid, Sailing
 from planner.dubins import DubinsPath, Pose
 from planner.keep_out import NOWHERE, KeepOut
-from planner.sweep import Sweep, shifted
+from planner.sweep import Pass, shifted
 from planner.types import FloatArray
 from planner.ways import way_or_direct
 
@@ -155,9 +155,11 @@ def survey_course(
     ahead = [track for track in tracks if not track.flown] if state.mode is not Mode.FINISHED else []
     if state.mode is Mode.SURVEY and ahead and ahead[0].number == state.works_on and state.expected_end_ms > 0:
         # When the track ends is known more exactly than where the vehicle was last.
-        end = pass_of(ahead.pop(0), entry).end
+        begin, end = pass_of(ahead.pop(0), entry)
         left_s = max(0.0, state.expected_end_ms / 1000 - heard_s)
         left_m = left_s / sailing.straight_s(1.0, end) + entry.run_in_m
+        if not sailing.is_in_still_water:  # what it makes good until then is known less
+            left_m = run_out_left_m(end, pose, math.dist(begin[:2], end[:2])) or left_m
         pose = shifted(end[:2], end.heading_rad, -left_m)
     else:
         left_m = survey_run_out_left_m(entry, plan, pose)
@@ -175,16 +177,16 @@ def sweep_course(
     start_s: float,
     sailing: Sailing,
     turn_radius_m: float,
-    sweep: Sweep,
+    passes: Sequence[Pass],
     *,
     entered: bool = False,
     run_out_m: float = 0.0,
     keep_out: KeepOut = NOWHERE,
 ) -> Course:
-    """The course over a strip's legs from a pose at a time; `entered`: the first leg's run-in lies behind it, the pose
-    on the leg; `run_out_m`: what is first to be sailed straight on, see `run_out_left_m`."""
+    """The course over passes of a strip's legs from a pose at a time; `entered`: the pose is on the first of them;
+    `run_out_m`: what is first to be sailed straight on, see `run_out_left_m`."""
     paths, here = [straight(pose, run_out_m, turn_radius_m)], shifted(pose[:2], pose.heading_rad, run_out_m)
-    for place, (begin, end) in enumerate(sweep.passes):
+    for place, (begin, end) in enumerate(passes):
         if not (entered and place == 0):
             paths += way_or_direct(here, begin, turn_radius_m, keep_out)
             here = begin

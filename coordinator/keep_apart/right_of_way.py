@@ -172,12 +172,13 @@ class RightOfWay:
         mine, its = one.vehicle, other.vehicle
         if mine.state is None or its.state is None:
             return now_s + CLEAR_AHEAD_S
-        closing_mps = mine.entry.speed_mps + its.entry.speed_mps
+        mine_mps, its_mps = (one.entry.speed_mps + one.entry.drift_mps for one in (mine, its))
+        closing_mps = mine_mps + its_mps
         apart_m = math.dist((mine.state.x_m, mine.state.y_m), (its.state.x_m, its.state.y_m))
-        apart_m -= mine.entry.speed_mps * (now_s - mine.heard_ms / 1000)
-        apart_m -= its.entry.speed_mps * (now_s - its.heard_ms / 1000)
+        apart_m -= mine_mps * (now_s - mine.heard_ms / 1000)
+        apart_m -= its_mps * (now_s - its.heard_ms / 1000)
         if one.strip is None:  # it circles
-            near_m = its.entry.speed_mps * CLEAR_AHEAD_S + 2 * mine.entry.turn_radius_m
+            near_m = its_mps * CLEAR_AHEAD_S + 2 * mine.entry.turn_radius_m
         else:
             near_m = closing_mps * GIVES_BACK_S
         return now_s + (apart_m - near_m - self.separation_m - MARGIN_M) / closing_mps

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from comms.said.messages import AgentState, Mode
 from coordinator.keep_apart.courses import (
@@ -20,7 +21,7 @@ from coordinator.vehicles import KnownVehicle, way_home_of
 from planner.dubins import DubinsPath, Pose
 from planner.footprints import footprint_of
 from planner.keep_out import NOWHERE, KeepOut
-from planner.sweep import NoSweepError, Sweep, shortest_sweep, sweeps_by
+from planner.sweep import NoSweepError, Pass, Sweep, shortest_sweep, sweeps_by
 from planner.types import Point, Strip
 from planner.ways import shortest_way, way_or_direct
 
@@ -44,7 +45,8 @@ class _Errand:
 
 
 OFF_COURSE_M = 10.0
-"""Of two ways to a place that are hardly longer than each other a vehicle may take the other than is expected."""
+"""Of two ways to a place that are hardly longer than each other a vehicle may take the other than is expected, and a
+current that flows to and fro may help it: farther off than this its course is laid anew."""
 
 
 class Traffic:
@@ -92,7 +94,9 @@ class Traffic:
         `run_out_m`: what it has first to sail straight on."""
         sweep = self._sweep_from(pose, vehicle, other)
         radius_m, keep_out = vehicle.entry.turn_radius_m, self._keep_out
-        laid = sweep_course(pose, from_s, vehicle.sailing, radius_m, sweep, run_out_m=run_out_m, keep_out=keep_out)
+        laid = sweep_course(
+            pose, from_s, vehicle.sailing, radius_m, sweep.passes, run_out_m=run_out_m, keep_out=keep_out
+        )
         return laid, sweep
 
     def aside(self, vehicle: KnownVehicle, strip: Strip | None, place: Point, now_s: float) -> Course:
@@ -139,7 +143,8 @@ class Traffic:
         told = (plan.revision if plan else 0, state.mode, state.works_on, ends_ms)
         known = self._surveys.get(name)
         # One that should have sailed its tracks, or has none yet, is where it was heard last.
-        if known is None or known[0] != told or (known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s):
+        is_known = known is not None and known[0] == told and not _is_off(vehicle, known[2])
+        if known is None or not is_known or (known[1] != vehicle.heard_ms and now_s >= known[2].arrives_s):
             laid = survey_course(vehicle.entry, state, plan, vehicle.heard_ms / 1000, self._keep_out, vehicle.flows)
             known = self._surveys[name] = told, vehicle.heard_ms, laid
         return known[2]
@@ -150,21 +155,31 @@ class Traffic:
         stage = 0 if state.works_on != strip.number else 2 if state.mode is Mode.REVISIT else 1
         known = self._sweeps.get(entry.vehicle)
         if known is None or known.strip != strip or known.stage < stage:
-            pose, heard_s = Pose(state.x_m, state.y_m, state.heading_rad), vehicle.heard_ms / 1000
             entered = known is not None and known.strip == strip and stage == 2
+            pose = Pose(state.x_m, state.y_m, state.heading_rad)
             sweep = known.sweep if known and entered else self._sweep_from(pose, vehicle, strip)
-            run_out_m = 0.0 if entered else self._run_out_m(vehicle, pose)
-            radius_m = entry.turn_radius_m
-            laid = sweep_course(
-                *(pose, heard_s, vehicle.sailing, radius_m, sweep),
-                entered=entered,
-                run_out_m=run_out_m,
-                keep_out=self._keep_out,
-            )
+            laid = self._over(vehicle, sweep.passes, entered=entered)
             known = self._sweeps[entry.vehicle] = _Sweeping(strip, stage, sweep, laid)
+        elif stage and _is_off(vehicle, known.course):
+            passes = _left_of(known.sweep.passes, state) if stage == 2 else known.sweep.passes
+            if passes:  # else it turns, and is on the next before long
+                laid = self._over(vehicle, passes, entered=stage == 2)
+                known = self._sweeps[entry.vehicle] = replace(known, course=laid)
         if stage == 2:
             self._entered[entry.vehicle] = known.sweep
         return known.course
+
+    def _over(self, vehicle: KnownVehicle, passes: Sequence[Pass], *, entered: bool) -> Course:
+        """Over the legs of a strip from where it was heard; `entered`: on the first of them."""
+        state, entry = vehicle.state, vehicle.entry
+        assert state is not None
+        pose = Pose(state.x_m, state.y_m, state.heading_rad)
+        return sweep_course(
+            *(pose, vehicle.heard_ms / 1000, vehicle.sailing, entry.turn_radius_m, passes),
+            entered=entered,
+            run_out_m=0.0 if entered else self._run_out_m(vehicle, pose),
+            keep_out=self._keep_out,
+        )
 
     def _homeward(self, vehicle: KnownVehicle, state: AgentState) -> Course:
         """On its way home, or where it lies."""
@@ -240,6 +255,23 @@ class Traffic:
         entry, entered = vehicle.entry, self._entered.get(vehicle.entry.vehicle)
         lefts_m = [run_out_left_m(leg.end, pose, entry.run_in_m) for leg in entered.passes] if entered else []
         return max(*lefts_m, 0.0, survey_run_out_left_m(entry, vehicle.plan, pose))
+
+
+def _is_off(vehicle: KnownVehicle, laid: Course) -> bool:
+    """Whether a vehicle was heard somewhere else than its course leads, in a current of which not all is known."""
+    state, heard_s = vehicle.state, vehicle.heard_ms / 1000
+    if state is None or vehicle.sailing.is_in_still_water or heard_s <= laid.start_s:
+        return False
+    return math.dist(laid.at(heard_s)[:2], (state.x_m, state.y_m)) > OFF_COURSE_M
+
+
+def _left_of(passes: Sequence[Pass], state: AgentState) -> Sequence[Pass]:
+    """Those from the one on that a vehicle is on; empty where it is on none."""
+    pose = Pose(state.x_m, state.y_m, state.heading_rad)
+    for place, one in enumerate(passes):
+        if run_out_left_m(one.end, pose, one.length_m) > 0:
+            return passes[place:]
+    return ()
 
 
 def _arrival(pose: Pose, place: Point) -> Pose:

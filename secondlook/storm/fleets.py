@@ -52,7 +52,7 @@ def draw_fleet(number: int) -> Scenario:
         "targets": {"count": rng.choice((0, 20, 60))},
         "vehicles": vehicles,
         "coordinator": _coordinator(rng),
-        **({"current": {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}} if rng.random() < 0.1 else {}),
+        **({"current": _current(number, rng)} if rng.random() < 0.1 else {}),
     }
     if primaries > 1 and Random(f"again {number}").random() < AGAIN_SHARE:
         for name in list(vehicles)[:primaries]:
@@ -158,6 +158,13 @@ def _coordinator(rng: Random) -> dict[str, Any]:
         "objective": rng.choice(("mean", "worst30", "both", "both")),
         "across": rng.random() < 0.7,
     }
+
+
+def _current(number: int, rng: Random) -> dict[str, Any]:
+    """A steady one, or one to and fro of which nobody knows how it runs just then."""
+    found = {"drift_mps": _m(rng.uniform(0.1, 1)), "set_deg": 45.0}
+    tide = Random(f"tide {number}")
+    return found if tide.random() < 0.5 else found | {"period_s": _m(tide.uniform(0.2, 4) * _LONGEST_S)}
 
 
 def _link(number: int, drawn: dict[str, Any]) -> dict[str, Any]:

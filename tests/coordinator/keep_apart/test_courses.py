@@ -110,7 +110,7 @@ class TestCourses:
     def test_a_sweep_ends_when_and_where_its_service_does(self) -> None:
         one, free = strip(1, 300, 100), helper(x_m=-50, heading_rad=2.0)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
-        laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep)
+        laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep.passes)
         served = expected_service(OpenStrip(one, 1), free)
         assert laid.arrives_s == pytest.approx(served.free_s)
         assert laid.at(served.free_s) == pytest.approx(served.free_at, abs=1e-6)
@@ -118,8 +118,8 @@ class TestCourses:
     def test_a_run_out_is_sailed_before_the_way_to_the_next_strip(self) -> None:
         free = helper(heading_rad=EAST)
         sweep, _ = shortest_sweep(sweeps(strip(1, 300, 100), free), free.pose, free.turn_radius_m)
-        at_once = sweep_course(free.pose, 0, Sailing(2), 6, sweep)
-        later = sweep_course(free.pose, 0, Sailing(2), 6, sweep, run_out_m=20)
+        at_once = sweep_course(free.pose, 0, Sailing(2), 6, sweep.passes)
+        later = sweep_course(free.pose, 0, Sailing(2), 6, sweep.passes, run_out_m=20)
         assert later.at(10) == pytest.approx((20, 0, EAST))
         assert at_once.at(10).y_m > 1
         assert later.arrives_s == pytest.approx(at_once.arrives_s, abs=2)
@@ -129,17 +129,17 @@ class TestCourses:
         free = helper(swath_m=swath_m)
         sweep, _ = shortest_sweep(sweeps(strip(1), free), free.pose, free.turn_radius_m)
         begin = sweep.passes[0].begin
-        whole = sweep_course(begin, 0, Sailing(2), 6, sweep)
+        whole = sweep_course(begin, 0, Sailing(2), 6, sweep.passes)
         on_it = whole.at(40)
         assert on_it.y_m == pytest.approx(begin.y_m + 80)
-        laid = sweep_course(on_it, 40, Sailing(2), 6, sweep, entered=True)
+        laid = sweep_course(on_it, 40, Sailing(2), 6, sweep.passes, entered=True)
         assert laid.arrives_s == pytest.approx(whole.arrives_s)
         assert laid.at(90)[:2] == pytest.approx(whole.at(90)[:2])
 
     def test_a_strip_that_takes_longer_than_half_an_hour_is_laid_to_its_end(self) -> None:
         one, free = strip(1, 0, 0, length_m=4000), helper(x_m=0, y_m=-100)
         sweep, _ = shortest_sweep(sweeps(one, free), free.pose, free.turn_radius_m)
-        laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep)
+        laid = sweep_course(free.pose, 0, free.sailing, free.turn_radius_m, sweep.passes)
         crosses_s = laid.arrives_s - 60
         assert crosses_s > 1800
         meets = laid.at(crosses_s)
@@ -276,7 +276,7 @@ class TestCourses:
         speed_mps, radius_m, start_s = moves
         free = helper(x_m=place[0], y_m=place[1], heading_rad=place[2], speed_mps=speed_mps, turn_radius_m=radius_m)
         sweep, _ = shortest_sweep(sweeps(strip(1), free), free.pose, radius_m)
-        laid = sweep_course(free.pose, start_s, Sailing(speed_mps), radius_m, sweep)
+        laid = sweep_course(free.pose, start_s, Sailing(speed_mps), radius_m, sweep.passes)
         steps = [math.dist(one[:2], other[:2]) for one, other in pairwise(laid.poses.tolist())]
         assert max(steps) <= speed_mps * STEP_S + 1e-6
 

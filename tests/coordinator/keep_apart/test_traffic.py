@@ -430,3 +430,72 @@ def test_a_strip_in_a_dead_end_is_expected_to_be_flown_into_that() -> None:
         course = Traffic(keep_out).course(at(helper(), Mode.TRANSIT, -60, SERVED.number), SERVED, 0.0)
         assert course is not None
         assert course.at(course.arrives_s)[:2] == pytest.approx(end_m, abs=0.01)
+
+
+class TestInATide:
+    """Of one of 1 m/s it is not known how it runs: a helper of 2 m/s is expected against it, at 1 m/s, and makes 3."""
+
+    @staticmethod
+    def helper() -> KnownVehicle:
+        one = helper()
+        return replace(one, entry=replace(one.entry, drift_mps=1.0, set_rad=NORTH, is_tidal=True))
+
+    def heard(self, traffic: Traffic, one: KnownVehicle, mode: Mode, y_m: float, at_s: float) -> Course:
+        one.heard_ms = round(at_s * 1000)
+        course = traffic.course(at(one, mode, y_m, 7), SERVED, at_s)
+        assert course is not None
+        return course
+
+    def test_who_is_ahead_of_its_course_on_a_leg_is_expected_on_from_there(self) -> None:
+        traffic, one = Traffic(), self.helper()
+        self.heard(traffic, one, Mode.TRANSIT, 0, 0)
+        entered = self.heard(traffic, one, Mode.REVISIT, 20, 10)
+        assert entered.at(15)[:2] == pytest.approx((0, 25))
+        assert self.heard(traffic, one, Mode.REVISIT, 34.9, 15) is entered  # 10 m off, which margins make up for
+        anew = self.heard(traffic, one, Mode.REVISIT, 50, 20)
+        assert anew.at(20)[:2] == pytest.approx((0, 50))
+        assert anew.at(60)[:2] == pytest.approx((0, 90))
+        assert anew.arrives_s == pytest.approx(20 + 75)  # to the run-out's end at 125 m
+        assert self.heard(traffic, one, Mode.REVISIT, 52, 22) is anew
+
+    def test_on_a_later_leg_those_before_lie_behind_it(self) -> None:
+        traffic, one, wide = Traffic(), self.helper(), replace(SERVED, width_m=80)
+        pose = Pose(-20.0, 0.0, NORTH)
+        one.state, one.heard_ms = AgentState(Mode.TRANSIT, 7, 1, 0, *pose), 0
+        first = traffic.course(one, wide, 0)
+        assert first is not None
+        one.state, one.heard_ms = AgentState(Mode.REVISIT, 7, 1, 0, -20, 20, NORTH), 10_000
+        assert traffic.course(one, wide, 10) is not first
+        one.state, one.heard_ms = AgentState(Mode.REVISIT, 7, 1, 0, 20, 60, math.pi), 70_000  # southwards
+        second = traffic.course(one, wide, 70)
+        assert second is not None
+        assert second.at(70)[:2] == pytest.approx((20, 60))
+        assert second.at(100) == pytest.approx((20, 30, math.pi))
+        assert second.arrives_s == pytest.approx(70 + 45)  # at the run-out's end, 15 m
+        one.state, one.heard_ms = AgentState(Mode.REVISIT, 7, 1, 0, 55, 130, 1.0), 80_000  # on no leg
+        assert traffic.course(one, wide, 80) is second
+
+    def test_on_its_way_to_the_strip_it_is_expected_on_from_where_it_was_heard(self) -> None:
+        traffic, one = Traffic(), self.helper()
+        set_out = self.heard(traffic, one, Mode.TRANSIT, -100, 0)
+        assert set_out.at(20)[:2] == pytest.approx((0, -80))
+        anew = self.heard(traffic, one, Mode.TRANSIT, -40, 20)
+        assert anew.at(20)[:2] == pytest.approx((0, -40))
+        assert anew.arrives_s == pytest.approx(20 + 165)
+
+    def test_in_still_water_it_is_where_it_was_expected_whatever_it_says_of_its_place(self) -> None:
+        traffic, one = Traffic(), helper()
+        self.heard(traffic, one, Mode.TRANSIT, 0, 0)
+        entered = self.heard(traffic, one, Mode.REVISIT, 20, 10)
+        assert self.heard(traffic, one, Mode.REVISIT, 70, 20) is entered
+
+    def test_a_primary_on_its_track_is_where_it_says_and_else_where_its_end_lets_expect(self) -> None:
+        one = surveyor(works_on=1, expected_end_ms=100_000, x_m=0, y_m=50, mode=Mode.SURVEY)
+        one.plan = Plan(1, (PlannedTrack(1, 0, 0, 0, 0, 200, False),), (), (), "")
+        one.heard_ms = 20_000
+        for tidal, y_m in ((False, 120.0), (True, 50.0)):
+            drift_mps = 0.5 if tidal else 0.0
+            entry = replace(one.entry, speed_mps=1.0, drift_mps=drift_mps, set_rad=NORTH, is_tidal=tidal)
+            course = Traffic().course(replace(one, entry=entry), None, 20)
+            assert course is not None
+            assert course.at(20)[:2] == pytest.approx((0, y_m))

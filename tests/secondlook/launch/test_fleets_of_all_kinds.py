@@ -14,7 +14,7 @@ from comms.said.messages import AgentState, CoverageTile, Hotspot, Mode, Plan, S
 from secondlook.launch.mission import RunOptions, run_mission
 from secondlook.scenario import Scenario, load_scenario
 from secondlook.scenario.vehicle import Start
-from secondlook.testing import Fleet
+from secondlook.testing import Fleet, assert_kept_apart
 
 LONGER = ("area.polygon_m=[[0, 0], [300, 0], [300, 400], [0, 400]]", "coordinator.worth_risk=0.1")
 BRIEF = Path(__file__).parents[2] / "support" / "brief.yaml"
@@ -105,6 +105,11 @@ def test_two_vehicles_are_not_sent_and_called_back_in_turns(tmp_path: Path) -> N
     flight = fleet.run()
     sent = Counter(one.header.sent_ms // 10_000 for one in flight.heard if isinstance(one.message, Task))
     assert max(sent.values()) <= 2 * len(flight.scenario.vehicles)
+
+
+def test_in_a_tide_of_which_nobody_knows_how_it_runs_they_keep_apart(tmp_path: Path) -> None:
+    # Expected all the time by the slower of both ways alone, two pairs came within 5.7 and 6.2 m.
+    assert_kept_apart(Fleet(AGAIN_AND_AGAIN, folder=tmp_path, seed=5).run())
 
 
 class TestAPrimaryThatRevisits:
