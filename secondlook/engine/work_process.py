@@ -139,6 +139,9 @@ class WorkProcess:
         return f"died of {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
 
 
+YOUNG_OBJECTS = 20_000  # are looked through for garbage together, as in a fleet's processes: hardly any is
+
+
 def main() -> None:
     """Does what comes on the pipe. An exception of the work is the answer to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # who started it decides what an interrupt means
@@ -155,6 +158,7 @@ def main() -> None:
             function, arguments = pickle.loads(work.get())
             if not gc.isenabled():
                 gc.freeze()
+                gc.set_threshold(YOUNG_OBJECTS)
                 gc.enable()
             pipe.send((None, None))  # begun
             pipe.send((True, function(*arguments)))
