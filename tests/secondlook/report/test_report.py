@@ -134,6 +134,8 @@ def test_a_run_that_was_cut_off_is_told_as_far_as_it_came(brief_run: Path, share
     assert "This run was killed before it could sum up." in page.told
     assert ("The run ended before the mission began" in page.told) == (share == 0)
     assert ("Risk over time" in page.told) == (share > 0)
+    assert ("primary set out to search 0.03 km²" in page.told) == (0 < share < 0.9)
+    assert ("primary searched 0.03 km²" in page.told) == (share == 0.9)  # by then all tracks were flown
 
 
 def test_a_failure_comes_first(brief_copy: Path) -> None:
