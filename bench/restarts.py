@@ -3,8 +3,8 @@
 python -m bench.restarts [SCENARIO] [--times N] [--factor F] [--jobs J] [--node NODE ...] [--set KEY=VALUE ...]
 
 Starts a fleet with `secondlook node`, each process with `--state` and `--restart on-failure`, kills one of them with
-SIGKILL in one phase of the mission, and flies to the end: every node in every phase, N times, and as often as there are
-phases nobody. Tells the residual risk at the end, how many seconds of the mission the node was away, and whatever was
+SIGKILL in one phase of the mission, and flies to the end: nobody N times, then every node in every phase, N times each.
+Tells the residual risk at the end, how many seconds of the mission the node was away, and whatever was
 lost: a number that was given twice, a strip left out of the books, a process that did not end well.
 """
 
@@ -254,7 +254,8 @@ def main() -> None:
     except UserError as error:
         sys.exit(f"{error}")
     nodes = given.node or [ROUTER, WORLD, *vehicles, COORDINATOR, RECORDER]
-    plan = [(node, phase) for node in ("", *nodes) for phase in PHASES for _ in range(given.times)]
+    killed = [("", ""), *((node, phase) for node in nodes for phase in PHASES)]
+    plan = [one for one in killed for _ in range(given.times)]
     with ThreadPoolExecutor(given.jobs) as pool:
         flown = pool.map(lambda one: fly(given.scenario, given.set, given.factor, *one), plan)
         table: dict[tuple[str, str], list[Outcome]] = {}
