@@ -114,13 +114,13 @@ def _asserted(invariant: str, holds: Callable[[Flight], None], flight: Flight) -
 def _who_is_sent_may_go(flight: Flight, plan: TroublePlan, witness: Witness) -> Iterator[Violation]:
     """No vehicle is sent and called back again and again."""
     for name in plan.scenario.vehicles:
-        back_s, sent_to = list[float](), set[int]()
+        back_s, sent_to = list[float](), set[tuple[int, int]]()
         for one in flight.said(Task, f"coord/task/{name}/*"):
-            strip = one.message.strip
+            strip = one.header.incarnation, one.message.strip  # one that was started anew calls back from all before
             if one.message.action.is_offer:
                 sent_to.add(strip)
             elif one.message.action is TaskAction.GIVE_BACK and strip in sent_to:
-                sent_to.remove(strip)  # a coordinator that was started anew calls back from strips of before, too
+                sent_to.remove(strip)
                 back_s.append(one.t_s)
         for first_s, last_s in zip(back_s, back_s[MOST_CALLED_BACK:], strict=False):
             if last_s - first_s < WITHIN_S:

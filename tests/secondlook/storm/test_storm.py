@@ -145,13 +145,27 @@ def test_a_full_disk_that_nobody_tells_is_found(monkeypatch: pytest.MonkeyPatch)
 
 
 @pytest.mark.parametrize(
-    ("every_s", "offers", "found"), [(5.1, 30, []), (5.0, 30, []), (4.9, 30, [62.8]), (4.9, 2, []), (4.9, 0, [])]
+    ("every_s", "offers", "anew", "found"),
+    [
+        (5.1, 30, False, []),
+        (5.0, 30, False, []),
+        (4.9, 30, False, [62.8]),
+        (4.9, 2, False, []),
+        (4.9, 0, False, []),
+        (4.9, 30, True, []),  # a coordinator that was started anew calls back from what one before has offered
+    ],
 )
-def test_who_is_sent_and_called_back_again_and_again_is_found(every_s: float, offers: int, found: list[float]) -> None:
+def test_who_is_sent_and_called_back_again_and_again_is_found(
+    every_s: float, offers: int, anew: bool, found: list[float]
+) -> None:
     plan = storm_of(None, QUICK)
     (name, *_) = plan.scenario.vehicles
     told = [
-        SimpleNamespace(t_s=4 + round(every_s * n, 1), message=SimpleNamespace(action=action, strip=n % 2))
+        SimpleNamespace(
+            t_s=4 + round(every_s * n, 1),
+            header=SimpleNamespace(incarnation=int(anew and not action.is_offer)),
+            message=SimpleNamespace(action=action, strip=n % 2),
+        )
         for n in range(30)
         for action in (TaskAction.TAKE, TaskAction.GIVE_BACK)
         if n < offers or action is TaskAction.GIVE_BACK
